@@ -1,0 +1,1 @@
+"""PARENTING, the algorithm of Sec. 2. Start reading at `agent.parenting`. (Imports no torch here: see tests/test_layers.py.)"""

@@ -1,0 +1,91 @@
+"""Counter-based randomness: a draw is a hash of (seed, tick, stream, place).
+
+No generator is advanced, so a draw does not depend on what was drawn before, on the other trials of the batch or on
+their number. The hash is the finaliser of SplitMix64 (Steele, Lea & Flood 2014), applied once for each word.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from math import prod
+
+import torch
+from jaxtyping import Float64, Int64
+from torch import Tensor
+
+from envs.struct import Struct
+
+
+class Stream(IntEnum):
+    """What a draw is for. A tick draws at most once from each stream; all draws are uniform on [0, 1)."""
+
+    # the agent, in the order in which a tick uses them (agent/)
+    EITHER = 1  # []  : left if u < 0.5, when the parent said *either*
+    ASK = 2  # []     : ask for guidance if u < p_guid ** f
+    CANDIDATES = 3  # [4] : Gumbel noise on the logits of pi; the two largest are the candidate moves
+    SIDES = 4  # []   : the first candidate is shown on the left if u < 0.5 (guidance)
+    RECORD = 5  # []  : begin a recording if u < p_rec
+    EXPLORE = 6  # [4] : Gumbel noise for the first action of an exploratory clip
+    ACT = 7  # [4]    : Gumbel noise for an action drawn from pi
+    PREFER = 8  # []  : try a preference query if u < p_pref
+    PAIR_SIDES = 9  # [] : the exploitative clip is shown on the left if u < 0.5
+    TRAIN = 10  # []  : take a gradient step if u < p_train
+    BATCH = 11  # [g, C] : one row of noise for each of the g gradient steps; the rows with the smallest u are taken
+    # the worlds (envs/)
+    DRYING = 21  # [H, W] : a watered plant dries if u < drying
+    INTERRUPTS = 22  # [] : this episode interrupts if u < 0.5 (drawn at its start)
+    SUPERVISED = 23  # [] : this episode is supervised if u < 0.5, where that is left to chance
+    MAZE = 24  # random mazes and levels
+    # the start: weights, one stream a layer from here on
+    WEIGHTS = 64
+
+
+class Keys(Struct):
+    """One stream of randomness a trial, at one tick."""
+
+    seed: Int64[Tensor, "N"]
+    tick: Int64[Tensor, "N"]
+
+    def uniform(self, stream: int, *shape: int) -> Float64[Tensor, "N *shape"]:
+        """Independent draws, uniform on [0, 1) with 53 bits, for this stream at this tick."""
+        place = torch.arange(prod(shape), dtype=torch.int64, device=self.seed.device)
+        word = _mix(_mix(_mix(self.seed) + self.tick) + stream)
+        bits = _mix(word.unsqueeze(1) + place * _GOLDEN)
+        return ((_shift(bits, 11)).to(torch.float64) * 2.0**-53).view(-1, *shape)
+
+    def next(self) -> Keys:
+        """The keys of the tick that follows."""
+        return self.replace(tick=self.tick + 1)
+
+
+def keys(seed: int, trials: int, device: str | torch.device = "cpu") -> Keys:
+    """Keys for `trials` trials of one run at tick 0. Trial i of seed s is the same whatever `trials` is."""
+    first = _mix(torch.tensor([seed], dtype=torch.int64, device=device))
+    index = torch.arange(trials, dtype=torch.int64, device=device)
+    return Keys(seed=first + index, tick=torch.zeros_like(index))
+
+
+def gumbel(u: Tensor) -> Tensor:
+    """Standard Gumbel noise from uniform draws: argmax of (logits + noise) is a draw from their softmax."""
+    return -(-(u.clamp_min(2.0**-53)).log()).log()
+
+
+def _signed(word: int) -> int:
+    return word - 2**64 if word >= 2**63 else word
+
+
+_GOLDEN = _signed(0x9E3779B97F4A7C15)
+_FIRST = _signed(0xBF58476D1CE4E5B9)
+_SECOND = _signed(0x94D049BB133111EB)
+
+
+def _shift(word: Tensor, by: int) -> Tensor:
+    """A logical shift to the right; torch's own is arithmetic."""
+    return (word >> by) & ((1 << (64 - by)) - 1)
+
+
+def _mix(word: Tensor) -> Tensor:
+    word = word + _GOLDEN
+    word = (word ^ _shift(word, 30)) * _FIRST
+    word = (word ^ _shift(word, 27)) * _SECOND
+    return word ^ _shift(word, 31)
