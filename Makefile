@@ -1,0 +1,67 @@
+# Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
+# A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
+.DEFAULT_GOAL := help
+.PHONY: help run test check format coverage constraints clean
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# --no-compile halves the time: Python compiles what it imports, when it does.
+PIP_INSTALL := $(BIN)/pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt
+
+help: ## Print this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+run: $(VENV)/.installed ## Install, migrate, start the web pages and a worker, open the browser
+	@$(BIN)/parenting up
+
+test: check ## Install, then run every check and every test (ARGS="-k queue" for some)
+	$(BIN)/pytest $(ARGS)
+
+check: $(VENV)/.installed-dev ## Lint, formatting, types, layers
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+
+format: $(VENV)/.installed-dev ## Format the code and mend what lint can mend
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+coverage: $(VENV)/.installed-dev ## Run the tests and print the lines that none of them reached
+	$(BIN)/pytest --cov --cov-report=term-missing:skip-covered $(ARGS)
+
+# torch stays at the version that constraints.txt names: a newer one may pull gigabytes. TORCH=... changes it.
+TORCH = $(shell sed -n 's/^torch==//p' constraints.txt)
+LOCK := build/constraints
+constraints: ## Resolve all dependencies anew and write constraints.txt
+	rm -rf $(LOCK)
+	$(PYTHON) -m venv $(LOCK)
+	$(LOCK)/bin/pip install --quiet --no-compile --disable-pip-version-check "torch==$(TORCH)" '.[dev]'
+	$(LOCK)/bin/pip freeze --all --exclude parenting --exclude pip > $(LOCK)/freeze
+	{ sed '/^[^#]/,$$d' constraints.txt; sed 's/+[a-z0-9.]*$$//' $(LOCK)/freeze; } > $(LOCK)/constraints.txt
+	mv $(LOCK)/constraints.txt constraints.txt
+
+clean: ## Remove the environment and everything built (your databases stay)
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .coverage
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/pip
+	@echo "Installing into $(VENV), once: about a minute."
+	@$(PIP_INSTALL) -e .
+	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml constraints.txt | $(BIN)/pip
+	@echo "Installing into $(VENV) with the tools for development, once: about two minutes."
+	@$(PIP_INSTALL) -e '.[dev]'
+	@touch $@ $(VENV)/.installed
+
+# pip is the last thing that venv installs: where it is, the environment is whole.
+$(BIN)/pip:
+	@command -v $(PYTHON) >/dev/null 2>&1 || { \
+	  echo "$(PYTHON) is not installed. Install Python 3.11 or newer (Debian, Ubuntu: apt install python3 python3-venv)." >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "$(PYTHON) is older than 3.11. Name a newer one: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo "$(PYTHON) cannot make an environment: venv is missing (Debian, Ubuntu: apt install python3-venv)." >&2; exit 1; }
+	@$(PYTHON) -m venv --clear $(VENV)

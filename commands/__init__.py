@@ -1,0 +1,1 @@
+"""The command line, one file a command. The top layer: it alone knows both experiments and server."""

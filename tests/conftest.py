@@ -1,0 +1,27 @@
+"""What every test shares. Keep it small: a fixture for one folder belongs in that folder's conftest.py."""
+
+import os
+import shutil
+
+import hypothesis
+import pytest
+import torch
+
+# Two torch threads are slower than one here, and give other bits. pytest-xdist runs one process a core.
+torch.set_num_threads(1)
+
+# A shared machine is now and then slow. That is no reason for a property to fail.
+hypothesis.settings.register_profile("parenting", deadline=None)
+hypothesis.settings.load_profile("parenting")
+
+
+@pytest.fixture(scope="session")
+def chromium_path() -> str:
+    """The browser to test with. Without one a laptop skips the test, and CI fails it."""
+    path = os.environ.get("PARENTING_CHROMIUM") or shutil.which("chromium")
+    if path:
+        return path
+    reason = "no Chromium: install it (apt install chromium) or name it in PARENTING_CHROMIUM"
+    if os.environ.get("CI") == "true":
+        pytest.fail(reason)
+    pytest.skip(reason)

@@ -1,0 +1,83 @@
+"""The layers of docs/architecture.md: read from the source, and seen in the memory of a fresh process."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.tree import ROOT
+
+PYPROJECT = ROOT / "pyproject.toml"
+CONTRACTS = tomllib.loads(PYPROJECT.read_text())["tool"]["importlinter"]["contracts"]
+
+
+def lint_imports(tree: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    code = "from importlinter.cli import lint_imports_command as main; main()"
+    options = ("--config", str(PYPROJECT), "--no-cache", "--no-logo", *options)
+    return subprocess.run([sys.executable, "-c", code, *options], cwd=tree, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("contract", [contract["id"] for contract in CONTRACTS])
+def test_contract_is_kept(contract: str) -> None:
+    result = lint_imports(ROOT, "--contract", contract)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.parametrize("module", ["server.app", "commands.main"])
+def test_web_process_never_loads_torch(module: str) -> None:
+    """`parenting web` imports both. So commands.run, which needs torch, imports it when it is called."""
+    code = f"import {module}, sys; assert 'torch' not in sys.modules, 'torch was loaded'"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+
+
+@pytest.fixture
+def miniature(tmp_path: Path) -> Path:
+    """The layout in empty files, in which everything is allowed that is there."""
+    modules = {name for contract in CONTRACTS for name in contract.get("source_modules", [])}
+    modules |= {"agent.learning", "commands.run", "experiments.table1", "parents.scripted"}
+    for module in modules:
+        *packages, name = module.split(".")
+        for package in [*packages, *([] if packages else [name])]:
+            (tmp_path / package).mkdir(exist_ok=True)
+            (tmp_path / package / "__init__.py").touch()
+        if packages:
+            (tmp_path / packages[0] / f"{name}.py").touch()
+    (tmp_path / "agent/learning.py").write_text("import torch\nimport envs.registry\n")
+    (tmp_path / "parents/scripted.py").write_text("import agent.learning\n")
+    (tmp_path / "experiments/table1.py").write_text("import parents.scripted\n")
+    (tmp_path / "commands/run.py").write_text("import experiments.table1\nimport server.app\n")
+    return tmp_path
+
+
+def test_miniature_is_allowed(miniature: Path) -> None:
+    result = lint_imports(miniature)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.parametrize(
+    ("file", "line", "contract"),
+    [
+        ("agent/learning.py", "import parents.scripted", "layers"),
+        ("agent/learning.py", "import parents.scripted", "parent-outside"),
+        ("envs/registry.py", "import agent.config", "layers"),
+        ("parents/scripted.py", "import server.queue", "layers"),
+        ("experiments/table1.py", "import server.queue", "layers"),
+        ("server/app.py", "import experiments.table1", "layers"),
+        ("server/app.py", "import commands.run", "layers"),
+        ("agent/learning.py", "import time", "pure"),
+        ("envs/art.py", "from pathlib import Path", "pure"),
+        ("envs/registry.py", "def draw():\n    import random", "pure"),
+        ("server/app.py", "import agent.learning", "web-without-torch"),
+        ("envs/levels.py", "import torch", "web-without-torch"),
+        ("agent/__init__.py", "from agent.learning import torch", "inits-without-torch"),
+    ],
+)
+def test_contract_catches(miniature: Path, file: str, line: str, contract: str) -> None:
+    with (miniature / file).open("a") as source:
+        source.write(f"{line}\n")
+    result = lint_imports(miniature, "--contract", contract)
+    assert result.returncode == 1, result.stdout + result.stderr
+    assert "BROKEN" in result.stdout

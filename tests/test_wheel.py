@@ -1,0 +1,58 @@
+"""The wheel carries everything that the program needs: code, pages and migrations."""
+
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import pytest
+
+from tests.tree import ROOT, git_files
+
+FOLDERS = ("agent", "commands", "envs", "experiments", "migrations", "parents", "server", "web")
+
+
+def files_of_the_project() -> list[str]:
+    """What git tracks or would track: no caches, no leftovers of an earlier build."""
+    return git_files("--cached", "--others", "--exclude-standard")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+    """Built from a copy: it leaves nothing in the tree, and takes nothing from an earlier build."""
+    source, target = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    for name in files_of_the_project():
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, source / name)
+    # No isolation: the build uses the setuptools at hand and needs no network.
+    options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation", "--no-index"]
+    command = [sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", str(target), str(source)]
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
+    (built,) = target.glob("parenting-*.whl")
+    return zipfile.ZipFile(built)
+
+
+def test_wheel_carries_exactly_the_files_of_our_folders(wheel: zipfile.ZipFile) -> None:
+    ours = {name for name in files_of_the_project() if name.split("/")[0] in FOLDERS}
+    carried = {name for name in wheel.namelist() if ".dist-info/" not in name}
+    assert carried == ours
+
+
+@pytest.mark.parametrize(
+    ("folder", "suffix"),
+    [
+        ("web/templates/", ".html"),
+        ("web/static/", ".js"),
+        ("web/static/", ".css"),
+        ("migrations/", "env.py"),
+        ("migrations/versions/", ".py"),
+    ],
+)
+def test_wheel_carries_pages_and_migrations(wheel: zipfile.ZipFile, folder: str, suffix: str) -> None:
+    assert [name for name in wheel.namelist() if name.startswith(folder) and name.endswith(suffix)]
+
+
+def test_wheel_installs_the_command(wheel: zipfile.ZipFile) -> None:
+    (entry,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
+    assert "parenting = commands.main:app" in wheel.read(entry).decode()
