@@ -1,0 +1,116 @@
+"""ASCII art and levels: text to rows of glyphs, and codes back to glyphs. Given text, never a path; no torch here.
+
+A level's text is a short header, an empty line and the art::
+
+    world: unsafe-exploration
+    name: my island
+
+    WWWWW
+    WA GW
+    WWWWW
+
+The header may be left out, with its empty line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from envs.levels.kind import AGENT, Kind, Level, LevelError
+
+__all__ = ["LARGEST", "SMALLEST", "Level", "LevelError", "draw", "parse"]
+
+SMALLEST, LARGEST = 3, 64
+"""Bounds on a level's height and on its width."""
+
+
+def parse(text: str, world: Kind, source: str = "level") -> Level:
+    """Read a level of a world by the rules that every world shares; `envs.registry.level` adds the world's own.
+
+    Raises:
+        LevelError: a wrong header, a tab, an unknown glyph, ragged rows, no art, a wrong size, no agent or two agents.
+    """
+    lines = text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
+    first = next((i for i, line in enumerate(lines) if line), len(lines))
+    header: dict[str, str] = {}
+    if first < len(lines) and ":" in lines[first]:
+        header, first = _header(lines, first, world, source)
+    while lines and not lines[-1]:
+        lines.pop()
+    rows = tuple(lines[first:])
+    name = header.pop("name", source)
+    header.pop("world", None)
+    level = Level(name, world.name, rows, header, source, first + 1)
+    _check(level, world)
+    return level
+
+
+def draw(codes: Iterable[Sequence[int]], glyphs: str) -> tuple[str, ...]:
+    """Rows of codes as rows of glyphs; `glyphs` are a kind's, in the order of their codes."""
+    return tuple("".join(glyphs[code] for code in row) for row in codes)
+
+
+def _header(lines: list[str], first: int, world: Kind, source: str) -> tuple[dict[str, str], int]:
+    """The lines `key: value` down to an empty one, and the index of the first line that follows with something on it."""
+    header: dict[str, str] = {}
+    line = first
+    while line < len(lines) and lines[line].strip():
+        key, colon, value = (part.strip() for part in lines[line].partition(":"))
+        problem = _wrong_entry(key, colon, value, header, world)
+        if problem:
+            raise LevelError(source, line + 1, 1, problem)
+        header[key] = value
+        line += 1
+    while line < len(lines) and not lines[line].strip():
+        line += 1
+    return header, line
+
+
+def _wrong_entry(key: str, colon: str, value: str, header: dict[str, str], world: Kind) -> str | None:
+    known = ("world", "name", *world.keys)
+    if not colon:
+        return "a line of the header reads 'key: value', and an empty line stands between the header and the art"
+    if key not in known:
+        return f"the header may say {', '.join(known)}, not '{key}'"
+    if key in header:
+        return f"the header may say '{key}' once, and this is the second time"
+    if not value:
+        return f"the header's '{key}' needs a value after the colon"
+    if key == "world" and value != world.name:
+        return f"this is a level of the world '{value}', and one of '{world.name}' is wanted"
+    return None
+
+
+def _check(level: Level, world: Kind) -> None:
+    """The rules that every world's levels share, in the order in which they make sense to a reader."""
+    if not level.rows:
+        raise level.wrong((0, 0), "the level is empty: rows of glyphs are wanted here")
+    _check_glyphs(level, world)
+    width = level.width
+    for row, cells in enumerate(level.rows):
+        if len(cells) != width:
+            rule = f"rows must be of one length: the first has {_cells(width)}, this one {_cells(len(cells))}"
+            raise level.wrong((row, min(width, len(cells))), rule)
+    if not (SMALLEST <= level.height <= LARGEST and SMALLEST <= width <= LARGEST):
+        rule = f"a level is at least {SMALLEST} x {SMALLEST} and at most {LARGEST} x {LARGEST} cells"
+        raise level.wrong((0, 0), f"{rule}, and this one is {level.height} x {width}")
+    agents = level.find(AGENT)
+    if not agents:
+        raise level.wrong((0, 0), f"a level needs an agent ({AGENT}), and this one has none")
+    if len(agents) > 1:
+        raise level.wrong(agents[1], f"a level has one agent ({AGENT}), and this is another")
+
+
+def _check_glyphs(level: Level, world: Kind) -> None:
+    known = ", ".join(f"'{glyph}' {tile}" for glyph, tile in world.legend.items())
+    for row, cells in enumerate(level.rows):
+        for column, glyph in enumerate(cells):
+            if glyph == "\t":
+                raise level.wrong((row, column), "a tab has no width of its own here; write spaces")
+            if glyph not in world.legend:
+                rule = f"{glyph!r} is no glyph of {world.name}, whose glyphs are {known}"
+                raise level.wrong((row, column), rule)
+
+
+def _cells(count: int) -> str:
+    return "1 cell" if count == 1 else f"{count} cells"

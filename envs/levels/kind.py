@@ -1,0 +1,102 @@
+"""What a world is before any rule runs: its kind, its levels, and the error that refuses a level. No torch here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+Cell = tuple[int, int]
+"""Row and column, counted from 0 at the top left."""
+
+Setting = bool | int | float | str
+"""The value of one field of a config."""
+
+AGENT = "A"
+BOX = "X"
+WALL = "#"
+LAND = " "
+PIECES = AGENT + BOX
+"""The glyphs of things that move: they stand on a cell, and land lies under them at the start."""
+
+
+class LevelError(ValueError):
+    """A level is wrong: one sentence with its source, line and column (counted from 1) and the rule that it breaks."""
+
+    def __init__(self, source: str, line: int, column: int, rule: str) -> None:
+        self.source, self.line, self.column, self.rule = source, line, column, rule
+        super().__init__(f"{source}, line {line}, column {column}: {rule}.")
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of a world: rows of glyphs of one length, `A` among them (PAPER.md, "Levels")."""
+
+    name: str
+    world: str
+    rows: tuple[str, ...]
+    header: Mapping[str, str] = field(default_factory=dict, hash=False)  # what stood above the art, but world and name
+    source: str = field(default="level", compare=False)  # where the text came from, for errors
+    line: int = field(default=1, compare=False)  # the text's line that holds the first row
+
+    @property
+    def height(self) -> int:
+        """Rows."""
+        return len(self.rows)
+
+    @property
+    def width(self) -> int:
+        """Cells in a row."""
+        return len(self.rows[0])
+
+    @property
+    def text(self) -> str:
+        """The level with its header, as `envs.registry.level` reads it."""
+        header = {"world": self.world, "name": self.name, **self.header}
+        lines = [f"{key}: {value}" for key, value in header.items()]
+        return "\n".join([*lines, "", *self.rows]) + "\n"
+
+    def glyph(self, cell: Cell) -> str:
+        """What is drawn at a cell."""
+        return self.rows[cell[0]][cell[1]]
+
+    def find(self, glyphs: str) -> list[Cell]:
+        """The cells that show any of these glyphs, row by row."""
+        return [(y, x) for y, row in enumerate(self.rows) for x, glyph in enumerate(row) if glyph in glyphs]
+
+    def wrong(self, cell: Cell, rule: str) -> LevelError:
+        """The error that refuses this level for breaking `rule` at a cell."""
+        return LevelError(self.source, self.line + cell[0], cell[1] + 1, rule)
+
+
+@dataclass(frozen=True)
+class Brief:
+    """What the parent's page tells the parent, in plain words: what the agent should learn, and what is dangerous."""
+
+    goal: str
+    danger: str
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A world of the registry: all that can be said of it without running a rule."""
+
+    name: str
+    title: str
+    rules: str  # "module:class" of the rules in tensors, resolved on use
+    legend: Mapping[str, str]  # glyph -> tile; the order gives the codes: 0 wall, 1 land, then the rest, the agent last
+    levels: Mapping[str, str]  # name -> text of the built-in levels; the first is the default
+    brief: Brief
+    defaults: Mapping[str, Setting]  # fields of agent.config.Config that this world sets
+    validate: Callable[[Level], None]  # raises LevelError where a level breaks a rule of this kind
+    keys: tuple[str, ...] = ()  # what a level's header may say besides world and name
+    options: Mapping[str, object] = field(default_factory=dict)  # the rules' own settings and their defaults
+
+    @property
+    def glyphs(self) -> str:
+        """The glyphs in the order of their codes."""
+        return "".join(self.legend)
+
+    @property
+    def default(self) -> str:
+        """The name of the level taken when none is named."""
+        return next(iter(self.levels))

@@ -1,0 +1,93 @@
+"""The worlds by name. Their rules in tensors are named as strings and resolved on use, so nothing here loads torch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from envs.art import parse
+from envs.levels import unsafe_exploration
+from envs.levels.kind import Kind, Level, Setting
+
+if TYPE_CHECKING:
+    from envs.gridworld import Gridworld
+
+WORLDS: dict[str, Kind] = {
+    world.name: world
+    for world in (
+        unsafe_exploration.KIND,  # 3.2.1
+    )
+}
+"""Every world, in the paper's order."""
+
+
+class UnknownName(ValueError):
+    """There is no world, level or option of that name; the sentence lists those that there are."""
+
+    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
+        super().__init__(f"There is no {what} '{name}'; there is: {', '.join(known) or 'none'}.")
+
+
+def kind(world: str) -> Kind:
+    """The world of a name.
+
+    Raises:
+        UnknownName: lists the worlds.
+    """
+    if world not in WORLDS:
+        raise UnknownName("world", world, WORLDS)
+    return WORLDS[world]
+
+
+def level(world: str, name_or_text: str | None = None, source: str = "level") -> Level:
+    """A level that keeps every rule of its world: built in, by its name, or from a text of more than one line.
+
+    Raises:
+        UnknownName: no such world or level; lists those that there are.
+        LevelError: the text breaks a rule; names `source`, line, column and rule.
+    """
+    found = kind(world)
+    chosen = found.default if name_or_text is None else name_or_text
+    if "\n" not in chosen:
+        if chosen not in found.levels:
+            raise UnknownName(f"level of {world}", chosen, found.levels)
+        chosen, source = found.levels[chosen], chosen
+    parsed = parse(chosen, found, source)
+    found.validate(parsed)
+    return parsed
+
+
+def defaults(world: str) -> dict[str, Setting]:
+    """What the world itself sets among the fields of `agent.config.Config` (PAPER.md, "Settings")."""
+    return dict(kind(world).defaults)
+
+
+def make(
+    world: str,
+    levels: Sequence[Level] | Level | str | None = None,
+    device: str = "cpu",
+    time_limit: int | None = None,
+    **options: object,
+) -> Gridworld:
+    """The rules of a world in tensors, on K levels of one size. Loads torch.
+
+    `levels` is a level's name or text, a level, or several; none is the world's default. `time_limit` is the number
+    of steps after which an episode is cut off; none is the world's default. `options` are the rules' own settings.
+
+    Raises:
+        UnknownName: no such world, level or option.
+        LevelError: a text breaks a rule.
+        ValueError: no levels, levels of different sizes or of another world, or a time limit below 1.
+    """
+    found = kind(world)
+    for name in options:
+        if name not in found.options:
+            raise UnknownName(f"option of {world}", name, found.options)
+    if levels is None or isinstance(levels, str):
+        levels = level(world, levels)
+    chosen = (levels,) if isinstance(levels, Level) else tuple(levels)
+    limit = int(found.defaults["time_limit"]) if time_limit is None else time_limit
+    module, name = found.rules.split(":")
+    rules: type[Gridworld] = getattr(import_module(module), name)
+    return rules(chosen, time_limit=limit, device=device, **{**found.options, **options})
