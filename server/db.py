@@ -1,0 +1,154 @@
+"""The database handle: one engine, transactions for reading and for writing, and the clock.
+
+Every write begins with BEGIN IMMEDIATE: a deferred transaction that reads and then writes fails at once under another
+writer, whatever the busy timeout. SQLite runs in WAL with `synchronous=FULL`: after a commit nothing is lost, power included.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event, make_url
+from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError
+from sqlalchemy.orm import Session
+
+from server.errors import Busy, DiskFull, SetupError
+from server.settings import Settings
+
+SAFE_SQLITE = (3, 51, 3)
+"""Older ones may corrupt a database in WAL: a race between the log's reset and a checkpoint."""
+BUSY_SECONDS = 5.0
+PRAGMAS = {"journal_mode": "wal", "synchronous": "full", "foreign_keys": "on", "busy_timeout": str(int(BUSY_SECONDS * 1000))}
+
+
+def utc_now() -> datetime:
+    """Now, in UTC."""
+    return datetime.now(UTC)
+
+
+class Database:
+    """What every verb takes first. `read()` and `write()` are transactions; `clock()` is the time."""
+
+    def __init__(self, engine: Engine, clock: Callable[[], datetime] = utc_now) -> None:
+        self.engine = engine
+        self.clock = clock
+        self._writing = engine.execution_options(begin="IMMEDIATE")
+        # One writer of this process at a time: fairer than many threads that sleep on SQLite's lock.
+        self._turn = threading.Lock()
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """A deferred transaction, for reading only; what is written in it is rolled back.
+
+        Raises:
+            Busy: the database was locked for five seconds.
+        """
+        with _said_plainly(), Session(self.engine) as session:
+            yield session
+
+    @contextmanager
+    def write(self) -> Iterator[Session]:
+        """A transaction that holds the write lock from its beginning and commits at its end.
+
+        Raises:
+            Busy: no turn to write within five seconds.
+            DiskFull: nothing was stored.
+        """
+        if not self._turn.acquire(timeout=BUSY_SECONDS):
+            raise Busy
+        try:
+            with _said_plainly(), Session(self._writing, expire_on_commit=False) as session, session.begin():
+                yield session
+        finally:
+            self._turn.release()
+
+    def close(self) -> None:
+        """Close every connection."""
+        self.engine.dispose()
+
+
+def connect(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Database:
+    """The database of these settings. Makes the data folder; makes no tables (see `server.schema`).
+
+    Raises:
+        SetupError: an URL that cannot be read, a missing driver, or an SQLite too old to be safe.
+    """
+    try:
+        url = make_url(settings.url)
+        if url.get_backend_name() != "sqlite":
+            return Database(create_engine(url, json_serializer=_dumps, pool_pre_ping=True), clock)
+    except (ArgumentError, NoSuchModuleError, ImportError) as error:
+        raise SetupError(f"PARENTING_DATABASE_URL: {error}. Write it as sqlite:////folder/parenting.db.") from None
+    if url.database in (None, "", ":memory:"):
+        raise SetupError("PARENTING_DATABASE_URL: a database in memory is seen by one process only. Name a file.")
+    make_folder(Path(str(url.database)).parent)
+    engine = create_engine(url, module=sqlite_module(), json_serializer=_dumps, pool_size=20, max_overflow=30, pool_timeout=BUSY_SECONDS)
+    event.listen(engine, "connect", _set_up)
+    event.listen(engine, "begin", _begin)
+    return Database(engine, clock)
+
+
+def make_folder(folder: Path) -> None:
+    """Make the data folder, readable by its owner only.
+
+    Raises:
+        SetupError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    except OSError as error:
+        raise SetupError(f"The data folder {folder} cannot be made: {error.strerror}. Set PARENTING_DATA to another one.") from None
+
+
+def sqlite_module() -> Any:
+    """SQLite's driver: `pysqlite3`, which brings its own SQLite, or Python's own where that is new enough.
+
+    Raises:
+        SetupError: neither is safe.
+    """
+    found = "none"
+    for name in ("pysqlite3.dbapi2", "sqlite3"):
+        try:
+            module = importlib.import_module(name)
+        except ImportError:
+            continue
+        if module.sqlite_version_info >= SAFE_SQLITE:
+            return module
+        found = module.sqlite_version
+    least = ".".join(map(str, SAFE_SQLITE))
+    raise SetupError(f"SQLite {found} can corrupt a database under load; {least} or newer is needed. Run: pip install 'pysqlite3>=0.6.1'")
+
+
+def _set_up(connection: Any, _record: Any) -> None:
+    connection.isolation_level = None  # the driver begins nothing by itself; `_begin` does
+    for name, value in PRAGMAS.items():
+        connection.execute(f"PRAGMA {name}={value}").fetchall()
+
+
+def _begin(connection: Connection) -> None:
+    mode = connection.get_execution_options().get("begin", "DEFERRED")
+    connection.exec_driver_sql(f"BEGIN {mode}")
+
+
+@contextmanager
+def _said_plainly() -> Iterator[None]:
+    try:
+        yield
+    except OperationalError as error:
+        name = str(getattr(error.orig, "sqlite_errorname", ""))
+        if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
+            raise Busy from error
+        if name.startswith("SQLITE_FULL"):
+            raise DiskFull from error
+        raise
+
+
+_dumps = partial(json.dumps, allow_nan=False, separators=(",", ":"))

@@ -1,0 +1,42 @@
+"""What a route is given. Pages and API alike write, for example,
+
+    from server.deps import Db, SettingsOf
+
+    @router.get("/runs/{run_id}")
+    def page(request: Request, run_id: int, db: Db, settings: SettingsOf) -> Response: ...
+
+`Db` is the `server.db.Database` that every verb of `server.runs`, `queue` and `record` takes first. Write `def`, not
+`async def`: verbs block, so they belong in the thread pool. Raise `server.errors` freely: `server.app` turns them into
+the one JSON shape under `/api`, and `/healthz`, and asks the pages for a page everywhere else.
+After a stored answer or event call `ring(request)`, so that the worker hears of it at once.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from server.db import Database
+from server.settings import Settings
+
+
+def database(request: Request) -> Database:
+    """The database of this application."""
+    db: Database = request.app.state.db
+    return db
+
+
+def settings_of(request: Request) -> Settings:
+    """The settings that this application was made with."""
+    settings: Settings = request.app.state.settings
+    return settings
+
+
+def ring(request: Request) -> None:
+    """Wake the worker after a commit. A hint: lost ones cost it one poll."""
+    request.app.state.worker_bell.ring()
+
+
+Db = Annotated[Database, Depends(database)]
+SettingsOf = Annotated[Settings, Depends(settings_of)]

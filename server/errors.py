@@ -1,0 +1,94 @@
+"""Every error that a user may meet, in one tree. The docstring is the default message; all have one JSON shape.
+
+    {"error": {"code": "conflict", "message": "...", "field": "choice", "fields": [{"field": ..., "message": ...}]}}
+
+`field` and `fields` stand there only where they apply.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class ServerError(Exception):
+    """Something went wrong here; it was logged. Try again."""
+
+    status = 500
+    code = "internal"
+
+    def __init__(self, message: str | None = None, *, field: str | None = None) -> None:
+        self.message = message or (type(self).__doc__ or "").strip()
+        self.field = field
+        super().__init__(self.message)
+
+    def body(self) -> dict[str, Any]:
+        """The JSON shape of this error."""
+        error: dict[str, Any] = {"code": self.code, "message": self.message}
+        if self.field is not None:
+            error["field"] = self.field
+        return {"error": error}
+
+
+class NotFound(ServerError):
+    """There is no such thing here."""
+
+    status, code = 404, "not_found"
+
+
+class Conflict(ServerError):
+    """This contradicts what is already stored; nothing was changed."""
+
+    status, code = 409, "conflict"
+
+
+class Forbidden(ServerError):
+    """This request came from another site and was refused."""
+
+    status, code = 403, "cross_site"
+
+
+class TooLarge(ServerError):
+    """The body of this request is too large."""
+
+    status, code = 413, "too_large"
+
+
+class Busy(ServerError):
+    """The database was busy for five seconds; nothing was stored. Send the same again."""
+
+    status, code = 503, "busy"
+
+
+class DiskFull(ServerError):
+    """The disk is full; nothing was stored. Free some space and send the same again."""
+
+    status, code = 507, "disk_full"
+
+
+class Invalid(ServerError):
+    """Some fields are not as they should be."""
+
+    status, code = 422, "invalid"
+
+    def __init__(self, fields: list[tuple[str, str]], message: str | None = None) -> None:
+        self.fields = fields
+        only = fields[0] if len(fields) == 1 else None
+        super().__init__(message or (f"{only[0]}: {only[1]}" if only else None), field=only[0] if only else None)
+
+    def body(self) -> dict[str, Any]:
+        """The JSON shape, with one message a field."""
+        body = super().body()
+        body["error"]["fields"] = [{"field": field, "message": message} for field, message in self.fields]
+        return body
+
+
+class SetupError(ServerError):
+    """The server cannot start as it is set up. Commands print the message and exit with 2."""
+
+    status, code = 500, "setup"
+
+
+class LostClaim(ServerError):
+    """Another worker raises this run now; this one must let go of it without writing."""
+
+    status, code = 409, "lost_claim"

@@ -1,0 +1,197 @@
+"""Verbs on runs: create, list, get, pause, resume, stop for the operator; claim, report, finish for the worker.
+
+One actor a run: `claim` raises the run's epoch, and every later write of a worker checks it inside its own transaction
+(`held`). A worker that slept past its claim therefore cannot write.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+from sqlalchemy import func, or_, select, update
+from sqlalchemy.orm import Session
+
+from server.db import Database
+from server.errors import Conflict, LostClaim, NotFound
+from server.tables import Query, Run
+
+CLAIM_SECONDS = 5.0
+OVER = ("stopped", "finished", "failed")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A worker's right to raise a run, until another claims it. Every write of a worker carries one."""
+
+    run_id: int
+    actor: str
+    epoch: int
+
+
+@dataclass(frozen=True)
+class Open:
+    """How many queries of a run wait for an answer, by kind."""
+
+    guidance: int
+    preference: int
+
+
+def create_run(db: Database, **fields: Any) -> Run:
+    """Add a run. The fields are those of `tables.Run`; `server.starting` checks and fills them in from a form."""
+    with db.write() as session:
+        run = Run(created=db.clock(), **fields)
+        session.add(run)
+        session.flush()
+        return run
+
+
+def list_runs(db: Database, limit: int = 200) -> Sequence[Run]:
+    """The runs, newest first."""
+    with db.read() as session:
+        return session.scalars(select(Run).order_by(Run.id.desc()).limit(limit)).all()
+
+
+def get_run(db: Database, run_id: int) -> Run:
+    """One run.
+
+    Raises:
+        NotFound: there is none of this id.
+    """
+    with db.read() as session:
+        return find(session, run_id)
+
+
+def open_counts(db: Database, run_id: int) -> Open:
+    """How many queries are open (not yet answered), by kind."""
+    with db.read() as session:
+        return open_in(session, run_id)
+
+
+def set_status(db: Database, run_id: int, status: str, reason: str | None = None) -> Run:
+    """Pause, resume (`active`) or stop a run, for the operator. Doing it twice is doing it once. Stopping withdraws what is open.
+
+    Raises:
+        NotFound: there is no such run.
+        Conflict: it is over for another reason.
+    """
+    with db.write() as session:
+        run = hold(session, run_id)
+        if run.status in OVER and run.status != status:
+            raise Conflict(f"Run {run_id} is {run.status}; it cannot become {status}.")
+        if run.status != status:
+            _become(session, run, status, reason)
+        return run
+
+
+def claim(db: Database, actor: str, seconds: float = CLAIM_SECONDS) -> Sequence[Claim]:
+    """Take every living run (active or paused) that is free, or whose worker gave no sign of life for `seconds`."""
+    late = db.clock() - timedelta(seconds=seconds)
+    living = (Run.status.in_(("active", "paused")), or_(Run.actor.is_(None), Run.heartbeat < late))
+    with db.read() as session:  # nothing to claim is the common case, and takes no lock
+        if session.scalars(select(Run.id).where(*living).limit(1)).first() is None:
+            return []
+    with db.write() as session:
+        runs = session.scalars(select(Run).where(*living).order_by(Run.id).with_for_update()).all()
+        for run in runs:
+            run.actor, run.epoch, run.heartbeat = actor, run.epoch + 1, db.clock()
+        return [Claim(run.id, actor, run.epoch) for run in runs]
+
+
+def let_go(db: Database, claims: Sequence[Claim]) -> None:
+    """Give runs back at once, at a worker's orderly end; those that others hold by now are left alone."""
+    with db.write() as session:
+        for mine in claims:
+            run = find(session, mine.run_id)
+            if (run.actor, run.epoch) == (mine.actor, mine.epoch):
+                run.actor = run.heartbeat = None
+
+
+def beat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
+    """A sign of life for all runs of a worker; returns the claims that still hold, which it may go on with."""
+    with db.write() as session:
+        kept = []
+        for mine in claims:
+            rows = update(Run).where(Run.id == mine.run_id, Run.actor == mine.actor, Run.epoch == mine.epoch)
+            found = session.execute(rows.values(heartbeat=db.clock()).returning(Run.id)).scalar()
+            kept += [mine] if found is not None else []
+        return kept
+
+
+def report(db: Database, mine: Claim, **fields: Any) -> Run:
+    """Show where an agent is: any of `tick`, `waiting`, `optimal`, `versions`. Also a sign of life.
+
+    Raises:
+        LostClaim: another worker raises this run now.
+    """
+    unknown = set(fields) - {"tick", "waiting", "optimal", "versions"}
+    if unknown:
+        raise TypeError(f"report takes tick, waiting, optimal and versions, not {sorted(unknown)}")
+    with db.write() as session:
+        run = held(session, mine)
+        run.heartbeat = db.clock()
+        for name, value in fields.items():
+            setattr(run, name, value)
+        return run
+
+
+def finish(db: Database, mine: Claim, status: str, reason: str, error: str | None = None) -> Run:
+    """End a run as `finished` or `failed`, with a sentence for people and, if it failed, the details. Withdraws what is open.
+
+    Raises:
+        LostClaim: another worker raises this run now.
+    """
+    with db.write() as session:
+        run = held(session, mine)
+        if run.status not in OVER:
+            _become(session, run, status, reason)
+            run.error = error
+        return run
+
+
+def find(session: Session, run_id: int) -> Run:
+    """One run, in a transaction that is already open; raises NotFound."""
+    run = session.get(Run, run_id)
+    if run is None:
+        raise NotFound(f"There is no run {run_id}.")
+    return run
+
+
+def hold(session: Session, run_id: int) -> Run:
+    """The same, with the row locked until the transaction ends (SQLite locks the whole file anyway)."""
+    run = session.get(Run, run_id, with_for_update=True)
+    if run is None:
+        raise NotFound(f"There is no run {run_id}.")
+    return run
+
+
+def held(session: Session, mine: Claim) -> Run:
+    """The run of a claim, locked, after checking that the claim still holds: the first line of every write of a worker."""
+    run = hold(session, mine.run_id)
+    if (run.actor, run.epoch) != (mine.actor, mine.epoch):
+        raise LostClaim(f"Run {mine.run_id} is raised by {run.actor or 'nobody'} now (epoch {run.epoch}, not {mine.epoch}).")
+    return run
+
+
+def open_in(session: Session, run_id: int) -> Open:
+    """`open_counts`, in a transaction that is already open."""
+    rows = select(Query.kind, func.count()).where(Query.run_id == run_id, Query.status == "open").group_by(Query.kind)
+    counts = dict(session.execute(rows).tuples().all())
+    return Open(guidance=counts.get("guidance", 0), preference=counts.get("preference", 0))
+
+
+def withdraw_in(session: Session, run_id: int, kind: str | None = None) -> None:
+    """Withdraw the open queries of a run (of one kind), in a transaction that is already open."""
+    rows = update(Query).where(Query.run_id == run_id, Query.status == "open")
+    if kind is not None:
+        rows = rows.where(Query.kind == kind)
+    session.execute(rows.values(status="withdrawn"))
+
+
+def _become(session: Session, run: Run, status: str, reason: str | None) -> None:
+    run.status, run.reason = status, reason
+    if status in OVER:
+        run.waiting = None
+        withdraw_in(session, run.id)

@@ -1,0 +1,223 @@
+"""The six tables: a run, its queries, their answers, the operator's events, metrics and checkpoints.
+
+The database holds the invariants: one query a run and tick, one standing answer a query, known words only.
+Times are UTC. JSON is readable by eye; the shape of a clip is described at `Query.clips`.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Any, ClassVar
+
+from sqlalchemy import (
+    JSON,
+    CheckConstraint,
+    DateTime,
+    Dialect,
+    ForeignKey,
+    Index,
+    LargeBinary,
+    MetaData,
+    Text,
+    TypeDecorator,
+    UniqueConstraint,
+    text,
+)
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+RUN_STATUSES = {
+    "active": "The agent lives, or waits for its parent.",
+    "paused": "The operator paused it; no tick passes until it is resumed.",
+    "stopped": "The operator stopped it for good; its open questions were withdrawn.",
+    "finished": "It reached what it was started for.",
+    "failed": "The worker could not go on; the reason says why.",
+}
+"""What a run can be, a sentence each; the column is held to these words by a CHECK."""
+
+QUERY_STATUSES = {
+    "open": "It waits for an answer.",
+    "answered": "It was answered; the agent has not heard it yet.",
+    "applied": "The agent has heard the answer, at the answer's `applied_tick`.",
+    "withdrawn": "It is no longer asked: the run ended, or the operator ended the episode.",
+}
+"""What a query can be, a sentence each."""
+
+WAITING = {
+    "guidance": "The agent waits for guidance before it moves.",
+    "preferences": "The agent waits until fewer preference questions are open.",
+    "stuck": "No action was acceptable: the operator has to end the episode.",
+}
+"""Whom a run waits for when it does not tick; null while it lives."""
+
+KINDS = ("guidance", "preference")
+CHOICES = ("left", "right", "either", "neither")
+PARENTS = ("human", "scripted")
+
+
+class Utc(TypeDecorator[datetime]):
+    """A moment, stored without zone as UTC and read back as UTC, in every database alike."""
+
+    impl = DateTime(timezone=False)
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """To UTC, without its zone."""
+        return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Back to UTC, with its zone."""
+        return None if value is None else value.replace(tzinfo=UTC)
+
+
+class Table(DeclarativeBase):
+    """The root of all tables. Constraints are named, so that migrations can name them too."""
+
+    metadata = MetaData(
+        naming_convention={
+            "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+            "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+            "ck": "ck_%(table_name)s_%(constraint_name)s",
+            "fk": "fk_%(table_name)s_%(column_0_name)s",
+            "pk": "pk_%(table_name)s",
+        }
+    )
+    type_annotation_map: ClassVar[dict[Any, Any]] = {str: Text, datetime: Utc, dict[str, Any]: JSON, bytes: LargeBinary}
+
+
+def _one_of(column: str, words: Any, nullable: bool = False) -> CheckConstraint:
+    listed = ", ".join(f"'{word}'" for word in words)
+    rule = f"{column} IN ({listed})"
+    return CheckConstraint(f"{column} IS NULL OR {rule}" if nullable else rule, name=column)
+
+
+class Run(Table):
+    """One agent's life: what it was started with, where it is, and which worker raises it."""
+
+    __tablename__ = "run"
+    __table_args__ = (
+        _one_of("status", RUN_STATUSES),
+        _one_of("parent", PARENTS),
+        _one_of("waiting", WAITING, nullable=True),
+        Index(None, "status"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    created: Mapped[datetime]
+    name: Mapped[str | None]
+    world: Mapped[str]
+    level: Mapped[str]
+    level_text: Mapped[str]  # the level's file as it was at the start, header included
+    legend: Mapped[dict[str, Any]]  # glyph -> tile name: the page needs no world's code
+    brief: Mapped[dict[str, Any]]  # {"goal": ..., "danger": ...}
+    config: Mapped[dict[str, Any]]  # agent.config.Config, whole
+    preset: Mapped[str]
+    seed: Mapped[int]
+    parent: Mapped[str]
+    # where it is
+    status: Mapped[str] = mapped_column(default="active")
+    reason: Mapped[str | None]
+    tick: Mapped[int] = mapped_column(default=0)  # the last tick reported, for display
+    waiting: Mapped[str | None]
+    optimal: Mapped[bool] = mapped_column(default=False)
+    answers: Mapped[int] = mapped_column(default=0)  # numbers the run's answers, in the answer's own transaction
+    # which worker raises it
+    actor: Mapped[str | None]
+    epoch: Mapped[int] = mapped_column(default=0)  # grows at each claim; checked inside every write of a worker
+    heartbeat: Mapped[datetime | None]
+    versions: Mapped[dict[str, Any] | None]  # torch build and threads: other ones give other bits
+    error: Mapped[str | None]
+
+
+class Query(Table):
+    """One question of a run. A lease is a timestamp, not a state, so nothing sticks."""
+
+    __tablename__ = "query"
+    __table_args__ = (
+        _one_of("kind", KINDS),
+        _one_of("status", QUERY_STATUSES),
+        UniqueConstraint("run_id", "tick"),
+        Index(None, "run_id", "status", "kind"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
+    tick: Mapped[int]
+    kind: Mapped[str]
+    maturity: Mapped[int]
+    clips: Mapped[dict[str, Any]]
+    """{"left": CLIP, "right": CLIP}, CLIP = {"actions": ["up", ...], "length": n, "frames": [n + 1 of
+    {"ground": [rows], "observed": [rows], "agent": [row, column], "box": [row, column] or null}]}."""
+    status: Mapped[str] = mapped_column(default="open")
+    posted: Mapped[datetime]
+    leased_until: Mapped[datetime | None]
+    leased_by: Mapped[str | None]
+
+
+class Answer(Table):
+    """What a parent said. Rows are only ever added; a correction names the row that it supersedes."""
+
+    __tablename__ = "answer"
+    __table_args__ = (
+        _one_of("choice", CHOICES),
+        UniqueConstraint("run_id", "number"),
+        Index("uq_answer_standing", "query_id", unique=True, sqlite_where=text("standing"), postgresql_where=text("standing")),
+        Index(
+            "uq_answer_first",
+            "query_id",
+            "client_id",
+            unique=True,
+            sqlite_where=text("supersedes IS NULL"),
+            postgresql_where=text("supersedes IS NULL"),
+        ),
+        Index(None, "run_id", "applied_tick"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    query_id: Mapped[int] = mapped_column(ForeignKey("query.id"))
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
+    number: Mapped[int]
+    choice: Mapped[str]
+    parent: Mapped[str]
+    client_id: Mapped[str]
+    supersedes: Mapped[int | None] = mapped_column(ForeignKey("answer.id"))
+    standing: Mapped[bool] = mapped_column(default=True)
+    received: Mapped[datetime]
+    applied_tick: Mapped[int | None]
+
+
+class Event(Table):
+    """What the operator did to a living agent (agent.events), and the tick before which it was applied."""
+
+    __tablename__ = "event"
+    __table_args__ = (Index(None, "run_id", "applied_tick"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
+    kind: Mapped[str]
+    payload: Mapped[dict[str, Any]]
+    created: Mapped[datetime]
+    applied_tick: Mapped[int | None]
+
+
+class Metric(Table):
+    """What the worker measured at a tick: name -> number, or null where it was not finite."""
+
+    __tablename__ = "metric"
+
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
+    tick: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    values: Mapped[dict[str, Any]]
+
+
+class Checkpoint(Table):
+    """The whole state of an agent after a tick. The last two of a run are kept."""
+
+    __tablename__ = "checkpoint"
+    __table_args__ = (Index(None, "run_id", "tick"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
+    tick: Mapped[int]
+    blob: Mapped[bytes]
+    sha256: Mapped[str]
+    created: Mapped[datetime]
