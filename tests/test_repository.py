@@ -3,6 +3,9 @@
 import re
 from pathlib import Path
 
+import pytest
+
+from server.settings import Settings
 from tests.tree import ROOT, git_files
 
 LINES = 300
@@ -71,3 +74,15 @@ def test_patterns_find_what_they_are_for() -> None:
     assert REGISTRY.search("pip install --" + "index-url somewhere")
     assert all(LIBRARY.fullmatch(name) for name in ("plotly.min.js", "plotly-2.js", "htmx.js", "d3.v7.js"))
     assert not any(LIBRARY.fullmatch(name) for name in ("charts.js", "play.js", "parent.css", "draw.mjs"))
+
+
+def test_example_of_the_settings_lists_each_with_its_default(monkeypatch: pytest.MonkeyPatch) -> None:
+    example = re.findall(r"^# (PARENTING_\w+)=(.*)$", (ROOT / ".env.example").read_text(), re.MULTILINE)
+    assert {name for name, _ in example} == {f"PARENTING_{name.upper()}" for name in Settings.model_fields}
+    for name, _ in example:
+        monkeypatch.delenv(name, raising=False)
+    defaults = Settings()
+    for name, value in example:
+        if name not in {"PARENTING_DATA", "PARENTING_DATABASE_URL"}:  # these two depend on the machine
+            monkeypatch.setenv(name, value)
+    assert Settings() == defaults
