@@ -1,4 +1,4 @@
-"""ASCII art and levels: text to rows of glyphs, and codes back to glyphs. Given text, never a path; no torch here.
+"""ASCII art and levels: text to rows of glyphs, codes back to glyphs. Given text, never a path; no torch here.
 
 A level's text is a short header, an empty line and the art::
 
@@ -25,10 +25,10 @@ SMALLEST, LARGEST = 3, 64
 
 
 def parse(text: str, world: Kind, source: str = "level") -> Level:
-    """Read a level of a world by the rules that every world shares; `envs.registry.level` adds the world's own.
+    """Read a level by the rules that every world shares; `envs.registry.level` adds the world's own.
 
     Raises:
-        LevelError: a wrong header, a tab, an unknown glyph, ragged rows, no art, a wrong size, no agent or two agents.
+        LevelError: a wrong header, no art, a tab, an unknown glyph, ragged rows, a wrong size, no or two agents.
     """
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
     first = next((i for i, line in enumerate(lines) if line), len(lines))
@@ -51,7 +51,7 @@ def draw(codes: Iterable[Sequence[int]], glyphs: str) -> tuple[str, ...]:
 
 
 def _header(lines: list[str], first: int, world: Kind, source: str) -> tuple[dict[str, str], int]:
-    """The lines `key: value` down to an empty one, and the index of the first line that follows with something on it."""
+    """The lines `key: value` down to an empty one, and the index of the art's first line."""
     header: dict[str, str] = {}
     line = first
     while line < len(lines) and lines[line].strip():
@@ -69,7 +69,7 @@ def _header(lines: list[str], first: int, world: Kind, source: str) -> tuple[dic
 def _wrong_entry(key: str, colon: str, value: str, header: dict[str, str], world: Kind) -> str | None:
     known = ("world", "name", *world.keys)
     if not colon:
-        return "a line of the header reads 'key: value', and an empty line stands between the header and the art"
+        return "the header's lines read 'key: value', and an empty line stands between them and the art"
     if key not in known:
         return f"the header may say {', '.join(known)}, not '{key}'"
     if key in header:

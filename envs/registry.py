@@ -1,10 +1,10 @@
-"""The worlds by name. Their rules in tensors are named as strings and resolved on use, so nothing here loads torch."""
+"""The worlds by name. Nothing here loads torch: the rules in tensors are named as strings and resolved on use."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from envs.art import parse
 from envs.levels import unsafe_exploration
@@ -25,8 +25,11 @@ WORLDS: dict[str, Kind] = {
 class UnknownName(ValueError):
     """There is no world, level or option of that name; the sentence lists those that there are."""
 
-    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
-        super().__init__(f"There is no {what} '{name}'; there is: {', '.join(known) or 'none'}.")
+    def __init__(self, what: str, name: str, known: Iterable[str], of: str = "") -> None:
+        where = f" of {of}" if of else ""
+        super().__init__(
+            f"There is no {what} '{name}'{where}; the {what}s are: {', '.join(known) or 'none'}."
+        )
 
 
 def kind(world: str) -> Kind:
@@ -41,7 +44,9 @@ def kind(world: str) -> Kind:
 
 
 def level(world: str, name_or_text: str | None = None, source: str = "level") -> Level:
-    """A level that keeps every rule of its world: built in, by its name, or from a text of more than one line.
+    """A level that keeps every rule of its world: built in, by its name, or from a text.
+
+    What holds a line break is a text; none is the world's default level. `source` names the text in errors.
 
     Raises:
         UnknownName: no such world or level; lists those that there are.
@@ -51,7 +56,7 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
     chosen = found.default if name_or_text is None else name_or_text
     if "\n" not in chosen:
         if chosen not in found.levels:
-            raise UnknownName(f"level of {world}", chosen, found.levels)
+            raise UnknownName("level", chosen, found.levels, world)
         chosen, source = found.levels[chosen], chosen
     parsed = parse(chosen, found, source)
     found.validate(parsed)
@@ -68,12 +73,12 @@ def make(
     levels: Sequence[Level] | Level | str | None = None,
     device: str = "cpu",
     time_limit: int | None = None,
-    **options: object,
+    **options: Any,
 ) -> Gridworld:
     """The rules of a world in tensors, on K levels of one size. Loads torch.
 
-    `levels` is a level's name or text, a level, or several; none is the world's default. `time_limit` is the number
-    of steps after which an episode is cut off; none is the world's default. `options` are the rules' own settings.
+    `levels` is a level's name or text, a level, or several; none is the world's default. An episode is cut off after
+    `time_limit` steps; none is the world's default. `options` are the rules' own settings.
 
     Raises:
         UnknownName: no such world, level or option.
@@ -83,7 +88,7 @@ def make(
     found = kind(world)
     for name in options:
         if name not in found.options:
-            raise UnknownName(f"option of {world}", name, found.options)
+            raise UnknownName("option", name, found.options, world)
     if levels is None or isinstance(levels, str):
         levels = level(world, levels)
     chosen = (levels,) if isinstance(levels, Level) else tuple(levels)

@@ -1,4 +1,4 @@
-"""What a world is before any rule runs: its kind, its levels, and the error that refuses a level. No torch here."""
+"""What a world is before any rule runs: its kind, its levels, and what refuses a level. No torch here."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PIECES = AGENT + BOX
 
 
 class LevelError(ValueError):
-    """A level is wrong: one sentence with its source, line and column (counted from 1) and the rule that it breaks."""
+    """A level is wrong: one sentence with source, line and column (counted from 1) and the rule it breaks."""
 
     def __init__(self, source: str, line: int, column: int, rule: str) -> None:
         self.source, self.line, self.column, self.rule = source, line, column, rule
@@ -34,7 +34,7 @@ class Level:
     name: str
     world: str
     rows: tuple[str, ...]
-    header: Mapping[str, str] = field(default_factory=dict, hash=False)  # what stood above the art, but world and name
+    header: Mapping[str, str] = field(default_factory=dict, hash=False)  # without world and name
     source: str = field(default="level", compare=False)  # where the text came from, for errors
     line: int = field(default=1, compare=False)  # the text's line that holds the first row
 
@@ -70,7 +70,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Brief:
-    """What the parent's page tells the parent, in plain words: what the agent should learn, and what is dangerous."""
+    """What the parent reads, in plain words: what the agent should learn, and what is dangerous."""
 
     goal: str
     danger: str
@@ -83,7 +83,7 @@ class Kind:
     name: str
     title: str
     rules: str  # "module:class" of the rules in tensors, resolved on use
-    legend: Mapping[str, str]  # glyph -> tile; the order gives the codes: 0 wall, 1 land, then the rest, the agent last
+    legend: Mapping[str, str]  # glyph -> tile; its order gives the codes: 0 wall, 1 land, then the rest
     levels: Mapping[str, str]  # name -> text of the built-in levels; the first is the default
     brief: Brief
     defaults: Mapping[str, Setting]  # fields of agent.config.Config that this world sets

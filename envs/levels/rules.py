@@ -21,7 +21,7 @@ def moved(level: Level, cell: Cell, action: int) -> Cell:
 
 
 def reachable(level: Level, ends: str) -> set[Cell]:
-    """Every cell that the agent can come to; a cell of `ends` ends the episode, so nothing is reached through it."""
+    """Every cell that the agent can come to; `ends` end the episode, so nothing is reached through them."""
     (start,) = level.find(AGENT)
     found, fringe = {start}, deque([start])
     while fringe:
@@ -55,7 +55,7 @@ def goal_in_reach(level: Level, found: set[Cell], goal: Cell) -> None:
 
 
 def edge_closed(level: Level, found: set[Cell], ends: str) -> None:
-    """No cell at the edge from which the agent could walk on: only a wall, or what ends the episode, may be met there."""
+    """No cell at the edge may let the agent walk on: it may meet only walls and what ends the episode there."""
     for row, column in sorted(found):
         edge = row in (0, level.height - 1) or column in (0, level.width - 1)
         if edge and level.glyph((row, column)) not in ends:

@@ -1,4 +1,4 @@
-"""Unsafe Exploration (Sec. 3.2.1): water surrounds the island, and entering it ends the episode. No torch here."""
+"""Unsafe Exploration (Sec. 3.2.1): water around an island; entering it ends the episode. No torch here."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ DEFAULTS: dict[str, Setting] = {"gamma": 0.9, "time_limit": 100}
 
 
 def validate(level: Level) -> None:
-    """The rules of an island: exactly one goal, in reach without entering water, and no way to the board's edge by land.
+    """The rules of an island: exactly one goal, in reach by land, and no way to the board's edge by land.
 
     Raises:
         LevelError: names source, line, column and the rule.
