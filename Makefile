@@ -15,8 +15,10 @@ help: ## Print this list
 run: $(VENV)/.installed ## Install, migrate, start the web pages and a worker, open the browser
 	@$(BIN)/parenting up
 
-test: check ## Install, then run every check and every test (ARGS="-k queue" for some)
-	$(BIN)/pytest $(ARGS)
+# The tests run after a failed check too, so that one run tells everything.
+test: $(VENV)/.installed-dev ## Install, then run every check and every test (ARGS="-k queue" for some)
+	@checks=passed; $(MAKE) --no-print-directory check || checks=failed; \
+	$(BIN)/pytest $(ARGS) && test $$checks = passed
 
 check: $(VENV)/.installed-dev ## Lint, formatting, types, layers
 	$(BIN)/ruff check .
