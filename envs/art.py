@@ -1,4 +1,4 @@
-"""ASCII art and levels: text to rows of glyphs, codes back to glyphs. Given text, never a path; no torch here.
+"""ASCII art and levels: text to rows of glyphs, codes back to glyphs. Given text, never a path; no torch.
 
 A level's text is a short header, an empty line and the art::
 
@@ -28,7 +28,7 @@ def parse(text: str, world: Kind, source: str = "level") -> Level:
     """Read a level by the rules that every world shares; `envs.registry.level` adds the world's own.
 
     Raises:
-        LevelError: a wrong header, no art, a tab, an unknown glyph, ragged rows, a wrong size, no or two agents.
+        LevelError: a wrong header, no art, a tab, an unknown glyph, ragged rows, a wrong size, not one agent.
     """
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
     first = next((i for i, line in enumerate(lines) if line), len(lines))

@@ -1,7 +1,7 @@
 """What every world shares: cells, four moves, walls, observations. All trials at once; no reward in `step`.
 
-A world is a subclass that overrides the hooks in the order in which its rules happen: `flags` at a reset, then in
-each step `move`, `enter` and `chance`. `reward`, `unsafe`, `suite_reward` and `hidden_reward` stand beside `step`.
+A world is a subclass that overrides the hooks, in the order in which its rules happen: `flags` at a reset, and in
+each step `move`, `enter` and `chance`. Beside `step` stand `reward`, `unsafe`, `suite_reward`, `hidden_reward`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from envs.levels.kind import AGENT, BOX, LAND, PIECES, WALL, Cell, Kind, Level
 from envs.levels.rules import MOVES
 from envs.rng import Keys
 from envs.struct import Struct
-
 
 Actions = Int64[Tensor, "N"]
 """One action a trial: 0 up, 1 down, 2 left, 3 right."""
@@ -177,9 +176,9 @@ class Gridworld(ABC):
 def local_state(
     observation: UInt8[Tensor, "... H W"], agent: Int64[Tensor, "... 2"]
 ) -> UInt8[Tensor, "... 4"]:
-    """The local state l(s) of Sec. 2: the codes of the 4 cells that the agent can reach next, in action order.
+    """The local state l(s) of Sec. 2: the codes of the 4 cells that the agent can reach next.
 
-    As observed; what lies beyond the edge counts as wall (code 0).
+    As observed, in action order; what lies beyond the edge counts as wall (code 0).
     """
     height, width = observation.shape[-2] + 2, observation.shape[-1] + 2
     flat = pad(observation, (1, 1, 1, 1)).reshape(-1, height * width)
@@ -190,7 +189,7 @@ def local_state(
 
 @cache
 def _neighbours(width: int, device: torch.device) -> tuple[Tensor, Tensor]:
-    """In a board padded by one cell: how far apart rows and columns lie, and the neighbours of cell (0, 0)."""
+    """In a board padded by one cell: how far apart rows and columns lie, and where the neighbours are."""
     first = width + 1
     offsets = [first + row * width + column for row, column in MOVES]
     return torch.tensor([width, 1], device=device), torch.tensor(offsets, device=device)

@@ -1,4 +1,4 @@
-"""Gymnasium adapter (PAPER.md, "Levels: Adapter"): `import envs.gym` registers an id for every world of the registry.
+"""Gymnasium adapter (PAPER.md, "Levels: Adapter"): `import envs.gym` registers an id for each world.
 
 The rewards are the safety suite's own, which an agent could hack; what the suite holds back is in
 ``info["hidden_reward"]``. The parent's reward has no place here: PARENTING reads none.
@@ -6,7 +6,7 @@ The rewards are the safety suite's own, which an agent could hack; what the suit
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -38,7 +38,7 @@ Observation = NDArray[np.int8]
 class GridworldEnv(gymnasium.Env[Observation, np.int64]):
     """One trial of a world. Observation: one-hot bits (H, W, O). Actions: 0 up, 1 down, 2 left, 3 right."""
 
-    metadata = {"render_modes": ["ansi", "rgb_array"], "render_fps": 4}
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["ansi", "rgb_array"], "render_fps": 4}
 
     def __init__(
         self,

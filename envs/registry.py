@@ -1,4 +1,4 @@
-"""The worlds by name. Nothing here loads torch: the rules in tensors are named as strings and resolved on use."""
+"""The worlds by name. Nothing here loads torch: the rules are named as strings and resolved on use."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ def make(
 ) -> Gridworld:
     """The rules of a world in tensors, on K levels of one size. Loads torch.
 
-    `levels` is a level's name or text, a level, or several; none is the world's default. An episode is cut off after
-    `time_limit` steps; none is the world's default. `options` are the rules' own settings.
+    `levels` is a level's name or text, a level, or several; none is the world's default. An episode is cut
+    off after `time_limit` steps; none is the world's default. `options` are the rules' own settings.
 
     Raises:
         UnknownName: no such world, level or option.

@@ -1,1 +1,1 @@
-"""The worlds as data: a file a world, with its art, legend, brief, defaults and level rules. No torch here."""
+"""The worlds as data: a file a world, with art, legend, brief, defaults and level rules. No torch here."""

@@ -55,7 +55,7 @@ def goal_in_reach(level: Level, found: set[Cell], goal: Cell) -> None:
 
 
 def edge_closed(level: Level, found: set[Cell], ends: str) -> None:
-    """No cell at the edge may let the agent walk on: it may meet only walls and what ends the episode there."""
+    """At the edge the agent may meet only walls and what ends the episode, so that it cannot walk on."""
     for row, column in sorted(found):
         edge = row in (0, level.height - 1) or column in (0, level.width - 1)
         if edge and level.glyph((row, column)) not in ends:
