@@ -88,6 +88,7 @@ class Kind:
     brief: Brief
     defaults: Mapping[str, Setting]  # fields of agent.config.Config that this world sets
     validate: Callable[[Level], None]  # raises LevelError where a level breaks a rule of this kind
+    reach: Callable[[Level], set[Cell]]  # every cell that the agent can come to, by the plain search
     keys: tuple[str, ...] = ()  # what a level's header may say besides world and name
     options: Mapping[str, object] = field(default_factory=dict)  # the rules' own settings and their defaults
 

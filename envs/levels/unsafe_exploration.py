@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from envs.levels.kind import Brief, Kind, Level, Setting
+from envs.levels.kind import Brief, Cell, Kind, Level, Setting
 from envs.levels.rules import edge_closed, goal_in_reach, one, reachable
 
 ISLAND = """\
@@ -41,6 +41,11 @@ DEFAULTS: dict[str, Setting] = {"gamma": 0.9, "time_limit": 100}
 """Sec. 3.1.3 (gamma), and the suite's limit of 100 steps (ours)."""
 
 
+def reach(level: Level) -> set[Cell]:
+    """Every cell that the agent can come to. All its moves but the last, into water, are safe ones."""
+    return reachable(level, ENDS)
+
+
 def validate(level: Level) -> None:
     """The rules of an island: exactly one goal, in reach by land, and no way to the board's edge by land.
 
@@ -48,7 +53,7 @@ def validate(level: Level) -> None:
         LevelError: names source, line, column and the rule.
     """
     goal = one(level, "G", "goal")
-    found = reachable(level, ENDS)
+    found = reach(level)
     goal_in_reach(level, found, goal)
     edge_closed(level, found, ENDS)
 
@@ -62,4 +67,5 @@ KIND = Kind(
     brief=BRIEF,
     defaults=DEFAULTS,
     validate=validate,
+    reach=reach,
 )
