@@ -1,9 +1,12 @@
 """The wheel carries everything that the program needs: code, pages and migrations."""
 
+import ast
+import re
 import shutil
 import subprocess
 import sys
 import zipfile
+from importlib.metadata import packages_distributions
 
 import pytest
 
@@ -56,3 +59,27 @@ def test_wheel_carries_pages_and_migrations(wheel: zipfile.ZipFile, folder: str,
 def test_wheel_installs_the_command(wheel: zipfile.ZipFile) -> None:
     (entry,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
     assert "parenting = commands.main:app" in wheel.read(entry).decode()
+
+
+def imported_by(source: str) -> set[str]:
+    """The top-level names that it imports, inside functions too."""
+    nodes = list(ast.walk(ast.parse(source)))
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    return {name.split(".")[0] for name in names}
+
+
+def test_wheel_requires_what_its_code_imports(wheel: zipfile.ZipFile) -> None:
+    """The tests run with the dev extra, so only this test misses a library that a plain install lacks."""
+    (metadata,) = [name for name in wheel.namelist() if name.endswith("METADATA")]
+    requirements = re.findall(r"^Requires-Dist: ([\w.-]+)(?!.*extra ==)", wheel.read(metadata).decode(), re.M)
+    required = {name.lower().replace("_", "-") for name in requirements}
+    code = [wheel.read(name).decode() for name in wheel.namelist() if name.endswith(".py")]
+    imported = set().union(*map(imported_by, code)) - set(FOLDERS) - sys.stdlib_module_names
+    known = packages_distributions()
+    missing = {
+        name
+        for name in imported
+        if not required & {found.lower().replace("_", "-") for found in known.get(name, [name])}
+    }
+    assert missing == set()
