@@ -1,26 +1,12 @@
-"""The seam between agent and parent: a mailbox with two verbs, and the operator's events (DESIGN.md, "The algorithm, once")."""
+"""Who may stand behind the agent's mailbox: a script in tensors, people through rows of a database, or a record of either.
+
+    parents.scripted.ScriptedParent   answers in tensors, one tick later (Eq. 7, 8)
+    parents.replay.ReplayParent       gives a recorded session back
+    server.inbox.QueueParent          answers through the database
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol
+from agent.mailbox import Mailbox as Parent
 
-from agent.events import Event
-from agent.query import Answer, Query
-from agent.state import AgentState
-
-
-class Parent(Protocol):
-    """Whoever answers: a script in tensors, people through rows of a database, or a record of either."""
-
-    def take(self, state: AgentState) -> Answer:
-        """At most one answer a trial, for this tick; "none" is an answer. Never waits."""
-        ...
-
-    def post(self, query: Query) -> None:
-        """Hand over what the agent asks in this tick."""
-        ...
-
-    def events(self, state: AgentState) -> Sequence[Event]:
-        """The operator's events that apply before this tick: mature now, end the episode, a changed p."""
-        ...
+__all__ = ["Parent"]

@@ -1,0 +1,98 @@
+"""Agents at tick 0: fresh weights, a first episode, nothing known."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from agent import dataset, familiarity
+from agent.config import Config
+from agent.policy import Network, network
+from agent.state import AgentState, Asked, Clip, Learner, Recorder, Report, Ring
+from envs.gridworld import Gridworld, WorldState
+from envs.rng import Keys
+
+
+def init(world: Gridworld, config: Config, keys: Keys) -> AgentState:
+    """Agents at tick 0, one a trial of `keys`: weights and first episode are drawn from them."""
+    trials, device = len(keys.seed), keys.seed.device
+    brain = network_of(world)
+
+    def zeros(*shape: int, dtype: torch.dtype = torch.int64) -> Tensor:
+        return torch.zeros(trials, *shape, dtype=dtype, device=device)
+
+    start = world.reset(keys, zeros())
+    return AgentState(
+        keys=keys,
+        world=start,
+        maturity=zeros() + 1,
+        answered=zeros(),
+        familiarity=zeros(familiarity.places(len(world.legend))),
+        waiting=zeros(dtype=torch.bool),
+        refused=zeros(4, dtype=torch.bool),
+        x=dataset.empty(trials, world.height, world.width, device),
+        recorder=_recorder(world, config.stages, trials, device),
+        learner=_learner(brain, config, keys),
+        report=no_report(start, getattr(torch, config.dtype)),
+    )
+
+
+def _learner(brain: Network, config: Config, keys: Keys) -> Learner:
+    live = brain.start(keys, getattr(torch, config.dtype))
+    return Learner(
+        live=live,
+        first=torch.zeros_like(live),
+        second=torch.zeros_like(live),
+        steps=torch.zeros_like(keys.tick),
+        elders=live.new_zeros(config.stages - 1, *live.shape),
+    )
+
+
+def _recorder(world: Gridworld, length: int, trials: int, device: torch.device) -> Recorder:
+    def zeros(*shape: int, dtype: torch.dtype = torch.int64) -> Tensor:
+        return torch.zeros(trials, *shape, dtype=dtype, device=device)
+
+    byte, flag = torch.int8, torch.bool
+    board = (length + 1, world.height, world.width)
+    clip = Clip(
+        ground=zeros(*board, dtype=torch.uint8),
+        agent=zeros(length + 1, 2, dtype=byte),
+        box=zeros(length + 1, 2, dtype=byte),
+        action=zeros(length, dtype=byte),
+    )
+    ring = Ring(
+        ground=zeros(2, 16, *board, dtype=torch.uint8),
+        agent=zeros(2, 16, length + 1, 2, dtype=byte),
+        box=zeros(2, 16, length + 1, 2, dtype=byte),
+        action=zeros(2, 16, length, dtype=byte),
+        length=zeros(2, 16, dtype=byte),
+        level=zeros(2, 16),
+        tick=zeros(2, 16),
+        first=zeros(2, 16),
+        digest=zeros(2, 16),
+        here=zeros(2, 16, dtype=flag),
+        open=zeros(2, 16, dtype=flag),
+        count=zeros(2),
+    )
+    asked = Asked(pair=zeros(16), compared=zeros(16), count=zeros())
+    return Recorder(running=zeros(dtype=flag), turn=zeros(), step=zeros(), clip=clip, ring=ring, asked=asked)
+
+
+def no_report(world: WorldState, dtype: torch.dtype) -> Report:
+    """The report of a tick in which nothing has happened yet."""
+    nothing = torch.zeros_like(world.over)
+    number = torch.zeros_like(world.t, dtype=dtype)
+    return Report(
+        before=world,
+        action=torch.zeros_like(world.t),
+        moved=nothing,
+        trained=nothing,
+        loss=number,
+        entropy_global=number,
+        entropy_local=number,
+    )
+
+
+def network_of(world: Gridworld) -> Network:
+    """The policy's architecture for a world (Sec. 3.1.1)."""
+    return network(world.height, world.width, len(world.legend))

@@ -1,0 +1,126 @@
+"""Guidance: in unfamiliar surroundings the agent pauses and asks before it moves (Sec. 2.1)."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Bool, Float, Int64, UInt8
+from torch import Tensor
+
+from agent import dataset, familiarity
+from agent.config import Config
+from agent.dataset import Entry
+from agent.query import Answer, Choice, Kind, Query
+from agent.state import AgentState
+from envs.gridworld import Gridworld, WorldState, local_state
+from envs.rng import Stream, gumbel
+from envs.struct import Struct
+
+NO_ACTION = -1
+
+
+class View(Struct):
+    """What a trial sees and would do now; the policy does not change between asking and acting."""
+
+    observation: UInt8[Tensor, "N H W"]
+    near: UInt8[Tensor, "N 4"]
+    logits: Float[Tensor, "N 4"]
+    steering: Bool[Tensor, "N"]  # not frozen: what it does makes a difference
+    watched: Bool[Tensor, "N"]  # steering, and a supervisor is present: only then may it ask (Sec. 3.2.5)
+
+
+class Heard(Struct):
+    """What the answers of this tick mean for the pause."""
+
+    approved: Int64[Tensor, "N"]  # the action to perform, or NO_ACTION
+    redraw: Bool[Tensor, "N"]  # *neither*: ask about other actions in this same tick
+
+
+def hear(config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Heard]:
+    """Answers enter X (Eq. 1, 2); guidance approves an action, or refuses both."""
+    query, choice = answer.query, answer.choice
+    guided = (query.kind == Kind.GUIDANCE) & (choice != Choice.NONE)
+    reviewed = (query.kind == Kind.PREFERENCE) & (choice != Choice.NONE)
+    state = state.replace(
+        x=_store(config, state, answer),
+        answered=state.answered + (guided | (reviewed & (query.maturity == state.maturity))),
+    )
+    return _resolve(state, query, choice, guided & state.waiting)
+
+
+def _store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset:
+    query, choice = answer.query, answer.choice
+    first = query.observation[:, 0, 0]
+    learnt = (query.kind != Kind.NONE) & (choice != Choice.NONE) & (choice != Choice.NEITHER)
+    if not bool(learnt.any()):
+        return state.x
+    trained = query.maturity == state.maturity if config.own_length else learnt
+    entry = Entry(s0=first, near=local_state(first, query.agent[:, 0, 0]), a0=query.action[:, :, 0], mu=answer.mu)
+    return dataset.add(state.x, entry, learnt, trained)
+
+
+def _resolve(state: AgentState, query: Query, choice: Tensor, guided: Tensor) -> tuple[AgentState, Heard]:
+    left, right = query.action[:, 0, 0], query.action[:, 1, 0]
+    coin = state.keys.uniform(Stream.EITHER) < 0.5
+    leftward = (choice == Choice.LEFT) | ((choice == Choice.EITHER) & coin)
+    refusing = guided & (choice == Choice.NEITHER)
+    approving = guided & ~refusing
+    both = torch.nn.functional.one_hot(query.action[:, :, 0], 4).sum(1) > 0
+    refused = (state.refused | (refusing[:, None] & both)) & ~approving[:, None]
+    approved = torch.where(approving, torch.where(leftward, left, right), NO_ACTION)
+    state = state.replace(waiting=state.waiting & ~approving, refused=refused)
+    return state, Heard(approved=approved, redraw=refusing & ~refused.all(1))
+
+
+def ask(
+    world: Gridworld, config: Config, state: AgentState, view: View, heard: Heard, query: Query
+) -> tuple[AgentState, Query]:
+    """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi; redraw after *neither*."""
+    codes = len(world.legend)
+    where = familiarity.place(view.near, codes)
+    f = state.familiarity.gather(1, where[:, None]).squeeze(1)
+    pausing = state.keys.uniform(Stream.ASK) < familiarity.ask_chance(f, config.p_guid)
+    pausing &= view.watched & ~state.waiting & (heard.approved == NO_ACTION)
+    asking = pausing | heard.redraw
+    if not bool(asking.any()):
+        return state, query
+    state = state.replace(
+        familiarity=familiarity.count(state.familiarity, where, asking),
+        waiting=state.waiting | asking,
+    )
+    return state, _candidates(world, state, view, asking, query)
+
+
+def _candidates(world: Gridworld, state: AgentState, view: View, asking: Tensor, query: Query) -> Query:
+    """The two moves as clips of length 1: where the agent stands, and the forecast of each move."""
+    noise = gumbel(state.keys.uniform(Stream.CANDIDATES, 4))
+    perturbed = (view.logits.double() + noise).masked_fill(state.refused, -torch.inf)
+    pair = perturbed.topk(2, dim=1).indices
+    sides = torch.where(state.keys.uniform(Stream.SIDES)[:, None] < 0.5, pair, pair.flip(1))
+    now = [state.world, state.world]
+    then = [world.forecast(state.world, sides[:, side]) for side in (0, 1)]
+    asked = query.replace(
+        kind=torch.full_like(query.kind, Kind.GUIDANCE),
+        maturity=torch.ones_like(query.maturity),
+        level=state.world.level,
+        action=_first(query.action, sides),
+        length=torch.ones_like(query.length),
+        **_frames(world, query, now, then),
+    )
+    return asked.where(asking, query)
+
+
+def _first(action: Tensor, sides: Tensor) -> Tensor:
+    action = torch.zeros_like(action)
+    action[:, :, 0] = sides
+    return action
+
+
+def _frames(world: Gridworld, query: Query, now: list[WorldState], then: list[WorldState]) -> dict[str, Tensor]:
+    ground, agent, box = map(torch.zeros_like, (query.ground, query.agent, query.box))
+    for time, states in enumerate((now, then)):
+        ground[:, :, time] = torch.stack([state.board for state in states], 1)
+        agent[:, :, time] = torch.stack([state.agent for state in states], 1)
+        box[:, :, time] = torch.stack([state.box for state in states], 1)
+    observation = torch.zeros_like(query.observation)
+    observation[:, :, :2] = world.observe(ground[:, :, :2], agent[:, :, :2], box[:, :, :2])
+    return {"ground": ground, "agent": agent, "box": box, "observation": observation}

@@ -1,0 +1,126 @@
+"""Direct policy learning: pi is trained as a predictor of the parent's preferred actions (Sec. 2.3, Eq. 2)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, Int64, UInt8
+from torch import Tensor
+
+from agent.config import Config
+from agent.dataset import Dataset
+from agent.policy import Affine, Heads, Network
+from agent.state import AgentState, Learner
+from envs.rng import Keys, Stream
+
+BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam's default parameters (Sec. 3.1.2)
+
+
+class Rows(NamedTuple):
+    """The rows of X in one gradient step, trimmed to what the fullest trial needs."""
+
+    s0: UInt8[Tensor, "N S H W"]
+    near: UInt8[Tensor, "N S 4"]
+    at: Int64[Tensor, "N R"]
+    a0: Int64[Tensor, "N R 2"]
+    mu: Float[Tensor, "N R 2"]
+
+    @property
+    def weight(self) -> Float[Tensor, "N S"]:
+        """How many entries start at each state."""
+        entries = self.mu.sum(-1)
+        return entries.new_zeros(self.near.shape[:2]).scatter_add_(1, self.at, entries)
+
+
+class Terms(NamedTuple):
+    """The terms of the objective, each summed over the entries of X."""
+
+    loss: Float[Tensor, "N"]
+    entropy_global: Float[Tensor, "N"]
+    entropy_local: Float[Tensor, "N"]
+
+
+def train(network: Network, config: Config, state: AgentState, acted: Bool[Tensor, "N"]) -> AgentState:
+    """With probability p_train, `gradient_steps` steps of Adam on X. Updates the learner in place."""
+    coin = state.keys.uniform(Stream.TRAIN) < config.p_train
+    training = acted & coin & (state.x.rows > 0)
+    if not bool(training.any()):
+        return state
+    for step in range(config.gradient_steps):
+        rows = choose(config, state.x, state.keys, step)
+        terms, gradient = differentiate(network, config, state.learner.live, rows)
+        adam(state.learner, gradient, training, config.learning_rate)
+    entries = rows.mu.sum((-1, -2)).clamp_min(1)
+    return state.replace(
+        report=state.report.replace(
+            trained=training,
+            loss=terms.loss / entries,
+            entropy_global=terms.entropy_global / entries,
+            entropy_local=terms.entropy_local / entries,
+        )
+    )
+
+
+def choose(config: Config, x: Dataset, keys: Keys, step: int) -> Rows:
+    """All rows of X, or `batch` of them drawn by key without replacement."""
+    rows, states = max(1, int(x.rows.max())), max(1, int(x.states.max()))
+    at, a0, mu = x.at[:, :rows], x.a0[:, :rows], x.mu[:, :rows]
+    if config.batch is None or rows <= config.batch:
+        return Rows(x.s0[:, :states], x.near[:, :states], at, a0, mu)
+    place = torch.arange(rows, device=at.device)
+    noise = keys.at(Stream.BATCH, 65536 * step + place).masked_fill(place >= x.rows[:, None], 2.0)
+    picked = noise.topk(config.batch, dim=1, largest=False).indices
+    both = picked[:, :, None].expand(-1, -1, 2)
+    state = at.gather(1, picked)
+    every = torch.arange(len(at), device=at.device)[:, None]
+    own = torch.arange(config.batch, device=at.device).expand_as(state)
+    return Rows(x.s0[every, state], x.near[every, state], own, a0.gather(1, both), mu.gather(1, both))
+
+
+def differentiate(
+    network: Network, config: Config, parameters: Float[Tensor, "N P"], rows: Rows
+) -> tuple[Terms, Float[Tensor, "N P"]]:
+    """The terms of the objective and its gradient, each trial's by itself."""
+    layers = [Affine(*(part.detach().requires_grad_() for part in layer)) for layer in network.unpack(parameters)]
+    with torch.enable_grad():
+        terms = objective(network.heads(layers, rows.s0, rows.near), rows)
+        value = terms.loss - config.lambda_global * terms.entropy_global - config.lambda_local * terms.entropy_local
+        parts = torch.autograd.grad(value.sum(), [part for layer in layers for part in layer])
+    return Terms(*(term.detach() for term in terms)), torch.cat([part.flatten(1) for part in parts], dim=1)
+
+
+def objective(heads: Heads, rows: Rows) -> Terms:
+    """Eq. (2) and the two entropies, at the first states of the entries.
+
+    With logits z, pi(a_i) / (pi(a_0) + pi(a_1)) is sigmoid(z[a_i] - z[a_other]), and -log of it a softplus.
+    """
+    mu = rows.mu.to(heads.local.dtype)
+    z = heads.logits.gather(1, rows.at[:, :, None].expand(-1, -1, 4)).gather(2, rows.a0)
+    margin = z[..., 0] - z[..., 1]
+    loss = mu[..., 0] * F.softplus(-margin) + mu[..., 1] * F.softplus(margin)
+    weight = rows.weight.to(heads.local.dtype)
+    return Terms(
+        loss=loss.sum(-1),
+        entropy_global=(weight * entropy(heads.overall)).sum(-1),
+        entropy_local=(weight * entropy(heads.local)).sum(-1),
+    )
+
+
+def entropy(logits: Float[Tensor, "N S 4"]) -> Float[Tensor, "N S"]:
+    """The entropy of softmax(logits), in nats."""
+    logs = logits.log_softmax(-1)
+    return -(logs.exp() * logs).sum(-1)
+
+
+def adam(learner: Learner, gradient: Float[Tensor, "N P"], training: Bool[Tensor, "N"], rate: float) -> None:
+    """One step of Adam (Kingma & Ba 2014) in the trials that train; nothing moves in the others. In place."""
+    learner.steps.add_(training)
+    on = training.to(gradient.dtype)[:, None]
+    t = learner.steps.clamp_min(1).to(torch.float64)[:, None]
+    learner.first.lerp_(gradient, on * (1 - BETA1))
+    learner.second.lerp_(gradient.square_(), on * (1 - BETA2))
+    size = (rate / (1 - BETA1**t)).to(gradient.dtype) * on
+    root = (1 - BETA2**t).sqrt().to(gradient.dtype)
+    learner.live.sub_(learner.second.sqrt().div_(root).add_(EPSILON).reciprocal_().mul_(learner.first).mul_(size))

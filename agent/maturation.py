@@ -1,0 +1,48 @@
+"""Maturation: from policies that look one step ahead to policies that look further (Sec. 2.4)."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Bool, Int64
+from torch import Tensor
+
+from agent import dataset, pairing
+from agent.config import Config
+from agent.state import AgentState, Learner
+
+
+def grow(config: Config, state: AgentState) -> AgentState:
+    """pi_T -> pi_{T+1} where the stage's budget of answered queries is spent."""
+    if config.mature_every is None:
+        return state
+    return mature(config, state, state.answered >= config.mature_every)
+
+
+def mature(config: Config, state: AgentState, ripe: Bool[Tensor, "N"]) -> AgentState:
+    """Freeze pi_T and go on with pi_{T+1}, its copy; the last stage never ends.
+
+    The running clip is dropped, the recorder emptied, and Adam begins anew.
+    """
+    ripe = ripe & (state.maturity < config.stages)
+    if not bool(ripe.any()):
+        return state
+    return state.replace(
+        learner=_freeze(state.learner, state.maturity, ripe),
+        maturity=state.maturity + ripe,
+        answered=state.answered.masked_fill(ripe, 0),
+        recorder=pairing.forget(state.recorder, ripe),
+        x=dataset.clear(state.x, ripe) if config.own_length else state.x,
+    )
+
+
+def _freeze(learner: Learner, maturity: Int64[Tensor, "N"], ripe: Bool[Tensor, "N"]) -> Learner:
+    trial = ripe.nonzero().squeeze(1)
+    elders = learner.elders.clone()
+    elders[maturity[trial] - 1, trial] = learner.live[trial]
+    return learner.replace(
+        elders=elders,
+        first=learner.first.masked_fill(ripe[:, None], 0),
+        second=learner.second.masked_fill(ripe[:, None], 0),
+        steps=learner.steps.masked_fill(ripe, 0),
+    )
+

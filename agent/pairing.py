@@ -1,0 +1,197 @@
+"""Pairs of recorded clips to ask a preference about (Sec. 2.2): one of each kind, same start, different first actions.
+
+Pairs are ordered by the completion of the later clip, then of the earlier, newest first. A clip's partners that are
+older than itself only ever grow fewer. So once it has none it is *closed* for good, and a search looks at open clips
+alone: over a run, every clip is closed at most once, and no search costs more as the recorder fills.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Bool, Int64
+from torch import Tensor
+
+from agent.config import Config
+from agent.digest import fingerprint, scramble, together, unordered
+from agent.guidance import View
+from agent.query import Kind, Query
+from agent.state import AgentState, Asked, Recorder, Ring
+from envs.gridworld import Gridworld
+from envs.rng import Stream
+
+CAPACITY = 4096  # clips of each kind that the recorder holds
+EXPLOIT, EXPLORE = 0, 1
+
+
+class Pair(NamedTuple):
+    """Places in the rings of the clips found, for some trials."""
+
+    trial: Int64[Tensor, "n"]
+    exploit: Int64[Tensor, "n"]
+    explore: Int64[Tensor, "n"]
+
+
+def store(
+    world: Gridworld, recorder: Recorder, complete: Bool[Tensor, "N"], level: Int64[Tensor, "N"], tick: Int64[Tensor, "N"]
+) -> Recorder:
+    """File finished clips with their kind's ring; the newest overwrites the oldest. The turn changes. In place."""
+    trial = complete.nonzero().squeeze(1)
+    kind = recorder.turn[trial]
+    ring = _room(recorder.ring)
+    place = ring.count[trial, kind] % CAPACITY
+    clip, length = recorder.clip.pick(trial), recorder.step[trial]
+    at = (trial, kind, place)
+    ring.ground[at], ring.agent[at], ring.box[at] = clip.ground, clip.agent, clip.box
+    ring.action[at], ring.length[at], ring.level[at] = clip.action, length.to(torch.int8), level[trial]
+    first = world.observe(clip.ground[:, 0], clip.agent[:, 0].long(), clip.box[:, 0].long())
+    ring.first[at] = fingerprint(first.flatten(1))
+    ring.digest[at] = digest(clip.ground, clip.agent, clip.box, clip.action, length, level[trial])
+    ring.tick[at], ring.here[at], ring.open[at] = tick[trial], True, True
+    ring.count[trial, kind] += 1
+    turn = torch.where(complete, 1 - recorder.turn, recorder.turn)
+    return recorder.replace(ring=ring, running=recorder.running & ~complete, turn=turn)
+
+
+def digest(ground: Tensor, agent: Tensor, box: Tensor, action: Tensor, length: Tensor, level: Tensor) -> Tensor:
+    """A clip's fingerprint: true frames, agent, box, actions, length, level. Leading axes [n]."""
+    parts = (ground, agent, box, action)
+    return together(*(fingerprint(part.flatten(1)) for part in parts), length.long(), level)
+
+
+def forget(recorder: Recorder, mask: Bool[Tensor, "N"]) -> Recorder:
+    """An empty recorder where `mask` holds; what was asked is remembered."""
+    ring = recorder.ring
+    keep = ~mask[:, None, None]
+    return recorder.replace(
+        running=recorder.running & ~mask,
+        turn=recorder.turn.masked_fill(mask, EXPLOIT),
+        ring=ring.replace(here=ring.here & keep, open=ring.open & keep, count=ring.count.masked_fill(mask[:, None], 0)),
+    )
+
+
+def pair(
+    world: Gridworld, config: Config, state: AgentState, view: View, steered: Bool[Tensor, "N"], query: Query
+) -> tuple[AgentState, Query]:
+    """After a step, with probability p_pref, ask about the newest pair. Remembers whatever this tick asks."""
+    trying = steered & view.watched & (state.keys.uniform(Stream.PREFER) < config.p_pref)
+    recorder = state.recorder
+    found = _search(config, recorder, trying)
+    if len(found.trial):
+        query = _ask(world, state, found, query)
+        recorder.ring.here[found.trial, EXPLOIT, found.exploit] = False
+        recorder.ring.here[found.trial, EXPLORE, found.explore] = False
+    recorder = recorder.replace(asked=_remember(recorder.asked, query))
+    return state.replace(recorder=recorder), query
+
+
+def _search(config: Config, recorder: Recorder, trying: Bool[Tensor, "N"]) -> Pair:
+    ring = recorder.ring
+    trial = (trying & (ring.here & ring.open).flatten(1).any(1)).nonzero().squeeze(1)
+    found: list[Tensor] = []
+    while len(trial):
+        capacity = ring.tick.shape[2]
+        candidate = (ring.here[trial] & ring.open[trial]).flatten(1)
+        newest = torch.where(candidate, ring.tick[trial].flatten(1), -1).max(1)
+        later, kind = newest.indices % capacity, newest.indices // capacity
+        partner = _partner(config, recorder, trial, kind, later)
+        paired = partner >= 0
+        ring.open[trial[~paired], kind[~paired], later[~paired]] = False
+        exploit, explore = torch.where(kind == EXPLOIT, later, partner), torch.where(kind == EXPLOIT, partner, later)
+        found.append(torch.stack((trial, exploit, explore))[:, paired])
+        trial = trial[~paired]
+        trial = trial[(ring.here[trial] & ring.open[trial]).flatten(1).any(1)]
+    every = torch.cat(found, dim=1) if found else torch.zeros(3, 0, dtype=torch.int64, device=trying.device)
+    return Pair(*every)
+
+
+def _partner(
+    config: Config, recorder: Recorder, trial: Int64[Tensor, "n"], kind: Int64[Tensor, "n"], later: Int64[Tensor, "n"]
+) -> Int64[Tensor, "n"]:
+    """The newest clip of the other kind that is older, starts alike, acts otherwise and is not known: its place, or -1."""
+    ring, other = recorder.ring, 1 - kind
+    tick = ring.tick[trial, other]
+    matches = ring.here[trial, other] & (ring.first[trial, other] == ring.first[trial, kind, later][:, None])
+    matches &= ring.action[trial, other, :, 0] != ring.action[trial, kind, later, 0][:, None]
+    matches &= tick < ring.tick[trial, kind, later][:, None]
+    if not config.recompare:
+        row, place = matches.nonzero(as_tuple=True)
+        word = unordered(ring.digest[trial[row], other[row], place], ring.digest[trial, kind, later][row])
+        matches[row, place] = ~(word[:, None] == recorder.asked.pair[trial[row]]).any(1)
+    newest = torch.where(matches, tick, -1).max(1)
+    return torch.where(newest.values >= 0, newest.indices, -1)
+
+
+def _ask(world: Gridworld, state: AgentState, found: Pair, query: Query) -> Query:
+    """The pair as a query; the exploitative clip is shown on the left by the toss of a coin."""
+    ring, trial = state.recorder.ring, found.trial
+    leftward = state.keys.uniform(Stream.PAIR_SIDES)[trial] < 0.5
+    kinds = torch.where(leftward[:, None], torch.tensor([EXPLOIT, EXPLORE]), torch.tensor([EXPLORE, EXPLOIT]))
+    places = torch.stack((found.exploit, found.explore), 1).gather(1, kinds)
+    at = (trial[:, None], kinds, places)
+    ground, agent, box = ring.ground[at], ring.agent[at].long(), ring.box[at].long()
+    frames = {"ground": ground, "agent": agent, "box": box, "observation": _observations(world, ground, agent, box, ring.length[at])}
+    parts = {
+        **frames,
+        "kind": torch.full_like(trial, Kind.PREFERENCE),
+        "action": ring.action[at].long(),
+        "length": ring.length[at].long(),
+        "maturity": state.maturity[trial],
+        "level": ring.level[trial, EXPLOIT, found.exploit],
+    }
+    return query.replace(**{name: getattr(query, name).index_copy(0, trial, part) for name, part in parts.items()})
+
+
+def _observations(world: Gridworld, ground: Tensor, agent: Tensor, box: Tensor, length: Tensor) -> Tensor:
+    """What the agent saw in each frame; zero beyond a clip's length, as everything there is."""
+    frame = torch.arange(ground.shape[2], device=ground.device)
+    within = frame <= length[:, :, None]
+    return world.observe(ground, agent, box) * within[..., None, None]
+
+
+def comparison(seen: Tensor, one: Tensor, other: Tensor, maturity: Tensor) -> Int64[Tensor, "..."]:
+    """One word for: these two first actions were compared in this state at this stage."""
+    return together(seen, (1 << one) + (1 << other), maturity)
+
+
+def _remember(asked: Asked, query: Query) -> Asked:
+    """Keep the digest of what is asked this tick, guidance too, and which actions it compares where. In place."""
+    trial = (query.kind != Kind.NONE).nonzero().squeeze(1)
+    if not len(trial):
+        return asked
+    asked, query = _more(asked), query.pick(trial)
+    place = asked.count[trial]
+    clips = [
+        digest(query.ground[:, i], query.agent[:, i], query.box[:, i], query.action[:, i], query.length[:, i], query.level)
+        for i in (0, 1)
+    ]
+    asked.pair[trial, place] = unordered(*clips)
+    seen, first = fingerprint(query.observation[:, 0, 0].flatten(1)), query.action[:, :, 0]
+    asked.compared[trial, place] = comparison(seen, first[:, 0], first[:, 1], query.maturity)
+    asked.count[trial] += 1
+    return asked
+
+
+def _more(asked: Asked) -> Asked:
+    size = asked.pair.shape[1]
+    if int(asked.count.max()) < size:
+        return asked
+    return asked.replace(pair=_widen(asked.pair, 1, 2 * size), compared=_widen(asked.compared, 1, 2 * size))
+
+
+def _room(ring: Ring) -> Ring:
+    """Twice the room, up to CAPACITY, where one more clip would not fit."""
+    size = ring.tick.shape[2]
+    if size == CAPACITY or int(ring.count.max()) < size:
+        return ring
+    room = min(2 * size, CAPACITY)
+    return ring.map(lambda _name, part, _axis: part if part.dim() == 2 else _widen(part, 2, room))
+
+
+def _widen(part: Tensor, axis: int, size: int) -> Tensor:
+    shape = list(part.shape)
+    shape[axis] = size
+    wide = part.new_zeros(shape)
+    wide.narrow(axis, 0, part.shape[axis]).copy_(part)
+    return wide

@@ -1,0 +1,99 @@
+"""PARENTING (Sec. 2): start reading here.
+
+The agent is a pure step over stacked trials; the parent is a mailbox outside it. `step` reads no reward, no clock, no
+file and no global seed. A run is a function of (config, seed, answers, the operator's events).
+
+`step` consumes its state: the buffers of policy, recorder, X and familiarity are updated in place, so that a tick costs
+what it changes. Whoever wants to keep an earlier state keeps `state.clone()`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import torch
+
+from agent import guidance, learning, maturation, pairing, recording
+from agent import query as queries
+from agent.birth import init, network_of, no_report
+from agent.config import Config
+from agent.events import Change, EndEpisode, Event, Mature
+from agent.guidance import View
+from agent.mailbox import Mailbox
+from agent.policy import Network
+from agent.query import Answer, Query
+from agent.state import AgentState
+from envs.gridworld import Gridworld, local_state
+
+__all__ = ["apply", "init", "live", "no_query", "step"]
+
+
+def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Query]:
+    """One tick of PARENTING for every trial (Sec. 2). Reads no reward, does no I/O. Consumes `state`."""
+    brain = network_of(world)
+    state = wake(world, state)
+    view = perceive(world, brain, state)
+    query = no_query(world, config, state)
+    state, heard = guidance.hear(config, state, answer)  # answers enter X; "neither": ask again         2.1
+    state, query = guidance.ask(world, config, state, view, heard, query)  # unfamiliar? pause and ask   2.1
+    state, steered = recording.act(world, brain, config, state, view, heard)  # the move, and clips of it   2.2, 2.4
+    state, query = pairing.pair(world, config, state, view, steered, query)  # a matching pair of clips  2.2
+    state = learning.train(brain, config, state, steered)  # gradient steps on X with p_train            2.3
+    return maturation.grow(config, state), query  # pi_T -> pi_{T+1}                                     2.4
+
+
+def live(
+    world: Gridworld, config: Config, state: AgentState, parent: Mailbox
+) -> Iterator[tuple[AgentState, Query]]:
+    """A life: events, answers, a tick, a question. One item a tick; whoever iterates decides when the next may be."""
+    while True:
+        for event in parent.events(state):
+            state, config = apply(world, config, state, event)
+        state, query = step(world, config, state, parent.take(state))
+        parent.post(query)
+        yield state, query
+
+
+def apply(world: Gridworld, config: Config, state: AgentState, event: Event) -> tuple[AgentState, Config]:
+    """An operator's event, in every trial, before a tick."""
+    match event:
+        case Mature():
+            return maturation.mature(config, state, torch.ones_like(state.waiting)), config
+        case EndEpisode():
+            ended = state.world.replace(t=torch.full_like(state.world.t, world.time_limit))
+            calm = torch.zeros_like(state.waiting)
+            return state.replace(world=ended, waiting=calm, refused=torch.zeros_like(state.refused)), config
+        case Change(name=name, value=value):
+            return state, config.model_copy(update={name: value})
+
+
+def wake(world: Gridworld, state: AgentState) -> AgentState:
+    """The keys of a new tick; episodes that have ended start anew, each on its next level."""
+    state = state.replace(keys=state.keys.next(), report=no_report(state.world, state.learner.live.dtype))
+    ended = state.world.over | world.truncated(state.world)
+    if not bool(ended.any()):
+        return state
+    level = torch.where(ended, (state.world.level + 1) % len(world.levels), state.world.level)
+    recorder = state.recorder.replace(running=state.recorder.running & ~ended)
+    return state.replace(world=world.reset(state.keys, level).where(ended, state.world), recorder=recorder)
+
+
+def perceive(world: Gridworld, brain: Network, state: AgentState) -> View:
+    """What each trial sees, and its policy's logits there."""
+    now = state.world
+    observation = world.observe(now.board, now.agent, now.box)
+    near = local_state(observation, now.agent)
+    steering = ~world.frozen(now)
+    return View(
+        observation=observation,
+        near=near,
+        logits=brain.logits(state.learner.live, observation, near),
+        steering=steering,
+        watched=steering & world.supervised(now),
+    )
+
+
+def no_query(world: Gridworld, config: Config, state: AgentState) -> Query:
+    """No question in any trial, for clips of up to `stages` steps."""
+    return queries.empty(len(state.waiting), config.stages, world.height, world.width, state.waiting.device)
+

@@ -1,0 +1,178 @@
+"""The policy pi(a|s): a local and a global head, averaged, then softmax (Sec. 3.1.1). One network a trial, stacked.
+
+All parameters of a trial stand in one flat row, so that freezing, copying and Adam are a few operations on `[N, P]`.
+Convolutions are matrix products of patches (im2col), so that every layer is one `baddbmm` over the trials.
+"""
+
+from __future__ import annotations
+
+from functools import cache, cached_property
+from math import sqrt
+from typing import NamedTuple
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float, Int64, UInt8
+from torch import Tensor
+
+from envs.rng import Keys, Stream
+
+HIDDEN = 64
+FILTERS = (16, 32, 64, 64)
+ACTIONS = 4
+
+
+class Side(NamedTuple):
+    """What a convolution does to one side of the grid: cells of padding before and behind, and the length that is left."""
+
+    before: int
+    behind: int
+    length: int
+
+
+def side(length: int) -> Side:
+    """Longer than 3 shrinks by 2; 3 shrinks to 2 (one cell behind); 2 or less keeps its size (ours, Sec. 3.1.1)."""
+    if length > 3:
+        return Side(0, 0, length - 2)
+    return Side(0, 1, 2) if length == 3 else Side(1, 1, length)
+
+
+class Layer(NamedTuple):
+    """One matrix of weights `[rows, columns]` and its biases, at `start` of the flat row; conv layers know their sides."""
+
+    rows: int
+    columns: int
+    start: int
+    sides: tuple[Side, Side] | None = None
+
+    @property
+    def bias(self) -> int:
+        """Where the biases begin."""
+        return self.start + self.rows * self.columns
+
+    @property
+    def end(self) -> int:
+        """Where the layer ends."""
+        return self.bias + self.columns
+
+    @property
+    def fans(self) -> tuple[int, int]:
+        """Numbers of inputs and outputs as Glorot initialisation counts them."""
+        return (self.rows, 9 * self.columns) if self.sides else (self.rows, self.columns)
+
+
+class Heads(NamedTuple):
+    """The logits of both heads before they are averaged."""
+
+    local: Float[Tensor, "N S 4"]
+    overall: Float[Tensor, "N S 4"]  # "global" is a keyword
+
+    @property
+    def logits(self) -> Float[Tensor, "N S 4"]:
+        """The logits of pi: the mean of the two heads."""
+        return (self.local + self.overall) / 2
+
+
+class Affine(NamedTuple):
+    """One layer's weights and biases, stacked over the trials."""
+
+    weight: Float[Tensor, "N rows columns"]
+    bias: Float[Tensor, "N 1 columns"]
+
+    def __call__(self, x: Float[Tensor, "N B rows"]) -> Float[Tensor, "N B columns"]:
+        """Every trial's inputs through its own layer."""
+        return torch.baddbmm(self.bias, x, self.weight)
+
+
+class Network:
+    """The architecture for boards of `height` x `width` with `codes` kinds of things. It holds no weights."""
+
+    def __init__(self, height: int, width: int, codes: int) -> None:
+        """Lay the layers out: local dense and out, convolutions, global dense and out."""
+        self.height, self.width, self.codes = height, width, codes
+        self.layers: list[Layer] = []
+        self._add(ACTIONS * codes, HIDDEN)
+        self._add(HIDDEN, ACTIONS)
+        flat = self._add_convolutions()
+        self._add(flat, HIDDEN)
+        self._add(HIDDEN, ACTIONS)
+        self.size = self.layers[-1].end
+
+    def _add(self, rows: int, columns: int, sides: tuple[Side, Side] | None = None) -> None:
+        self.layers.append(Layer(rows, columns, self.layers[-1].end if self.layers else 0, sides))
+
+    def _add_convolutions(self) -> int:
+        height, width, channels = self.height, self.width, self.codes
+        for filters in FILTERS:
+            if height <= 2 and width <= 2:
+                break
+            sides = side(height), side(width)
+            self._add(9 * channels, filters, sides)
+            height, width, channels = sides[0].length, sides[1].length, filters
+        return height * width * channels
+
+    @cached_property
+    def convolutions(self) -> list[Layer]:
+        """The layers that are convolutions, in order."""
+        return [layer for layer in self.layers if layer.sides]
+
+    def start(self, keys: Keys, dtype: torch.dtype) -> Float[Tensor, "N P"]:
+        """Glorot uniform weights and zero biases, drawn from the trials' keys (ours: TensorFlow 1.12's default)."""
+        parameters = torch.zeros(keys.seed.shape[0], self.size, dtype=dtype, device=keys.seed.device)
+        for number, layer in enumerate(self.layers):
+            bound = sqrt(6 / sum(layer.fans))
+            drawn = (2 * keys.uniform(Stream.WEIGHTS + number, layer.rows, layer.columns) - 1) * bound
+            if layer.sides:  # drawn as (channel, row, column), kept as (row, column, channel): patches are copied in runs
+                drawn = drawn.unflatten(1, (-1, 9)).transpose(1, 2).flatten(1, 2)
+            parameters[:, layer.start : layer.bias] = drawn.flatten(1).to(dtype)
+        return parameters
+
+    def unpack(self, parameters: Float[Tensor, "N P"]) -> list[Affine]:
+        """The layers' weights and biases, as views of the flat rows."""
+        return [
+            Affine(
+                parameters[:, layer.start : layer.bias].view(-1, layer.rows, layer.columns),
+                parameters[:, layer.bias : layer.end].unsqueeze(1),
+            )
+            for layer in self.layers
+        ]
+
+    def heads(self, layers: list[Affine], seen: UInt8[Tensor, "N S H W"], near: UInt8[Tensor, "N S 4"]) -> Heads:
+        """Both heads' logits in S states a trial: `seen` the observations, `near` their local states l(s)."""
+        local_in, local_out, *convolutions, dense, out = layers
+        x = F.one_hot(near.long(), self.codes).to(out.weight.dtype).flatten(2)
+        local = local_out(local_in(x).relu())
+        y = F.one_hot(seen.long(), self.codes).to(out.weight.dtype)
+        for layer, affine in zip(self.convolutions, convolutions, strict=True):
+            assert layer.sides
+            patches = _patches(y, layer.sides)
+            y = affine(patches.flatten(1, 3)).relu().view(*patches.shape[:4], layer.columns)
+        return Heads(local, out(dense(y.flatten(2)).relu()))
+
+    def logits(
+        self, parameters: Float[Tensor, "N P"], seen: UInt8[Tensor, "N H W"], near: UInt8[Tensor, "N 4"]
+    ) -> Float[Tensor, "N 4"]:
+        """The logits of pi in one state a trial."""
+        with torch.no_grad():
+            return self.heads(self.unpack(parameters), seen.unsqueeze(1), near.unsqueeze(1)).logits.squeeze(1)
+
+
+@cache
+def network(height: int, width: int, codes: int) -> Network:
+    """The one network for this size of board and legend."""
+    return Network(height, width, codes)
+
+
+def _patches(x: Float[Tensor, "N S H W C"], sides: tuple[Side, Side]) -> Float[Tensor, "N S H2 W2 9C"]:
+    """The 3 x 3 surroundings of every place, one after the other: what a convolution multiplies with its weights."""
+    tall, wide = sides
+    if tall.before or tall.behind or wide.before or wide.behind:
+        x = F.pad(x, (0, 0, wide.before, wide.behind, tall.before, tall.behind))
+    shifts = [x[:, :, i : i + tall.length, j : j + wide.length] for i in range(3) for j in range(3)]
+    return torch.cat(shifts, dim=-1)
+
+
+def draw(logits: Float[Tensor, "N 4"], noise: Float[Tensor, "N 4"]) -> Int64[Tensor, "N"]:
+    """An action drawn from pi = softmax(logits), given Gumbel noise. Works where the policy has saturated, too."""
+    return (logits.double() + noise).argmax(-1)
+

@@ -1,0 +1,124 @@
+"""Recording: how the agent acts, and which clips of it it keeps (Sec. 2.2 and 2.4, Eq. 3 to 6).
+
+Which finished clips make a pair is the business of `agent.pairing`.
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Bool, Float, Int64
+from torch import Tensor
+
+from agent import pairing
+from agent.config import Config
+from agent.digest import fingerprint
+from agent.guidance import NO_ACTION, Heard, View
+from agent.pairing import EXPLORE, comparison
+from agent.policy import Network, draw
+from agent.state import AgentState, Clip, Recorder
+from envs.gridworld import Gridworld, WorldState
+from envs.rng import Stream, gumbel
+
+
+def act(
+    world: Gridworld, network: Network, config: Config, state: AgentState, view: View, heard: Heard
+) -> tuple[AgentState, Bool[Tensor, "N"]]:
+    """Perform the approved action, the recording's next one, or one drawn from pi_T. Says which trials steered."""
+    moving = ~state.waiting
+    recorder, begun = _begin(config, world, state, view, heard)
+    action = _action(network, config, state.replace(recorder=recorder), view, heard, begun)
+    before = state.world
+    after = world.step(before, action, state.keys).where(moving, before)
+    recorder = _record(world, state, recorder, action, after)
+    report = state.report.replace(before=before, action=action, moved=moving)
+    return state.replace(world=after, recorder=recorder, report=report), moving & view.steering
+
+
+def _begin(
+    config: Config, world: Gridworld, state: AgentState, view: View, heard: Heard
+) -> tuple[Recorder, Int64[Tensor, "N"]]:
+    """Drop clips that a pause or an absence broke, and begin new ones; with the first actions of those that begin."""
+    recorder, keys = state.recorder, state.keys
+    running = recorder.running & ~state.waiting & view.watched
+    idle = view.watched & ~state.waiting & ~running & (heard.approved == NO_ACTION)
+    fits = world.time_limit - state.world.t >= state.maturity
+    wanted = idle & fits & (keys.uniform(Stream.RECORD) < config.p_rec)
+    best = view.logits.argmax(1)
+    permitted = _permitted(config, state, view, best)
+    noise = gumbel(keys.uniform(Stream.EXPLORE, 4)).masked_fill(~permitted, -torch.inf)
+    exploring = recorder.turn == EXPLORE
+    begins = wanted & (~exploring | permitted.any(1))
+    first = torch.where(exploring, draw(view.logits, noise), best)
+    recorder = recorder.replace(running=running | begins, step=recorder.step.masked_fill(begins, 0))
+    return recorder, torch.where(begins, first, NO_ACTION)
+
+
+def _permitted(
+    config: Config, state: AgentState, view: View, best: Int64[Tensor, "N"]
+) -> Bool[Tensor, "N 4"]:
+    """The first actions of an exploratory clip: not the argmax (Eq. 4), nor compared with it here at this stage."""
+    actions = torch.arange(4, device=best.device)
+    permitted = actions != best[:, None]
+    if config.recompare:
+        return permitted
+    seen = fingerprint(view.observation.flatten(1))[:, None]
+    words = comparison(seen, actions, best[:, None], state.maturity[:, None])
+    asked = state.recorder.asked
+    return permitted & ~(words[:, :, None] == asked.compared[:, None, :]).any(2)
+
+
+def _action(
+    network: Network, config: Config, state: AgentState, view: View, heard: Heard, begun: Int64[Tensor, "N"]
+) -> Int64[Tensor, "N"]:
+    drawn = draw(view.logits, gumbel(state.keys.uniform(Stream.ACT, 4)))
+    action = torch.where(heard.approved != NO_ACTION, heard.approved, drawn)
+    action = torch.where(begun != NO_ACTION, begun, action)
+    if config.stages == 1:
+        return action
+    # Eq. (5), (6): move t of a clip is the argmax of pi_{T-t}, so that the last is always pi_1's
+    trial = (state.recorder.running & (state.recorder.step > 0)).nonzero().squeeze(1)
+    if not len(trial):
+        return action
+    age = (state.maturity - state.recorder.step)[trial]
+    logits = network.logits(state.learner.elders[age - 1, trial], view.observation[trial], view.near[trial])
+    return action.index_put((trial,), logits.argmax(1))
+
+
+def _record(
+    world: Gridworld, state: AgentState, recorder: Recorder, action: Int64[Tensor, "N"], after: WorldState
+) -> Recorder:
+    """Write this step into the running clips; file those that are complete, by length or by an early end."""
+    trial = recorder.running.nonzero().squeeze(1)
+    if not len(trial):
+        return recorder
+    step = recorder.step[trial]
+    _write(recorder.clip, trial, step, state.world, action, after)
+    ended = after.over | world.frozen(after)
+    complete = recorder.running & (ended | (recorder.step + 1 >= state.maturity))
+    recorder = recorder.replace(step=recorder.step + recorder.running)
+    if not bool(complete.any()):
+        return recorder
+    return pairing.store(world, recorder, complete, state.world.level, state.keys.tick)
+
+
+def _write(
+    clip: Clip,
+    trial: Int64[Tensor, "n"],
+    step: Int64[Tensor, "n"],
+    before: WorldState,
+    action: Int64[Tensor, "N"],
+    after: WorldState,
+) -> None:
+    first = step == 0
+    fresh = trial[first]
+    for part in (clip.ground, clip.agent, clip.box, clip.action):
+        part[fresh] = 0  # what lies beyond a clip's length is zero, whatever was recorded before
+    _frame(clip, fresh, step[first], before)
+    clip.action[trial, step] = action[trial].to(torch.int8)
+    _frame(clip, trial, step + 1, after)
+
+
+def _frame(clip: Clip, trial: Int64[Tensor, "n"], place: Int64[Tensor, "n"], world: WorldState) -> None:
+    clip.ground[trial, place] = world.board[trial]
+    clip.agent[trial, place] = world.agent[trial].to(torch.int8)
+    clip.box[trial, place] = world.box[trial].to(torch.int8)

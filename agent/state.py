@@ -1,0 +1,102 @@
+"""All that an agent is between two ticks. Checkpoints hold every field but the report."""
+
+from __future__ import annotations
+
+from jaxtyping import Bool, Float, Int8, Int64, UInt8
+from torch import Tensor
+
+from agent.dataset import Dataset
+from envs.gridworld import WorldState
+from envs.rng import Keys
+from envs.struct import Struct
+
+
+class Learner(Struct):
+    """The policy that trains, pi_T, and Adam's state. `elders` are the frozen pi_1 .. pi_{T-1} (Sec. 2.4)."""
+
+    live: Float[Tensor, "N P"]
+    first: Float[Tensor, "N P"]  # Adam's first moments
+    second: Float[Tensor, "N P"]  # Adam's second moments
+    steps: Int64[Tensor, "N"]  # gradient steps of this stage
+    elders: Float[Tensor, "M N P"]
+
+
+class Clip(Struct):
+    """The clip that is being recorded."""
+
+    ground: UInt8[Tensor, "N T1 H W"]
+    agent: Int8[Tensor, "N T1 2"]
+    box: Int8[Tensor, "N T1 2"]
+    action: Int8[Tensor, "N T"]
+
+
+class Ring(Struct):
+    """Finished clips of both kinds; the newest overwrite the oldest."""
+
+    ground: UInt8[Tensor, "N 2 C T1 H W"]
+    agent: Int8[Tensor, "N 2 C T1 2"]
+    box: Int8[Tensor, "N 2 C T1 2"]
+    action: Int8[Tensor, "N 2 C T"]
+    length: Int8[Tensor, "N 2 C"]
+    level: Int64[Tensor, "N 2 C"]
+    tick: Int64[Tensor, "N 2 C"]  # when the clip was completed
+    first: Int64[Tensor, "N 2 C"]  # fingerprint of the first observation
+    digest: Int64[Tensor, "N 2 C"]  # fingerprint of the whole clip
+    here: Bool[Tensor, "N 2 C"]  # stored, and not asked about yet
+    open: Bool[Tensor, "N 2 C"]  # may still have an older partner
+    count: Int64[Tensor, "N 2"]  # clips ever stored
+
+
+class Asked(Struct):
+    """What was compared before: one word a query for the whole pair, one for (state, first actions, stage)."""
+
+    pair: Int64[Tensor, "N Q"]
+    compared: Int64[Tensor, "N Q"]
+    count: Int64[Tensor, "N"]
+
+
+class Recorder(Struct):
+    """The running clip, and a ring of finished clips of each kind: 0 exploitative, 1 exploratory (Sec. 2.2).
+
+    Only truth is stored; an observation is a function of it. `T1` is T + 1, for the longest clips of the run.
+    """
+
+    running: Bool[Tensor, "N"]
+    turn: Int64[Tensor, "N"]  # the kind of the running clip, or of the next one
+    step: Int64[Tensor, "N"]  # steps of the running clip
+    clip: Clip
+    ring: Ring
+    asked: Asked
+
+
+class Report(Struct):
+    """What the last tick did, for whoever watches. Nothing in the agent reads it and no checkpoint holds it."""
+
+    before: WorldState  # the world before the move
+    action: Int64[Tensor, "N"]
+    moved: Bool[Tensor, "N"]
+    trained: Bool[Tensor, "N"]
+    loss: Float[Tensor, "N"]  # Eq. (2) as it stood before the last gradient step, a mean over the entries in it
+    entropy_global: Float[Tensor, "N"]  # mean entropy of each head at the first states of the entries, in nats
+    entropy_local: Float[Tensor, "N"]
+
+
+class AgentState(Struct):
+    """One agent a trial."""
+
+    keys: Keys
+    world: WorldState
+    maturity: Int64[Tensor, "N"]  # the stage T
+    answered: Int64[Tensor, "N"]  # queries answered in this stage
+    familiarity: Int64[Tensor, "N L"]  # guidance queries made in each local state
+    waiting: Bool[Tensor, "N"]  # paused for guidance
+    refused: Bool[Tensor, "N 4"]  # actions refused in this pause
+    x: Dataset
+    recorder: Recorder
+    learner: Learner
+    report: Report
+
+    @property
+    def stuck(self) -> Bool[Tensor, "N"]:
+        """Paused, and every action refused: *no acceptable action*."""
+        return self.waiting & self.refused.all(1)
