@@ -1,1 +1,1 @@
-"""The paper's tables and figures, runnable."""
+"""The paper's tables and figures, and the plain raising of many agents that they are made of."""
