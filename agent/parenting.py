@@ -25,7 +25,7 @@ from agent.query import Answer, Query
 from agent.state import AgentState
 from envs.gridworld import Gridworld, local_state
 
-__all__ = ["apply", "init", "live", "no_query", "step"]
+__all__ = ["apply", "beat", "init", "live", "no_query", "step"]
 
 
 def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Query]:
@@ -42,16 +42,24 @@ def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) ->
     return maturation.grow(config, state), query  # pi_T -> pi_{T+1}                                     2.4
 
 
+def beat(
+    world: Gridworld, config: Config, state: AgentState, parent: Mailbox
+) -> tuple[AgentState, Config, Query]:
+    """One tick with its parent: the operator's events, an answer, a step, a question."""
+    for event in parent.events(state):
+        state, config = apply(world, config, state, event)
+    state, query = step(world, config, state, parent.take(state))
+    parent.post(query)
+    return state, config, query
+
+
 def live(
     world: Gridworld, config: Config, state: AgentState, parent: Mailbox
-) -> Iterator[tuple[AgentState, Query]]:
-    """A life: events, answers, a tick, a question. One item a tick; whoever iterates decides when the next may be."""
+) -> Iterator[tuple[AgentState, Config, Query]]:
+    """A life, one item a tick; whoever iterates decides when the next may be."""
     while True:
-        for event in parent.events(state):
-            state, config = apply(world, config, state, event)
-        state, query = step(world, config, state, parent.take(state))
-        parent.post(query)
-        yield state, query
+        state, config, query = beat(world, config, state, parent)
+        yield state, config, query
 
 
 def apply(world: Gridworld, config: Config, state: AgentState, event: Event) -> tuple[AgentState, Config]:

@@ -57,16 +57,23 @@ class Evaluation:
 
     def returns(self, parameters: Float64[Tensor, "N P"], level: int = 0) -> Float64[Tensor, "N"]:
         """The discounted return of the argmax policy's episode on one level, cut off at the time limit."""
-        trials = torch.arange(len(parameters), device=parameters.device)
-        at = self.starts[level].expand(len(trials))
-        total = torch.zeros(len(trials), dtype=torch.float64, device=parameters.device)
+        action = self.actions(parameters)
+        trial = torch.arange(len(action), device=action.device)
+        at = self.starts[level].expand(len(trial))
+        total = torch.zeros(len(trial), dtype=torch.float64, device=action.device)
         for t in range(self.world.time_limit):
-            if bool(self.model.over[at].all()):
-                break
-            action = self.brain.logits(parameters, self.seen[at], self.near[at]).argmax(1)
-            total += self.gamma**t * self.model.reward[at, action]
-            at = self.model.then[at, action]
+            move = action[trial, at]
+            total += self.gamma**t * self.model.reward[at, move]
+            at = self.model.then[at, move]
         return total
+
+    def actions(self, parameters: Float64[Tensor, "N P"]) -> Int64[Tensor, "N S"]:
+        """The argmax action of every policy in every state."""
+        layers = self.brain.unpack(parameters)
+        seen = self.seen.expand(len(parameters), *self.seen.shape)
+        with torch.no_grad():
+            heads = self.brain.heads(layers, seen, self.near.expand(len(parameters), *self.near.shape))
+        return heads.logits.argmax(-1)
 
     def best(self, level: int = 0) -> float:
         """The discounted return of a shortest safe path: the line that the agent's return is to reach."""

@@ -66,7 +66,9 @@ def post_query(db: Database, mine: Claim, tick: int, kind: str, maturity: int, c
     """
     with db.write() as session:
         run = held(session, mine)
-        known = session.scalars(select(Query.id).where(Query.run_id == run.id, Query.tick == tick)).one_or_none()
+        known = session.scalars(
+            select(Query.id).where(Query.run_id == run.id, Query.tick == tick)
+        ).one_or_none()
         if known is not None:
             return known
         query = Query(run_id=run.id, tick=tick, kind=kind, maturity=maturity, clips=clips, posted=db.clock())
@@ -74,6 +76,12 @@ def post_query(db: Database, mine: Claim, tick: int, kind: str, maturity: int, c
         session.add(query)
         session.flush()
         return query.id
+
+
+def asked_at(db: Database, run_id: int, tick: int) -> Query | None:
+    """What was asked at a tick, if anything: a replayed tick has to ask the same."""
+    with db.read() as session:
+        return session.scalars(select(Query).where(Query.run_id == run_id, Query.tick == tick)).one_or_none()
 
 
 def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
@@ -131,7 +139,9 @@ def withdraw(db: Database, mine: Claim, query_id: int) -> None:
     with db.write() as session:
         run = held(session, mine)
         session.execute(
-            update(Query).where(Query.id == query_id, Query.run_id == run.id, Query.status == "open").values(status="withdrawn")
+            update(Query)
+            .where(Query.id == query_id, Query.run_id == run.id, Query.status == "open")
+            .values(status="withdrawn")
         )
 
 
@@ -139,7 +149,9 @@ def record(db: Database, run_id: int) -> Sequence[Taken]:
     """Every answer that the agent heard, in the order in which it heard them: from this X is rebuilt at any time."""
     with db.read() as session:
         rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
-        rows = rows.where(Answer.run_id == run_id, Answer.applied_tick.is_not(None)).order_by(Answer.applied_tick)
+        rows = rows.where(Answer.run_id == run_id, Answer.applied_tick.is_not(None)).order_by(
+            Answer.applied_tick
+        )
         return [Taken(answer, query) for answer, query in session.execute(rows)]
 
 
@@ -170,9 +182,15 @@ def _pending(session: Session, run_id: int) -> Taken | None:
 
 
 def _watch(session: Session, run_id: int) -> Watch | None:
-    answered = select(func.count()).where(Query.run_id == run_id, Query.status == "answered").scalar_subquery()
-    events = select(func.count()).where(Event.run_id == run_id, Event.applied_tick.is_(None)).scalar_subquery()
-    row = session.execute(select(Run.status, Run.epoch, Run.actor, answered, events).where(Run.id == run_id)).one_or_none()
+    answered = (
+        select(func.count()).where(Query.run_id == run_id, Query.status == "answered").scalar_subquery()
+    )
+    events = (
+        select(func.count()).where(Event.run_id == run_id, Event.applied_tick.is_(None)).scalar_subquery()
+    )
+    row = session.execute(
+        select(Run.status, Run.epoch, Run.actor, answered, events).where(Run.id == run_id)
+    ).one_or_none()
     if row is None:
         return None
     opened = open_in(session, run_id)

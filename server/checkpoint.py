@@ -1,0 +1,80 @@
+"""An agent's whole state as bytes: tensors by name, read back without running any code."""
+
+from __future__ import annotations
+
+import io
+from typing import Any, NamedTuple, TypeVar
+
+import torch
+from torch import Tensor
+
+from agent import parenting
+from agent.config import Config
+from agent.state import AgentState
+from envs.gridworld import Gridworld
+from envs.rng import keys
+from envs.struct import Struct
+from server.errors import ServerError
+from server.tally import Tally, no_tally
+
+S = TypeVar("S", bound=Struct)
+
+REPORT = "report."
+"""Checkpoints leave the report out: it says what the last tick did, and nothing in the agent reads it."""
+
+
+class Diverged(ServerError):
+    """The record and the agent disagree; the run was stopped so that nothing is built on it."""
+
+
+class Saved(NamedTuple):
+    """What a checkpoint holds: the agent, what was counted, and the config as the operator's events left it."""
+
+    state: AgentState
+    tally: Tally
+    config: Config
+
+
+def versions() -> dict[str, Any]:
+    """What bits depend on beside the record: torch's build and its threads."""
+    return {"torch": str(torch.__version__), "threads": torch.get_num_threads()}
+
+
+def birth(world: Gridworld, config: Config, seed: int) -> Saved:
+    """A run at tick 0."""
+    return Saved(parenting.init(world, config, keys(seed, 1)), no_tally(), config)
+
+
+def pack(saved: Saved) -> bytes:
+    """A checkpoint's bytes."""
+    whole = {
+        "state": {name: part for name, part in saved.state.tensors().items() if not name.startswith(REPORT)},
+        "tally": saved.tally.tensors(),
+        "config": saved.config.model_dump_json(),
+        "versions": versions(),
+    }
+    out = io.BytesIO()
+    torch.save(whole, out)
+    return out.getvalue()
+
+
+def unpack(world: Gridworld, config: Config, blob: bytes) -> Saved:
+    """What the bytes hold.
+
+    Raises:
+        Diverged: other versions of torch or another number of threads wrote them: the bits would differ.
+        TypeError, KeyError: a piece is missing or has another shape than declared.
+    """
+    whole = torch.load(io.BytesIO(blob), weights_only=True)
+    if whole["versions"] != versions():
+        raise Diverged(f"This run was raised with {whole['versions']}; here it would go on with {versions()}.")
+    template = birth(world, config, 0)
+    return Saved(
+        state=_restore(template.state, whole["state"]).check(),
+        tally=_restore(template.tally, whole["tally"]).check(),
+        config=Config.model_validate_json(whole["config"]),
+    )
+
+
+def _restore(template: S, parts: dict[str, Tensor]) -> S:
+    return template.map(lambda name, old, _axis: old if name.startswith(REPORT) else parts[name])

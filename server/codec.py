@@ -1,0 +1,77 @@
+"""Queries between tensors and the database: frames as rows of glyphs, actions by name, readable by eye.
+
+What is written down is all that a query holds, so that reading it back gives the same tensors bit for bit.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from agent import query as queries
+from agent.query import Choice, Kind, Query
+from envs.gridworld import Gridworld
+
+ACTIONS = ("up", "down", "left", "right")
+SIDES = ("left", "right")
+KINDS = {"guidance": Kind.GUIDANCE, "preference": Kind.PREFERENCE}
+CHOICES = {"left": Choice.LEFT, "right": Choice.RIGHT, "either": Choice.EITHER, "neither": Choice.NEITHER}
+CHOICE_NAMES = {int(choice): name for name, choice in CHOICES.items()}
+
+
+def encode(world: Gridworld, query: Query) -> dict[str, Any]:
+    """The clips of a run's one query, as stored in `query.clips` (server.tables)."""
+    return {name: _clip(world, query, side) for side, name in enumerate(SIDES)}
+
+
+def kind_name(query: Query) -> str | None:
+    """The kind of a run's one query by its name; None where nothing is asked."""
+    kind = int(query.kind[0])
+    return None if kind == Kind.NONE else Kind(kind).name.lower()
+
+
+def decode(world: Gridworld, stages: int, kind: str, maturity: int, clips: dict[str, Any]) -> Query:
+    """The query whose clips these are, for a run whose longest clips have `stages` steps."""
+    query = queries.empty(1, stages, world.height, world.width)
+    query.kind[0], query.maturity[0] = KINDS[kind], maturity
+    for side, name in enumerate(SIDES):
+        _fill(world, query, side, clips[name])
+    return query
+
+
+def _clip(world: Gridworld, query: Query, side: int) -> dict[str, Any]:
+    length = int(query.length[0, side])
+    actions = [ACTIONS[code] for code in query.action[0, side, :length].tolist()]
+    frames = [_frame(world, query, side, place) for place in range(length + 1)]
+    return {"actions": actions, "length": length, "frames": frames}
+
+
+def _frame(world: Gridworld, query: Query, side: int, place: int) -> dict[str, Any]:
+    box = query.box[0, side, place].tolist()
+    return {
+        "ground": _rows(world.legend, query.ground[0, side, place]),
+        "observed": _rows(world.legend, query.observation[0, side, place]),
+        "agent": query.agent[0, side, place].tolist(),
+        "box": None if box[0] < 0 else box,
+    }
+
+
+def _fill(world: Gridworld, query: Query, side: int, clip: dict[str, Any]) -> None:
+    query.length[0, side] = clip["length"]
+    for place, action in enumerate(clip["actions"]):
+        query.action[0, side, place] = ACTIONS.index(action)
+    for place, frame in enumerate(clip["frames"]):
+        query.ground[0, side, place] = _codes(world.legend, frame["ground"])
+        query.observation[0, side, place] = _codes(world.legend, frame["observed"])
+        query.agent[0, side, place] = torch.tensor(frame["agent"])
+        query.box[0, side, place] = torch.tensor(frame["box"] or (-1, -1))
+
+
+def _rows(legend: str, board: Tensor) -> list[str]:
+    return ["".join(legend[code] for code in row) for row in board.tolist()]
+
+
+def _codes(legend: str, rows: list[str]) -> Tensor:
+    return torch.tensor([[legend.index(glyph) for glyph in row] for row in rows], dtype=torch.uint8)

@@ -1,0 +1,87 @@
+"""QueueParent: a parent behind the database. People answer in the browser; a script may answer in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+from pydantic import TypeAdapter
+
+from agent import query as queries
+from agent.config import Config
+from agent.events import Event
+from agent.query import Answer, Query
+from agent.state import AgentState
+from envs.gridworld import Gridworld
+from parents.scripted import Judgement
+from server import mailbox, queue
+from server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_name
+from server.db import Database
+from server.errors import Conflict
+from server.runs import Claim
+
+SCRIPT = "scripted"
+_EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
+
+
+class QueueParent:
+    """Answers and the operator's events come from rows, and queries go into rows. The tick names them all."""
+
+    def __init__(self, db: Database, mine: Claim, world: Gridworld, config: Config, asked: Callable[[], None]) -> None:
+        """A mailbox for the run of a claim; `asked` is called after a query was stored, so that pages wake."""
+        self.db, self.mine, self.world, self.asked = db, mine, world, asked
+        self.stages = config.stages
+        self.tick = 0
+        self.heard: Answer | None = None
+
+    def events(self, state: AgentState) -> Sequence[Event]:
+        """The operator's events that apply before the tick that comes."""
+        self.tick = int(state.keys.tick[0]) + 1
+        rows = mailbox.take_events(self.db, self.mine, self.tick)
+        return [_EVENTS.validate_python({"kind": row.kind, **row.payload}) for row in rows]
+
+    def take(self, state: AgentState) -> Answer:
+        """The answer to be heard in the tick that comes, or none."""
+        taken = mailbox.take_answer(self.db, self.mine, self.tick)
+        nothing = queries.empty(1, self.stages, self.world.height, self.world.width)
+        self.heard = queries.silence(nothing)
+        if taken is not None:
+            row = taken.query
+            query = decode(self.world, self.stages, row.kind, row.maturity, row.clips)
+            self.heard = Answer(query=query, choice=self.heard.choice + int(CHOICES[taken.answer.choice]))
+        return self.heard
+
+    def post(self, query: Query) -> None:
+        """Store what the agent asks in this tick; a tick that was lived before asks nothing twice."""
+        kind = kind_name(query)
+        if kind is not None:
+            clips, maturity = encode(self.world, query), int(query.maturity[0])
+            number = mailbox.post_query(self.db, self.mine, self.tick, kind, maturity, clips)
+            self.posted(number, query)
+            self.asked()
+
+    def posted(self, number: int, query: Query) -> None:
+        """A query of this id is stored: somebody will see it."""
+
+
+class ScriptedQueueParent(QueueParent):
+    """The scripted parent behind the same rows: it answers each query as soon as it is stored."""
+
+    def __init__(
+        self,
+        db: Database,
+        mine: Claim,
+        world: Gridworld,
+        config: Config,
+        asked: Callable[[], None],
+        judgement: Judgement,
+    ) -> None:
+        """A mailbox that is answered by what `judgement` thinks."""
+        super().__init__(db, mine, world, config, asked)
+        self.judgement = judgement
+
+    def posted(self, number: int, query: Query) -> None:
+        """Store the script's answer. A replayed tick stores the same again, which changes nothing."""
+        choice = CHOICE_NAMES[int(self.judgement.choose(query)[0])]
+        with suppress(Conflict):  # the operator has stopped the run meanwhile: the question was withdrawn
+            queue.answer(self.db, number, choice, SCRIPT, SCRIPT)

@@ -1,0 +1,144 @@
+"""One run in a worker's hands: its agent, its mailbox, its checkpoints and what is measured of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import structlog
+
+from agent import parenting
+from agent.config import Config
+from agent.query import Kind, Query
+from envs import registry
+from parents.evaluation import Evaluation
+from parents.scripted import Judgement
+from server import mailbox, record, runs
+from server.checkpoint import Diverged, Saved, birth, pack, unpack, versions
+from server.codec import encode, kind_name
+from server.db import Database
+from server.inbox import QueueParent, ScriptedQueueParent
+from server.mailbox import Watch
+from server.measure import measure
+from server.runs import Claim
+from server.tables import Run
+from server.tally import count
+
+log = structlog.get_logger()
+
+CHECKPOINT_SECONDS = 2.0
+"""A restart lives at most the ticks of this long a second time; they replay exactly."""
+METRIC_SECONDS = 1.0
+
+
+class Life:
+    """An agent between its birth, or its last checkpoint, and whatever ends it."""
+
+    def __init__(self, db: Database, mine: Claim, run: Run, asked: Callable[[], None]) -> None:
+        """Take up a run where its last intact checkpoint left it, or at tick 0.
+
+        Raises:
+            Diverged: the checkpoint was written under other versions, so that the bits would differ.
+        """
+        self.db, self.mine, self.run = db, mine, run
+        born = Config.model_validate(run.config)
+        self.world = registry.make(run.world, run.level_text, time_limit=born.time_limit)
+        judgement = Judgement(self.world, born.gamma)
+        self.evaluation = Evaluation(self.world, judgement.model, born.gamma)
+        self.parent = self._parent(born, judgement, asked)
+        self.saved = self._recall(born)
+        self.record_ends = mailbox.high_water(db, mine.run_id)
+        self.optimal, self.waiting = run.optimal, run.waiting
+        self._saved_tick, self._saved_at, self._measured_at = self.tick, time.monotonic(), 0.0
+        runs.report(db, mine, versions=versions())
+
+    def _parent(self, config: Config, judgement: Judgement, asked: Callable[[], None]) -> QueueParent:
+        if self.run.parent == "scripted":
+            return ScriptedQueueParent(self.db, self.mine, self.world, config, asked, judgement)
+        return QueueParent(self.db, self.mine, self.world, config, asked)
+
+    def _recall(self, config: Config) -> Saved:
+        for checkpoint in record.load_checkpoints(self.db, self.mine.run_id):
+            if checkpoint.intact:
+                return unpack(self.world, config, checkpoint.blob)
+            log.warning("damaged checkpoint passed over", run=self.mine.run_id, tick=checkpoint.tick)
+        return birth(self.world, config, self.run.seed)
+
+    @property
+    def tick(self) -> int:
+        """The last tick that was lived."""
+        return int(self.saved.state.keys.tick[0])
+
+    # When it may live on
+
+    def ready(self, seen: Watch) -> bool:
+        """Whether the next tick may pass: an agent never outruns its parent (DESIGN.md, "Decisions")."""
+        if self.tick < self.record_ends or seen.events:
+            return True
+        if seen.open_guidance or seen.open_preferences > self.saved.config.max_open_preferences:
+            return False
+        return not bool(self.saved.state.waiting) or (seen.answers > 0 and not bool(self.saved.state.stuck))
+
+    def wait(self, seen: Watch) -> None:
+        """Say who waits for whom, and save what was lived: nothing happens here for a while."""
+        reason = None
+        if bool(self.saved.state.stuck):
+            reason = "stuck"
+        elif seen.open_guidance:
+            reason = "guidance"
+        elif seen.open_preferences:
+            reason = "preferences"
+        if reason != self.waiting:
+            self.waiting = reason
+            runs.report(self.db, self.mine, tick=self.tick, waiting=reason)
+        self.save_if_due()
+
+    # A tick
+
+    def beat(self) -> bool:
+        """One tick; whether it asked something."""
+        state, config, query = parenting.beat(self.world, self.saved.config, self.saved.state, self.parent)
+        assert self.parent.heard is not None
+        tally = count(self.world, self.saved.tally, self.parent.heard, state)
+        self.saved = Saved(state, tally, config)
+        if self.tick <= self.record_ends:
+            self._hold_to_the_record(query)
+        self._measure()
+        self.save_if_due()
+        return bool(query.kind[0] != Kind.NONE)
+
+    def _hold_to_the_record(self, query: Query) -> None:
+        """A tick that is lived again asks what it asked the first time, or the run stops."""
+        stored = mailbox.asked_at(self.db, self.mine.run_id, self.tick)
+        kind = kind_name(query)
+        if (stored.kind if stored else None) != kind or (stored and stored.clips != encode(self.world, query)):
+            raise Diverged(f"Run {self.mine.run_id} asked something else when tick {self.tick} was lived again.")
+
+    def _measure(self) -> None:
+        """Write a row of metrics when the parent was heard, and once a second besides."""
+        assert self.parent.heard is not None
+        heard = bool(self.parent.heard.choice[0])
+        now = time.monotonic()
+        if not heard and now - self._measured_at < METRIC_SECONDS:
+            return
+        self._measured_at = now
+        row = measure(self.saved, self.evaluation)
+        self.optimal, self.waiting = bool(row["optimal"]), None
+        record.write_metrics(self.db, self.mine, {self.tick: row})
+        runs.report(self.db, self.mine, tick=self.tick, waiting=None, optimal=self.optimal)
+
+    def finished(self) -> bool:
+        """A scripted parent has no more to teach once the argmax policy is optimal; a person may go on."""
+        return self.run.parent == "scripted" and self.optimal
+
+    # Checkpoints
+
+    def save_if_due(self) -> None:
+        """Save when the last checkpoint is old and something was lived since."""
+        if self.tick != self._saved_tick and time.monotonic() - self._saved_at >= CHECKPOINT_SECONDS:
+            self.save()
+
+    def save(self) -> None:
+        """Write a checkpoint."""
+        record.save_checkpoint(self.db, self.mine, self.tick, pack(self.saved))
+        self._saved_tick, self._saved_at = self.tick, time.monotonic()

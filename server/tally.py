@@ -1,0 +1,44 @@
+"""What is counted of one run, for the dashboard. It is in every checkpoint, so that no restart counts anything twice."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Int64
+from torch import Tensor
+
+from agent.query import Answer, Choice, Kind
+from agent.state import AgentState
+from envs.gridworld import Gridworld
+from envs.struct import Struct
+
+
+class Tally(Struct):
+    """Cumulative counts. Axes have one place: a run is a batch of one."""
+
+    deaths: Int64[Tensor, "N"]  # unsafe steps (PAPER.md, "Unsafe")
+    episodes: Int64[Tensor, "N"]  # ended ones
+    kinds: Int64[Tensor, "N 3"]  # answered queries by Kind
+    choices: Int64[Tensor, "N 5"]  # answers by Choice
+
+
+def no_tally() -> Tally:
+    """Nothing counted yet."""
+
+    def zeros(*shape: int) -> Tensor:
+        return torch.zeros(1, *shape, dtype=torch.int64)
+
+    return Tally(deaths=zeros(), episodes=zeros(), kinds=zeros(3), choices=zeros(5))
+
+
+def count(world: Gridworld, tally: Tally, answer: Answer, state: AgentState) -> Tally:
+    """The counts after one more tick: the answer that it heard, and the state that it left."""
+    report, now = state.report, state.world
+    died = report.moved & world.unsafe(report.before, report.action, now)
+    ended = report.moved & (now.over | world.truncated(now))
+    heard = answer.choice != Choice.NONE
+    return Tally(
+        deaths=tally.deaths + died,
+        episodes=tally.episodes + ended,
+        kinds=tally.kinds + (torch.nn.functional.one_hot(answer.query.kind, len(Kind)) * heard[:, None]),
+        choices=tally.choices + (torch.nn.functional.one_hot(answer.choice, len(Choice)) * heard[:, None]),
+    )

@@ -1,0 +1,145 @@
+"""The worker: raises every living run in turn, a few ticks each, and waits where a parent has not answered.
+
+It sleeps on a bell that the web rings after an answer; the bell is a hint, a poll every 50 ms is the truth.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import time
+import traceback
+from types import FrameType
+
+import structlog
+import torch
+
+from server import mailbox, runs
+from server.db import Database, connect
+from server.errors import Busy, DiskFull, LostClaim
+from server.life import Life
+from server.mailbox import Watch
+from server.runs import Claim
+from server.schema import require
+from server.settings import Settings
+from server.wake import Bell
+
+log = structlog.get_logger()
+
+POLL_SECONDS = 0.05
+SLICE_SECONDS = 0.01
+"""How long one run may live before the next has its turn."""
+CLAIM_EVERY = 0.5
+
+
+class Worker:
+    """Raises runs until it is told to stop."""
+
+    def __init__(self, db: Database, settings: Settings) -> None:
+        """A worker with a name of its own; it claims nothing yet."""
+        self.db, self.settings = db, settings
+        self.name = f"{socket.gethostname()}:{os.getpid()}"
+        self.claims: dict[int, Claim] = {}
+        self.lives: dict[int, Life] = {}
+        self.bell, self.web = Bell(settings.data, "worker"), Bell(settings.data, "web")
+        self.stopping = False
+        self._claimed_at = 0.0
+
+    def stop(self, _signal: int = 0, _frame: FrameType | None = None) -> None:
+        """Finish the tick in hand, save everything and end."""
+        self.stopping = True
+
+    def work(self) -> None:
+        """Raise runs in turn until stopped, then save them and give them back."""
+        self.bell.listen()
+        try:
+            while not self.stopping:
+                self._claim()
+                if not self._round():
+                    self.bell.wait(POLL_SECONDS)
+        finally:
+            self._close()
+
+    def _claim(self) -> None:
+        """Signs of life for what we raise, and a look for runs that nobody raises."""
+        now = time.monotonic()
+        if now - self._claimed_at < CLAIM_EVERY:
+            return
+        self._claimed_at = now
+        kept = runs.beat(self.db, list(self.claims.values()))
+        fresh = runs.claim(self.db, self.name, self.settings.claim_seconds)
+        self.claims = {claim.run_id: claim for claim in (*kept, *fresh)}
+        self.lives = {run_id: life for run_id, life in self.lives.items() if life.mine == self.claims.get(run_id)}
+
+    def _round(self) -> bool:
+        """A turn for every run that may live on; whether any did."""
+        lived = False
+        for run_id, seen in mailbox.watch(self.db, list(self.claims)).items():
+            if seen.status in runs.OVER:
+                self._drop(run_id)
+            elif seen.status == "active" and not self.stopping:
+                lived |= self._guarded(run_id, seen)
+        return lived
+
+    def _guarded(self, run_id: int, seen: Watch) -> bool:
+        """One run's turn. A run that fails stops alone, with its reason."""
+        try:
+            return self._turn(run_id, seen)
+        except LostClaim as error:
+            log.warning("run lost", run=run_id, reason=error.message)
+            self._drop(run_id)
+        except (Busy, DiskFull) as error:
+            log.warning("store refused; the run goes on from its checkpoint", run=run_id, reason=error.message)
+            self.lives.pop(run_id, None)
+        except Exception as error:
+            log.error("run failed", run=run_id, error=repr(error))
+            reason = f"The agent could not go on: {error}"
+            runs.finish(self.db, self.claims[run_id], "failed", reason, traceback.format_exc())
+            self._drop(run_id)
+        return False
+
+    def _turn(self, run_id: int, seen: Watch) -> bool:
+        life = self.lives.get(run_id) or self._begin(run_id)
+        if not life.ready(seen):
+            life.wait(seen)
+            return False
+        until = time.monotonic() + SLICE_SECONDS
+        while not life.beat() and time.monotonic() < until and not life.finished():
+            continue
+        if life.finished():
+            life.save()
+            runs.finish(self.db, life.mine, "finished", "Its argmax policy is optimal.")
+            self._drop(run_id)
+        return True
+
+    def _begin(self, run_id: int) -> Life:
+        run = runs.get_run(self.db, run_id)
+        self.lives[run_id] = Life(self.db, self.claims[run_id], run, self.web.ring)
+        log.info("run taken up", run=run_id, tick=self.lives[run_id].tick)
+        return self.lives[run_id]
+
+    def _drop(self, run_id: int) -> None:
+        self.lives.pop(run_id, None)
+        self.claims.pop(run_id, None)
+
+    def _close(self) -> None:
+        for run_id, life in list(self.lives.items()):
+            try:
+                life.save()
+            except LostClaim:
+                self._drop(run_id)
+        runs.let_go(self.db, list(self.claims.values()))
+        self.bell.close()
+
+
+def main(settings: Settings) -> None:
+    """Raise the runs of this database until SIGTERM or SIGINT."""
+    torch.set_num_threads(1)
+    db = connect(settings)
+    require(db)
+    worker = Worker(db, settings)
+    signal.signal(signal.SIGTERM, worker.stop)
+    signal.signal(signal.SIGINT, worker.stop)
+    worker.work()
+    db.close()
