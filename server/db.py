@@ -26,7 +26,12 @@ from server.settings import Settings
 SAFE_SQLITE = (3, 51, 3)
 """Older ones may corrupt a database in WAL: a race between the log's reset and a checkpoint."""
 BUSY_SECONDS = 5.0
-PRAGMAS = {"journal_mode": "wal", "synchronous": "full", "foreign_keys": "on", "busy_timeout": str(int(BUSY_SECONDS * 1000))}
+PRAGMAS = {
+    "journal_mode": "wal",
+    "synchronous": "full",
+    "foreign_keys": "on",
+    "busy_timeout": str(int(BUSY_SECONDS * 1000)),
+}
 
 
 def utc_now() -> datetime:
@@ -86,11 +91,22 @@ def connect(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Data
         if url.get_backend_name() != "sqlite":
             return Database(create_engine(url, json_serializer=_dumps, pool_pre_ping=True), clock)
     except (ArgumentError, NoSuchModuleError, ImportError) as error:
-        raise SetupError(f"PARENTING_DATABASE_URL: {error}. Write it as sqlite:////folder/parenting.db.") from None
+        raise SetupError(
+            f"PARENTING_DATABASE_URL: {error}. Write it as sqlite:////folder/parenting.db."
+        ) from None
     if url.database in (None, "", ":memory:"):
-        raise SetupError("PARENTING_DATABASE_URL: a database in memory is seen by one process only. Name a file.")
+        raise SetupError(
+            "PARENTING_DATABASE_URL: a database in memory is seen by one process only. Name a file."
+        )
     make_folder(Path(str(url.database)).parent)
-    engine = create_engine(url, module=sqlite_module(), json_serializer=_dumps, pool_size=20, max_overflow=30, pool_timeout=BUSY_SECONDS)
+    engine = create_engine(
+        url,
+        module=sqlite_module(),
+        json_serializer=_dumps,
+        pool_size=20,
+        max_overflow=30,
+        pool_timeout=BUSY_SECONDS,
+    )
     event.listen(engine, "connect", _set_up)
     event.listen(engine, "begin", _begin)
     return Database(engine, clock)
@@ -105,7 +121,9 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     except OSError as error:
-        raise SetupError(f"The data folder {folder} cannot be made: {error.strerror}. Set PARENTING_DATA to another one.") from None
+        raise SetupError(
+            f"The data folder {folder} cannot be made: {error.strerror}. Set PARENTING_DATA to another one."
+        ) from None
 
 
 def sqlite_module() -> Any:
@@ -124,7 +142,9 @@ def sqlite_module() -> Any:
             return module
         found = module.sqlite_version
     least = ".".join(map(str, SAFE_SQLITE))
-    raise SetupError(f"SQLite {found} can corrupt a database under load; {least} or newer is needed. Run: pip install 'pysqlite3>=0.6.1'")
+    raise SetupError(
+        f"SQLite {found} can corrupt a database under load; {least} or newer is needed. Run: pip install 'pysqlite3>=0.6.1'"
+    )
 
 
 def _set_up(connection: Any, _record: Any) -> None:

@@ -1,6 +1,8 @@
-"""Every error that a user may meet, in one tree. The docstring is the default message; all have one JSON shape.
+"""Every error that a user may meet, in one tree. The docstring is the default message.
 
-    {"error": {"code": "conflict", "message": "...", "field": "choice", "fields": [{"field": ..., "message": ...}]}}
+All have one JSON shape:
+
+    {"error": {"code": "invalid", "message": "...", "field": "seed", "fields": [{"field": ..., "message": ...}]}}
 
 `field` and `fields` stand there only where they apply.
 """
@@ -47,6 +49,24 @@ class Forbidden(ServerError):
     status, code = 403, "cross_site"
 
 
+class UnknownHost(ServerError):
+    """This server is called localhost or 127.0.0.1, and by no other name."""
+
+    status, code = 400, "unknown_host"
+
+
+class MethodNotAllowed(ServerError):
+    """This address does not take that method."""
+
+    status, code = 405, "method_not_allowed"
+
+
+class TooMany(ServerError):
+    """Too many live streams are open. Close a page and load this one again."""
+
+    status, code = 503, "too_many"
+
+
 class TooLarge(ServerError):
     """The body of this request is too large."""
 
@@ -73,7 +93,9 @@ class Invalid(ServerError):
     def __init__(self, fields: list[tuple[str, str]], message: str | None = None) -> None:
         self.fields = fields
         only = fields[0] if len(fields) == 1 else None
-        super().__init__(message or (f"{only[0]}: {only[1]}" if only else None), field=only[0] if only else None)
+        super().__init__(
+            message or (f"{only[0]}: {only[1]}" if only else None), field=only[0] if only else None
+        )
 
     def body(self) -> dict[str, Any]:
         """The JSON shape, with one message a field."""

@@ -91,7 +91,9 @@ def answer(db: Database, query_id: int, choice: str, client_id: str, parent: str
         if before is not None:
             return _again(before, choice, client_id)
         if query.status != "open":
-            raise Conflict(f"Question {query_id} was withdrawn: the run or its episode was ended before an answer came.")
+            raise Conflict(
+                f"Question {query_id} was withdrawn: the run or its episode was ended before an answer came."
+            )
         row = _add(session, db, query, choice, client_id, parent)
         query.status = "answered"
         return _stored(row)
@@ -115,7 +117,13 @@ def correct(db: Database, query_id: int, choice: str, client_id: str, parent: st
 
 
 def _add(
-    session: Session, db: Database, query: Query, choice: str, client_id: str, parent: str, supersedes: int | None = None
+    session: Session,
+    db: Database,
+    query: Query,
+    choice: str,
+    client_id: str,
+    parent: str,
+    supersedes: int | None = None,
 ) -> Answer:
     run = hold(session, query.run_id)
     run.answers += 1  # numbered in this transaction: no reader can see number n + 1 before n
@@ -137,14 +145,20 @@ def _add(
 
 def _again(before: Answer, choice: str, client_id: str) -> Stored:
     if before.client_id != client_id:
-        raise Conflict(f"Question {before.query_id} was already answered by someone else; your answer was not stored.")
+        raise Conflict(
+            f"Question {before.query_id} was already answered by someone else; your answer was not stored."
+        )
     if before.choice != choice:
-        raise Conflict(f"You already answered question {before.query_id} with {before.choice}; {choice} was not stored.")
+        raise Conflict(
+            f"You already answered question {before.query_id} with {before.choice}; {choice} was not stored."
+        )
     return _stored(before)
 
 
 def _stored(row: Answer) -> Stored:
-    return Stored(query=row.query_id, run=row.run_id, number=row.number, choice=row.choice, received=row.received)
+    return Stored(
+        query=row.query_id, run=row.run_id, number=row.number, choice=row.choice, received=row.received
+    )
 
 
 def _query(session: Session, query_id: int, lock: bool = False) -> Query:
@@ -169,7 +183,9 @@ def _urgent(run_id: int) -> Select[Query]:
 
 
 def _offer(session: Session, run_id: int, client_id: str, now: datetime) -> Query | None:
-    mine = session.scalars(_urgent(run_id).where(Query.leased_by == client_id, Query.leased_until > now)).first()
+    mine = session.scalars(
+        _urgent(run_id).where(Query.leased_by == client_id, Query.leased_until > now)
+    ).first()
     if mine is not None:
         return mine
     free = or_(Query.leased_until.is_(None), Query.leased_until <= now)

@@ -60,7 +60,9 @@ def write_metrics(db: Database, mine: Claim, rows: Mapping[int, Mapping[str, flo
     with db.write() as session:
         run = held(session, mine)
         session.execute(delete(Metric).where(Metric.run_id == run.id, Metric.tick.in_(list(rows))))
-        session.add_all(Metric(run_id=run.id, tick=tick, values=_finite(values)) for tick, values in rows.items())
+        session.add_all(
+            Metric(run_id=run.id, tick=tick, values=_finite(values)) for tick, values in rows.items()
+        )
 
 
 def metrics(db: Database, run_id: int, after: int = -1, limit: int = 10_000) -> Sequence[Metric]:
@@ -87,7 +89,12 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
         session.execute(delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.tick == tick))
         session.add(Checkpoint(run_id=run.id, tick=tick, blob=blob, sha256=digest, created=db.clock()))
         session.flush()
-        newest = select(Checkpoint.id).where(Checkpoint.run_id == run.id).order_by(Checkpoint.id.desc()).limit(KEPT)
+        newest = (
+            select(Checkpoint.id)
+            .where(Checkpoint.run_id == run.id)
+            .order_by(Checkpoint.id.desc())
+            .limit(KEPT)
+        )
         kept = session.scalars(newest).all()
         session.execute(delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.id.not_in(kept)))
 
@@ -95,7 +102,9 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
 def load_checkpoints(db: Database, run_id: int) -> Sequence[Saved]:
     """The kept checkpoints, newest first. The caller takes the first intact one, and says so if it had to pass one over."""
     with db.read() as session:
-        rows = session.scalars(select(Checkpoint).where(Checkpoint.run_id == run_id).order_by(Checkpoint.id.desc())).all()
+        rows = session.scalars(
+            select(Checkpoint).where(Checkpoint.run_id == run_id).order_by(Checkpoint.id.desc())
+        ).all()
         return [Saved(row.tick, row.blob, hashlib.sha256(row.blob).hexdigest() == row.sha256) for row in rows]
 
 

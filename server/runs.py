@@ -171,13 +171,19 @@ def held(session: Session, mine: Claim) -> Run:
     """The run of a claim, locked, after checking that the claim still holds: the first line of every write of a worker."""
     run = hold(session, mine.run_id)
     if (run.actor, run.epoch) != (mine.actor, mine.epoch):
-        raise LostClaim(f"Run {mine.run_id} is raised by {run.actor or 'nobody'} now (epoch {run.epoch}, not {mine.epoch}).")
+        raise LostClaim(
+            f"Run {mine.run_id} is raised by {run.actor or 'nobody'} now (epoch {run.epoch}, not {mine.epoch})."
+        )
     return run
 
 
 def open_in(session: Session, run_id: int) -> Open:
     """`open_counts`, in a transaction that is already open."""
-    rows = select(Query.kind, func.count()).where(Query.run_id == run_id, Query.status == "open").group_by(Query.kind)
+    rows = (
+        select(Query.kind, func.count())
+        .where(Query.run_id == run_id, Query.status == "open")
+        .group_by(Query.kind)
+    )
     counts = dict(session.execute(rows).tuples().all())
     return Open(guidance=counts.get("guidance", 0), preference=counts.get("preference", 0))
 

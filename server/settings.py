@@ -20,14 +20,24 @@ def state_folder() -> Path:
 class Settings(BaseSettings):
     """What web and worker need to know. Each field is set by `PARENTING_` and its name in capitals."""
 
-    model_config = SettingsConfigDict(env_prefix="PARENTING_", extra="ignore")
+    model_config = SettingsConfigDict(env_prefix="PARENTING_", env_file=".env", extra="ignore")
 
-    data: Path = Field(default_factory=state_folder, description="Folder of the database and of the sockets that wake processes.")
-    database_url: str | None = Field(None, description="Another database, as SQLAlchemy writes it; none is parenting.db in the data folder.")
+    data: Path = Field(
+        default_factory=state_folder,
+        description="Folder of the database and of the sockets that wake processes.",
+    )
+    database_url: str | None = Field(
+        None,
+        description="Another database, as SQLAlchemy writes it; none is parenting.db in the data folder.",
+    )
     host: str = Field("127.0.0.1", description="Address to listen on; only 127.0.0.1 is allowed as yet.")
     port: int = Field(8765, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
-    lease_seconds: float = Field(60.0, gt=0, description="How long a question is held for the parent who was shown it.")
-    claim_seconds: float = Field(5.0, gt=0, description="How long a run stays with a worker that gives no sign of life.")
+    lease_seconds: float = Field(
+        60.0, gt=0, description="How long a question is held for the parent who was shown it."
+    )
+    claim_seconds: float = Field(
+        5.0, gt=0, description="How long a run stays with a worker that gives no sign of life."
+    )
     streams: int = Field(50, ge=1, description="Live streams of events that may be open at once.")
     log_level: str = Field("warning", description="debug, info, warning or error.")
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 from sqlalchemy import (
     JSON,
+    BigInteger,
     CheckConstraint,
     DateTime,
     Dialect,
@@ -81,7 +82,12 @@ class Table(DeclarativeBase):
             "pk": "pk_%(table_name)s",
         }
     )
-    type_annotation_map: ClassVar[dict[Any, Any]] = {str: Text, datetime: Utc, dict[str, Any]: JSON, bytes: LargeBinary}
+    type_annotation_map: ClassVar[dict[Any, Any]] = {
+        str: Text,
+        datetime: Utc,
+        dict[str, Any]: JSON(none_as_null=True),
+        bytes: LargeBinary,
+    }
 
 
 def _one_of(column: str, words: Any, nullable: bool = False) -> CheckConstraint:
@@ -111,7 +117,7 @@ class Run(Table):
     brief: Mapped[dict[str, Any]]  # {"goal": ..., "danger": ...}
     config: Mapped[dict[str, Any]]  # agent.config.Config, whole
     preset: Mapped[str]
-    seed: Mapped[int]
+    seed: Mapped[int] = mapped_column(BigInteger)
     parent: Mapped[str]
     # where it is
     status: Mapped[str] = mapped_column(default="active")
@@ -119,10 +125,14 @@ class Run(Table):
     tick: Mapped[int] = mapped_column(default=0)  # the last tick reported, for display
     waiting: Mapped[str | None]
     optimal: Mapped[bool] = mapped_column(default=False)
-    answers: Mapped[int] = mapped_column(default=0)  # numbers the run's answers, in the answer's own transaction
+    answers: Mapped[int] = mapped_column(
+        default=0
+    )  # numbers the run's answers, in the answer's own transaction
     # which worker raises it
     actor: Mapped[str | None]
-    epoch: Mapped[int] = mapped_column(default=0)  # grows at each claim; checked inside every write of a worker
+    epoch: Mapped[int] = mapped_column(
+        default=0
+    )  # grows at each claim; checked inside every write of a worker
     heartbeat: Mapped[datetime | None]
     versions: Mapped[dict[str, Any] | None]  # torch build and threads: other ones give other bits
     error: Mapped[str | None]
@@ -160,7 +170,13 @@ class Answer(Table):
     __table_args__ = (
         _one_of("choice", CHOICES),
         UniqueConstraint("run_id", "number"),
-        Index("uq_answer_standing", "query_id", unique=True, sqlite_where=text("standing"), postgresql_where=text("standing")),
+        Index(
+            "uq_answer_standing",
+            "query_id",
+            unique=True,
+            sqlite_where=text("standing"),
+            postgresql_where=text("standing"),
+        ),
         Index(
             "uq_answer_first",
             "query_id",
@@ -169,7 +185,7 @@ class Answer(Table):
             sqlite_where=text("supersedes IS NULL"),
             postgresql_where=text("supersedes IS NULL"),
         ),
-        Index(None, "run_id", "applied_tick"),
+        Index(None, "run_id", "applied_tick", unique=True),  # at most one answer is heard in a tick
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)

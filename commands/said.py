@@ -1,0 +1,36 @@
+"""How the commands fail: a sentence on standard error and exit code 2, never a traceback."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import typer
+from pydantic import ValidationError
+
+from server.errors import ServerError
+from server.settings import Settings
+
+
+@contextmanager
+def plainly() -> Iterator[None]:
+    """Print what a `ServerError` says, and exit with 2."""
+    try:
+        yield
+    except ServerError as error:
+        typer.echo(error.message, err=True)
+        raise typer.Exit(2) from None
+
+
+def settings(**given: Any) -> Settings:
+    """The settings from the environment, `.env` and the options given (None: not given). Call it within `plainly`.
+
+    Raises:
+        ServerError: names each wrong setting.
+    """
+    try:
+        return Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        wrong = "\n".join(f"PARENTING_{str(item['loc'][0]).upper()}: {item['msg']}" for item in error.errors())
+        raise ServerError(wrong) from None

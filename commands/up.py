@@ -1,0 +1,142 @@
+"""`parenting up`: everything in one command. Web and worker are processes of their own, so that neither stops the other."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import webbrowser
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from commands.lifeline import VARIABLE
+from commands.said import plainly, settings
+from server.db import connect
+from server.schema import upgrade
+from server.serve import bind
+from server.settings import Settings
+
+PATIENCE = 1.6
+"""Seconds that web and worker get to stop by themselves; killed then, they lose nothing."""
+ROOT = Path(__file__).parents[1]
+
+Children = Mapping[str, subprocess.Popen[bytes]]
+
+
+def up(
+    port: Annotated[int | None, typer.Option(help="Port of the pages; 0 takes a free one. [default: 8765]")] = None,
+    browser: Annotated[bool, typer.Option(help="Open the pages in a browser.")] = True,
+) -> None:
+    """Migrate the database, start the pages and a worker, and open the pages in a browser. Ctrl-C stops all.
+
+    Example: parenting up --port 0 --no-browser
+    """
+    with plainly():
+        chosen = settings(port=port)
+        ear = bind(chosen.host, chosen.port)
+        _migrate(chosen)
+    with _signals() as told, _children(ear) as children:
+        url = f"http://localhost:{ear.getsockname()[1]}/"
+        ear.close()
+        typer.echo(f"Parenting is at {url}  (Ctrl-C stops it)")
+        if browser and _has_screen():
+            threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+        dead = _first_to_end(children, told)
+    if dead is not None:
+        typer.echo(f"The {dead} process ended by itself ({_how(children[dead].returncode)}), so all was stopped.", err=True)
+        raise typer.Exit(1)
+
+
+def _migrate(chosen: Settings) -> None:
+    db = connect(chosen)
+    try:
+        upgrade(db)
+    finally:
+        db.close()
+
+
+@contextmanager
+def _signals() -> Iterator[threading.Event]:
+    """An event that Ctrl-C and SIGTERM set; while this holds neither does anything else."""
+    told = threading.Event()
+
+    def tell(_number: int, _frame: FrameType | None) -> None:
+        told.set()
+
+    before = {number: signal.signal(number, tell) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield told
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _children(ear: socket.socket) -> Iterator[Children]:
+    """Web and worker, in sessions of their own so that Ctrl-C reaches `up` alone, which stops both in the end."""
+    lifeline, held = os.pipe()
+    web = ["web", "--fd", str(ear.fileno())]
+    children: dict[str, subprocess.Popen[bytes]] = {}
+    try:
+        children["web"] = _start(web, lifeline, [ear.fileno()])
+        children["worker"] = _start(["worker"], lifeline, [])
+        yield children
+    finally:
+        _stop(children)
+        os.close(lifeline)
+        os.close(held)
+
+
+def _start(arguments: Sequence[str], lifeline: int, descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
+    # -P: the folder that we are called in must not hide our packages.
+    command = [sys.executable, "-P", "-m", "commands.main", *arguments]
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    environment = {**os.environ, "PYTHONPATH": path, VARIABLE: str(lifeline)}
+    return subprocess.Popen(
+        command,
+        env=environment,
+        pass_fds=[lifeline, *descriptors],
+        stdin=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def _first_to_end(children: Children, told: threading.Event) -> str | None:
+    """The name of the first process that ends; None if we are told to stop before."""
+    while not told.wait(0.1):
+        for name, child in children.items():
+            if child.poll() is not None:
+                return name
+    return None
+
+
+def _stop(children: Children) -> None:
+    for child in children.values():
+        if child.poll() is None:
+            child.terminate()
+    end = time.monotonic() + PATIENCE
+    for child in children.values():
+        try:
+            child.wait(max(0.0, end - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.wait()
+
+
+def _has_screen() -> bool:
+    """Whether a browser would open a window; without one, some would take over the terminal."""
+    screens = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    return sys.platform != "linux" or any(os.environ.get(name) for name in screens)
+
+
+def _how(code: int) -> str:
+    return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"

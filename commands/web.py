@@ -1,0 +1,32 @@
+"""`parenting web`: serve the pages and the API. It never loads torch."""
+
+from __future__ import annotations
+
+import socket
+from typing import Annotated
+
+import typer
+
+from commands.lifeline import follow
+from commands.said import plainly, settings
+from server.serve import bind, serve
+
+Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a free one. [default: 8765]")]
+
+
+def web(
+    port: Port = None,
+    host: Annotated[str | None, typer.Option(help="Address to listen on; only 127.0.0.1 as yet.")] = None,
+    fd: Annotated[int | None, typer.Option(hidden=True, help="A listening socket, from `parenting up`.")] = None,
+) -> None:
+    """Serve the pages and the API on this machine until Ctrl-C.
+
+    Example: parenting web --port 8000
+    """
+    follow()
+    with plainly():
+        chosen = settings(port=port, host=host)
+        ear = bind(chosen.host, chosen.port) if fd is None else socket.socket(fileno=fd)
+        if fd is None:
+            typer.echo(f"Parenting's pages: http://localhost:{ear.getsockname()[1]}/  (Ctrl-C stops them)")
+        serve(chosen, ear)

@@ -1,0 +1,106 @@
+"""What stands before every route: known hosts, no cross-site acts, safe headers, and no traceback for anyone.
+
+Cross-site requests are told by `Sec-Fetch-Site`, which every browser of today sends, and by `Origin` in older ones
+(Datasette's and Go's way). A request with neither comes from no browser and passes: a program on this machine may
+answer too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import structlog
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.errors import Forbidden, ServerError, TooLarge, UnknownHost
+
+SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
+HOSTS = ("localhost", "127.0.0.1", "[::1]")
+
+log = structlog.get_logger()
+
+
+def policy(inline_styles: bool = False) -> str:
+    """The Content-Security-Policy. A page that needs inline styles (Plotly's) sets this header itself, with True."""
+    styles = "'self' 'unsafe-inline'" if inline_styles else "'self'"
+    return (
+        f"default-src 'self'; style-src {styles}; img-src 'self' data: blob:; object-src 'none'; "
+        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    )
+
+
+HEADERS = {
+    "Content-Security-Policy": policy(),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+class Guard:
+    """The outermost layer of the application."""
+
+    def __init__(self, app: ASGIApp, largest_body: int, hosts: Sequence[str] = HOSTS) -> None:
+        self.app = app
+        self.largest_body = largest_body
+        self.hosts = hosts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let the request through, or refuse it in the one JSON shape."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        started, size = False, 0
+
+        async def bounded() -> Message:
+            nonlocal size
+            message = await receive()
+            size += len(message.get("body", b""))
+            if size > self.largest_body:  # it came without a length, in pieces
+                raise HTTPException(413)
+            return message
+
+        async def safely(message: Message) -> None:
+            nonlocal started
+            if message["type"] == "http.response.start":
+                started = True
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        try:
+            refused = self.refusal(scope["method"], Headers(scope=scope))
+            answer = self.app if refused is None else JSONResponse(refused.body(), refused.status)
+            await answer(scope, bounded, safely)
+        except Exception:
+            log.exception("request failed", path=scope["path"], method=scope["method"])
+            if started:
+                raise  # half of a reply is out; uvicorn closes the connection
+            await JSONResponse(ServerError().body(), 500)(scope, receive, safely)
+
+    def refusal(self, method: str, headers: Headers) -> ServerError | None:
+        """Why this request must not pass, or None."""
+        host = headers.get("host", "")
+        if _without_port(host) not in self.hosts:
+            return UnknownHost()
+        length = headers.get("content-length", "0")
+        if not length.isdecimal() or len(length) > 15 or int(length) > self.largest_body:
+            return TooLarge()
+        if method in SAFE_METHODS:
+            return None
+        site, origin = headers.get("sec-fetch-site"), headers.get("origin")
+        if site is not None:
+            return None if site in ("same-origin", "none") else Forbidden()
+        if origin is not None:
+            return None if origin.partition("://")[2] == host else Forbidden()
+        return None
+
+
+def _without_port(host: str) -> str:
+    name, colon, port = host.lower().rpartition(":")
+    return name if colon and port.isdigit() else host.lower()

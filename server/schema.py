@@ -1,0 +1,77 @@
+"""Migrations: bring a database up to date, or say plainly why it cannot be used as it is.
+
+The scripts lie in `migrations/`, beside the packages in a checkout and in an installed wheel alike.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, inspect
+
+from server.db import Database
+from server.errors import SetupError
+
+FOLDER = Path(__file__).parents[1] / "migrations"
+
+
+def upgrade(db: Database) -> bool:
+    """Apply what is missing, all or nothing; whether anything was. Doing it twice is doing it once.
+
+    Raises:
+        SetupError: the database was written by a newer version, or holds other tables than ours.
+    """
+    with db.write() as session:
+        connection = session.connection()
+        before = _revision(connection)
+        if before == _head():
+            return False
+        if before is None and inspect(connection).has_table("run"):
+            raise SetupError(f"{_place(db)} holds tables that are not ours. Name another database.")
+        config = _config()
+        config.attributes["connection"] = connection
+        command.upgrade(config, "head")
+        return True
+
+
+def require(db: Database) -> None:
+    """Refuse to start on a database that is not up to date.
+
+    Raises:
+        SetupError: it has no tables yet, older ones, or newer ones; the sentence names the remedy.
+    """
+    with db.read() as session:
+        found = _revision(session.connection())
+    if found is None:
+        raise SetupError(f"{_place(db)} has no tables yet. Run: parenting migrate")
+    if found != _head():
+        raise SetupError(f"{_place(db)} is from an older version of Parenting. Run: parenting migrate")
+
+
+def _revision(connection: Connection) -> str | None:
+    found = MigrationContext.configure(connection).get_current_revision()
+    known = {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
+    if found is not None and found not in known:
+        raise SetupError(
+            f"The database is from a newer version of Parenting (revision {found}). "
+            "Update Parenting, or name another database."
+        )
+    return found
+
+
+def _head() -> str | None:
+    return ScriptDirectory.from_config(_config()).get_current_head()
+
+
+def _config() -> Config:
+    config = Config()
+    config.set_main_option("script_location", str(FOLDER).replace("%", "%%"))
+    return config
+
+
+def _place(db: Database) -> str:
+    return f"The database {db.engine.url.render_as_string()}"

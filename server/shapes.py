@@ -1,0 +1,178 @@
+"""What the API gives back, and what the pages draw: runs, questions, metrics. Times are ISO 8601 in UTC."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import Any
+
+from pydantic import BaseModel
+
+from server.db import Database
+from server.runs import OVER, find, open_in
+from server.tables import Metric, Query, Run
+
+SILENT_AFTER = timedelta(seconds=5)
+
+
+class OpenShape(BaseModel):
+    """How many questions wait for an answer, by kind."""
+
+    guidance: int
+    preference: int
+
+
+class RunShape(BaseModel):
+    """A run as it is now."""
+
+    id: int
+    created: datetime
+    name: str | None
+    world: str
+    level: str
+    preset: str
+    config: dict[str, Any]
+    seed: int
+    parent: str
+    status: str
+    reason: str | None
+    tick: int
+    waiting: str | None
+    optimal: bool
+    answers: int
+    open: OpenShape
+    worker: str
+    """alive, silent (none raises this run just now), or done (the run is over)."""
+
+
+class FrameShape(BaseModel):
+    """One moment of a clip: rows of glyphs as they were true and as the agent saw them, and where the pieces stood."""
+
+    ground: list[str]
+    observed: list[str]
+    agent: tuple[int, int]
+    box: tuple[int, int] | None
+
+
+class ClipShape(BaseModel):
+    """A clip: `length` actions between `length + 1` frames."""
+
+    actions: list[str]
+    length: int
+    frames: list[FrameShape]
+
+
+class QueryShape(BaseModel):
+    """A question: two clips, of which the parent prefers left, right, either or neither."""
+
+    id: int
+    run: int
+    tick: int
+    kind: str
+    maturity: int
+    status: str
+    posted: datetime
+    leased_until: datetime | None
+    left: ClipShape
+    right: ClipShape
+
+
+class WorldShape(BaseModel):
+    """All that is needed to draw a clip, and to answer it without knowing the world's code."""
+
+    name: str
+    level: str
+    text: str
+    legend: dict[str, str]
+    brief: dict[str, str]
+
+
+class ProgressShape(BaseModel):
+    """How far the parent is."""
+
+    answered: int
+    open: int
+
+
+class LeasedShape(QueryShape):
+    """A leased question, with what a parent who knows nothing else needs to answer it."""
+
+    world: WorldShape
+    parent: dict[str, float]
+    progress: ProgressShape
+
+
+class StoredShape(BaseModel):
+    """The reply to an answer; the same answer always gets the same reply."""
+
+    query: int
+    run: int
+    number: int
+    choice: str
+    received: datetime
+
+
+class MetricShape(BaseModel):
+    """What was measured at one tick; null where a number was not finite."""
+
+    tick: int
+    values: dict[str, float | int | None]
+
+
+class MetricsShape(BaseModel):
+    """Metrics in the order of their ticks; `more` says that there are further ones after the last."""
+
+    rows: list[MetricShape]
+    more: bool
+
+
+def shape_run(db: Database, run_id: int) -> RunShape:
+    """A run as it is now.
+
+    Raises:
+        NotFound: there is none of this id.
+    """
+    with db.read() as session:
+        run = find(session, run_id)
+        opened = open_in(session, run_id)
+    own = {name: getattr(run, name) for name in RunShape.model_fields if name not in ("open", "worker")}
+    shown = OpenShape(guidance=opened.guidance, preference=opened.preference)
+    return RunShape(**own, open=shown, worker=_worker(run, db.clock()))
+
+
+def shape_query(query: Query) -> QueryShape:
+    """A question as it is stored."""
+    names = ("id", "tick", "kind", "maturity", "status", "posted", "leased_until")
+    return QueryShape(run=query.run_id, **{name: getattr(query, name) for name in names}, **query.clips)
+
+
+def shape_leased(db: Database, query: Query) -> LeasedShape:
+    """A question with its world, its parent's settings and the progress so far."""
+    with db.read() as session:
+        run = find(session, query.run_id)
+        opened = open_in(session, run.id)
+    world = {
+        "name": run.world,
+        "level": run.level,
+        "text": run.level_text,
+        "legend": run.legend,
+        "brief": run.brief,
+    }
+    return LeasedShape(
+        **shape_query(query).model_dump(),
+        world=WorldShape(**world),
+        parent={"gamma": run.config["gamma"]},
+        progress=ProgressShape(answered=run.answers, open=opened.guidance + opened.preference),
+    )
+
+
+def shape_metrics(rows: Sequence[Metric]) -> list[MetricShape]:
+    """Metrics as the dashboard takes them."""
+    return [MetricShape(tick=row.tick, values=row.values) for row in rows]
+
+
+def _worker(run: Run, now: datetime) -> str:
+    if run.status in OVER:
+        return "done"
+    late = run.heartbeat is None or now - run.heartbeat > SILENT_AFTER
+    return "silent" if run.actor is None or late else "alive"

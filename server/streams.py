@@ -1,0 +1,161 @@
+"""Live streams: what a run does, told to the browsers that look at it, by server-sent events.
+
+One watcher a run polls the database four times a second, however many browsers look, and at once when the worker rings.
+A question is told without delay; everything else at most once in 250 ms. Streams end at once when the server stops.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from fastapi.sse import ServerSentEvent
+from starlette.concurrency import run_in_threadpool
+
+from server.db import Database
+from server.errors import ServerError, TooMany
+from server.queue import waiting
+from server.record import metrics
+from server.shapes import shape_metrics, shape_run
+from server.wake import Bell
+
+PERIOD = 0.25
+"""Seconds between polls, and at least between two events of the same browser, questions excepted."""
+
+
+@dataclass
+class Watcher:
+    """What is known of one run, and who wants to hear of it."""
+
+    streams: int = 0
+    run: dict[str, Any] = field(default_factory=dict)
+    question: dict[str, Any] | None = None
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
+    task: asyncio.Task[None] | None = None
+
+
+class Streams:
+    """All live streams of this process."""
+
+    def __init__(self, db: Database, bell: Bell, limit: int) -> None:
+        self.db, self.bell, self.limit = db, bell, limit
+        self.watchers: dict[int, Watcher] = {}
+        self.closed = False
+        self._rung = asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def open(self) -> None:
+        """Begin to listen for the bell, in the running event loop."""
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(self.bell.listen(), self._on_ring)
+
+    def close(self) -> None:
+        """End every stream now. May be called from a signal handler or from another thread."""
+        self.closed = True
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._wake_all)
+
+    def end(self) -> None:
+        """Stop listening, at the end of the application."""
+        self.close()
+        if self._loop is not None:
+            self._loop.remove_reader(self.bell.listen())
+        self.bell.close()
+
+    async def follow(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
+        """The events of one run: `run`, `question`, and `metrics` of the ticks after `after` unless it is None."""
+        watcher = self._join(run_id)
+        try:
+            seen: dict[str, Any] = {}
+            asked: Any = ...
+            ready = 0.0
+            while not self.closed:
+                changed = watcher.changed
+                if watcher.run and watcher.question != asked:
+                    asked = watcher.question
+                    yield ServerSentEvent(event="question", data=asked)
+                now = asyncio.get_running_loop().time()
+                if watcher.run != seen and now >= ready:
+                    seen, ready = watcher.run, now + PERIOD
+                    yield ServerSentEvent(event="run", data=seen)
+                    async for event in self._metrics(run_id, after):
+                        after = int(event.id or -1)
+                        yield event
+                await _either(changed, ready - now if watcher.run != seen else None)
+        finally:
+            self._leave(run_id, watcher)
+
+    async def _metrics(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
+        if after is None:
+            return
+        rows = await run_in_threadpool(metrics, self.db, run_id, after)
+        if rows:
+            shown = [row.model_dump(mode="json") for row in shape_metrics(rows)]
+            yield ServerSentEvent(event="metrics", data={"rows": shown}, id=str(rows[-1].tick))
+
+    def _join(self, run_id: int) -> Watcher:
+        watcher = self.watchers.setdefault(run_id, Watcher())
+        watcher.streams += 1
+        if watcher.task is None:
+            watcher.task = asyncio.create_task(self._watch(run_id, watcher))
+        return watcher
+
+    def _leave(self, run_id: int, watcher: Watcher) -> None:
+        watcher.streams -= 1
+        if not watcher.streams and watcher.task is not None:
+            watcher.task.cancel()
+            del self.watchers[run_id]
+
+    async def _watch(self, run_id: int, watcher: Watcher) -> None:
+        while not self.closed:
+            rung = self._rung
+            look = partial(_look, self.db, run_id)
+            try:
+                run, question = await run_in_threadpool(look)
+            except ServerError:  # busy: the next look will tell
+                run, question = watcher.run, watcher.question
+            if (run, question) != (watcher.run, watcher.question):
+                watcher.run, watcher.question = run, question
+                _tell(watcher)
+            await _either(rung, PERIOD)
+
+    def _on_ring(self) -> None:
+        self.bell.drain()
+        self._rung.set()
+        self._rung = asyncio.Event()
+
+    def _wake_all(self) -> None:
+        self._rung.set()
+        for watcher in self.watchers.values():
+            _tell(watcher)
+
+    def check_room(self) -> None:
+        """Refuse one stream too many.
+
+        Raises:
+            TooMany: as many as allowed are open.
+        """
+        if sum(watcher.streams for watcher in self.watchers.values()) >= self.limit:
+            raise TooMany
+
+
+def _tell(watcher: Watcher) -> None:
+    watcher.changed.set()
+    watcher.changed = asyncio.Event()
+
+
+def _look(db: Database, run_id: int) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """The run, and the most urgent open question, in few words."""
+    query = waiting(db, run_id)
+    question = None if query is None else {"id": query.id, "kind": query.kind}
+    return shape_run(db, run_id).model_dump(mode="json"), question
+
+
+async def _either(event: asyncio.Event, timeout: float | None) -> None:
+    try:
+        await asyncio.wait_for(event.wait(), None if timeout is None else max(timeout, 0.0))
+    except TimeoutError:
+        return

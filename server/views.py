@@ -1,0 +1,63 @@
+"""What the pages need of the database beyond the API's verbs. All their SQL is here; one transaction each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import timedelta
+
+from sqlalchemy import func, or_, select
+
+from server.db import Database
+from server.queue import LEASE_SECONDS, guidance_first
+from server.runs import hold
+from server.tables import Metric, Query
+
+
+def lease_ahead(db: Database, run_id: int, client_id: str, shown: int, seconds: float = LEASE_SECONDS) -> Query | None:
+    """The question after the one that is `shown`, held for this client too, so that the page has it before it is needed.
+
+    Raises:
+        NotFound: there is no such run.
+    """
+    now = db.clock()
+    free = or_(Query.leased_until.is_(None), Query.leased_until <= now, Query.leased_by == client_id)
+    rows = select(Query).where(Query.run_id == run_id, Query.status == "open", Query.id != shown, free)
+    rows = rows.order_by(guidance_first(), Query.tick).limit(1)
+    with db.read() as session:  # nothing to offer is the common case, and takes no lock
+        if session.scalars(rows).first() is None:
+            return None
+    with db.write() as session:
+        hold(session, run_id)
+        query = session.scalars(rows).first()
+        if query is not None:
+            query.leased_by, query.leased_until = client_id, now + timedelta(seconds=seconds)
+        return query
+
+
+def may_lease(db: Database, run_id: int, client_id: str) -> bool:
+    """Whether some open question is free, or held for this client already."""
+    free = or_(Query.leased_until.is_(None), Query.leased_until <= db.clock(), Query.leased_by == client_id)
+    rows = select(Query.id).where(Query.run_id == run_id, Query.status == "open", free)
+    with db.read() as session:
+        return session.scalars(rows.limit(1)).first() is not None
+
+
+def latest_metrics(db: Database, run_ids: Sequence[int]) -> dict[int, Metric]:
+    """The last metrics of each of some runs; a run that has none yet is absent."""
+    last = select(Metric.run_id, func.max(Metric.tick).label("tick")).where(Metric.run_id.in_(run_ids)).group_by(Metric.run_id)
+    newest = last.subquery()
+    rows = select(Metric).join(newest, (Metric.run_id == newest.c.run_id) & (Metric.tick == newest.c.tick))
+    with db.read() as session:
+        return {metric.run_id: metric for metric in session.scalars(rows)}
+
+
+def sampled_metrics(db: Database, run_id: int, rows: int = 40) -> Sequence[Metric]:
+    """At most about `rows` metrics, evenly spread over the ticks, the last one among them, newest first."""
+    with db.read() as session:
+        count = session.scalar(select(func.count()).select_from(Metric).where(Metric.run_id == run_id)) or 0
+        every = max(1, -(-count // rows))
+        number = func.row_number().over(order_by=Metric.tick.desc()) - 1
+        numbered = select(Metric.tick, number.label("number")).where(Metric.run_id == run_id).subquery()
+        chosen = select(numbered.c.tick).where(numbered.c.number % every == 0)
+        found = select(Metric).where(Metric.run_id == run_id, Metric.tick.in_(chosen)).order_by(Metric.tick.desc())
+        return session.scalars(found).all()
