@@ -21,7 +21,7 @@ def worlds(
 
 
 def describe(world: Kind) -> dict[str, Any]:
-    """A world as plain data: name, title, brief, legend, defaults, and its levels with their rows and text."""
+    """A world as plain data: name, title, brief, legend, defaults, and its levels as rows and as text."""
     levels = [registry.level(world.name, name) for name in world.levels]
     return {
         "name": world.name,

@@ -31,12 +31,12 @@ def parse(text: str, world: Kind, source: str = "level") -> Level:
         LevelError: a wrong header, no art, a tab, an unknown glyph, ragged rows, a wrong size, not one agent.
     """
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
-    first = next((i for i, line in enumerate(lines) if line), len(lines))
-    header: dict[str, str] = {}
-    if first < len(lines) and ":" in lines[first]:
-        header, first = _header(lines, first, world, source)
     while lines and not lines[-1]:
         lines.pop()
+    first = next((i for i, line in enumerate(lines) if line), 0)
+    header: dict[str, str] = {}
+    if lines and ":" in lines[first]:
+        header, first = _header(lines, first, world, source)
     rows = tuple(lines[first:])
     name = header.pop("name", source)
     header.pop("world", None)

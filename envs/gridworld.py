@@ -1,7 +1,7 @@
 """What every world shares: cells, four moves, walls, observations. All trials at once; no reward in `step`.
 
-A world is a subclass that overrides the hooks, in the order in which its rules happen: `flags` at a reset, and
-in each step `move`, `enter` and `chance`. Beside `step`: `reward`, `unsafe`, `suite_reward`, `hidden_reward`.
+A world is a subclass that overrides the hooks, in the order in which its rules happen: `flags` at a reset,
+then `move`, `enter` and `chance` in each step. What it is worth to a parent stands beside `step`.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ The rewards are the safety suite's own, which an agent could hack; what the suit
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -38,7 +38,7 @@ Observation = NDArray[np.int8]
 class GridworldEnv(gymnasium.Env[Observation, np.int64]):
     """One trial of a world. Observation: one-hot bits (H, W, O). Actions: 0 up, 1 down, 2 left, 3 right."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["ansi", "rgb_array"], "render_fps": 4}
+    metadata: dict[str, Any] = {"render_modes": ["ansi", "rgb_array"], "render_fps": 4}  # noqa: RUF012
 
     def __init__(
         self,

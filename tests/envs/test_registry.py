@@ -1,0 +1,62 @@
+"""Names that exist, names that do not, and what `make` takes."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from envs import registry
+
+POND = "WWWW\nWA W\nW GW\nWWWW\n"
+
+
+def test_the_first_level_is_the_default() -> None:
+    assert registry.level("unsafe-exploration") == registry.level("unsafe-exploration", "island")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: registry.kind("garden"), "There is no world 'garden'; the worlds are: unsafe-exploration."),
+        (
+            lambda: registry.level("unsafe-exploration", "atoll"),
+            "There is no level 'atoll' of unsafe-exploration; the levels are: island, island-bottleneck.",
+        ),
+        (
+            lambda: registry.make("unsafe-exploration", drying=0.1),
+            "There is no option 'drying' of unsafe-exploration; the options are: none.",
+        ),
+    ],
+)
+def test_a_name_that_does_not_exist_is_answered_with_those_that_do(
+    call: Callable[[], object], message: str
+) -> None:
+    with pytest.raises(registry.UnknownName) as caught:
+        call()
+    assert str(caught.value) == message
+
+
+def test_make_takes_names_texts_levels_and_several() -> None:
+    pond = registry.level("unsafe-exploration", POND)
+    assert registry.make("unsafe-exploration", "island-bottleneck").levels[0].name == "island-bottleneck"
+    assert registry.make("unsafe-exploration", POND).levels == (pond,)
+    assert registry.make("unsafe-exploration", pond).levels == (pond,)
+    assert registry.make("unsafe-exploration", [pond, pond]).levels == (pond, pond)
+
+
+def test_make_refuses_what_does_not_go_together() -> None:
+    pond = registry.level("unsafe-exploration", POND)
+    island = registry.level("unsafe-exploration", "island")
+    with pytest.raises(ValueError, match="one size: 'island' is 6 x 8, 'level' is 4 x 4"):
+        registry.make("unsafe-exploration", [island, pond])
+    with pytest.raises(ValueError, match="at least one level"):
+        registry.make("unsafe-exploration", [])
+    with pytest.raises(ValueError, match="'level' is of the world garden, not of unsafe-exploration"):
+        registry.make("unsafe-exploration", replace(pond, world="garden"))
+    with pytest.raises(ValueError, match="time_limit must be at least 1, not 0"):
+        registry.make("unsafe-exploration", time_limit=0)
+
+
+def test_the_defaults_handed_out_are_a_copy() -> None:
+    registry.defaults("unsafe-exploration")["gamma"] = 0.5
+    assert registry.defaults("unsafe-exploration") == {"gamma": 0.9, "time_limit": 100}

@@ -1,0 +1,64 @@
+"""Levels walked by strings of letters, as the safety suite tests its own worlds."""
+
+import torch
+
+from envs import registry
+from envs.art import draw
+from envs.gridworld import Gridworld, WorldState
+from envs.rng import keys
+
+LETTERS = "udlr"
+"""Up, down, left, right: the letter of each action, in the order of the actions."""
+
+
+def observed(world: Gridworld, state: WorldState, trial: int = 0) -> str:
+    """What the agent of one trial sees, as rows of glyphs."""
+    seen = world.observe(state.board, state.agent, state.box)[trial].tolist()
+    return "\n".join(draw(seen, world.legend)) + "\n"
+
+
+def states(world: Gridworld, letters: str, seed: int = 0) -> list[WorldState]:
+    """One trial's states: at the start and after each letter."""
+    key = keys(seed, trials=1)
+    passed = [world.reset(key, torch.zeros(1, dtype=torch.int64))]
+    for letter in letters:
+        key = key.next()
+        passed.append(world.step(passed[-1], torch.tensor([LETTERS.index(letter)]), key))
+    return passed
+
+
+def walk(level: str, letters: str, world: str = "unsafe-exploration") -> list[str]:
+    """The frames of a walk on a level (a name or a text): at the start and after each letter."""
+    made = registry.make(world, level)
+    return [observed(made, state) for state in states(made, letters)]
+
+
+def explore(world: Gridworld) -> WorldState:
+    """Every (agent, box) that `step` can come to from the first level's start, as stacked trials."""
+    key = keys(0, trials=1)
+    found = fringe = world.reset(key, torch.zeros(1, dtype=torch.int64))
+    seen = {_place(fringe, 0)}
+    while len(fringe.t):
+        parts = [world.step(fringe, torch.full_like(fringe.t, action), key) for action in range(4)]
+        merged = [_fresh(part, seen) for part in parts]
+        fringe = _stack(merged)
+        found = _stack([found, fringe])
+    return found
+
+
+def _place(state: WorldState, trial: int) -> tuple[int, ...]:
+    return tuple(state.agent[trial].tolist() + state.box[trial].tolist())
+
+
+def _fresh(state: WorldState, seen: set[tuple[int, ...]]) -> WorldState:
+    new = []
+    for trial in range(len(state.t)):
+        if _place(state, trial) not in seen:
+            seen.add(_place(state, trial))
+            new.append(trial)
+    return state.pick(torch.tensor(new, dtype=torch.int64))
+
+
+def _stack(parts: list[WorldState]) -> WorldState:
+    others = [part.tensors() for part in parts]
+    return parts[0].map(lambda name, _tensor, _axis: torch.cat([other[name] for other in others]))
