@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -43,3 +44,24 @@ PRESETS: dict[str, dict[str, float]] = {
     "direct": {"p_guid": 0.0, "p_rec": 0.5, "p_pref": 0.5},
 }
 """The settings of Table 1, by name; the conservative one stands first everywhere."""
+
+
+def compose(preset: str, world: Mapping[str, object], changes: Mapping[str, object], *, strict: bool) -> Config:
+    """The preset, over it the world's own defaults, over it what this run sets (PAPER.md, "Settings").
+
+    `strict` refuses text in the place of a number, as JSON needs it; the command line has nothing but text.
+
+    Raises:
+        UnknownPreset: there is no such preset.
+        pydantic.ValidationError: names every field that is wrong.
+    """
+    if preset not in PRESETS:
+        raise UnknownPreset(preset)
+    return Config.model_validate({**PRESETS[preset], **world, **changes}, strict=strict)
+
+
+class UnknownPreset(ValueError):
+    """There is no preset of that name; the sentence lists those that there are."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"There is no preset '{name}'; there is: {', '.join(PRESETS)}.")

@@ -96,7 +96,7 @@ class Life:
     # A tick
 
     def beat(self) -> bool:
-        """One tick; whether it asked something."""
+        """One tick; whether the next may follow at once, because nothing was asked and nothing is awaited."""
         state, config, query = parenting.beat(self.world, self.saved.config, self.saved.state, self.parent)
         assert self.parent.heard is not None
         tally = count(self.world, self.saved.tally, self.parent.heard, state)
@@ -105,7 +105,7 @@ class Life:
             self._hold_to_the_record(query)
         self._measure()
         self.save_if_due()
-        return bool(query.kind[0] != Kind.NONE)
+        return not bool(state.waiting) and bool(query.kind[0] == Kind.NONE)
 
     def _hold_to_the_record(self, query: Query) -> None:
         """A tick that is lived again asks what it asked the first time, or the run stops."""

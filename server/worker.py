@@ -105,7 +105,7 @@ class Worker:
             life.wait(seen)
             return False
         until = time.monotonic() + SLICE_SECONDS
-        while not life.beat() and time.monotonic() < until and not life.finished():
+        while life.beat() and time.monotonic() < until and not life.finished():
             continue
         if life.finished():
             life.save()
@@ -133,7 +133,7 @@ class Worker:
         self.bell.close()
 
 
-def main(settings: Settings) -> None:
+def main(settings: Settings) -> int:
     """Raise the runs of this database until SIGTERM or SIGINT."""
     torch.set_num_threads(1)
     db = connect(settings)
@@ -143,3 +143,4 @@ def main(settings: Settings) -> None:
     signal.signal(signal.SIGINT, worker.stop)
     worker.work()
     db.close()
+    return 0
