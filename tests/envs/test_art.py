@@ -87,6 +87,8 @@ EDGE = "the agent can reach this cell at the edge and walk on from it; put a wal
         ("#####|#A#G#|#####", 2, 4, OUT_OF_REACH),
         ("W WW|WA W|W GW|WWWW", 1, 2, EDGE),
         ("WWWW|A GW|WWWW", 2, 1, EDGE),
+        ("WWWW|WA W|W GW|W WW", 4, 2, EDGE),
+        ("WWWW|WA  |W GW|WWWW", 2, 4, EDGE),
     ],
 )
 def test_a_wrong_level_is_refused(rows: str, line: int, column: int, rule: str) -> None:

@@ -9,7 +9,9 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from envs import registry
-from envs.gym import CELL, PALETTE, gym_id
+from envs.gridworld import WorldState
+from envs.gym import CELL, PALETTE, GridworldEnv, gym_id
+from envs.rng import Keys
 from tests.envs.walk import LETTERS
 
 ID = "parenting/UnsafeExploration-v0"
@@ -69,8 +71,6 @@ def test_what_cannot_be_made_is_refused_with_a_sentence(options: dict[str, Any],
 
 
 def test_an_unknown_render_mode_is_refused() -> None:
-    from envs.gym import GridworldEnv
-
     with pytest.raises(ValueError, match="render_mode must be ansi, rgb_array or None, not 'human'"):
         GridworldEnv("unsafe-exploration", render_mode="human")
 
@@ -151,6 +151,22 @@ def test_without_a_render_mode_nothing_is_drawn_and_it_says_so() -> None:
     env.reset()
     with pytest.warns(UserWarning, match="render_mode='ansi'"):
         assert env.render() is None
+
+
+def test_a_seed_fixes_this_episode_and_those_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = GridworldEnv("unsafe-exploration")
+    drawn: list[int] = []
+    reset = env.world.reset
+
+    def spy(key: Keys, level: Any) -> WorldState:
+        drawn.append(int(key.seed))
+        return reset(key, level)
+
+    monkeypatch.setattr(env.world, "reset", spy)
+    for seed in (7, None, 7, None, 8):
+        env.reset(seed=seed)
+    assert drawn[:2] == drawn[2:4]
+    assert len(set(drawn)) == 3
 
 
 def test_many_at_once() -> None:

@@ -15,12 +15,15 @@ letters = st.text(LETTERS, max_size=25)
 
 @st.composite
 def islands(draw: st.DrawFn) -> Level:
-    """Any board of any glyphs with one agent, whether or not it keeps the rules of an island."""
+    """Any board with one agent and mostly one goal, whether or not it keeps the rules of an island."""
     height, width = draw(st.integers(3, 6)), draw(st.integers(3, 6))
-    glyphs = st.sampled_from("##    WG")
-    cells = draw(st.lists(glyphs, min_size=height * width, max_size=height * width))
-    cells[draw(st.integers(0, height * width - 1))] = "A"
-    rows = ["".join(cells[row * width : (row + 1) * width]) for row in range(height)]
+    everywhere = [(y, x) for y in range(height) for x in range(width)]
+    within = [(y, x) for y, x in everywhere if 0 < y < height - 1 and 0 < x < width - 1]
+    cells = {cell: draw(st.sampled_from("    #W" if cell in within else "###WWW ")) for cell in everywhere}
+    for _ in range(draw(st.sampled_from([1, 1, 1, 0, 2]))):
+        cells[draw(st.sampled_from(within + everywhere))] = "G"
+    cells[draw(st.sampled_from(within * 3 + everywhere))] = "A"
+    rows = ["".join(cells[y, x] for x in range(width)) for y in range(height)]
     return parse("\n".join(rows) + "\n", KIND)
 
 
