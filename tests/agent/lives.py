@@ -1,0 +1,85 @@
+"""Batched lives under a parent, written down as the reference writes its own down, so that both can be compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+
+from agent import parenting
+from agent.config import Config
+from agent.policy import Network
+from agent.query import Answer, Choice, Kind, Query, empty
+from agent.state import AgentState
+from envs.gridworld import Gridworld
+from envs.rng import keys
+from tests.reference_clips import Clip, Frame, board
+
+Judge = Callable[[Query], torch.Tensor]
+LogEntry = tuple[int, str, Clip, Clip]
+
+
+def live(
+    world: Gridworld, config: Config, judge: Judge, seed: int, trials: int, ticks: int
+) -> tuple[AgentState, list[list[LogEntry]]]:
+    """`trials` lives of `ticks` ticks; the state they end in, and what each asked."""
+    state = parenting.init(world, config, keys(seed, trials))
+    query = parenting.no_query(world, config, state)
+    logs: list[list[LogEntry]] = [[] for _ in range(trials)]
+    for tick in range(1, ticks + 1):
+        answer = Answer(query=query, choice=judge(query))
+        state, query = parenting.step(world, config, state, answer)
+        for trial in (query.kind != Kind.NONE).nonzero().squeeze(1).tolist():
+            kind = Kind(int(query.kind[trial])).name.lower()
+            logs[trial].append((tick, kind, clip(query, trial, 0), clip(query, trial, 1)))
+    state.check()
+    return state, logs
+
+
+def clip(query: Query, trial: int, side: int) -> Clip:
+    """One clip of a query as the reference holds it."""
+    length = int(query.length[trial, side])
+    frames = tuple(
+        Frame(
+            board(query.observation[trial, side, None, place]),
+            board(query.ground[trial, side, None, place]),
+            tuple(query.agent[trial, side, place].tolist()),
+            tuple(query.box[trial, side, place].tolist()),
+        )
+        for place in range(length + 1)
+    )
+    return Clip(int(query.level[trial]), frames, tuple(query.action[trial, side, :length].tolist()))
+
+
+def as_query(world: Gridworld, stages: int, left: Clip, right: Clip, kind: str) -> Query:
+    """A pair of the reference's clips as a query of one trial."""
+    query = empty(1, stages, world.height, world.width)
+    query.kind[0], query.level[0] = Kind[kind.upper()], left.level
+    for side, one in enumerate((left, right)):
+        length = len(one.actions)
+        query.length[0, side] = length
+        query.action[0, side, :length] = torch.tensor(one.actions)
+        for place, frame in enumerate(one.frames):
+            query.observation[0, side, place] = torch.tensor(frame.observation)
+            query.ground[0, side, place] = torch.tensor(frame.ground)
+            query.agent[0, side, place] = torch.tensor(frame.agent)
+            query.box[0, side, place] = torch.tensor(frame.box)
+    return query
+
+
+def capricious(query: Query) -> torch.Tensor:
+    """A parent whose answers have no sense but use all four choices: a function of moves and places alone."""
+    moves = (query.action * torch.tensor([[[3], [5]]])).sum((1, 2))
+    places = (query.agent * torch.tensor([7, 11])).sum((1, 2, 3))
+    return torch.where(query.kind == Kind.NONE, 0, 1 + (moves + places) % len(list(Choice)[1:]))
+
+
+def layers(brain: Network, parameters: torch.Tensor) -> list[torch.Tensor]:
+    """One policy's flat row [P] as the reference holds its parameters: weights [fan in, out] and biases, by layer."""
+    parts: list[torch.Tensor] = []
+    for layer in brain.layers:
+        weight = parameters[layer.start : layer.bias].view(layer.rows, layer.columns)
+        if layer.sides:  # kept as (row, column, channel), drawn as (channel, row, column)
+            weight = weight.unflatten(0, (9, -1)).transpose(0, 1).flatten(0, 1)
+        parts += [weight, parameters[layer.bias : layer.end]]
+    return parts
