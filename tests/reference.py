@@ -200,11 +200,15 @@ class Reference:
     # ---- 2.4 Maturation ----
 
     def grow(self) -> None:
-        """After enough answers pi_T is frozen, and pi_{T+1} begins as its copy."""
+        """A stage ends after enough answers; the last never does."""
         every = self.config.mature_every
         if every is not None and self.answered >= every and self.stage < self.config.stages:
-            self.policies.append(deepcopy(self.pi))
-            self.begin_stage()
+            self.mature()
+
+    def mature(self) -> None:
+        """pi_T is frozen, and pi_{T+1} begins as its copy."""
+        self.policies.append(deepcopy(self.pi))
+        self.begin_stage()
 
     def begin_stage(self) -> None:
         """An empty recorder, no answers yet, and a new Adam, for pi_T alone."""
