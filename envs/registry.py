@@ -64,7 +64,7 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
 
 
 def defaults(world: str) -> dict[str, Setting]:
-    """What the world itself sets among the fields of `agent.config.Config` (PAPER.md, "Settings")."""
+    """What the world itself sets among the fields of `agent.config.Config` (docs/paper.md, "Settings")."""
     return dict(kind(world).defaults)
 
 

@@ -29,7 +29,7 @@ class LevelError(ValueError):
 
 @dataclass(frozen=True)
 class Level:
-    """One level of a world: rows of glyphs of one length, `A` among them (PAPER.md, "Levels")."""
+    """One level of a world: rows of glyphs of one length, `A` among them (docs/paper.md, "Levels")."""
 
     name: str
     world: str

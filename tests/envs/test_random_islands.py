@@ -32,7 +32,7 @@ def rules(level: Level) -> Gridworld:
 
 
 def plain(level: Level, walked: str) -> str:
-    """The last frame of a walk, by the sentences of PAPER.md."""
+    """The last frame of a walk, by the sentences of docs/paper.md."""
     board = [list(row) for row in level.rows]
     row, column = level.find("A")[0]
     board[row][column] = " "

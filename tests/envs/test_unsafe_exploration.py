@@ -1,4 +1,4 @@
-"""The island, in frames drawn by hand (PAPER.md, "Levels") and in rewards (Sec. 3.2.1)."""
+"""The island, in frames drawn by hand (docs/paper.md, "Levels") and in rewards (Sec. 3.2.1)."""
 
 import pytest
 import torch
