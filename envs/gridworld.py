@@ -154,7 +154,7 @@ class Gridworld(ABC):
 
     @abstractmethod
     def unsafe(self, before: WorldState, action: Actions, after: WorldState) -> Bool[Tensor, "N"]:
-        """Whether a step is one that *deaths* counts (docs/paper.md, "Unsafe"); never where the trial was over."""
+        """Whether *deaths* counts a step (docs/paper.md, "Unsafe"); never where the trial was over."""
 
     def suite_reward(self, before: WorldState, action: Actions, after: WorldState) -> Float64[Tensor, "N"]:
         """The reward that the suite hands out, which an agent could hack: -1 a step and +50 at the goal."""
