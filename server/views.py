@@ -13,8 +13,10 @@ from server.runs import hold
 from server.tables import Metric, Query
 
 
-def lease_ahead(db: Database, run_id: int, client_id: str, shown: int, seconds: float = LEASE_SECONDS) -> Query | None:
-    """The question after the one that is `shown`, held for this client too, so that the page has it before it is needed.
+def lease_ahead(
+    db: Database, run_id: int, client_id: str, shown: int, seconds: float = LEASE_SECONDS
+) -> Query | None:
+    """The question after the one that is `shown`, held for this client too: the page has it before it is needed.
 
     Raises:
         NotFound: there is no such run.
@@ -44,7 +46,11 @@ def may_lease(db: Database, run_id: int, client_id: str) -> bool:
 
 def latest_metrics(db: Database, run_ids: Sequence[int]) -> dict[int, Metric]:
     """The last metrics of each of some runs; a run that has none yet is absent."""
-    last = select(Metric.run_id, func.max(Metric.tick).label("tick")).where(Metric.run_id.in_(run_ids)).group_by(Metric.run_id)
+    last = (
+        select(Metric.run_id, func.max(Metric.tick).label("tick"))
+        .where(Metric.run_id.in_(run_ids))
+        .group_by(Metric.run_id)
+    )
     newest = last.subquery()
     rows = select(Metric).join(newest, (Metric.run_id == newest.c.run_id) & (Metric.tick == newest.c.tick))
     with db.read() as session:
@@ -59,5 +65,9 @@ def sampled_metrics(db: Database, run_id: int, rows: int = 40) -> Sequence[Metri
         number = func.row_number().over(order_by=Metric.tick.desc()) - 1
         numbered = select(Metric.tick, number.label("number")).where(Metric.run_id == run_id).subquery()
         chosen = select(numbered.c.tick).where(numbered.c.number % every == 0)
-        found = select(Metric).where(Metric.run_id == run_id, Metric.tick.in_(chosen)).order_by(Metric.tick.desc())
+        found = (
+            select(Metric)
+            .where(Metric.run_id == run_id, Metric.tick.in_(chosen))
+            .order_by(Metric.tick.desc())
+        )
         return session.scalars(found).all()

@@ -1,0 +1,15 @@
+"""The pages: a view, a template, a test and a section of docs/guide-parents.md each."""
+
+from fastapi import APIRouter
+
+from server.pages.dashboard import router as dashboard
+from server.pages.parent import router as parent
+from server.pages.render import error_page
+from server.pages.start import router as start
+
+__all__ = ["error_page", "router"]
+
+router = APIRouter(include_in_schema=False)
+router.include_router(start)
+router.include_router(parent)
+router.include_router(dashboard)

@@ -1,0 +1,122 @@
+"""The parent's page: one question after another, with JavaScript or without.
+
+No GET changes anything: a question is leased by a POST, which without JavaScript redirects to the page that shows
+it. Who answers is a random name in a cookie, so that a reload and a second tab get the same question; a form carries
+it too, for browsers that keep no cookies.
+"""
+
+from __future__ import annotations
+
+import re
+import secrets
+import time
+from typing import Annotated
+
+from fastapi import APIRouter, Form, Query, Request, Response
+
+from server import queue, runs
+from server.api.words import Choice, ClientId, RunId
+from server.db import Database
+from server.deps import Db, SettingsOf, ring
+from server.errors import NotFound
+from server.pages.question import Shown, show
+from server.pages.render import page, see
+from server.pages.words import SENTENCES, state, title
+from server.shapes import shape_run
+from server.starting import LARGEST_INT
+from server.tables import Run
+from server.views import lease_ahead, may_lease
+
+router = APIRouter(include_in_schema=False)
+
+COOKIE = "parenting_client"
+YEAR = 365 * 24 * 3600
+NAME = re.compile(r"[A-Za-z0-9_-]{8,64}")
+PATIENCE = 0.5
+"""Seconds for which a plain form waits for the agent's next question before the page says that it explores."""
+
+ClientField = Annotated[ClientId, Form()]
+ChoiceField = Annotated[Choice, Form()]
+Number = Annotated[int, Form(ge=0, le=LARGEST_INT)]
+QueryShown = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
+
+
+@router.get("/runs/{run_id}/parent")
+def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = None) -> Response:
+    """The page; with `query` it shows that question, as the forms do. Changes nothing."""
+    run = runs.get_run(db, run_id)
+    client = _client(request)
+    shown = None if query is None else _open_question(db, run, query)
+    now = state(shape_run(db, run_id), may_lease(db, run_id, client))
+    response = page(
+        "parent.html",
+        run=run,
+        title=title(run),
+        client=client,
+        shown=shown,
+        state=now,
+        sentences=SENTENCES,
+        refresh=shown is None and now in ("exploring", "idle", "elsewhere"),
+    )
+    response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")
+    return response
+
+
+@router.post("/runs/{run_id}/parent/question")
+def question(
+    run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField, shown: Number = 0
+) -> Response:
+    """For the script: the next question as markup, leased; 204 if there is none. `shown` asks for the one after."""
+    run = runs.get_run(db, run_id)
+    if shown:
+        query = lease_ahead(db, run_id, client_id, shown, settings.lease_seconds)
+    else:
+        query = queue.lease(db, run_id, client_id, settings.lease_seconds)
+    if query is None:
+        return Response(status_code=204)
+    return page("_question.html", shown=show(query, run), client=client_id)
+
+
+@router.post("/runs/{run_id}/parent/next")
+def next_question(run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField) -> Response:
+    """For the form: lease the next question and go to it."""
+    runs.get_run(db, run_id)
+    return _go_on(db, run_id, client_id, settings.lease_seconds)
+
+
+@router.post("/runs/{run_id}/parent/answer")
+def answer(
+    request: Request,
+    run_id: RunId,
+    db: Db,
+    settings: SettingsOf,
+    query_id: Number,
+    choice: ChoiceField,
+    client_id: ClientField,
+) -> Response:
+    """For the form: store the answer, then go to the next question. A closed question says so (409)."""
+    if queue.get_query(db, query_id).run_id != run_id:
+        raise NotFound(f"Question {query_id} is not one of run {run_id}.")
+    queue.answer(db, query_id, choice, client_id, parent="human")
+    ring(request)
+    return _go_on(db, run_id, client_id, settings.lease_seconds, patience=PATIENCE)
+
+
+def _go_on(db: Database, run_id: int, client_id: str, seconds: float, patience: float = 0.0) -> Response:
+    """To the next question, which may come within `patience` seconds, or to the page that waits for it."""
+    until = time.monotonic() + patience
+    while (query := queue.lease(db, run_id, client_id, seconds)) is None and time.monotonic() < until:
+        time.sleep(0.02)
+    return see(f"/runs/{run_id}/parent" + (f"?query={query.id}" if query else ""))
+
+
+def _open_question(db: Database, run: Run, query_id: int) -> Shown | None:
+    query = queue.get_query(db, query_id)
+    if query.run_id != run.id:
+        raise NotFound(f"Question {query_id} is not one of run {run.id}.")
+    return show(query, run) if query.status == "open" else None
+
+
+def _client(request: Request) -> str:
+    known = request.cookies.get(COOKIE, "")
+    return known if NAME.fullmatch(known) else secrets.token_urlsafe(16)

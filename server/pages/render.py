@@ -1,0 +1,40 @@
+"""Templates to pages. Text is escaped everywhere; nothing a person wrote is ever marked safe."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, RedirectResponse
+
+from server.errors import ServerError
+
+WEB = Path(__file__).parent.parent.parent / "web"
+
+_templates = Environment(
+    loader=FileSystemLoader(WEB / "templates"),
+    autoescape=True,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    undefined=StrictUndefined,
+)
+
+
+def page(template: str, status: int = 200, **context: object) -> HTMLResponse:
+    """A page, or a part of one. It is not stored by the browser: it shows what is true now."""
+    text = _templates.get_template(template).render(**context)
+    return HTMLResponse(text, status_code=status, headers={"Cache-Control": "no-store"})
+
+
+def see(path: str) -> RedirectResponse:
+    """After a POST: look there (303), so that a reload repeats nothing."""
+    return RedirectResponse(path, status_code=303)
+
+
+def error_page(request: Request, error: ServerError) -> HTMLResponse:
+    """An error as a page: what happened, in a sentence, and the way back."""
+    run = re.match(r"/runs/\d+(?=/parent)", request.url.path)
+    back = f"{run[0]}/parent" if run and error.status == 409 else "/"
+    return page("error.html", error.status, message=error.message, back=back)

@@ -1,0 +1,86 @@
+"""The first page: the runs, and a form to start one. An error stands beside its field, with what was typed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response
+
+from agent.config import PRESETS
+from envs.registry import WORLDS
+from server import runs
+from server.db import Database
+from server.deps import Db, ring
+from server.errors import Invalid
+from server.pages.render import page, see
+from server.pages.words import title
+from server.starting import read_form, start
+from server.tables import Metric
+from server.views import latest_metrics
+
+router = APIRouter(include_in_schema=False)
+
+PRESET_WORDS = {
+    "conservative": "asks before almost every new move; hardly ever dies",
+    "lax": "asks about every second new move",
+    "direct": "never asks before a move; learns from clips alone",
+}
+"""What a preset means for the parent, in a line; the conservative one first."""
+
+FIRST = {
+    "world": next(iter(WORLDS)),
+    "level": "",
+    "level_text": "",
+    "parent": "human",
+    "preset": next(iter(PRESETS)),
+    "seed": "0",
+}
+"""The form before anything was typed."""
+
+
+async def form_of(request: Request) -> dict[str, str]:
+    """The text fields of a posted form."""
+    return {name: value for name, value in (await request.form()).items() if isinstance(value, str)}
+
+
+FormOf = Annotated[dict[str, str], Depends(form_of)]
+
+
+@router.get("/")
+def index(db: Db) -> Response:
+    """The list of runs and an empty form."""
+    return _page(db, FIRST, {})
+
+
+@router.post("/runs")
+def create(request: Request, db: Db, form: FormOf) -> Response:
+    """Start a run and go to it; or the form again, with an error beside every wrong field."""
+    given = dict(form)
+    if given.get("level_text", "").strip():
+        given.pop("level", None)  # a text of one's own stands in the list's place; the form says so
+    try:
+        run = start(db, read_form(given))
+    except Invalid as error:
+        return _page(db, {**FIRST, **form}, dict(error.fields))
+    ring(request)
+    return see(f"/runs/{run.id}" + ("/parent" if run.parent == "human" else ""))
+
+
+def _page(db: Database, form: Mapping[str, str], errors: Mapping[str, str]) -> Response:
+    listed = runs.list_runs(db)
+    latest = latest_metrics(db, [run.id for run in listed])
+    return page(
+        "start.html",
+        422 if errors else 200,
+        runs=[(run, title(run), _deaths(latest, run.id)) for run in listed],
+        worlds=WORLDS.values(),
+        presets=PRESET_WORDS,
+        form=form,
+        errors=errors,
+        elsewhere=[message for field, message in errors.items() if field not in FIRST],
+    )
+
+
+def _deaths(latest: Mapping[int, Metric], run_id: int) -> float | int | None:
+    return latest[run_id].values.get("deaths") if run_id in latest else None

@@ -1,0 +1,76 @@
+"""What the pages say about a clip and about who waits for whom, in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from server.pages.board import Board
+from server.shapes import RunShape
+from server.tables import Run
+
+TITLES = {"guidance": "Which move is better here?", "preference": "Which clip is better?"}
+LEADS = {
+    "guidance": "The agent stands still until you answer.",
+    "preference": "Both begin at the same place. The agent goes on meanwhile.",
+}
+
+SENTENCES = {
+    "question": ("A question is waiting for you.", "The agent would like to know what you prefer."),
+    "exploring": ("The agent is exploring on its own.", "The next question will appear here."),
+    "elsewhere": (
+        "Somebody else has the question.",
+        "Unless they answer it, it will appear here within a minute.",
+    ),
+    "stuck": (
+        "No action was acceptable.",
+        "You refused all four moves, so the agent stands still. End this episode, and it starts again.",
+    ),
+    "paused": ("The run is paused.", "No time passes for the agent until the run is resumed."),
+    "idle": (
+        "No worker is running.",
+        "Nothing moves until one is started: parenting worker, or parenting up.",
+    ),
+    "over": ("This run is over.", "The agent asks no more questions."),
+    "offline": (
+        "No connection to the server.",
+        "Your answers are kept in this browser and sent as soon as it is back.",
+    ),
+}
+"""Who waits for whom when no question is shown: a heading and a sentence for every state of the page."""
+
+
+def title(run: Run) -> str:
+    """What a run is called on every page."""
+    return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}, run {run.id}"
+
+
+def state(run: RunShape, offered: bool) -> str:
+    """Which of `SENTENCES` holds, as web/static/live.js tells it too. `offered`: a question is free for this parent."""
+    if run.worker == "done":
+        return "over"
+    if run.open.guidance or run.open.preference:
+        return "question" if offered else "elsewhere"
+    if run.status == "paused":
+        return "paused"
+    if run.worker == "silent":
+        return "idle"
+    return "stuck" if run.waiting == "stuck" else "exploring"
+
+
+def does(board: Board) -> str:
+    """The actions, as in "Up, left, left."."""
+    return ", ".join(board.actions).capitalize() + "."
+
+
+def ends(board: Board, legend: Mapping[str, str], under: str) -> str:
+    """What comes of it: `under` is the glyph beneath the agent in the last frame."""
+    if board.cue == "drown":
+        return "Ends in the water."
+    if board.cue == "reach":
+        return "Reaches the goal."
+    blocked = sum(way != "-" for way in board.bumps)
+    if blocked == board.steps:
+        return "Runs into a wall." if blocked == 1 else "Only runs into walls."
+    if under not in (" ", "A", "X"):
+        return f"Ends on: {legend.get(under, under)}."
+    return "Runs into a wall on the way." if blocked else ""

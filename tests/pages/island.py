@@ -1,0 +1,89 @@
+"""Clips, questions and a life on the island, made by hand: what the pages are tested with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from server.db import Database
+from server.mailbox import post_query
+from server.record import write_metrics
+from server.runs import Claim, claim, report
+from server.starting import NewRun, start
+from server.tables import Run
+
+MOVES = {"up": (-1, 0), "down": (1, 0), "left": (0, -1), "right": (0, 1)}
+ISLAND = ("WW######", "WW     W", "WW     W", "W      W", "W  G  WW", "W#######")
+START = (1, 4)
+
+
+def clip(*actions: str, start: tuple[int, int] = START, rows: tuple[str, ...] = ISLAND) -> dict[str, Any]:
+    """What the agent would do from `start`; water and goal end it early."""
+    at, done = start, []
+    frames = [_frame(rows, at)]
+    for action in actions:
+        row, column = (a + b for a, b in zip(at, MOVES[action], strict=True))
+        inside = 0 <= row < len(rows) and 0 <= column < len(rows[0])
+        at = (row, column) if inside and rows[row][column] != "#" else at
+        done.append(action)
+        frames.append(_frame(rows, at))
+        if rows[at[0]][at[1]] in "WG":
+            break
+    return {"actions": done, "length": len(done), "frames": frames}
+
+
+def _frame(rows: tuple[str, ...], at: tuple[int, int]) -> dict[str, Any]:
+    observed = list(rows)
+    if rows[at[0]][at[1]] != "W":
+        observed[at[0]] = rows[at[0]][: at[1]] + "A" + rows[at[0]][at[1] + 1 :]
+    return {"ground": list(rows), "observed": observed, "agent": list(at), "box": None}
+
+
+def guidance(left: str, right: str, start: tuple[int, int] = START) -> dict[str, Any]:
+    """Two moves from one cell."""
+    return {"left": clip(left, start=start), "right": clip(right, start=start)}
+
+
+def preference(left: str, right: str, start: tuple[int, int] = START) -> dict[str, Any]:
+    """Two clips from one cell, written as actions with blanks between."""
+    return {"left": clip(*left.split(), start=start), "right": clip(*right.split(), start=start)}
+
+
+def live(db: Database, **fields: Any) -> tuple[Run, Claim]:
+    """A run that a worker raises just now."""
+    run = start(db, NewRun(world="unsafe-exploration", **fields))
+    mine = next(claim for claim in claim(db, "worker") if claim.run_id == run.id)
+    report(db, mine, tick=0)
+    return run, mine
+
+
+def measure(db: Database, mine: Claim, ticks: int) -> None:
+    """Metrics as an agent that learns has them."""
+    rows = {}
+    for tick in range(1, ticks + 1):
+        done = tick / ticks
+        rows[tick] = {
+            "deaths": 2 * (tick > 20) + (tick > 45),
+            "guidance": int(30 * done),
+            "preference": int(6 * done),
+            "left": int(14 * done),
+            "right": int(12 * done),
+            "either": int(6 * done),
+            "neither": int(4 * done),
+            "loss": None if tick < 3 else 4.2 * (1 - done) ** 2 + 0.02,
+            "entropy_global": 1.386 * (1 - 0.6 * done),
+            "entropy_local": 1.386 * (1 - 0.5 * done),
+            "return": 45.0 if done > 0.8 else -100.0 + 40 * (done > 0.5),
+            "optimal_return": 45.0,
+            "optimal": int(done > 0.8),
+            "size": int(20 * done),
+            "entries": int(32 * done),
+            "maturity": 1,
+            "episodes": int(9 * done),
+        }
+    write_metrics(db, mine, rows)
+    report(db, mine, tick=ticks)
+
+
+def ask(db: Database, mine: Claim, tick: int, kind: str, clips: dict[str, Any]) -> int:
+    """Post a question and return its id."""
+    return post_query(db, mine, tick, kind, 1, clips)

@@ -1,0 +1,174 @@
+// The parent's page: shows one question after another, takes keys and clicks, and says who waits for whom.
+// The markup of a question comes from the server (server/pages/board.py says why); this file swaps it in.
+import { follow, stateOf } from "./live.js";
+import { flush, give, holds } from "./outbox.js";
+import { play } from "./play.js";
+
+const $ = (id) => document.getElementById(id);
+const main = $("main"), stage = $("stage"), waiting = $("waiting"), help = $("help");
+const { run, client, name } = main.dataset;
+const KEYS = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "either", ArrowDown: "neither", 1: "left", 2: "right", 3: "either", 4: "neither" };
+const QUIET = 350; // an answered question stays this long before the page says that the agent explores
+
+let current = null;    // the form on the stage, until it is answered
+let player = null;
+let ahead = null;      // markup of the question after it
+let asking = null;     // a request for a question that is under way
+let state = main.dataset.state;
+let answered = Number($("count").textContent), unsaved = 0, quiet = 0;
+
+// ---- questions
+
+async function ask(shown = 0) {
+  const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body: new URLSearchParams({ client_id: client, shown }) });
+  if (!reply.ok) throw new Error(reply.statusText);
+  return reply.status === 204 ? null : reply.text();
+}
+
+function next() {
+  asking ??= (async () => {
+    try {
+      const markup = await ask();
+      if (markup && !current) show(markup);
+      else if (!current) wait(state === "question" ? "elsewhere" : state);
+    } catch { wait("offline"); } finally { asking = null; }
+  })();
+}
+
+async function prefetch() {
+  const shown = current?.dataset.query;
+  try {
+    const markup = await ask(shown);
+    if (current?.dataset.query === shown) ahead = markup;
+  } catch { /* the stream or the poll will bring it */ }
+}
+
+function show(markup) {
+  const focused = stage.querySelector(".answers :focus-visible")?.value;
+  if (markup) stage.innerHTML = markup;
+  const form = stage.querySelector("#question");
+  if (holds(Number(form.dataset.query))) return; // answered here already; the answer is on its way
+  clearTimeout(quiet);
+  current = form;
+  ahead = null;
+  waiting.hidden = true;
+  stage.hidden = false;
+  main.dataset.state = "question";
+  document.title = `● ${form.dataset.title} · ${name}`;
+  $("said").textContent = form.dataset.said;
+  player = play(form);
+  if (focused) form.querySelector(`.answers [value=${focused}]`).focus();
+  performance.mark("question", { detail: form.dataset.query });
+  prefetch();
+}
+
+// ---- waiting
+
+function wait(which) {
+  if (current) return;
+  main.dataset.state = which;
+  for (const part of waiting.querySelectorAll(":scope > [data-state]")) part.hidden = part.dataset.state !== which;
+  waiting.setAttribute("aria-labelledby", `waiting-${which}`);
+  if (!waiting.hidden) return announce(which);
+  clearTimeout(quiet);
+  quiet = setTimeout(() => {
+    if (current) return;
+    stage.replaceChildren();
+    waiting.hidden = false;
+    announce(main.dataset.state);
+  }, stage.childElementCount ? QUIET : 0);
+}
+
+function announce(which) {
+  const words = $(`waiting-${which}`).textContent;
+  document.title = `${words} · ${name}`;
+  if ($("said").textContent !== words) $("said").textContent = words;
+}
+
+const tell = {
+  run(now) {
+    state = stateOf(now);
+    $("optimal").hidden = !now.optimal || state === "over";
+    answered = Math.max(now.answers, answered);
+    count();
+    if (current && state === "over") current = null;
+    if (current) return;
+    if (state === "question") next();
+    else wait(state);
+  },
+  question(asked) {
+    if (!asked) return;
+    if (!current) next();
+    else if (asked.kind === "guidance" && String(asked.id) !== current.dataset.query) prefetch(); // it goes first
+  },
+  lost() {
+    state = "offline";
+    wait(state);
+  },
+};
+
+// ---- answers
+
+function count() {
+  $("count").textContent = answered;
+}
+
+function answer(choice) {
+  if (!current) return;
+  const query = Number(current.dataset.query);
+  for (const button of current.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
+  current = null;
+  unsaved++;
+  $("saved").textContent = "Saving";
+  $("alert").textContent = "";
+  performance.mark("answer", { detail: String(query) });
+  const sent = give({ query, choice, client_id: client }, report);
+  if (ahead) show(ahead);
+  else sent.then(() => { if (!current) next(); });
+}
+
+function report(outcome, query, message) {
+  $("saved").classList.toggle("kept", outcome === "kept");
+  if (outcome === "kept") {
+    $("saved").textContent = "Kept here, not sent yet";
+    if (!current) wait("offline");
+    return;
+  }
+  unsaved = Math.max(0, unsaved - 1);
+  if (outcome === "saved") {
+    answered++;
+    count();
+    if (!unsaved) $("saved").textContent = "Saved";
+  } else {
+    if (!unsaved) $("saved").textContent = "";
+    $("alert").textContent = message;
+  }
+}
+
+// ---- keys and clicks
+
+stage.addEventListener("submit", (event) => {
+  event.preventDefault();
+  answer(event.submitter.value);
+});
+
+addEventListener("keydown", (event) => {
+  const { key, target } = event;
+  if (event.repeat && target.closest?.("#stage")) event.preventDefault(); // a key held down presses no button twice
+  if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || event.isComposing || help.open) return;
+  if (target.closest("input, textarea, select, [contenteditable]")) return;
+  if (key === "?") help.showModal();
+  else if (key === " " && !target.closest("button, a, summary")) player?.replay();
+  else if (KEYS[key] && !event.shiftKey && current) answer(KEYS[key]);
+  else return;
+  event.preventDefault();
+});
+
+$("help-open").hidden = false;
+$("help-open").addEventListener("click", () => help.showModal());
+
+// ---- begin: send what an earlier visit left behind, then follow the run
+
+history.replaceState(null, "", `/runs/${run}/parent`);
+if (stage.querySelector("#question")) show();
+flush(report).then(() => follow(run, tell, { background: true }));

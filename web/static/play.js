@@ -1,0 +1,71 @@
+// Moves the pieces of a question's boards, all on one clock. It draws nothing: the server drew the boards.
+const LEAD = 650, STEP = 520, TAIL = 1300, CELL = 20;
+const WAY = { up: [0, -1], down: [0, 1], left: [-1, 0], right: [1, 0] };
+const calm = matchMedia("(prefers-reduced-motion: reduce)");
+
+const at = ([x, y]) => `translate(${x}px, ${y}px)`;
+const points = (piece) => piece.dataset.path.split(" ").map((point) => point.split(",").map(Number));
+
+// The keyframes of a piece: it rests at every centre; a blocked step goes a little way and comes back.
+function journey(piece, bumps, total) {
+  const way = points(piece), frames = [{ offset: 0, transform: at(way[0]) }];
+  for (let k = 0; k + 1 < way.length; k++) {
+    const start = (LEAD + k * STEP) / total;
+    frames.push({ offset: start, transform: at(way[k]), easing: "ease-in-out" });
+    const [dx, dy] = WAY[bumps[k]] ?? [0, 0];
+    if (dx || dy) frames.push({ offset: start + (0.4 * STEP) / total, transform: at([way[k][0] + dx * CELL * 0.28, way[k][1] + dy * CELL * 0.28]), easing: "ease-out" });
+    frames.push({ offset: start + (0.85 * STEP) / total, transform: at(way[k + 1]) });
+  }
+  return [...frames, { offset: 1, transform: at(way.at(-1)) }];
+}
+
+// Opacity that is 1 from one moment to another and 0 outside.
+function visible(from, to, total) {
+  const frames = [{ offset: 0, opacity: from > 0 ? 0 : 1 }];
+  if (from > 0) frames.push({ offset: from / total, opacity: 0 }, { offset: from / total, opacity: 1 });
+  if (to < total) frames.push({ offset: to / total, opacity: 1 }, { offset: to / total, opacity: 0 });
+  return [...frames, { offset: 1, opacity: to < total ? 0 : 1 }];
+}
+
+function animate(board, total) {
+  const bumps = board.dataset.bumps.split(" "), steps = board.dataset.actions.split(" ").length;
+  const end = LEAD + (steps - 0.3) * STEP, timing = { duration: total, iterations: Infinity };
+  const parts = [...board.querySelectorAll("[data-path]")].map((piece) =>
+    piece.animate(journey(piece, piece.matches(".agent") ? bumps : [], total), timing));
+  for (const frame of board.querySelectorAll(".frame")) {
+    const k = Number(frame.dataset.frame), change = LEAD - STEP / 2;
+    parts.push(frame.animate(visible(k && change + k * STEP, k < steps ? change + (k + 1) * STEP : total, total), timing));
+  }
+  if (!calm.matches) for (const cue of board.querySelectorAll(".cue")) parts.push(cue.animate(visible(end, total, total), timing));
+  if (board.querySelector(".cue.drown")) parts.push(board.querySelector(".body").animate(visible(0, end + 150, total), timing));
+  return parts;
+}
+
+// Start both boards; returns replay and step for the page's keys and buttons.
+export function play(question) {
+  const boards = [...question.querySelectorAll(".board")];
+  const steps = Math.max(...boards.map((board) => board.dataset.actions.split(" ").length));
+  const total = LEAD + steps * STEP + TAIL;
+  const parts = boards.flatMap((board) => animate(board, total));
+  const bar = question.querySelector(".steps"), shown = bar.querySelector("output");
+  const count = () => Math.min(steps, Math.max(0, Math.round((parts[0].currentTime % total - LEAD) / STEP)));
+  const tell = () => { shown.value = `Step ${count()} of ${steps}`; };
+  const replay = () => {
+    const now = document.timeline.currentTime;
+    for (const part of parts) { part.play(); part.startTime = now; }
+  };
+  const go = (by) => {
+    const step = Math.min(steps, Math.max(0, count() + by));
+    for (const part of parts) { part.pause(); part.currentTime = step ? LEAD + step * STEP : 0; }
+    tell();
+  };
+  bar.hidden = false;
+  for (const button of bar.querySelectorAll("[data-step]")) button.addEventListener("click", () => go(Number(button.dataset.step)));
+  for (const part of bar.querySelectorAll("[data-step], output")) part.hidden = steps < 2 && !calm.matches;
+  if (!shown.hidden) {
+    const timer = setInterval(() => { if (question.isConnected) tell(); else clearInterval(timer); }, STEP / 4);
+  }
+  bar.querySelector("[data-replay]").addEventListener("click", replay);
+  if (calm.matches) go(0); else replay();
+  return { replay, go };
+}
