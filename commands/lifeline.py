@@ -10,7 +10,9 @@ VARIABLE = "PARENTING_LIFELINE"
 
 
 def follow() -> None:
-    """Stop this process, as SIGTERM would, when the process that holds the other end is gone. Does nothing without one."""
+    """Stop this process, as SIGTERM would, when the process that holds the other end is gone. Does nothing
+    without one.
+    """
     number = os.environ.pop(VARIABLE, None)
     if number is not None:
         threading.Thread(target=_wait, args=(int(number),), daemon=True, name="lifeline").start()

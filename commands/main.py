@@ -34,7 +34,9 @@ parenting run unsafe-exploration --preset conservative --trials 100
 
 
 class Lazy(TyperGroup):
-    """A group that loads a command's file when the command is called, or its own help asked for, not to list it."""
+    """A group that loads a command's file when the command is called, or its own help asked for, not to list
+    it.
+    """
 
     def list_commands(self, ctx: Any) -> list[str]:
         """The names, in the order of `COMMANDS`."""
@@ -63,7 +65,9 @@ def _listed() -> None:
     """Stands for a command in the list."""
 
 
-app = typer.Typer(cls=Lazy, add_completion=False, no_args_is_help=True, pretty_exceptions_show_locals=False, epilog=EXAMPLES)
+app = typer.Typer(
+    cls=Lazy, add_completion=False, no_args_is_help=True, pretty_exceptions_show_locals=False, epilog=EXAMPLES
+)
 
 
 @app.callback()

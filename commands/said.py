@@ -24,7 +24,8 @@ def plainly() -> Iterator[None]:
 
 
 def settings(**given: Any) -> Settings:
-    """The settings from the environment, `.env` and the options given (None: not given). Call it within `plainly`.
+    """The settings from the environment, `.env` and the options given (None: not given). Call it within
+    `plainly`.
 
     Raises:
         ServerError: names each wrong setting.
@@ -32,5 +33,7 @@ def settings(**given: Any) -> Settings:
     try:
         return Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
-        wrong = "\n".join(f"PARENTING_{str(item['loc'][0]).upper()}: {item['msg']}" for item in error.errors())
+        wrong = "\n".join(
+            f"PARENTING_{str(item['loc'][0]).upper()}: {item['msg']}" for item in error.errors()
+        )
         raise ServerError(wrong) from None

@@ -1,4 +1,6 @@
-"""`parenting up`: everything in one command. Web and worker are processes of their own, so that neither stops the other."""
+"""`parenting up`: everything in one command. Web and worker are processes of their own, so that neither stops
+the other.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ Children = Mapping[str, subprocess.Popen[bytes]]
 
 
 def up(
-    port: Annotated[int | None, typer.Option(help="Port of the pages; 0 takes a free one. [default: 8765]")] = None,
+    port: Annotated[
+        int | None, typer.Option(help="Port of the pages; 0 takes a free one. [default: 8765]")
+    ] = None,
     browser: Annotated[bool, typer.Option(help="Open the pages in a browser.")] = True,
 ) -> None:
     """Migrate the database, start the pages and a worker, and open the pages in a browser. Ctrl-C stops all.
@@ -52,7 +56,10 @@ def up(
             threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
         dead = _first_to_end(children, told)
     if dead is not None:
-        typer.echo(f"The {dead} process ended by itself ({_how(children[dead].returncode)}), so all was stopped.", err=True)
+        typer.echo(
+            f"The {dead} process ended by itself ({_how(children[dead].returncode)}), so all was stopped.",
+            err=True,
+        )
         raise typer.Exit(1)
 
 
@@ -82,7 +89,9 @@ def _signals() -> Iterator[threading.Event]:
 
 @contextmanager
 def _children(ear: socket.socket) -> Iterator[Children]:
-    """Web and worker, in sessions of their own so that Ctrl-C reaches `up` alone, which stops both in the end."""
+    """Web and worker, in sessions of their own so that Ctrl-C reaches `up` alone, which stops both in the
+    end.
+    """
     lifeline, held = os.pipe()
     web = ["web", "--fd", str(ear.fileno())]
     children: dict[str, subprocess.Popen[bytes]] = {}

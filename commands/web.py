@@ -9,7 +9,7 @@ import typer
 
 from commands.lifeline import follow
 from commands.said import plainly, settings
-from server.serve import bind, serve
+from server.serve import bind, make_server
 
 Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a free one. [default: 8765]")]
 
@@ -17,7 +17,9 @@ Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a fre
 def web(
     port: Port = None,
     host: Annotated[str | None, typer.Option(help="Address to listen on; only 127.0.0.1 as yet.")] = None,
-    fd: Annotated[int | None, typer.Option(hidden=True, help="A listening socket, from `parenting up`.")] = None,
+    fd: Annotated[
+        int | None, typer.Option(hidden=True, help="A listening socket, from `parenting up`.")
+    ] = None,
 ) -> None:
     """Serve the pages and the API on this machine until Ctrl-C.
 
@@ -26,7 +28,8 @@ def web(
     follow()
     with plainly():
         chosen = settings(port=port, host=host)
+        server = make_server(chosen)
         ear = bind(chosen.host, chosen.port) if fd is None else socket.socket(fileno=fd)
         if fd is None:
             typer.echo(f"Parenting's pages: http://localhost:{ear.getsockname()[1]}/  (Ctrl-C stops them)")
-        serve(chosen, ear)
+        server.run(sockets=[ear])

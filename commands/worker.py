@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import typer
-
 from commands.lifeline import follow
 from commands.said import plainly, settings
+from server.log import set_up_log
 
 
 def worker() -> None:
@@ -14,8 +13,9 @@ def worker() -> None:
     Example: parenting worker
     """
     follow()
-    from server.worker import main  # loads torch
-
     with plainly():
-        code = main(settings())
-    raise typer.Exit(code)
+        chosen = settings()
+        set_up_log(chosen.log_level)
+        from server.worker import main  # loads torch, which takes a second: settings are checked first
+
+        main(chosen)

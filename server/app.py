@@ -35,7 +35,8 @@ log = structlog.get_logger()
 
 
 def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
-    """The application on a migrated database; `db` instead of the settings' own is for tests with a clock of theirs.
+    """The application on a migrated database; `db` instead of the settings' own is for tests with a clock of
+    theirs.
 
     Raises:
         SetupError: the database cannot be used as it is; the sentence names the remedy.
@@ -118,12 +119,16 @@ def _add_health(app: FastAPI) -> None:
 def _add_static(app: FastAPI) -> None:
     plotly = find_spec("plotly")  # found, not imported: it takes a second
     folders = [] if plotly is None else plotly.submodule_search_locations or []
-    script = next((path for folder in folders if (path := Path(folder, "package_data/plotly.min.js")).is_file()), None)
+    script = next(
+        (path for folder in folders if (path := Path(folder, "package_data/plotly.min.js")).is_file()), None
+    )
 
     @app.get("/static/vendor/plotly.min.js", include_in_schema=False)
     def plotly_script() -> FileResponse:
         if script is None:
             raise NotFound("The charts' library is not installed. Run: pip install plotly")
-        return FileResponse(script, media_type="text/javascript", headers={"Cache-Control": f"public, max-age={WEEK}"})
+        return FileResponse(
+            script, media_type="text/javascript", headers={"Cache-Control": f"public, max-age={WEEK}"}
+        )
 
     app.mount("/static", StaticFiles(directory=STATIC), name="static")

@@ -1,7 +1,8 @@
 """The database handle: one engine, transactions for reading and for writing, and the clock.
 
-Every write begins with BEGIN IMMEDIATE: a deferred transaction that reads and then writes fails at once under another
-writer, whatever the busy timeout. SQLite runs in WAL with `synchronous=FULL`: after a commit nothing is lost, power included.
+Every write begins with BEGIN IMMEDIATE: a deferred transaction that reads and then writes fails at once under
+another writer, whatever the busy timeout. SQLite runs in WAL with `synchronous=FULL`: after a commit nothing
+is lost, power included.
 """
 
 from __future__ import annotations
@@ -71,6 +72,7 @@ class Database:
             raise Busy
         try:
             with _said_plainly(), Session(self._writing, expire_on_commit=False) as session, session.begin():
+                session.connection()  # BEGIN IMMEDIATE now, not at the first statement
                 yield session
         finally:
             self._turn.release()

@@ -5,10 +5,11 @@
     @router.get("/runs/{run_id}")
     def page(request: Request, run_id: int, db: Db, settings: SettingsOf) -> Response: ...
 
-`Db` is the `server.db.Database` that every verb of `server.runs`, `queue` and `record` takes first. Write `def`, not
-`async def`: verbs block, so they belong in the thread pool. Raise `server.errors` freely: `server.app` turns them into
-the one JSON shape under `/api`, and `/healthz`, and asks the pages for a page everywhere else.
-After a stored answer or event call `ring(request)`, so that the worker hears of it at once.
+`Db` is the `server.db.Database` that every verb of `server.runs`, `queue` and `record` takes first. Write
+`def`, not `async def`: verbs block, so they belong in the thread pool. Raise `server.errors` freely:
+`server.app` turns them into the one JSON shape for programs (/api, /static, /healthz, /readyz), and into the
+pages' `error_page` elsewhere. After a stored answer or event call `ring(request)`, so that the worker hears
+of it at once.
 """
 
 from __future__ import annotations

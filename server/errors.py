@@ -2,7 +2,7 @@
 
 All have one JSON shape:
 
-    {"error": {"code": "invalid", "message": "...", "field": "seed", "fields": [{"field": ..., "message": ...}]}}
+{"error": {"code": "invalid", "message": "...", "field": "seed", "fields": [{"field": ..., "message": ...}]}}
 
 `field` and `fields` stand there only where they apply.
 """

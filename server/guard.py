@@ -1,8 +1,8 @@
 """What stands before every route: known hosts, no cross-site acts, safe headers, and no traceback for anyone.
 
-Cross-site requests are told by `Sec-Fetch-Site`, which every browser of today sends, and by `Origin` in older ones
-(Datasette's and Go's way). A request with neither comes from no browser and passes: a program on this machine may
-answer too.
+Cross-site requests are told by `Sec-Fetch-Site`, which every browser of today sends, and by `Origin` in older
+ones (Datasette's and Go's way). A request with neither comes from no browser and passes: a program on this
+machine may answer too.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ log = structlog.get_logger()
 
 
 def policy(inline_styles: bool = False) -> str:
-    """The Content-Security-Policy. A page that needs inline styles (Plotly's) sets this header itself, with True."""
+    """The Content-Security-Policy. A page that needs inline styles (Plotly's) sets this header itself, with
+    True.
+    """
     styles = "'self' 'unsafe-inline'" if inline_styles else "'self'"
     return (
         f"default-src 'self'; style-src {styles}; img-src 'self' data: blob:; object-src 'none'; "

@@ -1,12 +1,13 @@
-"""The worker's verbs on queries, answers and events: watch, post, take. One transaction each; all their SQL is here.
+"""The worker's verbs on queries, answers and events: watch, post, take. One transaction each; all their SQL
+is here.
 
-**Crash and replay.** A worker that lost its memory goes on from a checkpoint and lives some ticks a second time. At or
-below the *high-water tick*, the largest on any posted query, applied answer or applied event, `take_answer` and
-`take_events` give back exactly what was recorded for that tick, and `post_query` of a known tick inserts nothing.
-So ticks replay exactly and nothing is asked twice.
+**Crash and replay.** A worker that lost its memory goes on from a checkpoint and lives some ticks a second
+time. At or below the *high-water tick*, the largest on any posted query, applied answer or applied event,
+`take_answer` and `take_events` give back exactly what was recorded for that tick, and `post_query` of a known
+tick inserts nothing. So ticks replay exactly and nothing is asked twice.
 
-Within a tick the order is: events, answer, step, query. So an event applied at a tick does not close that tick to an
-answer, but an answer or a query closes it to both.
+Within a tick the order is: events, answer, step, query. So an event applied at a tick does not close that
+tick to an answer, but an answer or a query closes it to both.
 """
 
 from __future__ import annotations
@@ -59,7 +60,8 @@ def high_water(db: Database, run_id: int) -> int:
 
 
 def post_query(db: Database, mine: Claim, tick: int, kind: str, maturity: int, clips: dict[str, Any]) -> int:
-    """Ask: insert the query of this tick and return its id. A known tick inserts nothing: its id and payload stay.
+    """Ask: insert the query of this tick and return its id. A known tick inserts nothing: its id and payload
+    stay.
 
     Raises:
         LostClaim: another worker raises this run now.
@@ -87,8 +89,8 @@ def asked_at(db: Database, run_id: int, tick: int) -> Query | None:
 def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
     """The answer to be heard at this tick, at most one: guidance first, then the oldest query's. Never waits.
 
-    A new one is marked with the tick in the same transaction; on replay the recorded one comes back, even if it was
-    superseded later.
+    A new one is marked with the tick in the same transaction; on replay the recorded one comes back, even if
+    it was superseded later.
 
     Raises:
         LostClaim: another worker raises this run now.
@@ -146,7 +148,9 @@ def withdraw(db: Database, mine: Claim, query_id: int) -> None:
 
 
 def record(db: Database, run_id: int) -> Sequence[Taken]:
-    """Every answer that the agent heard, in the order in which it heard them: from this X is rebuilt at any time."""
+    """Every answer that the agent heard, in the order in which it heard them: from this X is rebuilt at any
+    time.
+    """
     with db.read() as session:
         rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
         rows = rows.where(Answer.run_id == run_id, Answer.applied_tick.is_not(None)).order_by(

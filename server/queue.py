@@ -1,7 +1,8 @@
-"""The parents' verbs on queries and answers: lease, release, answer, correct. One transaction each; all their SQL is here.
+"""The parents' verbs on queries and answers: lease, release, answer, correct. One transaction each; all their
+SQL is here.
 
-A lease is a timestamp: nothing sticks when a browser dies. Silence is never consent: no verb answers by itself.
-The worker's verbs (post, take, withdraw) are in `server.mailbox`.
+A lease is a timestamp: nothing sticks when a browser dies. Silence is never consent: no verb answers by
+itself. The worker's verbs (post, take, withdraw) are in `server.mailbox`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ LEASE_SECONDS = 60.0
 
 @dataclass(frozen=True)
 class Stored:
-    """The reply to an answer: only what never changes afterwards, so that the same answer always gets the same reply."""
+    """The reply to an answer: only what never changes afterwards, so that the same answer always gets the
+    same reply.
+    """
 
     query: int
     run: int
@@ -54,9 +57,11 @@ def waiting(db: Database, run_id: int) -> Query | None:
 
 
 def lease(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECONDS) -> Query | None:
-    """Offer the most urgent open query that nobody else holds, and hold it for this client; None if there is none.
+    """Offer the most urgent open query that nobody else holds, and hold it for this client; None if there is
+    none.
 
-    Guidance goes first, then the oldest. A client that still holds one gets the same again, for `seconds` more.
+    Guidance goes first, then the oldest. A client that still holds one gets the same again, for `seconds`
+    more.
     """
     with db.read() as session:  # nothing to offer is the common case, and takes no lock
         if _offer(session, run_id, client_id, db.clock()) is None:
@@ -71,7 +76,9 @@ def lease(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECO
 
 
 def release(db: Database, query_id: int, client_id: str) -> None:
-    """Let go of a leased query at once, so that it is offered again; nothing happens if another client holds it."""
+    """Let go of a leased query at once, so that it is offered again; nothing happens if another client holds
+    it.
+    """
     with db.write() as session:
         query = _query(session, query_id, lock=True)
         if query.leased_by == client_id:
@@ -79,7 +86,8 @@ def release(db: Database, query_id: int, client_id: str) -> None:
 
 
 def answer(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Stored:
-    """Store an answer, once. The same again by the same client gets the same reply; a late one is taken if none stands.
+    """Store an answer, once. The same again by the same client gets the same reply; a late one is taken if
+    none stands.
 
     Raises:
         NotFound: there is no such query.
@@ -100,7 +108,8 @@ def answer(db: Database, query_id: int, choice: str, client_id: str, parent: str
 
 
 def correct(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Answer:
-    """Supersede the standing answer by a new row. If the agent had heard the old one, its tick stays on the old row.
+    """Supersede the standing answer by a new row. If the agent had heard the old one, its tick stays on the
+    old row.
 
     Raises:
         NotFound: there is no such query.

@@ -1,7 +1,8 @@
-"""Verbs on runs: create, list, get, pause, resume, stop for the operator; claim, report, finish for the worker.
+"""Verbs on runs: create, list, get, pause, resume, stop for the operator; claim, report, finish for the
+worker.
 
-One actor a run: `claim` raises the run's epoch, and every later write of a worker checks it inside its own transaction
-(`held`). A worker that slept past its claim therefore cannot write.
+One actor a run: `claim` raises the run's epoch, and every later write of a worker checks it inside its own
+transaction (`held`). A worker that slept past its claim therefore cannot write.
 """
 
 from __future__ import annotations
@@ -40,7 +41,9 @@ class Open:
 
 
 def create_run(db: Database, **fields: Any) -> Run:
-    """Add a run. The fields are those of `tables.Run`; `server.starting` checks and fills them in from a form."""
+    """Add a run. The fields are those of `tables.Run`; `server.starting` checks and fills them in from a
+    form.
+    """
     with db.write() as session:
         run = Run(created=db.clock(), **fields)
         session.add(run)
@@ -71,7 +74,8 @@ def open_counts(db: Database, run_id: int) -> Open:
 
 
 def set_status(db: Database, run_id: int, status: str, reason: str | None = None) -> Run:
-    """Pause, resume (`active`) or stop a run, for the operator. Doing it twice is doing it once. Stopping withdraws what is open.
+    """Pause, resume (`active`) or stop a run, for the operator. Doing it twice is doing it once. Stopping
+    withdraws what is open.
 
     Raises:
         NotFound: there is no such run.
@@ -87,7 +91,9 @@ def set_status(db: Database, run_id: int, status: str, reason: str | None = None
 
 
 def claim(db: Database, actor: str, seconds: float = CLAIM_SECONDS) -> Sequence[Claim]:
-    """Take every living run (active or paused) that is free, or whose worker gave no sign of life for `seconds`."""
+    """Take every living run (active or paused) that is free, or whose worker gave no sign of life for
+    `seconds`.
+    """
     late = db.clock() - timedelta(seconds=seconds)
     living = (Run.status.in_(("active", "paused")), or_(Run.actor.is_(None), Run.heartbeat < late))
     with db.read() as session:  # nothing to claim is the common case, and takes no lock
@@ -138,7 +144,8 @@ def report(db: Database, mine: Claim, **fields: Any) -> Run:
 
 
 def finish(db: Database, mine: Claim, status: str, reason: str, error: str | None = None) -> Run:
-    """End a run as `finished` or `failed`, with a sentence for people and, if it failed, the details. Withdraws what is open.
+    """End a run as `finished` or `failed`, with a sentence for people and, if it failed, the details.
+    Withdraws what is open.
 
     Raises:
         LostClaim: another worker raises this run now.
@@ -168,7 +175,9 @@ def hold(session: Session, run_id: int) -> Run:
 
 
 def held(session: Session, mine: Claim) -> Run:
-    """The run of a claim, locked, after checking that the claim still holds: the first line of every write of a worker."""
+    """The run of a claim, locked, after checking that the claim still holds: the first line of every write of
+    a worker.
+    """
     run = hold(session, mine.run_id)
     if (run.actor, run.epoch) != (mine.actor, mine.epoch):
         raise LostClaim(
@@ -184,7 +193,7 @@ def open_in(session: Session, run_id: int) -> Open:
         .where(Query.run_id == run_id, Query.status == "open")
         .group_by(Query.kind)
     )
-    counts = dict(session.execute(rows).tuples().all())
+    counts = {row[0]: row[1] for row in session.execute(rows)}
     return Open(guidance=counts.get("guidance", 0), preference=counts.get("preference", 0))
 
 

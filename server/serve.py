@@ -1,18 +1,16 @@
-"""The web process: uvicorn, which ends live streams when it is told to stop, and logs that are quiet by default."""
+"""The web process: uvicorn, which ends live streams when it is told to stop."""
 
 from __future__ import annotations
 
-import logging
 import socket
-import sys
 from types import FrameType
 
-import structlog
 import uvicorn
 from fastapi import FastAPI
 
 from server.app import create_app
 from server.errors import SetupError
+from server.log import set_up_log
 from server.settings import Settings
 
 GRACE = 1
@@ -45,50 +43,29 @@ def bind(host: str, port: int) -> socket.socket:
     except OSError as error:
         ear.close()
         said = error.strerror or "it cannot be used"
-        raise SetupError(f"port: {port} cannot be used ({said}). Name another one, or 0 for any free one.") from None
+        raise SetupError(
+            f"port: {port} cannot be used ({said}). Name another one, or 0 for any free one."
+        ) from None
     ear.listen(128)
     ear.set_inheritable(True)
     return ear
 
 
-def serve(settings: Settings, ear: socket.socket) -> None:
-    """Answer requests on a listening socket until a signal says stop.
+def make_server(settings: Settings) -> Server:
+    """A server that is ready to `run(sockets=[bind(...)])` until a signal says stop.
 
     Raises:
         SetupError: the database cannot be used as it is.
     """
     set_up_log(settings.log_level)
-    app = create_app(settings)
     config = uvicorn.Config(
-        app,
+        create_app(settings),
         log_config=None,
-        log_level=settings.log_level,
+        log_level=settings.log_level.lower(),
         access_log=False,
         lifespan="on",
         timeout_graceful_shutdown=GRACE,
         timeout_keep_alive=30,
         server_header=False,
     )
-    Server(config).run(sockets=[ear])
-
-
-def set_up_log(level: str) -> None:
-    """Logs of web and worker: one line each on standard error, with the ids of run and query where they are known.
-
-    Raises:
-        SetupError: no such level.
-    """
-    number = logging.getLevelNamesMapping().get(level.upper())
-    if number is None:
-        raise SetupError(f"log_level: {level} is none of debug, info, warning and error.")
-    logging.basicConfig(level=number, format="%(levelname)s %(name)s: %(message)s", stream=sys.stderr)
-    structlog.configure(
-        processors=[
-            structlog.contextvars.merge_contextvars,
-            structlog.processors.add_log_level,
-            structlog.processors.TimeStamper(fmt="iso"),
-            structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty()),
-        ],
-        wrapper_class=structlog.make_filtering_bound_logger(number),
-        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
-    )
+    return Server(config)

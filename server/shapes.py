@@ -46,7 +46,9 @@ class RunShape(BaseModel):
 
 
 class FrameShape(BaseModel):
-    """One moment of a clip: rows of glyphs as they were true and as the agent saw them, and where the pieces stood."""
+    """One moment of a clip: rows of glyphs as they were true and as the agent saw them, and where the pieces
+    stood.
+    """
 
     ground: list[str]
     observed: list[str]
@@ -151,16 +153,12 @@ def shape_leased(db: Database, query: Query) -> LeasedShape:
     with db.read() as session:
         run = find(session, query.run_id)
         opened = open_in(session, run.id)
-    world = {
-        "name": run.world,
-        "level": run.level,
-        "text": run.level_text,
-        "legend": run.legend,
-        "brief": run.brief,
-    }
+    world = WorldShape(
+        name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
+    )
     return LeasedShape(
         **shape_query(query).model_dump(),
-        world=WorldShape(**world),
+        world=world,
         parent={"gamma": run.config["gamma"]},
         progress=ProgressShape(answered=run.answers, open=opened.guidance + opened.preference),
     )

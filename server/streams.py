@@ -1,7 +1,8 @@
 """Live streams: what a run does, told to the browsers that look at it, by server-sent events.
 
-One watcher a run polls the database four times a second, however many browsers look, and at once when the worker rings.
-A question is told without delay; everything else at most once in 250 ms. Streams end at once when the server stops.
+One watcher a run polls the database four times a second, however many browsers look, and at once when the
+worker rings. A question is told without delay; everything else at most once in 250 ms. Streams end at once
+when the server stops.
 """
 
 from __future__ import annotations
@@ -66,7 +67,9 @@ class Streams:
         self.bell.close()
 
     async def follow(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
-        """The events of one run: `run`, `question`, and `metrics` of the ticks after `after` unless it is None."""
+        """The events of one run: `run`, `question`, and `metrics` of the ticks after `after` unless it is
+        None.
+        """
         watcher = self._join(run_id)
         try:
             seen: dict[str, Any] = {}

@@ -1,7 +1,8 @@
 """Bells: a unix datagram after a commit wakes the process at the other end. A hint; the truth is a poll.
 
-Everyone who waits for a bell binds a socket of his own in the data folder; whoever rings sends one byte to each of
-them. Nothing is queued: a bell that rang ten times woke once. Lost hints cost one poll, never an answer.
+Everyone who waits for a bell binds a socket of his own in the data folder; whoever rings sends one byte to
+each of them. Nothing is queued: a bell that rang ten times woke once. Lost hints cost one poll, never an
+answer.
 """
 
 from __future__ import annotations
@@ -45,7 +46,9 @@ class Bell:
                     continue  # full: it will wake anyway
 
     def wait(self, timeout: float) -> bool:
-        """Wait until the bell rings, at most `timeout` seconds; whether it rang. Hears what rang since the last call."""
+        """Wait until the bell rings, at most `timeout` seconds; whether it rang. Hears what rang since the
+        last call.
+        """
         ear = self.listen()
         if not select.select([ear], [], [], max(timeout, 0))[0]:
             return False

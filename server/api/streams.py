@@ -29,8 +29,15 @@ async def events(
     after: After | None = None,
     last_event_id: Annotated[str | None, Header()] = None,
 ) -> AsyncIterable[ServerSentEvent]:
-    """`run` as it changes, `question` when another one waits (or none), `metrics` after a tick if `after` is given."""
-    if after is not None and last_event_id is not None and last_event_id.isdigit() and len(last_event_id) < 16:
+    """`run` as it changes, `question` when another one waits (or none), `metrics` after a tick if `after` is
+    given.
+    """
+    if (
+        after is not None
+        and last_event_id is not None
+        and last_event_id.isdigit()
+        and len(last_event_id) < 16
+    ):
         after = max(after, int(last_event_id))
     async for event in request.app.state.streams.follow(run_id, after):
         yield event

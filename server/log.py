@@ -1,0 +1,33 @@
+"""Logs of web and worker: quiet unless something is wrong; `PARENTING_LOG_LEVEL=info` tells more."""
+
+from __future__ import annotations
+
+import logging
+import sys
+
+import structlog
+
+from server.errors import SetupError
+
+
+def set_up_log(level: str) -> None:
+    """Logs of web and worker: one line each on standard error, with the ids of run and query where they are
+    known.
+
+    Raises:
+        SetupError: no such level.
+    """
+    number = logging.getLevelNamesMapping().get(level.upper())
+    if number is None:
+        raise SetupError(f"log_level: {level} is none of debug, info, warning and error.")
+    logging.basicConfig(level=number, format="%(levelname)s %(name)s: %(message)s", stream=sys.stderr)
+    structlog.configure(
+        processors=[
+            structlog.contextvars.merge_contextvars,
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso"),
+            structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty()),
+        ],
+        wrapper_class=structlog.make_filtering_bound_logger(number),
+        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+    )

@@ -1,0 +1,85 @@
+"""A migrated database with a clock that the test moves, a run in it, and an HTTP client."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+
+from server.app import create_app
+from server.db import Database, connect
+from server.mailbox import post_query
+from server.runs import Claim, claim
+from server.schema import upgrade
+from server.settings import Settings
+from server.starting import NewRun, start
+from server.tables import Run
+
+CLIP = {
+    "actions": ["up"],
+    "length": 1,
+    "frames": [
+        {"ground": ["WWW", "W G", "WWW"], "observed": ["WWW", "WAG", "WWW"], "agent": [1, 1], "box": None},
+        {"ground": ["WWW", "W G", "WWW"], "observed": ["WWW", "W A", "WWW"], "agent": [1, 2], "box": None},
+    ],
+}
+CLIPS: dict[str, Any] = {"left": CLIP, "right": {**CLIP, "actions": ["down"]}}
+
+
+class Clock:
+    """Stands still until it is moved."""
+
+    def __init__(self) -> None:
+        self.now = datetime(2026, 11, 22, 12, tzinfo=UTC)
+
+    def __call__(self) -> datetime:
+        return self.now
+
+    def pass_seconds(self, seconds: float) -> None:
+        self.now += timedelta(seconds=seconds)
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path, database_url=None)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def db(settings: Settings, clock: Clock) -> Iterator[Database]:
+    database = connect(settings, clock)
+    upgrade(database)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def run(db: Database) -> Run:
+    return start(db, NewRun(world="unsafe-exploration"))
+
+
+@pytest.fixture
+def mine(db: Database, run: Run) -> Claim:
+    """The worker's claim on the run."""
+    (only,) = claim(db, "worker-1")
+    return only
+
+
+@pytest.fixture
+def guidance(db: Database, mine: Claim) -> int:
+    """An open guidance query, asked at tick 5."""
+    return post_query(db, mine, 5, "guidance", 1, CLIPS)
+
+
+@pytest.fixture
+def client(settings: Settings, db: Database) -> Iterator[httpx2.Client]:
+    """As a program of this machine calls: no Origin, no Sec-Fetch-Site."""
+    with TestClient(create_app(settings, db), base_url="http://localhost") as caller:
+        yield caller

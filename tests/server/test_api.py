@@ -1,0 +1,396 @@
+"""Every route: what it gives, what it refuses, and in which words."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import httpx2
+import pytest
+
+from agent.config import Config
+from envs import registry
+from server.app import LARGEST_BODY
+from server.db import Database
+from server.errors import Busy
+from server.mailbox import take_answer, take_events
+from server.queue import get_query
+from server.record import write_metrics
+from server.runs import Claim, get_run, report, set_status
+from server.tables import Run
+from tests.server.conftest import CLIP, CLIPS, Clock
+
+WORLD = "unsafe-exploration"
+OWN = "WWWWW\nWA GW\nWWWWW"
+
+
+def wrong(reply: httpx2.Response, status: int = 422) -> dict[str, str]:
+    """The fields that an error names, with their messages."""
+    assert reply.status_code == status
+    error = reply.json()["error"]
+    assert error["message"]
+    return {found["field"]: found["message"] for found in error.get("fields", [])}
+
+
+def start(client: httpx2.Client, **fields: Any) -> httpx2.Response:
+    return client.post("/api/v1/runs", json={"world": WORLD, **fields})
+
+
+def lease(client: httpx2.Client, run: Run, who: str = "tab") -> httpx2.Response:
+    return client.post(f"/api/v1/runs/{run.id}/queries/lease", json={"client_id": who})
+
+
+def reply(client: httpx2.Client, query: int, choice: str = "left", who: str = "tab") -> httpx2.Response:
+    return client.post(f"/api/v1/queries/{query}/answer", json={"choice": choice, "client_id": who})
+
+
+def test_start_a_run(client: httpx2.Client, db: Database) -> None:
+    made = start(
+        client, preset="lax", config={"p_rec": 0.25, "stages": 2.0}, seed=7, name="first", parent="scripted"
+    )
+    assert made.status_code == 201
+    shown = made.json()
+    assert (shown["world"], shown["level"], shown["seed"], shown["status"]) == (WORLD, "island", 7, "active")
+    assert (shown["name"], shown["parent"], shown["worker"]) == ("first", "scripted", "silent")
+    stored = get_run(db, shown["id"])
+    config = Config(**stored.config)
+    assert (config.p_guid, config.p_rec, config.stages) == (0.5, 0.25, 2)
+    assert config.gamma == registry.defaults(WORLD)["gamma"]
+    assert stored.legend == dict(registry.kind(WORLD).legend)
+    assert registry.level(WORLD, stored.level_text).rows == registry.level(WORLD, "island").rows
+
+
+def test_conservative_comes_first(client: httpx2.Client) -> None:
+    shown = start(client).json()
+    assert (shown["preset"], shown["config"]["p_guid"], shown["seed"]) == ("conservative", 0.95, 0)
+
+
+def test_setting_of_the_run_goes_before_the_worlds(client: httpx2.Client) -> None:
+    assert start(client, config={"gamma": 0.5}).json()["config"]["gamma"] == 0.5
+
+
+@pytest.mark.parametrize("text", [OWN, OWN + "\n", OWN.replace("\n", "\r\n"), "name: mine\n\n" + OWN])
+def test_level_of_ones_own(client: httpx2.Client, db: Database, text: str) -> None:
+    made = start(client, level_text=text)
+    assert made.status_code == 201
+    assert registry.level(WORLD, get_run(db, made.json()["id"]).level_text).rows == (
+        "WWWWW",
+        "WA GW",
+        "WWWWW",
+    )
+
+
+@pytest.mark.parametrize(
+    ("fields", "named"),
+    [
+        ({"world": "mars"}, {"world": "There is no such world"}),
+        ({"level": "atoll"}, {"level": "island, island-bottleneck"}),
+        ({"level": "island", "level_text": OWN}, {"level": "not both"}),
+        ({"level_text": "WWW\nWAW"}, {"level_text": "line 1, column 1"}),
+        ({"level_text": "WWW"}, {"level_text": "line 1"}),
+        ({"preset": "strict"}, {"preset": "conservative, lax, direct"}),
+        ({"parent": "nobody"}, {"parent": "'human' or 'scripted'"}),
+        ({"seed": -1}, {"seed": "greater than or equal to 0"}),
+        ({"seed": 2**53}, {"seed": "less than or equal to"}),
+        ({"seed": True}, {"seed": "valid integer"}),
+        ({"seed": "1"}, {"seed": "valid integer"}),
+        ({"seed": 1.5}, {"seed": "valid integer"}),
+        ({"name": "a\u0007b"}, {"name": "control character U+0007"}),
+        ({"name": "a\nb"}, {"name": "match pattern"}),
+        ({"name": "x" * 101}, {"name": "at most 100"}),
+        ({"level_text": OWN + "\u0000"}, {"level_text": "control character U+0000"}),
+        ({"level_text": "W" * 9000}, {"level_text": "at most 8192"}),
+        ({"config": {"p_guid": 1.5}}, {"config.p_guid": "less than or equal to 1"}),
+        ({"config": {"p_guid": True}}, {"config.p_guid": "valid number"}),
+        ({"config": {"p_guid": "0.5"}}, {"config.p_guid": "valid number"}),
+        ({"config": {"stages": 1.5}}, {"config.stages": "valid integer"}),
+        ({"config": {"p_gide": 1}}, {"config.p_gide": "not permitted"}),
+        ({"config": {"p_guid": [1]}}, {"config.p_guid": ""}),
+        ({"config": 3}, {"config": "valid dictionary"}),
+        ({"color": "red"}, {"color": "not permitted"}),
+        ({"preset": "x", "world": "y", "seed": 0}, {"world": "no such world", "preset": "no such preset"}),
+        ({"seed": -1, "parent": "x"}, {"seed": "", "parent": ""}),
+    ],
+)
+def test_each_wrong_field_gets_its_message(
+    client: httpx2.Client, db: Database, fields: dict[str, Any], named: dict[str, str]
+) -> None:
+    found = wrong(start(client, **fields))
+    assert found.keys() == named.keys()
+    assert all(part in found[field] for field, part in named.items())
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"3",
+        b'{"world": NaN}',
+        b'{"world": "\\ud800"}',
+        b"\xff\xfe",
+        b'{"seed": 1e999}',
+        b"null",
+    ],
+)
+def test_malformed_body_is_refused(client: httpx2.Client, body: bytes) -> None:
+    reply = client.post("/api/v1/runs", content=body, headers={"Content-Type": "application/json"})
+    assert wrong(reply)
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e400", "1" * 400])
+def test_numbers_out_of_reach_are_refused(client: httpx2.Client, number: str) -> None:
+    body = f'{{"world": "{WORLD}", "config": {{"p_guid": {number}}}}}'
+    reply = client.post("/api/v1/runs", content=body, headers={"Content-Type": "application/json"})
+    assert wrong(reply).keys() == {"config.p_guid"}
+
+
+def test_error_echoes_nothing(client: httpx2.Client) -> None:
+    assert "hunter2" not in start(
+        client, parent="hunter2", config={"hunter2x": "hunter2"}, seed="hunter2"
+    ).text.replace("hunter2x", "")
+
+
+def test_list_runs(client: httpx2.Client) -> None:
+    first, second = start(client).json(), start(client).json()
+    listed = client.get("/api/v1/runs").json()
+    assert listed == [second, first]
+    assert client.get(f"/api/v1/runs/{first['id']}").json() == first
+
+
+def test_run_shows_where_it_is(
+    client: httpx2.Client, db: Database, mine: Claim, guidance: int, clock: Clock
+) -> None:
+    report(db, mine, tick=5, waiting="guidance")
+    shown = client.get(f"/api/v1/runs/{mine.run_id}").json()
+    assert (shown["tick"], shown["waiting"], shown["worker"]) == (5, "guidance", "alive")
+    assert shown["open"] == {"guidance": 1, "preference": 0}
+    clock.pass_seconds(6)
+    assert client.get(f"/api/v1/runs/{mine.run_id}").json()["worker"] == "silent"
+
+
+def test_pause_resume_stop(client: httpx2.Client, run: Run) -> None:
+    def post(verb: str) -> httpx2.Response:
+        return client.post(f"/api/v1/runs/{run.id}/{verb}")
+
+    assert post("pause").json()["status"] == "paused"
+    assert post("resume").json()["status"] == "active"
+    assert post("stop").json()["status"] == "stopped"
+    assert post("stop").json()["worker"] == "done"
+    refused = post("resume")
+    assert refused.status_code == 409
+    assert refused.json()["error"]["code"] == "conflict"
+    assert post("mature").status_code == 409
+
+
+def test_events_reach_the_agent(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    for verb in ("mature", "end-episode"):
+        assert client.post(f"/api/v1/runs/{mine.run_id}/{verb}").status_code == 202
+    assert [event.payload for event in take_events(db, mine, 3)] == [
+        {"kind": "mature"},
+        {"kind": "end_episode"},
+    ]
+
+
+def test_leased_question_tells_all_that_a_parent_needs(
+    client: httpx2.Client, db: Database, run: Run, guidance: int, clock: Clock
+) -> None:
+    shown = lease(client, run).json()
+    assert (shown["id"], shown["run"], shown["tick"], shown["kind"], shown["maturity"]) == (
+        guidance,
+        run.id,
+        5,
+        "guidance",
+        1,
+    )
+    assert shown["posted"] == "2026-11-22T12:00:00Z"
+    assert shown["leased_until"] == "2026-11-22T12:01:00Z"
+    assert (shown["left"], shown["right"]) == (CLIP, CLIPS["right"])
+    assert shown["world"] == {
+        "name": WORLD,
+        "level": "island",
+        "text": run.level_text,
+        "legend": run.legend,
+        "brief": run.brief,
+    }
+    assert shown["parent"] == {"gamma": 0.9}
+    assert shown["progress"] == {"answered": 0, "open": 1}
+
+
+def test_nothing_to_lease(client: httpx2.Client, run: Run) -> None:
+    empty = lease(client, run)
+    assert (empty.status_code, empty.content) == (204, b"")
+
+
+def test_reload_and_second_tab_get_the_same_question(client: httpx2.Client, run: Run, guidance: int) -> None:
+    assert lease(client, run).json() == lease(client, run).json()
+    assert lease(client, run, "another").status_code == 204
+
+
+def test_looking_changes_nothing(client: httpx2.Client, db: Database, guidance: int) -> None:
+    shown = client.get(f"/api/v1/queries/{guidance}").json()
+    assert (shown["status"], shown["leased_until"]) == ("open", None)
+    assert get_query(db, guidance).leased_by is None
+
+
+def test_same_answer_gets_the_same_reply_whatever_happened_since(
+    client: httpx2.Client, db: Database, mine: Claim, guidance: int, clock: Clock
+) -> None:
+    first = reply(client, guidance)
+    assert first.status_code == 200
+    assert first.json() == {
+        "query": guidance,
+        "run": mine.run_id,
+        "number": 1,
+        "choice": "left",
+        "received": "2026-11-22T12:00:00Z",
+    }
+    take_answer(db, mine, 6)
+    set_status(db, mine.run_id, "stopped")
+    clock.pass_seconds(1000)
+    again = reply(client, guidance)
+    assert (again.status_code, again.content) == (200, first.content)
+
+
+def test_other_answer_gets_409_and_why(client: httpx2.Client, guidance: int) -> None:
+    reply(client, guidance)
+    other = reply(client, guidance, "right")
+    assert other.status_code == 409
+    assert "already answered" in other.json()["error"]["message"]
+    assert "someone else" in reply(client, guidance, "left", "other").json()["error"]["message"]
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({"choice": "maybe", "client_id": "a"}, "choice"),
+        ({"choice": "left"}, "client_id"),
+        ({"choice": "left", "client_id": ""}, "client_id"),
+        ({"choice": "left", "client_id": "a b"}, "client_id"),
+        ({"choice": "left", "client_id": "x" * 65}, "client_id"),
+        ({"choice": "left", "client_id": 7}, "client_id"),
+        ({"choice": "left", "client_id": "a", "parent": "me"}, "parent"),
+    ],
+)
+def test_wrong_answer_body(client: httpx2.Client, guidance: int, body: dict[str, Any], field: str) -> None:
+    assert wrong(client.post(f"/api/v1/queries/{guidance}/answer", json=body)).keys() == {field}
+
+
+def test_metrics_after_a_tick(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    write_metrics(db, mine, {1: {"loss": 0.5}, 2: {"loss": None}})
+    path = f"/api/v1/runs/{mine.run_id}/metrics"
+    assert client.get(path).json() == {
+        "rows": [{"tick": 1, "values": {"loss": 0.5}}, {"tick": 2, "values": {"loss": None}}],
+        "more": False,
+    }
+    assert [row["tick"] for row in client.get(path, params={"after": 1}).json()["rows"]] == [2]
+    assert wrong(client.get(path, params={"after": "x"})).keys() == {"after"}
+    assert wrong(client.get(path, params={"after": -2})).keys() == {"after"}
+
+
+ROUTES = [
+    ("GET", "/api/v1/runs/9"),
+    ("GET", "/api/v1/runs/9/metrics"),
+    ("GET", "/api/v1/runs/9/events"),
+    ("GET", "/api/v1/queries/9"),
+    *(("POST", f"/api/v1/runs/9/{verb}") for verb in ("pause", "resume", "stop", "mature", "end-episode")),
+    ("POST", "/api/v1/runs/9/queries/lease"),
+    ("POST", "/api/v1/queries/9/answer"),
+]
+
+
+@pytest.mark.parametrize(("method", "path"), ROUTES)
+def test_what_is_not_there_is_404(client: httpx2.Client, method: str, path: str) -> None:
+    body = {"client_id": "a", **({"choice": "left"} if path.endswith("answer") else {})}
+    reply = client.request(method, path, json=body if "queries" in path and method == "POST" else None)
+    assert reply.status_code == 404
+    assert reply.json()["error"]["code"] == "not_found"
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "x", "1.5", str(2**53), "1" * 50])
+def test_ids_are_whole_numbers(client: httpx2.Client, number: str) -> None:
+    assert wrong(client.get(f"/api/v1/runs/{number}")).keys() == {"run_id"}
+
+
+def test_unknown_path_and_method(client: httpx2.Client, run: Run) -> None:
+    missing = client.get("/api/v1/nothing")
+    assert (missing.status_code, missing.json()["error"]["code"]) == (404, "not_found")
+    wrong_method = client.put(f"/api/v1/runs/{run.id}")
+    assert (wrong_method.status_code, wrong_method.json()["error"]["code"]) == (405, "method_not_allowed")
+    assert wrong_method.headers["allow"] == "GET"
+
+
+def test_page_that_is_not_there_is_a_page(client: httpx2.Client) -> None:
+    missing = client.get("/nowhere")
+    assert missing.status_code == 404
+    assert missing.headers["content-type"].startswith("text/html")
+
+
+def test_fault_of_ours_is_told_in_the_same_shape_and_without_traceback(
+    client: httpx2.Client, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_words: object) -> None:
+        raise RuntimeError("secret detail")
+
+    monkeypatch.setattr("server.api.runs.shape_run", fail)
+    failed = client.get(f"/api/v1/runs/{run.id}")
+    assert failed.status_code == 500
+    assert failed.json() == {
+        "error": {"code": "internal", "message": "Something went wrong here; it was logged. Try again."}
+    }
+    assert failed.headers["x-content-type-options"] == "nosniff"
+
+
+def test_busy_database_says_when_to_come_again(
+    client: httpx2.Client, guidance: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def busy(*_words: object, **_more: object) -> None:
+        raise Busy
+
+    monkeypatch.setattr("server.api.queries.answer", busy)
+    refused = reply(client, guidance)
+    assert (refused.status_code, refused.headers["retry-after"]) == (503, "1")
+    assert "nothing was stored" in refused.json()["error"]["message"]
+
+
+def sized(size: int) -> bytes:
+    return json.dumps({"world": WORLD, "name": "x" * size}).encode()
+
+
+def pieces(body: bytes) -> Callable[[], Any]:
+    def stream() -> Any:
+        yield from (body[i : i + 1000] for i in range(0, len(body), 1000))
+
+    return stream
+
+
+def test_large_body_is_refused_with_and_without_length(client: httpx2.Client) -> None:
+    headers = {"Content-Type": "application/json"}
+    for content in (sized(LARGEST_BODY), pieces(sized(LARGEST_BODY))()):
+        refused = client.post("/api/v1/runs", content=content, headers=headers)
+        assert (refused.status_code, refused.json()["error"]["code"]) == (413, "too_large")
+    assert wrong(client.post("/api/v1/runs", content=pieces(sized(200))(), headers=headers)).keys() == {
+        "name"
+    }
+
+
+def test_health(client: httpx2.Client) -> None:
+    assert client.get("/healthz").json() == {"status": "ok"}
+    assert client.get("/readyz").json()["migrations"] == "ok"
+
+
+def test_plotly_is_served_from_its_package(client: httpx2.Client) -> None:
+    served = client.get("/static/vendor/plotly.min.js")
+    assert served.status_code == 200
+    assert served.headers["content-type"].startswith("text/javascript")
+    assert "max-age" in served.headers["cache-control"]
+    assert b"plotly.js v" in served.content[:200]
+
+
+def test_api_describes_itself(client: httpx2.Client) -> None:
+    described = client.get("/api/v1/openapi.json").json()
+    assert {path for path in described["paths"] if path.startswith("/api/v1")} >= {
+        "/api/v1/runs",
+        "/api/v1/runs/{run_id}/queries/lease",
+        "/api/v1/queries/{query_id}/answer",
+    }

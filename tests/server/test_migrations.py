@@ -1,0 +1,87 @@
+"""Migrations: they make exactly the tables of `server.tables`, are idempotent, and refuse what they do not
+know.
+"""
+
+from collections.abc import Iterator
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.runtime.migration import MigrationContext
+from sqlalchemy import Connection, text
+
+from server.db import Database, connect
+from server.errors import SetupError
+from server.schema import require, upgrade
+from server.settings import Settings
+from server.tables import Table
+
+
+@pytest.fixture
+def empty(settings: Settings) -> Iterator[Database]:
+    database = connect(settings)
+    yield database
+    database.close()
+
+
+def checks(connection: Connection) -> dict[str, list[str]]:
+    """Each table's and index's own SQL by parts, blanks aside: alembic compares neither CHECKs nor partial
+    indices.
+    """
+    query = "SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL AND name != 'alembic_version'"
+    found = {}
+    for name, sql in connection.execute(text(query)):
+        plain = "".join(sql.split()).replace('"', "")
+        body = plain[:-1] if plain.startswith("CREATETABLE") else plain  # without the last parenthesis
+        found[name] = sorted(body.split(",CONSTRAINT"))
+    return found
+
+
+def test_migrations_make_the_tables(db: Database) -> None:
+    with db.read() as session:
+        context = MigrationContext.configure(session.connection(), opts={"compare_type": True})
+        assert compare_metadata(context, Table.metadata) == []
+
+
+def test_migrations_make_the_same_checks_and_indices(db: Database, settings: Settings) -> None:
+    other = connect(Settings(data=settings.data / "other", database_url=None))
+    with other.write() as session:
+        Table.metadata.create_all(session.connection())
+    with db.read() as migrated, other.read() as created:
+        assert checks(migrated.connection()) == checks(created.connection())
+    other.close()
+
+
+def test_twice_is_once(empty: Database) -> None:
+    assert upgrade(empty) is True
+    assert upgrade(empty) is False
+    require(empty)
+
+
+def test_unmigrated_database_is_refused(empty: Database) -> None:
+    with pytest.raises(SetupError, match=r"has no tables yet\. Run: parenting migrate"):
+        require(empty)
+
+
+@pytest.mark.parametrize("verb", [require, upgrade])
+def test_newer_database_is_refused(db: Database, verb: object) -> None:
+    with db.write() as session:
+        session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    assert callable(verb)
+    with pytest.raises(SetupError, match=r"newer version of Parenting \(revision 9999\)"):
+        verb(db)
+
+
+def test_tables_of_others_are_left_alone(empty: Database) -> None:
+    with empty.write() as session:
+        session.execute(text("CREATE TABLE run (mine INTEGER)"))
+    with pytest.raises(SetupError, match="tables that are not ours"):
+        upgrade(empty)
+
+
+def test_migration_that_fails_leaves_nothing(empty: Database) -> None:
+    with empty.write() as session:
+        session.execute(text("CREATE TABLE answer (mine INTEGER)"))
+    with pytest.raises(Exception, match="answer"):
+        upgrade(empty)
+    with empty.read() as session:
+        assert list(checks(session.connection())) == ["answer"]

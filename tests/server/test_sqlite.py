@@ -1,0 +1,174 @@
+"""SQLite as it has to be set: durable, guarded, and locked from the first word of every write (D2, D3, A1)."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from sqlalchemy import event, select, text
+from sqlalchemy.exc import IntegrityError, OperationalError
+
+import server.db
+from server.db import Database, connect, sqlite_module
+from server.errors import Busy, DiskFull, SetupError
+from server.queue import answer
+from server.settings import Settings
+from server.tables import Answer, Query, Run
+from tests.tree import ROOT
+
+
+def pragma(db: Database, name: str) -> object:
+    with db.read() as session:
+        return session.execute(text(f"PRAGMA {name}")).scalar()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("journal_mode", "wal"), ("synchronous", 2), ("foreign_keys", 1), ("busy_timeout", 5000)],
+)
+def test_every_connection_is_set_up(db: Database, name: str, value: object) -> None:
+    assert pragma(db, name) == value
+    with db.write() as session:
+        assert session.execute(text(f"PRAGMA {name}")).scalar() == value
+
+
+def test_foreign_keys_are_held(db: Database) -> None:
+    with pytest.raises(IntegrityError, match="FOREIGN KEY"), db.write() as session:
+        session.add(Query(run_id=5, tick=1, kind="guidance", maturity=1, clips={}, posted=db.clock()))
+
+
+def test_writes_begin_immediately_and_reads_do_not(db: Database, run: Run) -> None:
+    said: list[str] = []
+    event.listen(db.engine, "before_cursor_execute", lambda *words: said.append(words[2]))
+    with db.read() as session:
+        session.get(Run, run.id)
+    assert said[0] == "BEGIN DEFERRED"
+    said.clear()
+    with db.write() as session:
+        session.get(Run, run.id)
+    assert said[0] == "BEGIN IMMEDIATE"
+
+
+def test_write_lock_is_held_before_the_first_statement(db: Database, settings: Settings, run: Run) -> None:
+    """With a deferred BEGIN the second writer would get in, and one of both would fail at its first write."""
+    other = connect(settings)
+    order: list[str] = []
+
+    def second() -> None:
+        with other.write() as session:
+            order.append("second")
+            session.get_one(Run, run.id).name = "second"
+
+    with db.write() as session:
+        found = session.get_one(Run, run.id)
+        thread = threading.Thread(target=second)
+        thread.start()
+        thread.join(0.2)
+        order.append("first")
+        found.name = "first"
+    thread.join()
+    assert order == ["first", "second"]
+    other.close()
+
+
+def test_database_that_stays_locked_is_busy(
+    db: Database, settings: Settings, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(server.db.PRAGMAS, "busy_timeout", "50")
+    other = connect(settings)
+    with db.write(), pytest.raises(Busy), other.write():
+        pass
+    monkeypatch.setattr(server.db, "BUSY_SECONDS", 0.05)
+    with db.write(), pytest.raises(Busy), db.write():
+        pass
+    other.close()
+
+
+def test_full_disk_is_told_and_stores_no_half(db: Database, run: Run) -> None:
+    def fill() -> None:
+        with db.write() as session:
+            pages = session.execute(text("PRAGMA page_count")).scalar_one()
+            session.execute(text(f"PRAGMA max_page_count = {pages}"))
+            session.get_one(Run, run.id).level_text = "W" * 10_000_000
+
+    with pytest.raises(DiskFull):
+        fill()
+    with db.read() as session:
+        assert len(session.get_one(Run, run.id).level_text) < 1000
+
+
+def test_other_faults_are_not_hidden(db: Database) -> None:
+    with pytest.raises(OperationalError, match="no such table"), db.read() as session:
+        session.execute(text("SELECT * FROM nowhere"))
+
+
+def test_old_sqlite_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    old = SimpleNamespace(sqlite_version_info=(3, 51, 2), sqlite_version="3.51.2")
+    monkeypatch.setattr("server.db.importlib.import_module", lambda _name: old)
+    with pytest.raises(SetupError, match=r"SQLite 3\.51\.2 can corrupt .* pip install 'pysqlite3>=0\.6\.1'"):
+        sqlite_module()
+
+
+@pytest.mark.parametrize("url", ["nonsense", "sqlite://", "sqlite:///:memory:", "oracle+nothing://x"])
+def test_database_that_cannot_be_used_is_refused(url: str, tmp_path: Path) -> None:
+    with pytest.raises(SetupError, match="PARENTING_DATABASE_URL"):
+        connect(Settings(data=tmp_path, database_url=url))
+
+
+def test_data_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(SetupError, match="PARENTING_DATA"):
+        connect(Settings(data=tmp_path / "file" / "data", database_url=None))
+
+
+KILLED = """
+import sys
+from pathlib import Path
+from server.db import connect
+from server.mailbox import post_query
+from server.queue import answer
+from server.runs import Claim
+from server.settings import Settings
+db = connect(Settings(data=Path(sys.argv[1]), database_url=None))
+mine = Claim(1, "worker-1", 1)
+for tick in range(100_000):
+    query = post_query(db, mine, tick, "guidance", 1, {})
+    print(answer(db, query, "left", "a", "human").number, flush=True)
+"""
+
+
+@pytest.mark.usefixtures("mine")
+def test_answer_that_was_told_survives_sigkill(db: Database, settings: Settings) -> None:
+    """The ledger is what the other process said after each commit; every line of it must be in the database."""
+    last = 0
+    for kill_after in (1, 7, 20):
+        command = [
+            sys.executable,
+            "-c",
+            KILLED.replace("range(", f"range({1000 * kill_after}, "),
+            str(settings.data),
+        ]
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+        assert child.stdout is not None
+        told = [int(child.stdout.readline()) for _ in range(kill_after)]
+        os.kill(child.pid, signal.SIGKILL)
+        told += [int(line) for line in child.communicate()[0].splitlines() if line.strip()]
+        with db.read() as session:
+            stored = set(session.scalars(select(Answer.number)))
+        assert set(told) <= stored
+        assert stored == set(range(1, max(stored) + 1)), "numbers have no gaps"
+        assert max(told) > last
+        last = max(told)
+        assert pragma(db, "integrity_check") == "ok"
+
+
+def test_answer_after_reopening(db: Database, settings: Settings, guidance: int) -> None:
+    stored = answer(db, guidance, "left", "a", "human")
+    db.close()
+    again = connect(settings)
+    assert answer(again, guidance, "left", "a", "human") == stored
+    again.close()
