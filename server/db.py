@@ -145,7 +145,8 @@ def sqlite_module() -> Any:
         found = module.sqlite_version
     least = ".".join(map(str, SAFE_SQLITE))
     raise SetupError(
-        f"SQLite {found} can corrupt a database under load; {least} or newer is needed. Run: pip install 'pysqlite3>=0.6.1'"
+        f"SQLite {found} can corrupt a database under load; {least} or newer is needed. "
+        "Run: pip install 'pysqlite3>=0.6.1'"
     )
 
 

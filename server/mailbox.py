@@ -27,7 +27,7 @@ from server.tables import Answer, Event, Query, Run
 
 @dataclass(frozen=True)
 class Watch:
-    """What a worker has to know of a run before it ticks; read in one transaction, cheap enough for a poll."""
+    """What a worker has to know of a run before it ticks; read at once, cheap enough for a poll."""
 
     run_id: int
     status: str

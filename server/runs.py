@@ -116,7 +116,7 @@ def let_go(db: Database, claims: Sequence[Claim]) -> None:
 
 
 def beat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
-    """A sign of life for all runs of a worker; returns the claims that still hold, which it may go on with."""
+    """A sign of life for all runs of a worker; gives back the claims that still hold."""
     with db.write() as session:
         kept = []
         for mine in claims:
@@ -181,7 +181,7 @@ def held(session: Session, mine: Claim) -> Run:
     run = hold(session, mine.run_id)
     if (run.actor, run.epoch) != (mine.actor, mine.epoch):
         raise LostClaim(
-            f"Run {mine.run_id} is raised by {run.actor or 'nobody'} now (epoch {run.epoch}, not {mine.epoch})."
+            f"Run {run.id} is raised by {run.actor or 'nobody'} now (epoch {run.epoch}, not {mine.epoch})."
         )
     return run
 

@@ -8,6 +8,7 @@ when the server stops.
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -79,7 +80,7 @@ class Streams:
                 changed = watcher.changed
                 if watcher.run and watcher.question != asked:
                     asked = watcher.question
-                    yield ServerSentEvent(event="question", data=asked)
+                    yield ServerSentEvent(event="question", raw_data=json.dumps(asked))  # "null" is data too
                 now = asyncio.get_running_loop().time()
                 if watcher.run != seen and now >= ready:
                     seen, ready = watcher.run, now + PERIOD

@@ -12,6 +12,7 @@ from envs import registry
 from server.app import LARGEST_BODY
 from server.db import Database
 from server.errors import Busy
+from server.log import set_up_log
 from server.mailbox import take_answer, take_events
 from server.queue import get_query
 from server.record import write_metrics
@@ -44,9 +45,8 @@ def reply(client: httpx2.Client, query: int, choice: str = "left", who: str = "t
 
 
 def test_start_a_run(client: httpx2.Client, db: Database) -> None:
-    made = start(
-        client, preset="lax", config={"p_rec": 0.25, "stages": 2.0}, seed=7, name="first", parent="scripted"
-    )
+    fields = {"preset": "lax", "config": {"p_rec": 0.25, "stages": 2.0}, "seed": 7, "name": "first"}
+    made = start(client, parent="scripted", **fields)
     assert made.status_code == 201
     shown = made.json()
     assert (shown["world"], shown["level"], shown["seed"], shown["status"]) == (WORLD, "island", 7, "active")
@@ -327,14 +327,17 @@ def test_page_that_is_not_there_is_a_page(client: httpx2.Client) -> None:
 
 
 def test_fault_of_ours_is_told_in_the_same_shape_and_without_traceback(
-    client: httpx2.Client, run: Run, monkeypatch: pytest.MonkeyPatch
+    client: httpx2.Client, run: Run, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    set_up_log("error")
+
     def fail(*_words: object) -> None:
         raise RuntimeError("secret detail")
 
     monkeypatch.setattr("server.api.runs.shape_run", fail)
     failed = client.get(f"/api/v1/runs/{run.id}")
     assert failed.status_code == 500
+    assert "secret detail" in capsys.readouterr().err, "the operator finds it in the log"
     assert failed.json() == {
         "error": {"code": "internal", "message": "Something went wrong here; it was logged. Try again."}
     }

@@ -80,7 +80,7 @@ def test_same_answer_again_gets_the_same_reply(db: Database, run: Run, guidance:
 
 def test_another_answer_is_refused(db: Database, guidance: int) -> None:
     answer(db, guidance, "left", "a", "human")
-    with pytest.raises(Conflict, match="already answered question .* with left; right was not stored"):
+    with pytest.raises(Conflict, match=r"already answered question .* with left; right was not stored"):
         answer(db, guidance, "right", "a", "human")
     with pytest.raises(Conflict, match="answered by someone else"):
         answer(db, guidance, "left", "b", "human")
@@ -144,7 +144,7 @@ def test_database_itself_allows_one_standing_answer(db: Database, run: Run, guid
 
     with pytest.raises(IntegrityError, match=r"UNIQUE.*answer\.query_id"):
         insert("2", standing=True)
-    with pytest.raises(IntegrityError, match="CHECK.*choice"):
+    with pytest.raises(IntegrityError, match=r"CHECK.*choice"):
         insert("3", standing=False, choice="maybe")
     insert("4", standing=False)
 
@@ -197,5 +197,5 @@ def test_lease_writes_nothing_when_there_is_nothing(db: Database, run: Run) -> N
 
 
 def test_statuses_are_held_by_the_database(db: Database, guidance: int) -> None:
-    with pytest.raises(IntegrityError, match="CHECK.*status"), db.write() as session:
+    with pytest.raises(IntegrityError, match=r"CHECK.*status"), db.write() as session:
         session.get_one(Query, guidance).status = "lost"

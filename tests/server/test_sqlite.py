@@ -1,4 +1,4 @@
-"""SQLite as it has to be set: durable, guarded, and locked from the first word of every write (D2, D3, A1)."""
+"""SQLite as it has to be set: durable, guarded, and locked from the first word of a write (A1, D2, D3)."""
 
 import os
 import signal
@@ -143,7 +143,7 @@ for tick in range(100_000):
 
 @pytest.mark.usefixtures("mine")
 def test_answer_that_was_told_survives_sigkill(db: Database, settings: Settings) -> None:
-    """The ledger is what the other process said after each commit; every line of it must be in the database."""
+    """The ledger is what the other process said after each commit; each line must be in the database."""
     last = 0
     for kill_after in (1, 7, 20):
         command = [

@@ -1,0 +1,160 @@
+"""SIGTERM and Ctrl-C stop web and worker within 2 s, with a tab open; none of them is left behind."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from server.db import connect
+from server.schema import upgrade
+from server.settings import Settings
+from server.starting import NewRun, start
+from tests.server.serving import Stream, free_port, parenting, until_up
+
+SOON = 2.0
+SIGNALS = [signal.SIGINT, signal.SIGTERM]
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A migrated database with one run that nobody has to raise: it is paused."""
+    db = connect(Settings(data=tmp_path, database_url=None))
+    upgrade(db)
+    start(db, NewRun(world="unsafe-exploration"))
+    db.close()
+    return tmp_path
+
+
+def tab(url: str) -> Stream:
+    stream = Stream(f"{url}/api/v1/runs/1/events?after=-1")
+    stream.wait_for("run", seconds=30)
+    return stream
+
+
+def seconds_to_end(child: subprocess.Popen[str], number: signal.Signals) -> float:
+    began = time.monotonic()
+    os.kill(child.pid, number)
+    child.wait(20)
+    return time.monotonic() - began
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_web_stops_with_a_tab_open(data: Path, number: signal.Signals) -> None:
+    port = free_port()
+    with parenting("web", "--port", str(port), data=data) as web:
+        until_up(url := f"http://127.0.0.1:{port}")
+        stream = tab(url)
+        assert seconds_to_end(web, number) < SOON
+        assert stream.ended.wait(1)
+        assert "Traceback" not in web.communicate()[1]
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_up_stops_both_with_a_tab_open(tmp_path: Path, number: signal.Signals) -> None:
+    with parenting("up", "--port", "0", "--no-browser", data=tmp_path) as up:
+        assert up.stdout is not None
+        url = re.findall(r"http://localhost:\d+", up.stdout.readline())[0]
+        until_up(url)
+        db = connect(Settings(data=tmp_path, database_url=None))
+        start(db, NewRun(world="unsafe-exploration"))
+        db.close()
+        stream = tab(url)
+        children = processes_of(up.pid)
+        assert len(children) == 2
+        assert seconds_to_end(up, number) < SOON
+        assert up.returncode == 0
+        assert stream.ended.wait(1)
+        assert not any(alive(child) for child in children)
+        assert "Traceback" not in up.communicate()[1]
+
+
+def test_up_stops_when_the_worker_dies(tmp_path: Path) -> None:
+    with parenting("up", "--port", "0", "--no-browser", data=tmp_path) as up:
+        assert up.stdout is not None
+        until_up(re.findall(r"http://localhost:\d+", up.stdout.readline())[0])
+        web, worker = processes_of(up.pid)
+        os.kill(worker, signal.SIGKILL)
+        _, said = up.communicate(timeout=10)
+        assert up.returncode == 1
+        assert "The worker process ended by itself (killed by SIGKILL), so all was stopped." in said
+        assert not alive(web)
+
+
+def test_web_and_worker_do_not_outlive_up(tmp_path: Path) -> None:
+    with parenting("up", "--port", "0", "--no-browser", data=tmp_path) as up:
+        assert up.stdout is not None
+        until_up(re.findall(r"http://localhost:\d+", up.stdout.readline())[0])
+        children = processes_of(up.pid)
+        os.kill(up.pid, signal.SIGKILL)
+        end = time.monotonic() + 10
+        while any(alive(child) for child in children):
+            assert time.monotonic() < end, "a process was left behind"
+            time.sleep(0.05)
+
+
+@pytest.mark.parametrize("command", ["up", "web"])
+def test_port_in_use_is_told_in_a_sentence(data: Path, command: str) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as ear:
+        port = ear.getsockname()[1]
+        with parenting(command, "--port", str(port), data=data) as child:
+            out, said = child.communicate(timeout=30)
+    assert child.returncode == 2
+    assert (
+        said
+        == f"port: {port} cannot be used (Address already in use). Name another one, or 0 for any free one.\n"
+    )
+    assert out == ""
+
+
+@pytest.mark.parametrize("command", ["web", "worker"])
+def test_unmigrated_database_is_refused_in_a_sentence(tmp_path: Path, command: str) -> None:
+    with parenting(command, data=tmp_path) as child:
+        out, said = child.communicate(timeout=60)
+    assert child.returncode == 2
+    assert said.endswith("has no tables yet. Run: parenting migrate\n")
+    assert said.count("\n") == 1
+    assert out == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("PARENTING_PORT", "99999", "PARENTING_PORT: "),
+        ("PARENTING_HOST", "0.0.0.0", "host: 0.0.0.0 would let others in"),
+        ("PARENTING_LOG_LEVEL", "loud", "log_level: loud is none of"),
+    ],
+)
+def test_wrong_setting_is_told_in_a_sentence(data: Path, name: str, value: str, told: str) -> None:
+    with parenting("web", data=data, **{name: value}) as child:
+        _, said = child.communicate(timeout=30)
+    assert child.returncode == 2
+    assert told in said
+    assert "Traceback" not in said
+
+
+def test_migrate_twice(tmp_path: Path) -> None:
+    said = []
+    for _ in range(2):
+        with parenting("migrate", data=tmp_path) as child:
+            said.append(child.communicate(timeout=30)[0])
+            assert child.returncode == 0
+    assert said == ["The database is up to date now.\n", "The database was up to date.\n"]
+
+
+def processes_of(parent: int) -> list[int]:
+    """The processes that this one started, oldest first."""
+    return sorted(map(int, Path(f"/proc/{parent}/task/{parent}/children").read_text().split()))
+
+
+def alive(process: int) -> bool:
+    """Whether a process still runs; one that waits to be reaped does not."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"

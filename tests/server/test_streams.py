@@ -1,0 +1,135 @@
+"""Live streams through a real server: what is told, how soon, how often."""
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+
+import httpx2
+import pytest
+import uvicorn
+
+from server.app import create_app
+from server.db import Database, connect
+from server.mailbox import post_query
+from server.queue import answer
+from server.record import write_metrics
+from server.runs import Claim, report
+from server.schema import upgrade
+from server.settings import Settings
+from server.streams import PERIOD
+from server.wake import Bell
+from tests.server.conftest import CLIPS
+from tests.server.serving import Stream, until_up
+
+
+@pytest.fixture
+def db(settings: Settings) -> Iterator[Database]:
+    """With the real clock: the server of these tests is real too."""
+    database = connect(settings)
+    upgrade(database)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def url(settings: Settings, db: Database) -> Iterator[str]:
+    """A server in a thread, with room for two streams."""
+    ear = socket.create_server(("127.0.0.1", 0))
+    app = create_app(settings.model_copy(update={"streams": 2}))
+    server = uvicorn.Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [ear]})
+    thread.start()
+    base = f"http://127.0.0.1:{ear.getsockname()[1]}"
+    until_up(base)
+    yield base
+    app.state.streams.close()
+    server.should_exit = True
+    thread.join(10)
+    assert not thread.is_alive()
+
+
+def follow(url: str, mine: Claim, query: str = "") -> Stream:
+    stream = Stream(f"{url}/api/v1/runs/{mine.run_id}/events{query}")
+    assert stream.opened.wait(10)
+    return stream
+
+
+def test_stream_begins_with_where_things_are(url: str, mine: Claim, guidance: int) -> None:
+    stream = follow(url, mine)
+    assert stream.headers["content-type"].startswith("text/event-stream")
+    (run,) = stream.wait_for("run")
+    assert isinstance(run, dict)
+    assert (run["status"], run["open"]["guidance"]) == ("active", 1)
+    assert stream.wait_for("question") == [{"id": guidance, "kind": "guidance"}]
+
+
+def test_question_is_told_when_the_bell_rings(
+    url: str, settings: Settings, db: Database, mine: Claim
+) -> None:
+    stream = follow(url, mine)
+    assert stream.wait_for("question") == [None]
+    bell, delays = Bell(settings.data, "web"), []
+    for tick in range(5):
+        query = post_query(db, mine, tick, "guidance", 1, CLIPS)
+        posted = time.monotonic()
+        bell.ring()
+        assert stream.wait_for("question", 2 * tick + 2)[-1] == {"id": query, "kind": "guidance"}
+        delays.append(
+            stream.events[-1][2] - posted if stream.events[-1][0] == "question" else time.monotonic() - posted
+        )
+        answer(db, query, "left", "a", "human")
+        bell.ring()
+        assert stream.wait_for("question", 2 * tick + 3)[-1] is None
+    assert sorted(delays)[2] < PERIOD / 2, "by the poll alone it would take as long as this on average"
+
+
+def test_question_is_told_without_any_bell(url: str, db: Database, mine: Claim) -> None:
+    stream = follow(url, mine)
+    stream.wait_for("question")
+    query = post_query(db, mine, 1, "preference", 1, CLIPS)
+    assert stream.wait_for("question", 2)[-1] == {"id": query, "kind": "preference"}
+
+
+def test_the_rest_is_told_four_times_a_second(
+    url: str, settings: Settings, db: Database, mine: Claim
+) -> None:
+    stream, bell = follow(url, mine), Bell(settings.data, "web")
+    stream.wait_for("run")
+    for tick in range(60):
+        report(db, mine, tick=tick)
+        bell.ring()
+        time.sleep(0.02)
+    stream.wait_for("run", 4)
+    times = [when for name, _, when in stream.events if name == "run"]
+    assert min(b - a for a, b in pairwise(times)) > PERIOD * 0.8
+    time.sleep(2 * PERIOD)
+    last = stream.wait_for("run")[-1]
+    assert isinstance(last, dict)
+    assert last["tick"] == 59, "the last state is told in the end"
+
+
+def test_metrics_follow_a_tick(url: str, db: Database, mine: Claim) -> None:
+    write_metrics(db, mine, {1: {"loss": 0.5}, 2: {"loss": 0.25}})
+    stream = follow(url, mine, "?after=1")
+    assert stream.wait_for("metrics") == [{"rows": [{"tick": 2, "values": {"loss": 0.25}}]}]
+    write_metrics(db, mine, {3: {"loss": None}})
+    report(db, mine, tick=3)
+    assert stream.wait_for("metrics", 2)[1] == {"rows": [{"tick": 3, "values": {"loss": None}}]}
+
+
+def test_parents_page_is_spared_the_metrics(url: str, db: Database, mine: Claim) -> None:
+    write_metrics(db, mine, {1: {"loss": 0.5}})
+    stream = follow(url, mine)
+    stream.wait_for("run")
+    report(db, mine, tick=1)
+    stream.wait_for("run", 2)
+    assert "metrics" not in {name for name, _, _ in stream.events}
+
+
+def test_one_stream_too_many_is_refused(url: str, mine: Claim) -> None:
+    for _ in range(2):
+        follow(url, mine).wait_for("run")
+    refused = httpx2.get(f"{url}/api/v1/runs/{mine.run_id}/events")
+    assert (refused.status_code, refused.json()["error"]["code"]) == (503, "too_many")
