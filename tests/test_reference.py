@@ -44,6 +44,18 @@ def test_first_step_of_adam_moves_the_two_actions_apart_by_the_learning_rate() -
         assert torch.allclose(bias(head), expected, atol=1e-7)
 
 
+def test_each_gradient_step_takes_a_gradient_of_its_own() -> None:
+    settings = {"p_guid": 1, "p_train": 1, "gradient_steps": 3, "learning_rate": 1e-12}
+    trial = live(born(world(ROOM), "left", **settings), 2)
+    (_, _, left, right) = trial.log[0]
+    expected = torch.zeros(4, dtype=torch.float64)
+    # dL/dz is -1/2 and 1/2 where both are as likely; a head is half of z
+    expected[left.actions[0]], expected[right.actions[0]] = -0.25, 0.25
+    gradient = bias(trial.pi.far).grad
+    assert gradient is not None
+    assert torch.allclose(gradient, expected, atol=1e-9)
+
+
 def test_batch_trains_on_the_rows_of_least_noise() -> None:
     trial = born(world(ROOM), p_train=1, batch=1, lambda_global=0, lambda_local=0)
     here = trial.frame(trial.state).observation

@@ -59,15 +59,21 @@ def test_death_ends_a_clip_early() -> None:
     assert drowned.observation == drowned.ground  # the agent is not drawn
 
 
-def test_no_clip_is_begun_that_the_time_limit_would_cut() -> None:
-    trial = born(world(ROOM, time_limit=5), p_rec=1, stages=3)
+@pytest.mark.parametrize(
+    ("time_limit", "exploit", "explore"),
+    [(5, [3, 13], [8, 18]), (6, [3, 9, 15], [6, 12, 18])],  # room for one clip in an episode, and for two
+)
+def test_no_clip_is_begun_that_the_time_limit_would_cut(
+    time_limit: int, exploit: list[int], explore: list[int]
+) -> None:
+    trial = born(world(ROOM, time_limit=time_limit), p_rec=1, stages=3)
     trial.mature()
     trial.mature()
     for policy in trial.policies:
         always(policy, UP)
-    live(trial, 25)  # five episodes of five steps, with room for one clip of three in each
-    assert [clip.tick for clip in completed(trial, EXPLOIT)] == [3, 13, 23]
-    assert [clip.tick for clip in completed(trial, EXPLORE)] == [8, 18]
+    live(trial, 18)
+    assert [clip.tick for clip in completed(trial, EXPLOIT)] == exploit
+    assert [clip.tick for clip in completed(trial, EXPLORE)] == explore
 
 
 def test_a_clip_leaves_when_enough_have_come_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,6 +116,33 @@ def test_newest_pair_first() -> None:
     assert asked == [[5, 6], [3, 4], [1, 2]]
 
 
+def test_the_later_clip_decides_before_the_earlier() -> None:
+    trial = born(world(ROOM), p_pref=1)
+    here = trial.frame(trial.state)
+    there = here._replace(observation=here.ground)
+    for kind, tick, state, action in (
+        (EXPLOIT, 1, here, UP),
+        (EXPLORE, 6, here, DOWN),
+        (EXPLOIT, 4, there, UP),
+        (EXPLORE, 5, there, DOWN),
+    ):
+        trial.clips[kind].append(Recorded(tick, Clip(0, (state, state), (action,))))
+    trial.pair()
+    assert trial.log[0][2].start == here.observation
+
+
+def test_a_known_pair_is_skipped() -> None:
+    trial = born(world(ROOM), p_pref=1)
+    frame = trial.frame(trial.state)
+    for tick in range(1, 5):  # twice the same two clips
+        kind, action = (EXPLOIT, UP) if tick % 2 else (EXPLORE, DOWN)
+        trial.clips[kind].append(Recorded(tick, Clip(0, (frame, frame), (action,))))
+    for _ in range(2):
+        trial.pair()
+    assert len(trial.log) == 1
+    assert [clip.tick for clip in completed(trial, EXPLOIT)] == [1]
+
+
 def test_preferences_do_not_block() -> None:
     trial = born(world(ROOM), p_rec=1, p_pref=1)
     for _ in range(50):
@@ -129,6 +162,12 @@ def test_a_stage_ends_after_enough_answers_and_the_last_never() -> None:
     young, grown = trial.parameters()
     assert any(not torch.equal(a, b) for a, b in zip(young, grown, strict=True))
     assert {entry.maturity for entry in trial.X} == {1}  # guidance, at whatever stage
+
+
+def test_each_stage_counts_its_own_answers() -> None:
+    trial = born(world(ROOM), "left", p_guid=1, stages=3, mature_every=2)
+    stages = [live(trial, 1).stage for _ in range(9)]
+    assert stages == [1, 1, 1, 2, 2, 2, 2, 3, 3]  # an answer is heard in every second tick
 
 
 def test_a_mature_policy_is_frozen() -> None:

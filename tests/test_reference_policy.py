@@ -4,6 +4,7 @@ from math import log
 
 import pytest
 import torch
+from torch import nn
 
 from agent.config import Config
 from envs.rng import Stream, keys
@@ -71,6 +72,11 @@ def test_shapes(level: str, layers: int, fan_in: int) -> None:
     weights = [flat(p) if p.dim() > 1 else p for p in new(level).parameters()]
     expected = [*LOCAL, *CONVOLUTIONS[: 2 * layers], [fan_in, 64], *OUT]
     assert [list(weight.shape) for weight in weights] == expected
+
+
+def test_zeros_lie_behind_a_side_of_three_and_around_a_shorter_one() -> None:
+    first, second = (layer.padding for layer in new(ROOM).convolutions if isinstance(layer, nn.ZeroPad2d))
+    assert (first, second) == ((0, 0, 0, 1), (0, 1, 1, 1))  # left, right, top, bottom: 3 x 5, then 2 x 3
 
 
 def test_glorot_weights_are_drawn_from_the_trials_keys() -> None:
