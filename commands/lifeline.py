@@ -10,8 +10,9 @@ VARIABLE = "PARENTING_LIFELINE"
 
 
 def follow() -> None:
-    """Stop this process, as SIGTERM would, when the process that holds the other end is gone. Does nothing
-    without one.
+    """Stop this process, as SIGTERM would, when the process that holds the other end is gone.
+
+    Does nothing without one.
     """
     number = os.environ.pop(VARIABLE, None)
     if number is not None:

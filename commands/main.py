@@ -34,9 +34,7 @@ parenting run unsafe-exploration --preset conservative --trials 100
 
 
 class Lazy(TyperGroup):
-    """A group that loads a command's file when the command is called, or its own help asked for, not to list
-    it.
-    """
+    """A group that loads a command's file when the command is called, not to list it."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """The names, in the order of `COMMANDS`."""

@@ -24,8 +24,9 @@ def plainly() -> Iterator[None]:
 
 
 def settings(**given: Any) -> Settings:
-    """The settings from the environment, `.env` and the options given (None: not given). Call it within
-    `plainly`.
+    """The settings from the environment, `.env` and the options given (None: not given).
+
+    Call it within `plainly`.
 
     Raises:
         ServerError: names each wrong setting.

@@ -1,5 +1,6 @@
-"""`parenting up`: everything in one command. Web and worker are processes of their own, so that neither stops
-the other.
+"""`parenting up`: everything in one command.
+
+Web and worker are processes of their own, so that neither stops the other.
 """
 
 from __future__ import annotations
@@ -89,9 +90,7 @@ def _signals() -> Iterator[threading.Event]:
 
 @contextmanager
 def _children(ear: socket.socket) -> Iterator[Children]:
-    """Web and worker, in sessions of their own so that Ctrl-C reaches `up` alone, which stops both in the
-    end.
-    """
+    """Web and worker, in sessions of their own: Ctrl-C reaches `up` alone, which stops both."""
     lifeline, held = os.pipe()
     web = ["web", "--fd", str(ear.fileno())]
     children: dict[str, subprocess.Popen[bytes]] = {}

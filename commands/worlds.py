@@ -14,7 +14,10 @@ from envs.levels.kind import Kind
 def worlds(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
-    """List the worlds and their levels, with the art."""
+    """List the worlds and their levels, with the art.
+
+    Example: parenting worlds --json
+    """
     found = [describe(world) for world in registry.WORLDS.values()]
     text = json.dumps({"worlds": found}, indent=2) if as_json else "\n".join(map(_page, found))
     typer.echo(text)

@@ -23,6 +23,7 @@ from server.errors import Busy, Invalid, MethodNotAllowed, NotFound, ServerError
 from server.guard import Guard
 from server.schema import require
 from server.settings import Settings
+from server.shapes import shape_runs
 from server.starting import messages
 from server.streams import Streams
 from server.wake import Bell
@@ -35,8 +36,7 @@ log = structlog.get_logger()
 
 
 def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
-    """The application on a migrated database; `db` instead of the settings' own is for tests with a clock of
-    theirs.
+    """The application on a migrated database (`db` instead of the settings' own: for tests).
 
     Raises:
         SetupError: the database cannot be used as it is; the sentence names the remedy.
@@ -111,9 +111,11 @@ def _add_health(app: FastAPI) -> None:
 
     @app.get("/readyz", tags=["health"])
     def readyz(db: Db) -> dict[str, Any]:
-        """The database answers and its tables are up to date."""
+        """The database answers, its tables are up to date; and what the worker does."""
         require(db)
-        return {"status": "ok", "database": "ok", "migrations": "ok"}
+        living = {run.worker for run in shape_runs(db) if run.worker != "done"}
+        worker = "idle" if not living else "silent" if "silent" in living else "alive"
+        return {"status": "ok", "database": "ok", "migrations": "ok", "worker": worker}
 
 
 def _add_static(app: FastAPI) -> None:

@@ -24,9 +24,7 @@ log = structlog.get_logger()
 
 
 def policy(inline_styles: bool = False) -> str:
-    """The Content-Security-Policy. A page that needs inline styles (Plotly's) sets this header itself, with
-    True.
-    """
+    """The Content-Security-Policy; a page that needs inline styles (Plotly's) sets it itself, with True."""
     styles = "'self' 'unsafe-inline'" if inline_styles else "'self'"
     return (
         f"default-src 'self'; style-src {styles}; img-src 'self' data: blob:; object-src 'none'; "

@@ -11,8 +11,7 @@ from server.errors import SetupError
 
 
 def set_up_log(level: str) -> None:
-    """Logs of web and worker: one line each on standard error, with the ids of run and query where they are
-    known.
+    """Logs of web and worker: one line each on standard error.
 
     Raises:
         SetupError: no such level.

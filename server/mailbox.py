@@ -1,5 +1,6 @@
-"""The worker's verbs on queries, answers and events: watch, post, take. One transaction each; all their SQL
-is here.
+"""The worker's verbs on queries, answers and events: watch, post, take.
+
+One transaction each; all their SQL is here.
 
 **Crash and replay.** A worker that lost its memory goes on from a checkpoint and lives some ticks a second
 time. At or below the *high-water tick*, the largest on any posted query, applied answer or applied event,
@@ -60,8 +61,9 @@ def high_water(db: Database, run_id: int) -> int:
 
 
 def post_query(db: Database, mine: Claim, tick: int, kind: str, maturity: int, clips: dict[str, Any]) -> int:
-    """Ask: insert the query of this tick and return its id. A known tick inserts nothing: its id and payload
-    stay.
+    """Ask: insert the query of this tick and return its id.
+
+    A known tick inserts nothing: its id and payload stay.
 
     Raises:
         LostClaim: another worker raises this run now.
@@ -148,9 +150,7 @@ def withdraw(db: Database, mine: Claim, query_id: int) -> None:
 
 
 def record(db: Database, run_id: int) -> Sequence[Taken]:
-    """Every answer that the agent heard, in the order in which it heard them: from this X is rebuilt at any
-    time.
-    """
+    """Every answer that the agent heard, in that order: from this X is rebuilt at any time."""
     with db.read() as session:
         rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
         rows = rows.where(Answer.run_id == run_id, Answer.applied_tick.is_not(None)).order_by(

@@ -1,5 +1,6 @@
-"""The parents' verbs on queries and answers: lease, release, answer, correct. One transaction each; all their
-SQL is here.
+"""The parents' verbs on queries and answers: lease, release, answer, correct.
+
+One transaction each; all their SQL is here.
 
 A lease is a timestamp: nothing sticks when a browser dies. Silence is never consent: no verb answers by
 itself. The worker's verbs (post, take, withdraw) are in `server.mailbox`.
@@ -23,9 +24,7 @@ LEASE_SECONDS = 60.0
 
 @dataclass(frozen=True)
 class Stored:
-    """The reply to an answer: only what never changes afterwards, so that the same answer always gets the
-    same reply.
-    """
+    """The reply to an answer: only what never changes, so that the same answer gets the same reply."""
 
     query: int
     run: int
@@ -57,8 +56,7 @@ def waiting(db: Database, run_id: int) -> Query | None:
 
 
 def lease(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECONDS) -> Query | None:
-    """Offer the most urgent open query that nobody else holds, and hold it for this client; None if there is
-    none.
+    """Hold the most urgent open query that nobody else holds for this client; None if there is none.
 
     Guidance goes first, then the oldest. A client that still holds one gets the same again, for `seconds`
     more.
@@ -76,25 +74,24 @@ def lease(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECO
 
 
 def release(db: Database, query_id: int, client_id: str) -> None:
-    """Let go of a leased query at once, so that it is offered again; nothing happens if another client holds
-    it.
-    """
+    """Let go of a leased query at once, so that it is offered again; only its holder can."""
     with db.write() as session:
-        query = _query(session, query_id, lock=True)
+        query = _held(session, query_id)
         if query.leased_by == client_id:
             query.leased_by = query.leased_until = None
 
 
 def answer(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Stored:
-    """Store an answer, once. The same again by the same client gets the same reply; a late one is taken if
-    none stands.
+    """Store an answer, once.
+
+    The same again by the same client gets the same reply; a late one is taken if none stands.
 
     Raises:
         NotFound: there is no such query.
         Conflict: it was answered otherwise, or by someone else, or withdrawn; the message says which.
     """
     with db.write() as session:
-        query = _query(session, query_id, lock=True)
+        query = _held(session, query_id)
         before = _standing(session, query_id)
         if before is not None:
             return _again(before, choice, client_id)
@@ -108,15 +105,16 @@ def answer(db: Database, query_id: int, choice: str, client_id: str, parent: str
 
 
 def correct(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Answer:
-    """Supersede the standing answer by a new row. If the agent had heard the old one, its tick stays on the
-    old row.
+    """Supersede the standing answer by a new row.
+
+    If the agent had heard the old one, its tick stays on the old row.
 
     Raises:
         NotFound: there is no such query.
         Conflict: there is no answer to correct yet.
     """
     with db.write() as session:
-        query = _query(session, query_id, lock=True)
+        query = _held(session, query_id)
         before = _standing(session, query_id)
         if before is None:
             raise Conflict(f"Question {query_id} has no answer to correct.")
@@ -170,8 +168,16 @@ def _stored(row: Answer) -> Stored:
     )
 
 
-def _query(session: Session, query_id: int, lock: bool = False) -> Query:
-    query = session.get(Query, query_id, with_for_update=lock or None)
+def _held(session: Session, query_id: int) -> Query:
+    """A query, locked after its run: everyone locks in this order, or two could wait for each other."""
+    query = _query(session, query_id)
+    hold(session, query.run_id)
+    session.refresh(query, with_for_update=True)
+    return query
+
+
+def _query(session: Session, query_id: int) -> Query:
+    query = session.get(Query, query_id)
     if query is None:
         raise NotFound(f"There is no question {query_id}.")
     return query

@@ -52,8 +52,9 @@ def list_events(db: Database, run_id: int) -> Sequence[Event]:
 
 
 def write_metrics(db: Database, mine: Claim, rows: Mapping[int, Mapping[str, float | int | None]]) -> None:
-    """Store what was measured, by tick. A tick that is lived again replaces its row; what is not finite
-    becomes null.
+    """Store what was measured, by tick.
+
+    A tick that is lived again replaces its row; what is not finite becomes null.
 
     Raises:
         LostClaim: another worker raises this run now.
@@ -79,8 +80,9 @@ def metrics(db: Database, run_id: int, after: int = -1, limit: int = 10_000) -> 
 
 
 def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
-    """Store the state after a tick, with its hash, and forget all but the last two. A tick saved again is
-    replaced.
+    """Store the state after a tick, with its hash, and forget all but the last two.
+
+    A tick saved again is replaced.
 
     Raises:
         LostClaim: another worker raises this run now.
@@ -102,8 +104,9 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
 
 
 def load_checkpoints(db: Database, run_id: int) -> Sequence[Saved]:
-    """The kept checkpoints, newest first. The caller takes the first intact one, and says so if it had to
-    pass one over.
+    """The kept checkpoints, newest first.
+
+    The caller takes the first intact one, and says so if it had to pass one over.
     """
     with db.read() as session:
         rows = session.scalars(

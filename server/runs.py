@@ -1,5 +1,4 @@
-"""Verbs on runs: create, list, get, pause, resume, stop for the operator; claim, report, finish for the
-worker.
+"""Verbs on runs: the operator's (create, pause, stop) and the worker's (claim, report, finish).
 
 One actor a run: `claim` raises the run's epoch, and every later write of a worker checks it inside its own
 transaction (`held`). A worker that slept past its claim therefore cannot write.
@@ -41,8 +40,9 @@ class Open:
 
 
 def create_run(db: Database, **fields: Any) -> Run:
-    """Add a run. The fields are those of `tables.Run`; `server.starting` checks and fills them in from a
-    form.
+    """Add a run.
+
+    The fields are those of `tables.Run`; `server.starting` checks and fills them in from a form.
     """
     with db.write() as session:
         run = Run(created=db.clock(), **fields)
@@ -74,8 +74,9 @@ def open_counts(db: Database, run_id: int) -> Open:
 
 
 def set_status(db: Database, run_id: int, status: str, reason: str | None = None) -> Run:
-    """Pause, resume (`active`) or stop a run, for the operator. Doing it twice is doing it once. Stopping
-    withdraws what is open.
+    """Pause, resume (`active`) or stop a run, for the operator.
+
+    Doing it twice is doing it once. Stopping withdraws what is open.
 
     Raises:
         NotFound: there is no such run.
@@ -91,9 +92,7 @@ def set_status(db: Database, run_id: int, status: str, reason: str | None = None
 
 
 def claim(db: Database, actor: str, seconds: float = CLAIM_SECONDS) -> Sequence[Claim]:
-    """Take every living run (active or paused) that is free, or whose worker gave no sign of life for
-    `seconds`.
-    """
+    """Take every living run that is free, or whose worker gave no sign of life for `seconds`."""
     late = db.clock() - timedelta(seconds=seconds)
     living = (Run.status.in_(("active", "paused")), or_(Run.actor.is_(None), Run.heartbeat < late))
     with db.read() as session:  # nothing to claim is the common case, and takes no lock
@@ -145,6 +144,7 @@ def report(db: Database, mine: Claim, **fields: Any) -> Run:
 
 def finish(db: Database, mine: Claim, status: str, reason: str, error: str | None = None) -> Run:
     """End a run as `finished` or `failed`, with a sentence for people and, if it failed, the details.
+
     Withdraws what is open.
 
     Raises:
@@ -175,9 +175,7 @@ def hold(session: Session, run_id: int) -> Run:
 
 
 def held(session: Session, mine: Claim) -> Run:
-    """The run of a claim, locked, after checking that the claim still holds: the first line of every write of
-    a worker.
-    """
+    """The run of a claim, locked, if the claim still holds: the first line of every write of a worker."""
     run = hold(session, mine.run_id)
     if (run.actor, run.epoch) != (mine.actor, mine.epoch):
         raise LostClaim(
@@ -188,13 +186,16 @@ def held(session: Session, mine: Claim) -> Run:
 
 def open_in(session: Session, run_id: int) -> Open:
     """`open_counts`, in a transaction that is already open."""
-    rows = (
-        select(Query.kind, func.count())
-        .where(Query.run_id == run_id, Query.status == "open")
-        .group_by(Query.kind)
+    return open_by_run(session, [run_id])[run_id]
+
+
+def open_by_run(session: Session, run_ids: Sequence[int]) -> dict[int, Open]:
+    """`open_in` for many runs at once."""
+    rows = select(Query.run_id, Query.kind, func.count()).where(
+        Query.status == "open", Query.run_id.in_(run_ids)
     )
-    counts = {row[0]: row[1] for row in session.execute(rows)}
-    return Open(guidance=counts.get("guidance", 0), preference=counts.get("preference", 0))
+    counts = {(row[0], row[1]): row[2] for row in session.execute(rows.group_by(Query.run_id, Query.kind))}
+    return {i: Open(counts.get((i, "guidance"), 0), counts.get((i, "preference"), 0)) for i in run_ids}
 
 
 def withdraw_in(session: Session, run_id: int, kind: str | None = None) -> None:

@@ -11,9 +11,7 @@ from sqlalchemy import URL
 
 
 def state_folder() -> Path:
-    """Where data lives unless told otherwise: `parenting` in XDG's state folder, the same from wherever it is
-    started.
-    """
+    """Where data lives unless told otherwise: `parenting` in XDG's state folder."""
     state = os.environ.get("XDG_STATE_HOME", "")
     root = Path(state) if Path(state).is_absolute() else Path.home() / ".local" / "state"
     return root / "parenting"

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from server.db import Database
-from server.runs import OVER, find, open_in
+from server.runs import OVER, Open, find, list_runs, open_by_run, open_in
 from server.tables import Metric, Query, Run
 
 SILENT_AFTER = timedelta(seconds=5)
@@ -46,9 +46,7 @@ class RunShape(BaseModel):
 
 
 class FrameShape(BaseModel):
-    """One moment of a clip: rows of glyphs as they were true and as the agent saw them, and where the pieces
-    stood.
-    """
+    """One moment of a clip: glyphs as they were true and as the agent saw them, and the pieces."""
 
     ground: list[str]
     observed: list[str]
@@ -135,11 +133,15 @@ def shape_run(db: Database, run_id: int) -> RunShape:
         NotFound: there is none of this id.
     """
     with db.read() as session:
-        run = find(session, run_id)
-        opened = open_in(session, run_id)
-    own = {name: getattr(run, name) for name in RunShape.model_fields if name not in ("open", "worker")}
-    shown = OpenShape(guidance=opened.guidance, preference=opened.preference)
-    return RunShape(**own, open=shown, worker=_worker(run, db.clock()))
+        return _shape(find(session, run_id), open_in(session, run_id), db.clock())
+
+
+def shape_runs(db: Database) -> list[RunShape]:
+    """The runs as they are now, newest first (at most 200)."""
+    runs = list_runs(db)
+    with db.read() as session:
+        opened = open_by_run(session, [run.id for run in runs])
+    return [_shape(run, opened[run.id], db.clock()) for run in runs]
 
 
 def shape_query(query: Query) -> QueryShape:
@@ -167,6 +169,12 @@ def shape_leased(db: Database, query: Query) -> LeasedShape:
 def shape_metrics(rows: Sequence[Metric]) -> list[MetricShape]:
     """Metrics as the dashboard takes them."""
     return [MetricShape(tick=row.tick, values=row.values) for row in rows]
+
+
+def _shape(run: Run, opened: Open, now: datetime) -> RunShape:
+    own = {name: getattr(run, name) for name in RunShape.model_fields if name not in ("open", "worker")}
+    shown = OpenShape(guidance=opened.guidance, preference=opened.preference)
+    return RunShape(**own, open=shown, worker=_worker(run, now))
 
 
 def _worker(run: Run, now: datetime) -> str:

@@ -1,5 +1,6 @@
-"""From a form or a JSON body to a run: every field checked on its own, each with its own message. No torch
-here.
+"""From a form or a JSON body to a run: every field checked on its own, each with its own message.
+
+No torch here.
 """
 
 from __future__ import annotations
@@ -59,9 +60,7 @@ Setting = bool | Integer | float | Name | None
 
 
 class NewRun(BaseModel):
-    """What a run is started with: a world, a level (by name, or as text), a parent, a preset and changes to
-    it, a seed.
-    """
+    """What a run is started with; `level` is a built-in level's name, `config` changes the preset."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
@@ -111,8 +110,7 @@ def plan(new: NewRun) -> dict[str, Any]:
 
 
 def read_form(form: Mapping[str, str]) -> NewRun:
-    """A new run from a web form, where all is text: an empty field is an absent one, `config.p_guid` sets
-    `p_guid`.
+    """A new run from a web form's text; an empty field is an absent one, `config.p_guid` sets `p_guid`.
 
     Raises:
         Invalid: names every wrong field, with a message each.

@@ -68,9 +68,7 @@ class Streams:
         self.bell.close()
 
     async def follow(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
-        """The events of one run: `run`, `question`, and `metrics` of the ticks after `after` unless it is
-        None.
-        """
+        """The events of a run: `run`, `question`, and, unless `after` is None, `metrics` of later ticks."""
         watcher = self._join(run_id)
         try:
             seen: dict[str, Any] = {}

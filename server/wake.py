@@ -46,8 +46,9 @@ class Bell:
                     continue  # full: it will wake anyway
 
     def wait(self, timeout: float) -> bool:
-        """Wait until the bell rings, at most `timeout` seconds; whether it rang. Hears what rang since the
-        last call.
+        """Wait until the bell rings, at most `timeout` seconds; whether it rang.
+
+        Hears what rang since the last call.
         """
         ear = self.listen()
         if not select.select([ear], [], [], max(timeout, 0))[0]:

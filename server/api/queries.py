@@ -22,8 +22,9 @@ router = APIRouter(tags=["questions"])
     responses={204: {"description": "No question waits."}, **errors(403, 404)},
 )
 def lease_next(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf) -> Response:
-    """The most urgent open question, guidance first, held for this client; 204 if there is none. Leasing
-    again renews.
+    """The most urgent open question, guidance first, held for this client; 204 if there is none.
+
+    Leasing again renews.
     """
     get_run(db, run_id)
     query = lease(db, run_id, body.client_id, settings.lease_seconds)

@@ -8,8 +8,8 @@ from agent.events import EndEpisode, Mature
 from server.api.words import After, RunId, errors
 from server.deps import Db, ring
 from server.record import add_event, metrics
-from server.runs import list_runs, set_status
-from server.shapes import MetricsShape, RunShape, shape_metrics, shape_run
+from server.runs import set_status
+from server.shapes import MetricsShape, RunShape, shape_metrics, shape_run, shape_runs
 from server.starting import NewRun, start
 
 router = APIRouter(tags=["runs"])
@@ -19,7 +19,7 @@ PAGE = 10_000
 @router.get("/runs", responses=errors())
 def runs(db: Db) -> list[RunShape]:
     """All runs, newest first (at most 200)."""
-    return [shape_run(db, run.id) for run in list_runs(db)]
+    return shape_runs(db)
 
 
 @router.post("/runs", status_code=201, responses=errors(403, 413))

@@ -29,9 +29,7 @@ async def events(
     after: After | None = None,
     last_event_id: Annotated[str | None, Header()] = None,
 ) -> AsyncIterable[ServerSentEvent]:
-    """`run` as it changes, `question` when another one waits (or none), `metrics` after a tick if `after` is
-    given.
-    """
+    """`run` as it changes, `question` when another waits or none, `metrics` if `after` is given."""
     if (
         after is not None
         and last_event_id is not None

@@ -1,6 +1,4 @@
-"""The worker's verbs: posting, hearing, replaying at and below the high-water tick, and the fence around them
-(C1 to C4).
-"""
+"""The worker's verbs: posting, hearing, replaying, and the fence around them (C1 to C4)."""
 
 import pytest
 

@@ -1,6 +1,4 @@
-"""Migrations: they make exactly the tables of `server.tables`, are idempotent, and refuse what they do not
-know.
-"""
+"""Migrations: they make the tables of `server.tables`, once, and refuse what they do not know."""
 
 from collections.abc import Iterator
 
@@ -24,9 +22,7 @@ def empty(settings: Settings) -> Iterator[Database]:
 
 
 def checks(connection: Connection) -> dict[str, list[str]]:
-    """Each table's and index's own SQL by parts, blanks aside: alembic compares neither CHECKs nor partial
-    indices.
-    """
+    """Each table's and index's own SQL by parts: alembic compares neither CHECKs nor partial indices."""
     query = "SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL AND name != 'alembic_version'"
     found = {}
     for name, sql in connection.execute(text(query)):

@@ -1,6 +1,4 @@
-"""The parents' verbs: who is offered what, who may answer, and that an answer is stored once (A2, A4, B1 to
-B5).
-"""
+"""The parents' verbs: who is offered what, who may answer, and how often (A2, A4, B1 to B5)."""
 
 import threading
 from collections.abc import Callable

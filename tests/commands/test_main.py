@@ -1,0 +1,41 @@
+"""The command line: every command is listed, says what it does, and shows an example."""
+
+import subprocess
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+from commands.main import COMMANDS, app
+from tests.tree import ROOT
+
+run = CliRunner().invoke
+
+
+def test_help_lists_every_command() -> None:
+    said = run(app, ["--help"]).output
+    assert all(name in said for name in COMMANDS)
+    assert "Examples:" in said
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_command_shows_an_example(name: str) -> None:
+    result = run(app, [name, "--help"])
+    assert result.exit_code == 0, result.output
+    assert f"parenting {name}" in result.output.partition("Example")[2]
+
+
+def test_unknown_command_is_refused() -> None:
+    result = run(app, ["bogus"])
+    assert result.exit_code == 2
+    assert "No such command 'bogus'" in result.output
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["web", "--help"], ["up", "--help"], ["migrate", "--help"]]
+)
+def test_help_loads_no_torch(arguments: list[str]) -> None:
+    call = f"from commands.main import app; app({arguments}, standalone_mode=False)"
+    code = f"import sys; {call}; assert 'torch' not in sys.modules"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
