@@ -14,16 +14,16 @@ from server.tables import Metric, Query
 
 
 def lease_ahead(
-    db: Database, run_id: int, client_id: str, shown: int, seconds: float = LEASE_SECONDS
+    db: Database, run_id: int, client_id: str, shown: Sequence[int], seconds: float = LEASE_SECONDS
 ) -> Query | None:
-    """The question after the one that is `shown`, held for this client too: the page has it before it is needed.
+    """The most urgent question besides those `shown`, held for this client too, so that nobody waits for it.
 
     Raises:
         NotFound: there is no such run.
     """
     now = db.clock()
     free = or_(Query.leased_until.is_(None), Query.leased_until <= now, Query.leased_by == client_id)
-    rows = select(Query).where(Query.run_id == run_id, Query.status == "open", Query.id != shown, free)
+    rows = select(Query).where(Query.run_id == run_id, Query.status == "open", Query.id.not_in(shown), free)
     rows = rows.order_by(guidance_first(), Query.tick).limit(1)
     with db.read() as session:  # nothing to offer is the common case, and takes no lock
         if session.scalars(rows).first() is None:

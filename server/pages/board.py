@@ -19,7 +19,7 @@ DROWN, REACH = "W", "G"
 
 
 class Frame(TypedDict):
-    """One moment, as stored (server.tables.Query): the truth without pieces, what the agent saw, the pieces."""
+    """One moment, as stored (server.tables.Query): the truth, what the agent saw, the pieces."""
 
     ground: list[str]
     observed: list[str]

@@ -1,8 +1,8 @@
 """The parent's page: one question after another, with JavaScript or without.
 
-No GET changes anything: a question is leased by a POST, which without JavaScript redirects to the page that shows
-it. Who answers is a random name in a cookie, so that a reload and a second tab get the same question; a form carries
-it too, for browsers that keep no cookies.
+No GET changes anything: a question is leased by a POST, which without JavaScript redirects to the page that
+shows it. Who answers is a random name in a cookie, so that a reload and a second tab get the same question;
+a form carries it too, for browsers that keep no cookies.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import time
 from typing import Annotated
 
 from fastapi import APIRouter, Form, Query, Request, Response
+from pydantic import Field
 
 from server import queue, runs
 from server.api.words import Choice, ClientId, RunId
@@ -33,11 +34,12 @@ COOKIE = "parenting_client"
 YEAR = 365 * 24 * 3600
 NAME = re.compile(r"[A-Za-z0-9_-]{8,64}")
 PATIENCE = 0.5
-"""Seconds for which a plain form waits for the agent's next question before the page says that it explores."""
+"""Seconds for which a plain form waits for the next question before the page says that the agent explores."""
 
 ClientField = Annotated[ClientId, Form()]
 ChoiceField = Annotated[Choice, Form()]
-Number = Annotated[int, Form(ge=0, le=LARGEST_INT)]
+Number = Annotated[int, Form(ge=1, le=LARGEST_INT)]
+Numbers = Annotated[tuple[Annotated[int, Field(ge=1, le=LARGEST_INT)], ...], Form(max_length=100)]
 QueryShown = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 
 
@@ -64,9 +66,12 @@ def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = Non
 
 @router.post("/runs/{run_id}/parent/question")
 def question(
-    run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField, shown: Number = 0
+    run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField, shown: Numbers = ()
 ) -> Response:
-    """For the script: the next question as markup, leased; 204 if there is none. `shown` asks for the one after."""
+    """For the script: the next question as markup, leased; 204 if there is none.
+
+    `shown` are those that the page has already or whose answers are on their way: it asks for another one.
+    """
     run = runs.get_run(db, run_id)
     if shown:
         query = lease_ahead(db, run_id, client_id, shown, settings.lease_seconds)

@@ -1,4 +1,4 @@
-"""The first page: the runs, and a form to start one. An error stands beside its field, with what was typed."""
+"""The first page: the runs, and a form to start one. Errors stand beside their fields, and no typing is lost."""
 
 from __future__ import annotations
 

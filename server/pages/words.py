@@ -28,7 +28,7 @@ SENTENCES = {
     "paused": ("The run is paused.", "No time passes for the agent until the run is resumed."),
     "idle": (
         "No worker is running.",
-        "Nothing moves until one is started: parenting worker, or parenting up.",
+        "Nothing moves until one is started (parenting worker).",
     ),
     "over": ("This run is over.", "The agent asks no more questions."),
     "offline": (
@@ -45,7 +45,10 @@ def title(run: Run) -> str:
 
 
 def state(run: RunShape, offered: bool) -> str:
-    """Which of `SENTENCES` holds, as web/static/live.js tells it too. `offered`: a question is free for this parent."""
+    """Which of `SENTENCES` holds; web/static/live.js tells it in the same way.
+
+    `offered` says whether an open question is free for this parent.
+    """
     if run.worker == "done":
         return "over"
     if run.open.guidance or run.open.preference:

@@ -13,16 +13,16 @@ function write(answers) {
 
 const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListener("online", done, { once: true }); });
 
-// One attempt: "saved", "refused" (the server said no for good) or "kept" (no connection, or the server is in trouble).
+// One attempt: "saved", "refused" (the server said no for good) or "kept" (no connection, or a server in trouble).
 async function send({ query, choice, client_id }) {
   try {
     const reply = await fetch(`/api/v1/queries/${query}/answer`, {
       method: "POST", keepalive: true, headers: { "content-type": "application/json" }, body: JSON.stringify({ choice, client_id }),
     });
-    if (reply.ok) { await reply.json(); return ["saved"]; }
+    if (reply.ok) return ["saved", await reply.json()];
     if (reply.status >= 500 || reply.status === 429) return ["kept"];
     const { error } = await reply.json();
-    return ["refused", error.message];
+    return ["refused", error];
   } catch {
     return ["kept"];
   }
@@ -30,8 +30,8 @@ async function send({ query, choice, client_id }) {
 
 async function drain(report) {
   for (let answers = read(); answers.length; answers = read()) {
-    const [outcome, message] = await send(answers[0]);
-    report(outcome, answers[0].query, message);
+    const [outcome, reply] = await send(answers[0]);
+    report(outcome, reply);
     if (outcome === "kept") {
       await wait(delay);
       delay = Math.min(5000, delay * 2);
@@ -54,4 +54,5 @@ export function flush(report) {
   return sending;
 }
 
-export const holds = (query) => read().some((answer) => answer.query === query);
+// The questions whose answers are still on their way.
+export const kept = () => read().map(({ query }) => query);

@@ -1,26 +1,31 @@
 // The parent's page: shows one question after another, takes keys and clicks, and says who waits for whom.
 // The markup of a question comes from the server (server/pages/board.py says why); this file swaps it in.
 import { follow, stateOf } from "./live.js";
-import { flush, give, holds } from "./outbox.js";
+import { flush, give, kept } from "./outbox.js";
 import { play } from "./play.js";
 
 const $ = (id) => document.getElementById(id);
 const main = $("main"), stage = $("stage"), waiting = $("waiting"), help = $("help");
 const { run, client, name } = main.dataset;
 const KEYS = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "either", ArrowDown: "neither", 1: "left", 2: "right", 3: "either", 4: "neither" };
+const RENEW = 25_000;
 const QUIET = 350; // an answered question stays this long before the page says that the agent explores
 
 let current = null;    // the form on the stage, until it is answered
 let player = null;
 let ahead = null;      // markup of the question after it
+let prefetches = 0;    // the last request for it counts
 let asking = null;     // a request for a question that is under way
 let state = main.dataset.state;
 let answered = Number($("count").textContent), unsaved = 0, quiet = 0;
 
 // ---- questions
 
-async function ask(shown = 0) {
-  const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body: new URLSearchParams({ client_id: client, shown }) });
+// Markup of the most urgent question, besides those given and those whose answers are on their way; null if there is none.
+async function ask(...shown) {
+  const body = new URLSearchParams({ client_id: client });
+  for (const query of [...shown, ...kept()]) body.append("shown", query);
+  const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body });
   if (!reply.ok) throw new Error(reply.statusText);
   return reply.status === 204 ? null : reply.text();
 }
@@ -36,18 +41,25 @@ function next() {
 }
 
 async function prefetch() {
-  const shown = current?.dataset.query;
+  const mine = ++prefetches, form = current;
   try {
-    const markup = await ask(shown);
-    if (current?.dataset.query === shown) ahead = markup;
+    const markup = await ask(form.dataset.query);
+    if (mine === prefetches && form === current) ahead = markup;
+    form.dataset.ahead = /data-query="(\d+)"/.exec(markup)?.[1] ?? "";
   } catch { /* the stream or the poll will bring it */ }
+}
+
+// A question is held for this browser for a minute; while somebody looks at it, it is held on.
+async function renew() {
+  if (!current || document.hidden) return;
+  await ask().catch(() => null);
+  prefetch();
 }
 
 function show(markup) {
   const focused = stage.querySelector(".answers :focus-visible")?.value;
   if (markup) stage.innerHTML = markup;
   const form = stage.querySelector("#question");
-  if (holds(Number(form.dataset.query))) return; // answered here already; the answer is on its way
   clearTimeout(quiet);
   current = form;
   ahead = null;
@@ -89,8 +101,7 @@ const tell = {
   run(now) {
     state = stateOf(now);
     $("optimal").hidden = !now.optimal || state === "over";
-    answered = Math.max(now.answers, answered);
-    count();
+    count(now.answers);
     if (current && state === "over") current = null;
     if (current) return;
     if (state === "question") next();
@@ -109,7 +120,8 @@ const tell = {
 
 // ---- answers
 
-function count() {
+function count(number) {
+  answered = Math.max(answered, number);
   $("count").textContent = answered;
 }
 
@@ -127,7 +139,7 @@ function answer(choice) {
   else sent.then(() => { if (!current) next(); });
 }
 
-function report(outcome, query, message) {
+function report(outcome, reply) {
   $("saved").classList.toggle("kept", outcome === "kept");
   if (outcome === "kept") {
     $("saved").textContent = "Kept here, not sent yet";
@@ -136,12 +148,11 @@ function report(outcome, query, message) {
   }
   unsaved = Math.max(0, unsaved - 1);
   if (outcome === "saved") {
-    answered++;
-    count();
+    if (String(reply.run) === run) count(reply.number);
     if (!unsaved) $("saved").textContent = "Saved";
   } else {
     if (!unsaved) $("saved").textContent = "";
-    $("alert").textContent = message;
+    $("alert").textContent = reply.message;
   }
 }
 
@@ -170,5 +181,7 @@ $("help-open").addEventListener("click", () => help.showModal());
 // ---- begin: send what an earlier visit left behind, then follow the run
 
 history.replaceState(null, "", `/runs/${run}/parent`);
-if (stage.querySelector("#question")) show();
+const first = stage.querySelector("#question");
+if (first && !kept().includes(Number(first.dataset.query))) show();
+setInterval(renew, RENEW);
 flush(report).then(() => follow(run, tell, { background: true }));

@@ -1,0 +1,82 @@
+"""A site with a database of its own: called by a test client, or served to a real browser."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx2
+import pytest
+import uvicorn
+from fastapi.testclient import TestClient
+from playwright.sync_api import Browser, sync_playwright
+
+from server.app import create_app
+from server.db import Database, connect
+from server.schema import upgrade
+from server.serve import Server, bind
+from server.settings import Settings
+from tests.pages.watched import Watched
+
+FLAGS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path, database_url=None)
+
+
+@pytest.fixture
+def db(settings: Settings) -> Iterator[Database]:
+    database = connect(settings)
+    upgrade(database)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def client(settings: Settings, db: Database) -> Iterator[httpx2.Client]:
+    with TestClient(create_app(settings, db), base_url="http://localhost", follow_redirects=False) as caller:
+        yield caller
+
+
+@pytest.fixture
+def address(settings: Settings, db: Database) -> Iterator[str]:
+    """The site served at a free port, for a browser."""
+    app = create_app(settings, db)
+    ear = bind("127.0.0.1", 0)
+    server = Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [ear]})
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    yield f"http://127.0.0.1:{ear.getsockname()[1]}"
+    app.state.streams.close()
+    server.should_exit = True
+    thread.join()
+    ear.close()
+
+
+@pytest.fixture(scope="session")
+def browser(chromium_path: str) -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=chromium_path, args=list(FLAGS))
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def watched(browser: Browser, address: str) -> Iterator[Watched]:
+    """Opens pages of the site; at the end nothing may have gone wrong in them."""
+    found = Watched(browser, address)
+    yield found
+    found.close()
+    assert found.wrong == []

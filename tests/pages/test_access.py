@@ -1,0 +1,151 @@
+"""Everybody can use the pages: axe's rules, small screens, no motion, few bytes."""
+
+from __future__ import annotations
+
+import gzip
+from typing import Any
+
+import httpx2
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, expect
+
+from server import runs
+from server.db import Database
+from tests.pages import island
+from tests.pages.watched import Watched
+
+SCREENS = {"desktop": {"width": 1280, "height": 800}, "phone": {"width": 390, "height": 844}}
+PATHS = ("/", "/runs/1", "/runs/1/parent?query=1", "/runs/1/parent?query=2", "/runs/2/parent", "/runs/9")
+LARGEST_PAGE = 15_000
+"""Bytes of the parent's page with all that it loads, compressed."""
+
+
+@pytest.fixture
+def lives(db: Database) -> None:
+    """A run with two questions and a run that waits for its operator."""
+    _, mine = island.live(db)
+    island.measure(db, mine, 40)
+    island.ask(db, mine, 41, "guidance", island.guidance("left", "up", start=(1, 2)))
+    island.ask(db, mine, 42, "preference", island.preference("down left left left", "right down down"))
+    _, other = island.live(db, level="island-bottleneck")
+    runs.report(db, other, waiting="stuck", optimal=True)
+
+
+def violations(page: Page) -> list[str]:
+    """What axe finds, a line each, with the first element."""
+    found = Axe().run(page).response["violations"]
+    return [f"{rule['id']}: {rule['help']}: {rule['nodes'][0]['html']}" for rule in found]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("screen", SCREENS)
+def test_axe_finds_nothing(watched: Watched, lives: None, screen: str, scheme: str) -> None:
+    watched.expected = ("404", "422")
+    page = watched.open("/", viewport=SCREENS[screen], color_scheme=scheme)
+    for path in PATHS:
+        page.goto(watched.address + path)
+        page.wait_for_timeout(200)
+        assert violations(page) == [], path
+    page.goto(f"{watched.address}/runs/1/parent")
+    page.keyboard.press("?")
+    assert violations(page) == []
+    page.goto(watched.address)
+    page.get_by_label("Seed").fill("many")
+    page.get_by_role("button", name="Start").click()
+    expect(page.locator("#seed-error")).to_be_visible()
+    assert violations(page) == []
+
+
+def test_axe_finds_what_is_wrong(watched: Watched) -> None:
+    """The control: a picture without a text is found."""
+    page = watched.open("/")
+    page.evaluate("document.querySelector('main').append(new Image())")
+    assert any("image-alt" in line for line in violations(page))
+
+
+@pytest.mark.parametrize("width", [320, 390])
+@pytest.mark.parametrize("path", PATHS)
+def test_nothing_scrolls_sideways(watched: Watched, lives: None, path: str, width: int) -> None:
+    watched.expected = ("404",)
+    page = watched.open(path, viewport={"width": width, "height": 640})
+    page.wait_for_timeout(300)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_on_a_phone_four_thumb_buttons_lie_at_the_bottom(watched: Watched, lives: None) -> None:
+    page = watched.open("/runs/1/parent?query=1", viewport=SCREENS["phone"])
+    boxes: list[Any] = [button.bounding_box() for button in page.locator(".answers button").all()]
+    assert len(boxes) == 4
+    assert all(box["height"] >= 56 and box["y"] + box["height"] > 800 for box in boxes)
+    first, second = (board.bounding_box() for board in page.locator(".board").all())
+    assert first is not None
+    assert second is not None
+    assert second["y"] > first["y"] + first["height"]  # stacked
+    assert second["y"] + second["height"] < boxes[0]["y"]  # both to be seen at once
+    assert page.locator(".label").all_inner_texts() == ["A", "B"]
+
+
+def test_on_a_desktop_the_question_needs_no_scrolling(watched: Watched, lives: None) -> None:
+    page = watched.open("/runs/1/parent?query=2", viewport=SCREENS["desktop"])
+    left, right = (card.bounding_box() for card in page.locator(".card").all())
+    assert left is not None
+    assert right is not None
+    assert (left["width"], left["height"], left["y"]) == (right["width"], right["height"], right["y"])
+    brief = page.locator(".brief").bounding_box()
+    assert brief is not None
+    assert brief["y"] + brief["height"] <= 800
+
+
+def test_who_wants_no_motion_gets_steps(watched: Watched, lives: None) -> None:
+    page = watched.open("/runs/1/parent?query=2", reduced_motion="reduce")
+    moving = "document.getAnimations().filter(a => a.playState === 'running').length"
+    assert page.evaluate(moving) == 0
+    agent = page.locator(".card").nth(1).locator(".board .agent")
+    start = agent.bounding_box()
+    expect(page.locator(".steps output")).to_have_text("Step 0 of 4")
+    page.get_by_role("button", name="One step on").click()
+    expect(page.locator(".steps output")).to_have_text("Step 1 of 4")
+    assert agent.bounding_box() != start
+    page.get_by_role("button", name="One step back").click()
+    assert agent.bounding_box() == start
+
+
+def test_both_boards_play_on_one_clock(watched: Watched, lives: None) -> None:
+    page = watched.open("/runs/1/parent?query=2")
+    times = (
+        "[...new Set(document.getAnimations().filter(a => a.effect.target.closest('.board')).map(a => a.%s))]"
+    )
+    assert len(page.evaluate(times % "startTime")) == 1
+    page.get_by_role("button", name="One step on").click()
+    assert len(page.evaluate(times % "currentTime")) == 1
+
+
+def test_the_parents_page_is_small(client: httpx2.Client, lives: None) -> None:
+    paths = ["/runs/1/parent?query=2", "/static/site.css", "/static/parent.css", "/static/icon.svg"]
+    paths += [f"/static/{name}.js" for name in ("parent", "live", "outbox", "play")]
+    sizes = {path: len(gzip.compress(client.get(path).content)) for path in paths}
+    assert sum(sizes.values()) <= LARGEST_PAGE, sizes
+
+
+def test_the_charts_are_drawn_and_go_on(watched: Watched, db: Database, lives: None) -> None:
+    page = watched.open("/runs/1")
+    lines = page.locator(".plot .scatterlayer .trace")
+    expect(lines).to_have_count(14)
+    (mine,) = (claim for claim in runs.claim(db, "another", seconds=-1) if claim.run_id == 1)
+    island.measure(db, mine, 55)
+    expect(page.locator("#now-tick")).to_have_text("55")
+    page.wait_for_function("document.querySelector('.plot').data[0].x.at(-1) === 55")
+    log = page.get_by_role("button", name="Logarithmic axis for Loss")
+    log.click()
+    expect(log).to_have_attribute("aria-pressed", "true")
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Download Deaths as an image").click()
+    assert saved.value.suggested_filename == "run-1-deaths.png"
+
+
+def test_the_dashboard_without_javascript_is_a_table(watched: Watched, lives: None) -> None:
+    page = watched.open("/runs/1", java_script_enabled=False)
+    expect(page.locator("#charts")).to_be_hidden()
+    page.get_by_text("The numbers as a table").click()
+    expect(page.get_by_role("table")).to_be_visible()

@@ -1,0 +1,277 @@
+"""The parent's page in a real browser: real keys, real rows, nothing lost, with JavaScript and without."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, Route, expect
+from sqlalchemy import select
+
+from server import queue, runs
+from server.db import Database
+from server.runs import Claim
+from server.settings import Settings
+from server.tables import Answer, Query
+from server.wake import Bell
+from tests.pages import island
+from tests.pages.watched import Watched
+
+
+def given(db: Database) -> list[tuple[int, str]]:
+    """The stored answers, in their order."""
+    with db.read() as session:
+        rows = session.scalars(select(Answer).order_by(Answer.number)).all()
+        return [(row.query_id, row.choice) for row in rows]
+
+
+def until(holds: Callable[[], bool], seconds: float = 10.0) -> None:
+    """Wait until something holds that no page shows."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.02)
+
+
+def shown(page: Page, number: int) -> None:
+    """Wait until a question is on the page."""
+    expect(page.locator(f'#question[data-query="{number}"]')).to_be_visible()
+
+
+@pytest.fixture
+def mine(db: Database) -> Claim:
+    return island.live(db)[1]
+
+
+@pytest.fixture
+def ask(db: Database, mine: Claim, settings: Settings) -> Callable[..., int]:
+    """Post a question as the worker does, and ring for the pages."""
+    ticks = iter(range(1, 1000))
+
+    def post(kind: str = "guidance", left: str = "left", right: str = "down", start: Any = (1, 2)) -> int:
+        runs.report(db, mine, tick=0)  # a sign of life
+        clips = {"guidance": island.guidance, "preference": island.preference}[kind](left, right, start)
+        number = island.ask(db, mine, next(ticks), kind, clips)
+        Bell(settings.data, "web").ring()
+        return number
+
+    return post
+
+
+def test_keys_answer_one_question_after_another(
+    watched: Watched, db: Database, ask: Callable[..., int]
+) -> None:
+    keys = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "1", "2", "3", "4"]
+    numbers = [ask() for _ in keys]
+    page = watched.open("/runs/1/parent")
+    for number, key in zip(numbers, keys, strict=True):
+        shown(page, number)
+        page.keyboard.press(key)
+    expect(page.locator("#saved")).to_have_text("Saved")
+    expect(page.locator("#count")).to_have_text("8")
+    choices = ["left", "right", "either", "neither"] * 2
+    assert given(db) == list(zip(numbers, choices, strict=True))
+
+
+def test_cards_and_buttons_answer_too(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+    numbers = [ask(), ask("preference", "down down", "left")]
+    page = watched.open("/runs/1/parent")
+    shown(page, numbers[0])
+    page.locator(".card").nth(1).click()
+    shown(page, numbers[1])
+    page.get_by_role("button", name="Neither").click()
+    until(lambda: given(db) == [(numbers[0], "right"), (numbers[1], "neither")])
+
+
+def test_a_new_question_appears_by_itself(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+    page = watched.open("/runs/1/parent")
+    expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
+    expect(page).to_have_title("The agent is exploring on its own. · Unsafe exploration, island, run 1")
+    number = ask()
+    shown(page, number)
+    expect(page).to_have_title("● Which move is better here? · Unsafe exploration, island, run 1")
+    expect(page.locator("#said")).to_contain_text("Left: Left. Ends in the water. Right: Down.")
+    page.keyboard.press("ArrowRight")
+    expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
+    assert given(db) == [(number, "right")]
+
+
+def test_guidance_goes_before_what_was_leased_ahead(watched: Watched, ask: Callable[..., int]) -> None:
+    first, second = (ask("preference", "down down", "left") for _ in range(2))
+    page = watched.open("/runs/1/parent")
+    shown(page, first)
+    expect(page.locator("#question")).to_have_attribute("data-ahead", str(second))
+    urgent = ask()
+    expect(page.locator("#question")).to_have_attribute("data-ahead", str(urgent))
+    page.keyboard.press("ArrowLeft")
+    shown(page, urgent)
+    page.keyboard.press("ArrowLeft")
+    shown(page, second)
+
+
+def test_it_works_where_no_stream_comes_through(
+    watched: Watched, db: Database, ask: Callable[..., int]
+) -> None:
+    watched.expected = ("net::ERR_FAILED",)
+    page = watched.open("/")
+    page.context.route("**/events*", lambda route: route.abort())
+    page.goto(f"{watched.address}/runs/1/parent")
+    expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
+    numbers = []
+    for _ in range(2):
+        numbers.append(ask())
+        shown(page, numbers[-1])
+        page.keyboard.press("ArrowRight")
+    until(lambda: given(db) == [(number, "right") for number in numbers])
+
+
+def test_an_answer_given_offline_is_kept_and_sent(
+    watched: Watched, db: Database, ask: Callable[..., int]
+) -> None:
+    watched.expected = ("net::ERR_INTERNET_DISCONNECTED",)
+    number = ask()
+    page = watched.open("/runs/1/parent")
+    shown(page, number)
+    page.context.set_offline(True)
+    page.keyboard.press("ArrowRight")
+    expect(page.locator("#saved")).to_have_text("Kept here, not sent yet")
+    expect(page.get_by_role("heading", name="No connection")).to_be_visible()
+    assert given(db) == []
+    page.context.set_offline(False)
+    expect(page.locator("#saved")).to_have_text("Saved")
+    assert given(db) == [(number, "right")]
+
+
+def test_an_answer_survives_a_closed_tab(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+    watched.expected = ("503",)
+    number = ask()
+    page = watched.open("/runs/1/parent")
+    shown(page, number)
+
+    def busy(route: Route) -> None:
+        route.fulfill(status=503, json={"error": {"code": "busy", "message": "busy"}})
+
+    page.context.route("**/answer", busy)
+    page.keyboard.press("ArrowDown")
+    expect(page.locator("#saved")).to_have_text("Kept here, not sent yet")
+    page.close()
+    page.context.unroute("**/answer")
+    again = page.context.new_page()
+    again.goto(f"{watched.address}/runs/1/parent")
+    until(lambda: given(db) == [(number, "neither")])
+    assert again.evaluate("localStorage.getItem('parenting.answers')") == "[]"
+
+
+def test_a_lost_reply_is_asked_for_again(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+    """The server stored the answer and the reply got lost: the same again is the same answer."""
+    watched.expected = ("net::ERR_FAILED",)
+    number = ask()
+    page = watched.open("/runs/1/parent")
+    shown(page, number)
+    lost = []
+
+    def lose(route: Route) -> None:
+        if not lost:
+            lost.append(route.fetch().status)
+            route.abort()
+        else:
+            route.continue_()
+
+    page.context.route("**/answer", lose)
+    page.keyboard.press("ArrowRight")
+    expect(page.locator("#saved")).to_have_text("Saved")
+    expect(page.locator("#count")).to_have_text("1")
+    assert lost == [200]
+    assert given(db) == [(number, "right")]
+
+
+def test_a_question_closed_by_another_is_told(
+    watched: Watched, db: Database, ask: Callable[..., int]
+) -> None:
+    watched.expected = ("409",)
+    number, following = ask(), ask()
+    page = watched.open("/runs/1/parent")
+    shown(page, number)
+    queue.answer(db, number, "left", "somebody", "human")
+    page.keyboard.press("ArrowRight")
+    expect(page.get_by_role("alert")).to_contain_text("already answered by someone else")
+    expect(page.locator("#saved")).to_have_text("")
+    shown(page, following)
+    assert given(db) == [(number, "left")]
+
+
+def test_a_key_held_down_answers_once(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+    first, second = ask(), ask()
+    page = watched.open("/runs/1/parent")
+    shown(page, first)
+    page.keyboard.down("ArrowRight")
+    page.keyboard.down("ArrowRight")  # Chromium sends this one as a repeat
+    shown(page, second)
+    page.keyboard.up("ArrowRight")
+    page.get_by_role("button", name="Right").nth(1).focus()
+    page.keyboard.down("Control")
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.up("Control")
+    page.keyboard.press("ArrowUp")
+    until(lambda: given(db) == [(first, "right"), (second, "either")])
+
+
+def test_help_opens_and_takes_the_keys(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+    number = ask()
+    page = watched.open("/runs/1/parent")
+    shown(page, number)
+    page.keyboard.press("?")
+    expect(page.get_by_role("dialog")).to_be_visible()
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog")).not_to_be_visible()
+    assert given(db) == []
+    page.keyboard.press("ArrowLeft")
+    until(lambda: given(db) == [(number, "left")])
+
+
+def test_it_works_without_javascript(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+    numbers = [ask(), ask("preference", "down down", "left")]
+    page = watched.open("/runs/1/parent", java_script_enabled=False)
+    page.get_by_role("button", name="Show the question").click()
+    expect(page.locator("svg.board .trail")).to_have_count(2)
+    page.get_by_role("button", name="Either equally good").click()
+    expect(page).to_have_url(f"{watched.address}/runs/1/parent?query={numbers[1]}")
+    page.locator(".card").first.click()
+    expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
+    assert given(db) == [(numbers[0], "either"), (numbers[1], "left")]
+
+
+def test_who_waits_is_told_as_it_changes(watched: Watched, db: Database, mine: Claim) -> None:
+    page = watched.open("/runs/1/parent")
+    expect(page.get_by_role("heading", name="exploring on its own")).to_be_visible()
+    runs.report(db, mine, waiting="stuck", optimal=True)
+    expect(page.get_by_role("heading", name="No action was acceptable")).to_be_visible()
+    expect(page.get_by_text("The agent has found the optimal way.")).to_be_visible()
+    page.get_by_role("button", name="End this episode").click()
+    runs.report(db, mine, waiting=None)
+    runs.set_status(db, 1, "paused")
+    expect(page.get_by_role("heading", name="The run is paused")).to_be_visible()
+    page.get_by_role("button", name="Resume").click()
+    expect(page.get_by_role("heading", name="exploring on its own")).to_be_visible()
+    runs.set_status(db, 1, "stopped", "Stopped by the operator.")
+    expect(page.get_by_role("heading", name="This run is over")).to_be_visible()
+
+
+def test_a_leased_question_stays_with_its_browser(
+    watched: Watched, db: Database, ask: Callable[..., int]
+) -> None:
+    number = ask()
+    page = watched.open("/runs/1/parent")
+    shown(page, number)
+    page.reload()
+    shown(page, number)
+    tab = page.context.new_page()
+    tab.goto(f"{watched.address}/runs/1/parent")
+    shown(tab, number)
+    other = watched.open("/runs/1/parent")
+    expect(other.get_by_role("heading", name="Somebody else has the question")).to_be_visible()
+    with db.read() as session:
+        assert session.get_one(Query, number).leased_by

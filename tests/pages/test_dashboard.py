@@ -1,0 +1,92 @@
+"""The dashboard: its table, its numbers, its buttons."""
+
+from __future__ import annotations
+
+import re
+
+import httpx2
+import pytest
+
+from server.db import Database
+from server.runs import get_run, report, set_status
+from server.views import latest_metrics, sampled_metrics
+from tests.pages import island
+
+
+def test_nothing_measured_yet(client: httpx2.Client, db: Database) -> None:
+    island.live(db)
+    page = client.get("/runs/1").text
+    assert "Nothing has been measured yet." in page
+    assert '<dd id="now-deaths">–</dd>' in page
+
+
+def test_the_table_holds_the_numbers(client: httpx2.Client, db: Database) -> None:
+    _, mine = island.live(db)
+    island.measure(db, mine, 50)
+    page = client.get("/runs/1").text
+    assert '<dd id="now-deaths">3</dd>' in page
+    ticks = [int(tick) for tick in re.findall(r'<th scope="row">(\d+)</th>', page)]
+    assert ticks == sorted(ticks, reverse=True)
+    assert ticks[0] == 50
+    row = page.partition('<th scope="row">50</th>')[2].partition("</tr>")[0]
+    assert re.findall("<td>(.*?)</td>", row) == ["3", "30", "6", "0.02", "0.5544", "0.693", "45", "20"]
+
+
+def test_a_long_life_is_sampled_evenly(db: Database) -> None:
+    _, mine = island.live(db)
+    island.measure(db, mine, 1000)
+    ticks = [metric.tick for metric in sampled_metrics(db, 1, rows=40)]
+    assert ticks == list(range(1000, 0, -25))
+    assert latest_metrics(db, [1, 2]).keys() == {1}
+    assert latest_metrics(db, [1])[1].tick == 1000
+
+
+def test_a_number_that_was_not_finite_is_a_dash(client: httpx2.Client, db: Database) -> None:
+    _, mine = island.live(db)
+    island.measure(db, mine, 2)
+    row = client.get("/runs/1").text.partition('<th scope="row">2</th>')[2].partition("</tr>")[0]
+    assert "<td>–</td>" in row
+
+
+def test_pause_resume_stop(client: httpx2.Client, db: Database) -> None:
+    island.live(db)
+
+    def press(status: str, back: str = "dashboard") -> str:
+        reply = client.post("/runs/1/status", data={"status": status, "back": back})
+        assert reply.status_code == 303
+        assert get_run(db, 1).status == status
+        return str(reply.headers["location"])
+
+    assert press("paused") == "/runs/1"
+    assert "The run is paused." in client.get("/runs/1").text
+    assert press("active", "parent") == "/runs/1/parent"
+    assert press("stopped") == "/runs/1"
+    page = client.get("/runs/1").text
+    assert "Stopped by the operator." in page
+    assert 'action="/runs/1/status"' not in page
+    assert client.post("/runs/1/status", data={"status": "active"}).status_code == 409
+
+
+@pytest.mark.parametrize("status", ["finished", "failed", ""])
+def test_an_operator_cannot_declare_a_run_done(client: httpx2.Client, db: Database, status: str) -> None:
+    island.live(db)
+    assert client.post("/runs/1/status", data={"status": status}).status_code == 422
+    assert get_run(db, 1).status == "active"
+
+
+def test_who_waits_is_told(client: httpx2.Client, db: Database) -> None:
+    _, mine = island.live(db)
+    assert 'data-state="exploring">' in client.get("/runs/1").text
+    island.ask(db, mine, 1, "guidance", island.guidance("left", "down"))
+    assert "A question waits for the parent." in client.get("/runs/1").text
+    set_status(db, 1, "paused")
+    assert 'data-state="paused">' in client.get("/runs/1").text
+    report(db, mine, optimal=True)
+    assert '<dd id="now-optimal">optimal</dd>' in client.get("/runs/1").text
+
+
+def test_an_unknown_run_is_a_page_that_says_so(client: httpx2.Client) -> None:
+    for path in ("/runs/5", "/runs/5/parent", "/nowhere"):
+        page = client.get(path)
+        assert page.status_code == 404
+        assert "That did not work" in page.text

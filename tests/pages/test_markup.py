@@ -1,0 +1,106 @@
+"""Rules that hold for every page and every file that it loads."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from html.parser import HTMLParser
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from server.db import Database
+from server.pages.render import WEB
+from server.pages.words import SENTENCES
+from tests.pages import island
+
+PATHS = ("/", "/runs/1", "/runs/1/parent", "/runs/1/parent?query=1", "/runs/1/parent?query=2", "/runs/77")
+STATIC = sorted((WEB / "static").iterdir())
+
+
+class Tags(HTMLParser):
+    """Every tag of a page with its attributes."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+
+@pytest.fixture(params=PATHS)
+def tags(request: pytest.FixtureRequest, client: httpx2.Client, db: Database) -> Tags:
+    _, mine = island.live(db)
+    island.measure(db, mine, 30)
+    island.ask(db, mine, 31, "guidance", island.guidance("left", "up", start=(1, 2)))
+    island.ask(db, mine, 32, "preference", island.preference("down left left", "up down up down up down"))
+    return Tags(client.get(request.param).text)
+
+
+def test_no_script_and_no_style_stands_in_a_page(tags: Tags) -> None:
+    for tag, attributes in tags.found:
+        assert tag != "style"
+        assert "style" not in attributes
+        assert not [name for name in attributes if name.startswith("on")]
+        if tag == "script":
+            assert str(attributes["src"]).startswith("/static/")
+
+
+def test_everything_comes_from_here(tags: Tags) -> None:
+    for _, attributes in tags.found:
+        for name in ("src", "href", "action"):
+            assert name not in attributes or str(attributes[name]).startswith(("/", "#"))
+
+
+def test_ids_are_unique_and_labels_meet_their_fields(tags: Tags) -> None:
+    ids = Counter(attributes["id"] for _, attributes in tags.found if "id" in attributes)
+    assert not [name for name, count in ids.items() if count > 1]
+    for _, attributes in tags.found:
+        for name in ("for", "aria-labelledby"):
+            assert name not in attributes or attributes[name] in ids
+        for name in str(attributes.get("aria-describedby", "")).split():
+            assert name in ids
+
+
+def test_every_pattern_that_is_painted_is_there(tags: Tags) -> None:
+    ids = {attributes.get("id") for _, attributes in tags.found}
+    fills = {str(attributes.get("fill")) for _, attributes in tags.found}
+    painted = {fill[5:-1] for fill in fills if fill.startswith("url(#")}
+    assert painted <= ids
+
+
+@pytest.mark.parametrize("path", STATIC, ids=lambda path: path.name)
+def test_a_static_file_loads_nothing_from_elsewhere(path: Path) -> None:
+    text = path.read_text().replace("http://www.w3.org/2000/svg", "")
+    assert not re.findall(r"https?://|//[a-z]+\.[a-z]", text)
+
+
+@pytest.mark.parametrize("path", STATIC, ids=lambda path: path.name)
+def test_a_static_file_is_short(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= 300
+
+
+def test_script_and_server_know_the_same_states() -> None:
+    told = re.findall(r'return "(\w+)"|\? "(\w+)" : "(\w+)"', (WEB / "static/live.js").read_text())
+    scripted = {name for names in told for name in names if name}
+    assert scripted | {"elsewhere", "offline"} == set(SENTENCES)
+
+
+def test_pages_are_not_kept_by_the_browser(client: httpx2.Client, db: Database) -> None:
+    island.live(db)
+    for path in ("/", "/runs/1", "/runs/1/parent"):
+        assert client.get(path).headers["cache-control"] == "no-store"
+
+
+def test_the_content_security_policy_lets_no_script_in(client: httpx2.Client, db: Database) -> None:
+    """The dashboard allows inline styles, since Plotly writes them; no page allows inline scripts."""
+    island.live(db)
+    for path in ("/", "/runs/1", "/runs/1/parent"):
+        policy = client.get(path).headers["content-security-policy"]
+        rules = dict(rule.split(maxsplit=1) for rule in policy.split(";") if rule.strip())
+        assert "'unsafe-inline'" not in rules["default-src"]
+        assert "script-src" not in rules
+        assert ("'unsafe-inline'" in rules["style-src"]) == (path == "/runs/1")

@@ -1,0 +1,222 @@
+"""The parent's page, as a browser without JavaScript and as the page's script call it."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import httpx2
+import pytest
+from sqlalchemy import select
+
+from server import queue, runs
+from server.db import Database
+from server.pages.words import SENTENCES, state
+from server.runs import Claim
+from server.shapes import OpenShape, RunShape, shape_run
+from server.tables import Answer, Event, Query, Run
+from tests.pages import island
+
+ME, OTHER = "client-of-mine", "client-of-another"
+
+
+@pytest.fixture
+def life(db: Database) -> tuple[Run, Claim]:
+    return island.live(db)
+
+
+@pytest.fixture
+def asked(db: Database, life: tuple[Run, Claim]) -> list[int]:
+    """A preference question, then guidance: guidance is more urgent."""
+    _, mine = life
+    return [
+        island.ask(db, mine, 3, "preference", island.preference("down down", "left left left")),
+        island.ask(db, mine, 4, "guidance", island.guidance("left", "down", start=(1, 2))),
+    ]
+
+
+def rows(db: Database, table: Any) -> Any:
+    with db.read() as session:
+        return session.scalars(select(table).order_by(table.id)).all()
+
+
+def test_looking_changes_nothing(client: httpx2.Client, db: Database, asked: list[int]) -> None:
+    for path in ("/runs/1/parent", f"/runs/1/parent?query={asked[0]}", "/runs/1", "/"):
+        assert client.get(path).status_code == 200
+    assert [query.leased_by for query in rows(db, Query)] == [None, None]
+
+
+def test_the_browser_is_known_by_a_cookie(client: httpx2.Client, life: tuple[Run, Claim]) -> None:
+    first = client.get("/runs/1/parent")
+    cookie = first.headers["set-cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=lax" in cookie
+    (name,) = set(re.findall(r'data-client="([^"]+)"', first.text))
+    assert f'data-client="{name}"' in client.get("/runs/1/parent").text
+
+
+def test_a_forged_cookie_is_replaced(client: httpx2.Client, life: tuple[Run, Claim]) -> None:
+    client.cookies.set("parenting_client", '"><script>')
+    page = client.get("/runs/1/parent").text
+    assert '"><script>' not in page
+
+
+def test_without_javascript_forms_lead_from_question_to_question(
+    client: httpx2.Client, db: Database, asked: list[int]
+) -> None:
+    page = client.get("/runs/1/parent").text
+    assert "A question is waiting for you." in page
+    assert 'action="/runs/1/parent/next"' in page
+    shown = client.post("/runs/1/parent/next", data={"client_id": ME})
+    assert (shown.status_code, shown.headers["location"]) == (303, f"/runs/1/parent?query={asked[1]}")
+    page = client.get(shown.headers["location"]).text
+    assert "Which move is better here?" in page
+    assert "Ends in the water." in page
+    for choice in ("left", "right", "either", "neither"):
+        assert f'name="choice" value="{choice}"' in page
+    given = {"client_id": ME, "query_id": asked[1], "choice": "right"}
+    on = client.post("/runs/1/parent/answer", data=given)
+    assert on.headers["location"] == f"/runs/1/parent?query={asked[0]}"
+    client.post("/runs/1/parent/answer", data={**given, "query_id": asked[0], "choice": "neither"})
+    assert [(row.query_id, row.choice, row.client_id) for row in rows(db, Answer)] == [
+        (asked[1], "right", ME),
+        (asked[0], "neither", ME),
+    ]
+
+
+def test_the_same_form_sent_twice_is_one_answer(
+    client: httpx2.Client, db: Database, asked: list[int]
+) -> None:
+    given = {"client_id": ME, "query_id": asked[1], "choice": "right"}
+    assert [client.post("/runs/1/parent/answer", data=given).status_code for _ in range(2)] == [303, 303]
+    assert len(rows(db, Answer)) == 1
+
+
+def test_a_closed_question_says_so_and_leads_on(
+    client: httpx2.Client, db: Database, asked: list[int]
+) -> None:
+    queue.answer(db, asked[1], "left", OTHER, "human")
+    reply = client.post(
+        "/runs/1/parent/answer", data={"client_id": ME, "query_id": asked[1], "choice": "right"}
+    )
+    assert reply.status_code == 409
+    assert "already answered by someone else" in reply.text
+    assert 'href="/runs/1/parent"' in reply.text
+    assert "Which move" not in client.get(f"/runs/1/parent?query={asked[1]}").text
+
+
+@pytest.mark.parametrize(
+    ("path", "data", "status"),
+    [
+        ("/runs/1/parent/answer", {"query_id": 1, "choice": "maybe", "client_id": ME}, 422),
+        ("/runs/1/parent/answer", {"query_id": 1, "choice": "left", "client_id": "<script>"}, 422),
+        ("/runs/1/parent/answer", {"query_id": 99, "choice": "left", "client_id": ME}, 404),
+        ("/runs/2/parent/answer", {"query_id": 1, "choice": "left", "client_id": ME}, 404),
+        ("/runs/9/parent/next", {"client_id": ME}, 404),
+        ("/runs/9/parent/question", {"client_id": ME}, 404),
+        ("/runs/1/parent/question", {}, 422),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    client: httpx2.Client, db: Database, asked: list[int], path: str, data: dict[str, Any], status: int
+) -> None:
+    island.live(db)
+    reply = client.post(path, data=data)
+    assert reply.status_code == status
+    assert reply.headers["content-type"].startswith("text/html")
+    assert "Traceback" not in reply.text
+    assert not rows(db, Answer)
+
+
+def test_a_question_of_another_run_is_not_shown(
+    client: httpx2.Client, db: Database, asked: list[int]
+) -> None:
+    island.live(db)
+    assert client.get(f"/runs/2/parent?query={asked[0]}").status_code == 404
+
+
+def test_the_script_gets_the_same_markup(client: httpx2.Client, asked: list[int]) -> None:
+    part = client.post("/runs/1/parent/question", data={"client_id": ME}).text
+    client.cookies.set("parenting_client", ME)
+    page = client.get(f"/runs/1/parent?query={asked[1]}").text
+    assert part.strip().startswith("<form")
+    assert part.strip() in page
+
+
+def test_the_next_question_is_leased_ahead(client: httpx2.Client, db: Database, asked: list[int]) -> None:
+    def lease(who: str, *shown: int) -> list[str]:
+        reply = client.post("/runs/1/parent/question", data={"client_id": who, "shown": list(shown)})
+        return re.findall(r'data-query="(\d+)"', reply.text) if reply.status_code == 200 else []
+
+    assert lease(ME) == [str(asked[1])]
+    assert lease(ME, asked[1]) == [str(asked[0])]
+    assert lease(ME, *asked) == []
+    assert lease(ME) == [str(asked[1])]  # a reload gives the first again
+    assert lease(OTHER) == []
+    assert lease(OTHER, asked[0]) == []
+    assert [query.leased_by for query in rows(db, Query)] == [ME, ME]
+
+
+def test_somebody_elses_question_is_not_promised(
+    client: httpx2.Client, db: Database, asked: list[int]
+) -> None:
+    for number in asked:
+        assert client.post("/runs/1/parent/question", data={"client_id": OTHER, "shown": number}).text
+    page = client.get("/runs/1/parent").text
+    assert 'data-state="elsewhere"' in page.partition("<main")[2].partition(">")[0]
+
+
+def test_no_question_is_no_content(client: httpx2.Client, life: tuple[Run, Claim]) -> None:
+    assert client.post("/runs/1/parent/question", data={"client_id": ME}).status_code == 204
+    assert client.post("/runs/1/parent/next", data={"client_id": ME}).headers["location"] == "/runs/1/parent"
+
+
+def test_while_it_waits_the_page_without_javascript_reloads(
+    client: httpx2.Client, db: Database, life: tuple[Run, Claim]
+) -> None:
+    assert '<noscript><meta http-equiv="refresh"' in client.get("/runs/1/parent").text
+    island.ask(db, life[1], 1, "guidance", island.guidance("left", "down"))
+    assert 'http-equiv="refresh"' not in client.get("/runs/1/parent").text
+
+
+def test_the_operator_ends_an_episode(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
+    runs.report(db, life[1], waiting="stuck")
+    page = client.get("/runs/1/parent").text
+    assert 'data-state="stuck"' in page.partition("<main")[2].partition(">")[0]
+    reply = client.post("/runs/1/event", data={"kind": "end_episode", "back": "parent"})
+    assert reply.headers["location"] == "/runs/1/parent"
+    assert [event.kind for event in rows(db, Event)] == ["end_episode"]
+
+
+def test_an_optimal_agent_is_announced(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
+    note = re.compile(r'<div id="optimal" class="note"( hidden)?>')
+    assert note.search(client.get("/runs/1/parent").text)[1] == " hidden"  # type: ignore[index]
+    runs.report(db, life[1], optimal=True)
+    assert note.search(client.get("/runs/1/parent").text)[1] is None  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, "exploring"),
+        ({"worker": "done", "open": OpenShape(guidance=1, preference=0)}, "over"),
+        ({"open": OpenShape(guidance=1, preference=0), "status": "paused"}, "question"),
+        ({"open": OpenShape(guidance=0, preference=1), "worker": "silent"}, "question"),
+        ({"status": "paused", "worker": "silent"}, "paused"),
+        ({"worker": "silent", "waiting": "stuck"}, "idle"),
+        ({"waiting": "stuck"}, "stuck"),
+        ({"waiting": "guidance"}, "exploring"),  # the answer is on its way
+    ],
+)
+def test_who_waits_for_whom(
+    db: Database, life: tuple[Run, Claim], changes: dict[str, Any], expected: str
+) -> None:
+    shape: RunShape = shape_run(db, life[0].id).model_copy(update=changes)
+    assert state(shape, offered=True) == expected
+    assert expected in SENTENCES
+
+
+def test_a_silent_worker_is_told_of(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
+    runs.let_go(db, [life[1]])
+    page = client.get("/runs/1/parent").text
+    assert 'data-state="idle"' in page.partition("<main")[2].partition(">")[0]

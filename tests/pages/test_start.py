@@ -1,0 +1,103 @@
+"""The first page: the list and the form."""
+
+from __future__ import annotations
+
+import httpx2
+import pytest
+
+from server.db import Database
+from server.runs import get_run, list_runs, report
+from tests.pages import island
+
+FORM = {
+    "world": "unsafe-exploration",
+    "level": "island",
+    "level_text": "",
+    "parent": "human",
+    "preset": "conservative",
+    "seed": "7",
+}
+
+
+def test_without_runs_the_form_stands_alone(client: httpx2.Client) -> None:
+    page = client.get("/")
+    assert page.status_code == 200
+    assert "Raise an agent" in page.text
+    assert 'class="runs"' not in page.text
+    first = page.text.index('value="conservative" checked')
+    assert first < page.text.index('value="lax"') < page.text.index('value="direct"')
+
+
+def test_a_run_of_mine_begins_at_the_parents_page(client: httpx2.Client, db: Database) -> None:
+    reply = client.post("/runs", data=FORM)
+    assert (reply.status_code, reply.headers["location"]) == (303, "/runs/1/parent")
+    run = get_run(db, 1)
+    assert (run.level, run.preset, run.seed, run.parent) == ("island", "conservative", 7, "human")
+    assert run.config["p_guid"] == 0.95
+
+
+def test_a_scripted_run_begins_at_the_dashboard(client: httpx2.Client) -> None:
+    assert client.post("/runs", data={**FORM, "parent": "scripted"}).headers["location"] == "/runs/1"
+
+
+def test_a_level_of_ones_own_stands_in_for_the_list(client: httpx2.Client, db: Database) -> None:
+    assert client.post("/runs", data={**FORM, "level_text": "#####\r\n#A G#\r\n#####\r\n"}).status_code == 303
+    assert "#A G#" in get_run(db, 1).level_text
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("seed", "many", "integer"),
+        ("seed", "-1", "greater than or equal to 0"),
+        ("level", "atlantis", "There is no such level"),
+        ("level_text", "#####\n#A?G#\n#####\n", "line 2, column 3"),
+        ("world", "moon", "There is no such world"),
+        ("preset", "stern", "There is no such preset"),
+        ("parent", "nobody", "human"),
+    ],
+)
+def test_an_error_stands_beside_its_field_and_what_was_typed_stays(
+    client: httpx2.Client, db: Database, field: str, value: str, message: str
+) -> None:
+    page = client.post("/runs", data={**FORM, field: value})
+    assert page.status_code == 422
+    error = page.text.partition(f'id="{field}-error">')[2].partition("</p>")[0]
+    assert message in error
+    assert not list_runs(db)
+    if field in ("seed", "level_text"):
+        assert f'aria-invalid="true" aria-describedby="{field}-error' in page.text
+        assert value.split("\n")[0] in page.text
+    else:
+        assert 'value="7"' in page.text
+
+
+def test_every_wrong_field_is_named_at_once(client: httpx2.Client) -> None:
+    page = client.post("/runs", data={**FORM, "preset": "stern", "level": "atlantis"})
+    assert 'id="preset-error"' in page.text
+    assert 'id="level-error"' in page.text
+
+
+def test_what_was_typed_is_escaped(client: httpx2.Client) -> None:
+    page = client.post("/runs", data={**FORM, "level_text": "</textarea><script>alert(1)</script>"})
+    assert "<script>alert" not in page.text
+    assert "&lt;/textarea&gt;&lt;script&gt;" in page.text
+
+
+def test_a_stranger_field_is_no_crash(client: httpx2.Client) -> None:
+    assert client.post("/runs", data={"seed": ["1", "2"], "x": "y"}).status_code == 422
+
+
+def test_the_list_says_where_every_run_is(client: httpx2.Client, db: Database) -> None:
+    _, mine = island.live(db, name="<b>Bold</b>")
+    island.measure(db, mine, 50)
+    report(db, mine, optimal=True)
+    island.live(db, parent="scripted")
+    page = client.get("/").text
+    assert "&lt;b&gt;Bold&lt;/b&gt;" in page
+    assert "<dt>Tick</dt><dd>50</dd>" in page
+    assert "<dt>Deaths</dt><dd>3</dd>" in page
+    assert ">optimal<" in page
+    assert 'href="/runs/1/parent"' in page
+    assert 'href="/runs/2/parent"' not in page  # a script raises it
+    assert 'href="/runs/2"' in page

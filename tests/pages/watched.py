@@ -1,0 +1,41 @@
+"""Pages in a real browser, watched: errors on the console and requests to other origins are written down."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request
+
+
+class Watched:
+    """Opens pages of one site. `wrong` lists what went wrong in any of them."""
+
+    def __init__(self, browser: Browser, address: str) -> None:
+        self.browser, self.address = browser, address
+        self.wrong: list[str] = []
+        self.expected: tuple[str, ...] = ()  # parts of messages that a test brings about on purpose
+        self.contexts: list[BrowserContext] = []
+
+    def open(self, path: str, **options: Any) -> Page:
+        """A page in a context of its own (options: viewport, color_scheme, java_script_enabled, ...)."""
+        context = self.browser.new_context(**options)
+        self.contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(10_000)
+        page.on("console", self._heard)
+        page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        page.on("request", self._asked)
+        page.goto(self.address + path)
+        return page
+
+    def close(self) -> None:
+        for context in self.contexts:
+            context.close()
+
+    def _heard(self, message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning") and not any(part in message.text for part in self.expected):
+            self.wrong.append(message.text)
+
+    def _asked(self, request: Request) -> None:
+        if not request.url.startswith((self.address, "data:", "blob:")):
+            self.wrong.append(f"a request to {request.url}")
