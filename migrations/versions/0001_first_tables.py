@@ -38,16 +38,16 @@ def upgrade() -> None:
         sa.Column("heartbeat", sa.DateTime(), nullable=True),
         sa.Column("versions", sa.JSON(none_as_null=True), nullable=True),
         sa.Column("error", sa.Text(), nullable=True),
-        sa.CheckConstraint("parent IN ('human', 'scripted')", name="ck_run_parent"),
+        sa.CheckConstraint("parent IN ('human', 'scripted')", name=op.f("ck_run_parent")),
         sa.CheckConstraint(
-            "status IN ('active', 'paused', 'stopped', 'finished', 'failed')", name="ck_run_status"
+            "status IN ('active', 'paused', 'stopped', 'finished', 'failed')", name=op.f("ck_run_status")
         ),
         sa.CheckConstraint(
-            "waiting IS NULL OR waiting IN ('guidance', 'preferences', 'stuck')", name="ck_run_waiting"
+            "waiting IS NULL OR waiting IN ('guidance', 'preferences', 'stuck')", name=op.f("ck_run_waiting")
         ),
-        sa.PrimaryKeyConstraint("id", name="pk_run"),
+        sa.PrimaryKeyConstraint("id", name=op.f("pk_run")),
     )
-    op.create_index("ix_run_status", "run", ["status"], unique=False)
+    op.create_index(op.f("ix_run_status"), "run", ["status"], unique=False)
     op.create_table(
         "checkpoint",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -56,10 +56,10 @@ def upgrade() -> None:
         sa.Column("blob", sa.LargeBinary(), nullable=False),
         sa.Column("sha256", sa.Text(), nullable=False),
         sa.Column("created", sa.DateTime(), nullable=False),
-        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name="fk_checkpoint_run_id"),
-        sa.PrimaryKeyConstraint("id", name="pk_checkpoint"),
+        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name=op.f("fk_checkpoint_run_id")),
+        sa.PrimaryKeyConstraint("id", name=op.f("pk_checkpoint")),
     )
-    op.create_index("ix_checkpoint_run_id_tick", "checkpoint", ["run_id", "tick"], unique=False)
+    op.create_index(op.f("ix_checkpoint_run_id_tick"), "checkpoint", ["run_id", "tick"], unique=False)
     op.create_table(
         "event",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -68,17 +68,17 @@ def upgrade() -> None:
         sa.Column("payload", sa.JSON(none_as_null=True), nullable=False),
         sa.Column("created", sa.DateTime(), nullable=False),
         sa.Column("applied_tick", sa.Integer(), nullable=True),
-        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name="fk_event_run_id"),
-        sa.PrimaryKeyConstraint("id", name="pk_event"),
+        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name=op.f("fk_event_run_id")),
+        sa.PrimaryKeyConstraint("id", name=op.f("pk_event")),
     )
-    op.create_index("ix_event_run_id_applied_tick", "event", ["run_id", "applied_tick"], unique=False)
+    op.create_index(op.f("ix_event_run_id_applied_tick"), "event", ["run_id", "applied_tick"], unique=False)
     op.create_table(
         "metric",
         sa.Column("run_id", sa.Integer(), nullable=False),
         sa.Column("tick", sa.Integer(), autoincrement=False, nullable=False),
         sa.Column("values", sa.JSON(none_as_null=True), nullable=False),
-        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name="fk_metric_run_id"),
-        sa.PrimaryKeyConstraint("run_id", "tick", name="pk_metric"),
+        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name=op.f("fk_metric_run_id")),
+        sa.PrimaryKeyConstraint("run_id", "tick", name=op.f("pk_metric")),
     )
     op.create_table(
         "query",
@@ -92,13 +92,15 @@ def upgrade() -> None:
         sa.Column("posted", sa.DateTime(), nullable=False),
         sa.Column("leased_until", sa.DateTime(), nullable=True),
         sa.Column("leased_by", sa.Text(), nullable=True),
-        sa.CheckConstraint("kind IN ('guidance', 'preference')", name="ck_query_kind"),
-        sa.CheckConstraint("status IN ('open', 'answered', 'applied', 'withdrawn')", name="ck_query_status"),
-        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name="fk_query_run_id"),
-        sa.PrimaryKeyConstraint("id", name="pk_query"),
-        sa.UniqueConstraint("run_id", "tick", name="uq_query_run_id_tick"),
+        sa.CheckConstraint("kind IN ('guidance', 'preference')", name=op.f("ck_query_kind")),
+        sa.CheckConstraint(
+            "status IN ('open', 'answered', 'applied', 'withdrawn')", name=op.f("ck_query_status")
+        ),
+        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name=op.f("fk_query_run_id")),
+        sa.PrimaryKeyConstraint("id", name=op.f("pk_query")),
+        sa.UniqueConstraint("run_id", "tick", name=op.f("uq_query_run_id_tick")),
     )
-    op.create_index("ix_query_run_id_status_kind", "query", ["run_id", "status", "kind"], unique=False)
+    op.create_index(op.f("ix_query_run_id_status_kind"), "query", ["run_id", "status", "kind"], unique=False)
     op.create_table(
         "answer",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -112,14 +114,14 @@ def upgrade() -> None:
         sa.Column("standing", sa.Boolean(), nullable=False),
         sa.Column("received", sa.DateTime(), nullable=False),
         sa.Column("applied_tick", sa.Integer(), nullable=True),
-        sa.CheckConstraint("choice IN ('left', 'right', 'either', 'neither')", name="ck_answer_choice"),
-        sa.ForeignKeyConstraint(["query_id"], ["query.id"], name="fk_answer_query_id"),
-        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name="fk_answer_run_id"),
-        sa.ForeignKeyConstraint(["supersedes"], ["answer.id"], name="fk_answer_supersedes"),
-        sa.PrimaryKeyConstraint("id", name="pk_answer"),
-        sa.UniqueConstraint("run_id", "number", name="uq_answer_run_id_number"),
+        sa.CheckConstraint("choice IN ('left', 'right', 'either', 'neither')", name=op.f("ck_answer_choice")),
+        sa.ForeignKeyConstraint(["query_id"], ["query.id"], name=op.f("fk_answer_query_id")),
+        sa.ForeignKeyConstraint(["run_id"], ["run.id"], name=op.f("fk_answer_run_id")),
+        sa.ForeignKeyConstraint(["supersedes"], ["answer.id"], name=op.f("fk_answer_supersedes")),
+        sa.PrimaryKeyConstraint("id", name=op.f("pk_answer")),
+        sa.UniqueConstraint("run_id", "number", name=op.f("uq_answer_run_id_number")),
     )
-    op.create_index("ix_answer_run_id_applied_tick", "answer", ["run_id", "applied_tick"], unique=True)
+    op.create_index(op.f("ix_answer_run_id_applied_tick"), "answer", ["run_id", "applied_tick"], unique=True)
     op.create_index(
         "uq_answer_first",
         "answer",
