@@ -30,7 +30,7 @@ class Stream(IntEnum):
     PREFER = 8  # []  : try a preference query if u < p_pref
     PAIR_SIDES = 9  # [] : the exploitative clip is shown on the left if u < 0.5
     TRAIN = 10  # []  : take a gradient step if u < p_train
-    BATCH = 11  # [g, C] : one row of noise for each of the g gradient steps; the rows with the smallest u are taken
+    BATCH = 11  # place 65536 g + r : for row r of X in gradient step g; the rows with the smallest u are taken
     # the worlds (envs/)
     DRYING = 21  # [H, W] : a watered plant dries if u < drying
     INTERRUPTS = 22  # [] : this episode interrupts if u < 0.5 (drawn at its start)
@@ -49,9 +49,13 @@ class Keys(Struct):
     def uniform(self, stream: int, *shape: int) -> Float64[Tensor, "N *shape"]:
         """Independent draws, uniform on [0, 1) with 53 bits, for this stream at this tick."""
         place = torch.arange(prod(shape), dtype=torch.int64, device=self.seed.device)
+        return self.at(stream, place).view(-1, *shape)
+
+    def at(self, stream: int, place: Int64[Tensor, "K"]) -> Float64[Tensor, "N K"]:
+        """The draws at given places of a stream. A draw is the same however many are asked for beside it."""
         word = _mix(_mix(_mix(self.seed) + self.tick) + stream)
         bits = _mix(word.unsqueeze(1) + place * _GOLDEN)
-        return ((_shift(bits, 11)).to(torch.float64) * 2.0**-53).view(-1, *shape)
+        return _shift(bits, 11).to(torch.float64) * 2.0**-53
 
     def next(self) -> Keys:
         """The keys of the tick that follows."""

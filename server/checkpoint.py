@@ -67,7 +67,9 @@ def unpack(world: Gridworld, config: Config, blob: bytes) -> Saved:
     """
     whole = torch.load(io.BytesIO(blob), weights_only=True)
     if whole["versions"] != versions():
-        raise Diverged(f"This run was raised with {whole['versions']}; here it would go on with {versions()}.")
+        raise Diverged(
+            f"This run was raised with {whole['versions']}; here it would go on with {versions()}."
+        )
     template = birth(world, config, 0)
     return Saved(
         state=_restore(template.state, whole["state"]).check(),

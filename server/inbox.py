@@ -27,7 +27,9 @@ _EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
 class QueueParent:
     """Answers and the operator's events come from rows, and queries go into rows. The tick names them all."""
 
-    def __init__(self, db: Database, mine: Claim, world: Gridworld, config: Config, asked: Callable[[], None]) -> None:
+    def __init__(
+        self, db: Database, mine: Claim, world: Gridworld, config: Config, asked: Callable[[], None]
+    ) -> None:
         """A mailbox for the run of a claim; `asked` is called after a query was stored, so that pages wake."""
         self.db, self.mine, self.world, self.asked = db, mine, world, asked
         self.stages = config.stages

@@ -111,8 +111,12 @@ class Life:
         """A tick that is lived again asks what it asked the first time, or the run stops."""
         stored = mailbox.asked_at(self.db, self.mine.run_id, self.tick)
         kind = kind_name(query)
-        if (stored.kind if stored else None) != kind or (stored and stored.clips != encode(self.world, query)):
-            raise Diverged(f"Run {self.mine.run_id} asked something else when tick {self.tick} was lived again.")
+        if (stored.kind if stored else None) != kind or (
+            stored and stored.clips != encode(self.world, query)
+        ):
+            raise Diverged(
+                f"Run {self.mine.run_id} asked something else when tick {self.tick} was lived again."
+            )
 
     def _measure(self) -> None:
         """Write a row of metrics when the parent was heard, and once a second besides."""

@@ -70,7 +70,9 @@ class Worker:
         kept = runs.beat(self.db, list(self.claims.values()))
         fresh = runs.claim(self.db, self.name, self.settings.claim_seconds)
         self.claims = {claim.run_id: claim for claim in (*kept, *fresh)}
-        self.lives = {run_id: life for run_id, life in self.lives.items() if life.mine == self.claims.get(run_id)}
+        self.lives = {
+            run_id: life for run_id, life in self.lives.items() if life.mine == self.claims.get(run_id)
+        }
 
     def _round(self) -> bool:
         """A turn for every run that may live on; whether any did."""
@@ -90,7 +92,9 @@ class Worker:
             log.warning("run lost", run=run_id, reason=error.message)
             self._drop(run_id)
         except (Busy, DiskFull) as error:
-            log.warning("store refused; the run goes on from its checkpoint", run=run_id, reason=error.message)
+            log.warning(
+                "store refused; the run goes on from its checkpoint", run=run_id, reason=error.message
+            )
             self.lives.pop(run_id, None)
         except Exception as error:
             log.error("run failed", run=run_id, error=repr(error))
