@@ -98,6 +98,10 @@ class Streams:
             shown = [row.model_dump(mode="json") for row in shape_metrics(rows)]
             yield ServerSentEvent(event="metrics", data={"rows": shown}, id=str(rows[-1].tick))
 
+    def next_ring(self) -> asyncio.Event:
+        """Set when the worker rings for the next time: a hint for whoever waits for a question."""
+        return self._rung
+
     def _join(self, run_id: int) -> Watcher:
         watcher = self.watchers.setdefault(run_id, Watcher())
         watcher.streams += 1

@@ -7,13 +7,17 @@ a form carries it too, for browsers that keep no cookies.
 
 from __future__ import annotations
 
+import asyncio
 import re
 import secrets
 import time
+from contextlib import suppress
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Form, Query, Request, Response
 from pydantic import Field
+from starlette.concurrency import run_in_threadpool
 
 from server import queue, runs
 from server.api.words import Choice, ClientId, RunId
@@ -25,6 +29,7 @@ from server.pages.render import page, see
 from server.pages.words import SENTENCES, state, title
 from server.shapes import shape_run
 from server.starting import LARGEST_INT
+from server.streams import Streams
 from server.tables import Run
 from server.views import lease_ahead, may_lease
 
@@ -36,10 +41,14 @@ NAME = re.compile(r"[A-Za-z0-9_-]{8,64}")
 PATIENCE = 0.5
 """Seconds for which a plain form waits for the next question before the page says that the agent explores."""
 
+POLL = 0.25
+"""Seconds between looks at the database while nobody rings."""
+
 ClientField = Annotated[ClientId, Form()]
 ChoiceField = Annotated[Choice, Form()]
 Number = Annotated[int, Form(ge=1, le=LARGEST_INT)]
 Numbers = Annotated[tuple[Annotated[int, Field(ge=1, le=LARGEST_INT)], ...], Form(max_length=100)]
+Seconds = Annotated[float, Form(ge=0, le=2, allow_inf_nan=False)]
 QueryShown = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 
 
@@ -65,21 +74,31 @@ def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = Non
 
 
 @router.post("/runs/{run_id}/parent/question")
-def question(
-    run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField, shown: Numbers = ()
+async def question(
+    request: Request,
+    run_id: RunId,
+    db: Db,
+    settings: SettingsOf,
+    client_id: ClientField,
+    shown: Numbers = (),
+    wait: Seconds = 0.0,
 ) -> Response:
-    """For the script: the next question as markup, leased; 204 if there is none.
+    """For the script: the next question as markup, leased; 204 if there is none within `wait` seconds.
 
     `shown` are those that the page has already or whose answers are on their way: it asks for another one.
+    Asked right after an answer, the request lies here until the agent asks, so that no round trip is lost.
     """
-    run = runs.get_run(db, run_id)
-    if shown:
-        query = lease_ahead(db, run_id, client_id, shown, settings.lease_seconds)
-    else:
-        query = queue.lease(db, run_id, client_id, settings.lease_seconds)
-    if query is None:
-        return Response(status_code=204)
-    return page("_question.html", shown=show(query, run), client=client_id)
+    streams: Streams = request.app.state.streams
+    take = partial(_markup, db, run_id, client_id, shown, settings.lease_seconds)
+    until = time.monotonic() + wait
+    while True:
+        rung = streams.next_ring()
+        response = await run_in_threadpool(take)
+        left = until - time.monotonic()
+        if response is not None or left <= 0 or streams.closed:
+            return response or Response(status_code=204)
+        with suppress(TimeoutError):
+            await asyncio.wait_for(rung.wait(), min(left, POLL))
 
 
 @router.post("/runs/{run_id}/parent/next")
@@ -105,6 +124,17 @@ def answer(
     queue.answer(db, query_id, choice, client_id, parent="human")
     ring(request)
     return _go_on(db, run_id, client_id, settings.lease_seconds, patience=PATIENCE)
+
+
+def _markup(
+    db: Database, run_id: int, client_id: str, shown: tuple[int, ...], seconds: float
+) -> Response | None:
+    run = runs.get_run(db, run_id)
+    if shown:
+        query = lease_ahead(db, run_id, client_id, shown, seconds)
+    else:
+        query = queue.lease(db, run_id, client_id, seconds)
+    return None if query is None else page("_question.html", shown=show(query, run), client=client_id)
 
 
 def _go_on(db: Database, run_id: int, client_id: str, seconds: float, patience: float = 0.0) -> Response:

@@ -1,4 +1,4 @@
-"""The first page: the runs, and a form to start one. Errors stand beside their fields, and no typing is lost."""
+"""The first page: the runs, and a form to start one. Errors stand beside their fields, typing is kept."""
 
 from __future__ import annotations
 

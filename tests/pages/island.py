@@ -6,6 +6,7 @@ from typing import Any
 
 from server.db import Database
 from server.mailbox import post_query
+from server.pages.board import Clip, Frame
 from server.record import write_metrics
 from server.runs import Claim, claim, report
 from server.starting import NewRun, start
@@ -16,9 +17,10 @@ ISLAND = ("WW######", "WW     W", "WW     W", "W      W", "W  G  WW", "W#######"
 START = (1, 4)
 
 
-def clip(*actions: str, start: tuple[int, int] = START, rows: tuple[str, ...] = ISLAND) -> dict[str, Any]:
+def clip(*actions: str, start: tuple[int, int] = START, rows: tuple[str, ...] = ISLAND) -> Clip:
     """What the agent would do from `start`; water and goal end it early."""
-    at, done = start, []
+    at = start
+    done: list[str] = []
     frames = [_frame(rows, at)]
     for action in actions:
         row, column = (a + b for a, b in zip(at, MOVES[action], strict=True))
@@ -31,7 +33,7 @@ def clip(*actions: str, start: tuple[int, int] = START, rows: tuple[str, ...] = 
     return {"actions": done, "length": len(done), "frames": frames}
 
 
-def _frame(rows: tuple[str, ...], at: tuple[int, int]) -> dict[str, Any]:
+def _frame(rows: tuple[str, ...], at: tuple[int, int]) -> Frame:
     observed = list(rows)
     if rows[at[0]][at[1]] != "W":
         observed[at[0]] = rows[at[0]][: at[1]] + "A" + rows[at[0]][at[1] + 1 :]

@@ -170,7 +170,7 @@ def test_a_lost_reply_is_asked_for_again(watched: Watched, db: Database, ask: Ca
     number = ask()
     page = watched.open("/runs/1/parent")
     shown(page, number)
-    lost = []
+    lost: list[int] = []
 
     def lose(route: Route) -> None:
         if not lost:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import threading
+import time
 from typing import Any
 
 import httpx2
@@ -13,8 +15,10 @@ from server import queue, runs
 from server.db import Database
 from server.pages.words import SENTENCES, state
 from server.runs import Claim
+from server.settings import Settings
 from server.shapes import OpenShape, RunShape, shape_run
 from server.tables import Answer, Event, Query, Run
+from server.wake import Bell
 from tests.pages import island
 
 ME, OTHER = "client-of-mine", "client-of-another"
@@ -220,3 +224,30 @@ def test_a_silent_worker_is_told_of(client: httpx2.Client, db: Database, life: t
     runs.let_go(db, [life[1]])
     page = client.get("/runs/1/parent").text
     assert 'data-state="idle"' in page.partition("<main")[2].partition(">")[0]
+
+
+def test_a_request_for_a_question_waits_for_it(
+    client: httpx2.Client, db: Database, settings: Settings, life: tuple[Run, Claim]
+) -> None:
+    def post() -> None:
+        time.sleep(0.1)
+        island.ask(db, life[1], 1, "guidance", island.guidance("left", "down"))
+        Bell(settings.data, "web").ring()
+
+    agent = threading.Thread(target=post)
+    agent.start()
+    began = time.monotonic()
+    reply = client.post("/runs/1/parent/question", data={"client_id": ME, "wait": "2"})
+    agent.join()
+    assert reply.status_code == 200
+    assert 0.1 <= time.monotonic() - began < 1.9
+
+
+@pytest.mark.parametrize(
+    ("wait", "status"), [("0.1", 204), ("-1", 422), ("3", 422), ("nan", 422), ("x", 422)]
+)
+def test_it_does_not_wait_for_ever(
+    client: httpx2.Client, life: tuple[Run, Claim], wait: str, status: int
+) -> None:
+    reply = client.post("/runs/1/parent/question", data={"client_id": ME, "wait": wait})
+    assert reply.status_code == status

@@ -9,41 +9,51 @@ const main = $("main"), stage = $("stage"), waiting = $("waiting"), help = $("he
 const { run, client, name } = main.dataset;
 const KEYS = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "either", ArrowDown: "neither", 1: "left", 2: "right", 3: "either", 4: "neither" };
 const RENEW = 25_000;
+const PATIENCE = 1; // seconds that a request for a question may lie at the server
+const HASTE = 40;   // ms after an answer when the next question is asked for, if the answer's reply is not there before
 const QUIET = 350; // an answered question stays this long before the page says that the agent explores
 
 let current = null;    // the form on the stage, until it is answered
 let player = null;
 let ahead = null;      // markup of the question after it
 let prefetches = 0;    // the last request for it counts
-let asking = null;     // a request for a question that is under way
+let asking = false, again = false; // a request for a question is under way; another was wanted meanwhile
 let state = main.dataset.state;
 let answered = Number($("count").textContent), unsaved = 0, quiet = 0;
 
 // ---- questions
 
-// Markup of the most urgent question, besides those given and those whose answers are on their way; null if there is none.
-async function ask(...shown) {
-  const body = new URLSearchParams({ client_id: client });
-  for (const query of [...shown, ...kept()]) body.append("shown", query);
+// Markup of the most urgent question, besides those given and those whose answers are on their way; null if there is
+// none within `seconds`.
+async function ask(shown = [], seconds = 0) {
+  const body = new URLSearchParams({ client_id: client, wait: seconds });
+  for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
   const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body });
   if (!reply.ok) throw new Error(reply.statusText);
   return reply.status === 204 ? null : reply.text();
 }
 
-function next() {
-  asking ??= (async () => {
-    try {
-      const markup = await ask();
-      if (markup && !current) show(markup);
-      else if (!current) wait(state === "question" ? "elsewhere" : state);
-    } catch { wait("offline"); } finally { asking = null; }
-  })();
+// Fill the empty stage. One request at a time; what comes while it is under way is asked once more after it.
+async function next(seconds = 0) {
+  again = asking;
+  if (asking) return;
+  asking = true;
+  try {
+    let markup;
+    do {
+      again = false;
+      markup = await ask([], seconds);
+      seconds = 0;
+    } while (!markup && again && !current);
+    if (markup && !current) show(markup);
+    else if (!current) wait(state === "question" ? "elsewhere" : state);
+  } catch { wait("offline"); } finally { asking = false; }
 }
 
 async function prefetch() {
   const mine = ++prefetches, form = current;
   try {
-    const markup = await ask(form.dataset.query);
+    const markup = await ask([form.dataset.query]);
     if (mine === prefetches && form === current) ahead = markup;
     form.dataset.ahead = /data-query="(\d+)"/.exec(markup)?.[1] ?? "";
   } catch { /* the stream or the poll will bring it */ }
@@ -61,6 +71,7 @@ function show(markup) {
   if (markup) stage.innerHTML = markup;
   const form = stage.querySelector("#question");
   clearTimeout(quiet);
+  quiet = 0;
   current = form;
   ahead = null;
   waiting.hidden = true;
@@ -82,8 +93,8 @@ function wait(which) {
   for (const part of waiting.querySelectorAll(":scope > [data-state]")) part.hidden = part.dataset.state !== which;
   waiting.setAttribute("aria-labelledby", `waiting-${which}`);
   if (!waiting.hidden) return announce(which);
-  clearTimeout(quiet);
-  quiet = setTimeout(() => {
+  quiet ||= setTimeout(() => {
+    quiet = 0;
     if (current) return;
     stage.replaceChildren();
     waiting.hidden = false;
@@ -135,8 +146,9 @@ function answer(choice) {
   $("alert").textContent = "";
   performance.mark("answer", { detail: String(query) });
   const sent = give({ query, choice, client_id: client }, report);
-  if (ahead) show(ahead);
-  else sent.then(() => { if (!current) next(); });
+  if (ahead) return show(ahead);
+  Promise.race([sent, new Promise((done) => { setTimeout(done, HASTE); })]).then(() => { if (!current) next(PATIENCE); });
+  wait(state === "question" ? "exploring" : state);
 }
 
 function report(outcome, reply) {
