@@ -15,7 +15,7 @@ from server.deps import Db, ring
 from server.errors import Invalid
 from server.pages.render import page, see
 from server.pages.words import title
-from server.starting import read_form, start
+from server.starting import plan, read_form, start
 from server.tables import Metric
 from server.views import latest_metrics
 
@@ -59,12 +59,23 @@ def create(request: Request, db: Db, form: FormOf) -> Response:
     given = dict(form)
     if given.get("level_text", "").strip():
         given.pop("level", None)  # a text of one's own stands in the list's place; the form says so
-    try:
-        run = start(db, read_form(given))
-    except Invalid as error:
-        return _page(db, {**FIRST, **form}, dict(error.fields))
+    errors = _errors(given)
+    if errors:
+        return _page(db, {**FIRST, **form}, errors)
+    run = start(db, read_form(given))
     ring(request)
     return see(f"/runs/{run.id}" + ("/parent" if run.parent == "human" else ""))
+
+
+def _errors(given: Mapping[str, str]) -> dict[str, str]:
+    """Every wrong field: what is wrong by itself, and what is wrong in the world that the others name."""
+    errors: dict[str, str] = {}
+    for _ in range(2):
+        try:
+            plan(read_form({name: text for name, text in given.items() if name not in errors}))
+        except Invalid as error:
+            errors = {**dict(error.fields), **errors}
+    return errors
 
 
 def _page(db: Database, form: Mapping[str, str], errors: Mapping[str, str]) -> Response:
@@ -78,6 +89,7 @@ def _page(db: Database, form: Mapping[str, str], errors: Mapping[str, str]) -> R
         presets=PRESET_WORDS,
         form=form,
         errors=errors,
+        focus=next((field for field in FIRST if field in errors), None),
         elsewhere=[message for field, message in errors.items() if field not in FIRST],
     )
 

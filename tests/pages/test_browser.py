@@ -161,7 +161,7 @@ def test_an_answer_survives_a_closed_tab(watched: Watched, db: Database, ask: Ca
     again = page.context.new_page()
     again.goto(f"{watched.address}/runs/1/parent")
     until(lambda: given(db) == [(number, "neither")])
-    assert again.evaluate("localStorage.getItem('parenting.answers')") == "[]"
+    again.wait_for_function("localStorage.getItem('parenting.answers') === '[]'")
 
 
 def test_a_lost_reply_is_asked_for_again(watched: Watched, db: Database, ask: Callable[..., int]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import httpx2
 import pytest
 
@@ -73,9 +75,10 @@ def test_an_error_stands_beside_its_field_and_what_was_typed_stays(
 
 
 def test_every_wrong_field_is_named_at_once(client: httpx2.Client) -> None:
-    page = client.post("/runs", data={**FORM, "preset": "stern", "level": "atlantis"})
-    assert 'id="preset-error"' in page.text
-    assert 'id="level-error"' in page.text
+    wrong = {"preset": "stern", "level": "atlantis", "seed": "many"}
+    page = client.post("/runs", data={**FORM, **wrong})
+    assert re.findall(r'class="error" id="(\w+)-error"', page.text) == ["level", "preset", "seed"]
+    assert page.text.count(" autofocus") == 1
 
 
 def test_what_was_typed_is_escaped(client: httpx2.Client) -> None:

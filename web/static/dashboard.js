@@ -19,6 +19,8 @@ for (const name of Object.values(SERIES).flat().map(([key]) => key)) values[name
 
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
+const largest = (id) => Math.max(...SERIES[id].map(([key]) => values[key].at(-1)));
+
 function layout(id) {
   const axis = { color: colour("quiet"), gridcolor: colour("line"), zeroline: false, fixedrange: false, automargin: true };
   const many = SERIES[id].length > 1;
@@ -28,14 +30,14 @@ function layout(id) {
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { color: colour("ink") } },
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
     xaxis: { ...axis, title: { text: "tick", standoff: 4 }, showgrid: false },
-    yaxis: { ...axis, rangemode: COUNTS.has(id) ? "tozero" : "normal", type: logs.has(id) ? "log" : "linear" },
+    yaxis: { ...axis, dtick: COUNTS.has(id) && largest(id) < 6 ? 1 : null, rangemode: COUNTS.has(id) ? "tozero" : "normal", type: logs.has(id) ? "log" : "linear" },
   };
 }
 
 function traces(id) {
   const colours = [colour("blue"), colour("agent"), colour("leaf"), colour("unreal")];
   return SERIES[id].map(([key, name], at) => ({
-    type: "scatter", mode: "lines", x: ticks, y: values[key], name,
+    type: "scatter", mode: "lines", connectgaps: true, x: ticks, y: values[key], name,
     line: { color: key === "optimal_return" ? colour("quiet") : colours[at], width: 2, shape: COUNTS.has(id) ? "hv" : "linear", dash: key === "optimal_return" ? "dash" : "solid" },
   }));
 }
