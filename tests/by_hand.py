@@ -1,0 +1,103 @@
+"""A person at the parent's page, played by a real browser: reads the question from the page and presses keys."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from envs import registry
+
+ROOT = Path(__file__).parents[1]
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
+FAR = 1000
+Cell = tuple[int, int]
+
+
+@contextmanager
+def up(data: Path) -> Iterator[str]:
+    """`parenting up` with a database of its own, stopped by Ctrl-C: its URL."""
+    command = [sys.executable, "-m", "commands.main", "up", "--port", "0", "--no-browser"]
+    environment = {**os.environ, "PARENTING_DATA": str(data), "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        found = re.search(r"http://\S+", process.stdout.readline())
+        assert found
+        try:
+            yield found[0].rstrip("/")
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(10)
+
+
+@contextmanager
+def chromium(path: str) -> Iterator[Browser]:
+    """Debian's Chromium."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+def start(page: Page, url: str, seed: int = 3) -> None:
+    """Fill in the form on the first page, as a person does, and begin."""
+    page.goto(url)
+    page.fill("input[name=seed]", str(seed))
+    page.click("main form button[type=submit], main form button.primary")
+    page.wait_for_selector("#main[data-run]")
+
+
+def distances(level: str = "island") -> dict[Cell, int]:
+    """Steps to the goal on dry land, as anyone sees them who looks at the drawing."""
+    drawn = registry.level("unsafe-exploration", level)
+    reached = {drawn.find("G")[0]: 0}
+    edge = list(reached)
+    while edge:
+        y, x = edge.pop(0)
+        for cell in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
+            if drawn.glyph(cell) not in "#W" and cell not in reached:
+                reached[cell] = reached[(y, x)] + 1
+                edge.append(cell)
+    return reached
+
+
+def answer(page: Page, to_goal: dict[Cell, int]) -> str:
+    """Look at the question, press the key, wait until the page has moved on: the key."""
+    form = page.wait_for_selector("#question")
+    assert form
+    query = form.get_attribute("data-query")
+    left, right = (to_goal.get(_end(path), FAR) for path in _paths(page))
+    if left == right == FAR:
+        key = "ArrowDown"
+    elif left == right:
+        key = "ArrowUp"
+    else:
+        key = "ArrowLeft" if left < right else "ArrowRight"
+    page.keyboard.press(key)
+    page.wait_for_selector(f'#question[data-query="{query}"]', state="detached", timeout=10_000)
+    return key
+
+
+def _paths(page: Page) -> list[str]:
+    return [board.get_attribute("data-path") or "" for board in page.query_selector_all("#question .board .agent[data-path]")]
+
+
+def _end(path: str) -> Cell:
+    x, y = (float(number) for number in path.split()[-1].split(","))
+    return round((y - 10) / 20), round((x - 10) / 20)
+
+
+def until(holds: object, seconds: float, what: str) -> None:
+    """Wait for something that happens elsewhere."""
+    end = time.monotonic() + seconds
+    while not holds():  # type: ignore[operator]
+        assert time.monotonic() < end, what
+        time.sleep(0.02)

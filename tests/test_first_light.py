@@ -1,0 +1,37 @@
+"""The whole way through: a person raises an agent on the island by keyboard until it walks a shortest safe path."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from tests.by_hand import answer, chromium, distances, start, up
+from tests.pages.watched import Watched
+
+
+@pytest.mark.timeout(300)
+def test_an_agent_is_raised_by_keyboard(chromium_path: str, tmp_path: Path) -> None:
+    with up(tmp_path) as url, chromium(chromium_path) as browser:
+        watched = Watched(browser, url)
+        page = watched.open("/")
+        start(page, url)
+        dashboard = watched.open("/runs/1")
+        to_goal, keys = distances(), []
+        while page.locator("#optimal").is_hidden():
+            assert len(keys) < 150, "the agent did not become optimal"
+            keys.append(answer(page, to_goal))
+        run = httpx2.get(f"{url}/api/v1/runs/1").json()
+        rows = httpx2.get(f"{url}/api/v1/runs/1/metrics").json()["rows"]
+        assert run["optimal"] and run["status"] == "active"
+        assert rows[-1]["values"]["return"] == pytest.approx(rows[-1]["values"]["optimal_return"])
+        assert rows[-1]["values"]["deaths"] <= 1
+        # What was answered is what was pressed: every key is stored once.
+        counts = {name: rows[-1]["values"][name] for name in ("left", "right", "either", "neither")}
+        pressed = [keys.count(key) for key in ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown")]
+        assert run["answers"] == len(keys)
+        assert all(counted <= count for counted, count in zip(counts.values(), pressed, strict=True))
+        assert "Optimal" in dashboard.inner_text("main") or "optimal" in dashboard.inner_text("main")
+        watched.close()
+        assert watched.wrong == []
