@@ -1,7 +1,7 @@
 # Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
 # A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
 .DEFAULT_GOAL := help
-.PHONY: help run test check format coverage constraints clean
+.PHONY: help run test check format coverage pictures constraints clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -32,6 +32,9 @@ format: $(VENV)/.installed-dev ## Format the code and mend what lint can mend
 
 coverage: $(VENV)/.installed-dev ## Run the tests and print the lines that none of them reached
 	$(BIN)/pytest --cov --cov-report=term-missing:skip-covered $(ARGS)
+
+pictures: $(VENV)/.installed-dev ## Draw the pictures of the documentation anew (needs Chromium)
+	$(BIN)/python docs/pictures.py
 
 # torch stays at the version that constraints.txt names: a newer one may pull gigabytes. TORCH=... changes it.
 TORCH = $(shell sed -n 's/^torch==//p' constraints.txt)

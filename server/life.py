@@ -19,7 +19,7 @@ from server.codec import encode, kind_name
 from server.db import Database
 from server.inbox import QueueParent, ScriptedQueueParent
 from server.mailbox import Watch
-from server.measure import measure
+from server.measure import NOTHING_LEARNT, learnt, measure
 from server.runs import Claim
 from server.tables import Run
 from server.tally import count
@@ -50,6 +50,7 @@ class Life:
         self.record_ends = mailbox.high_water(db, mine.run_id)
         self.optimal, self.waiting = run.optimal, run.waiting
         self._saved_tick, self._saved_at, self._measured_at = self.tick, time.monotonic(), 0.0
+        self._news, self._learnt = False, NOTHING_LEARNT
         runs.report(db, mine, versions=versions())
 
     def _parent(self, config: Config, judgement: Judgement, asked: Callable[[], None]) -> QueueParent:
@@ -103,9 +104,11 @@ class Life:
         self.saved = Saved(state, tally, config)
         if self.tick <= self.record_ends:
             self._hold_to_the_record(query)
-        self._measure()
+        self._note()
+        at_once = not bool(state.waiting) and bool(query.kind[0] == Kind.NONE)
+        self._measure(at_once)
         self.save_if_due()
-        return not bool(state.waiting) and bool(query.kind[0] == Kind.NONE)
+        return at_once
 
     def _hold_to_the_record(self, query: Query) -> None:
         """A tick that is lived again asks what it asked the first time, or the run stops."""
@@ -118,15 +121,23 @@ class Life:
                 f"Run {self.mine.run_id} asked something else when tick {self.tick} was lived again."
             )
 
-    def _measure(self) -> None:
-        """Write a row of metrics when the parent was heard, and once a second besides."""
+    def _note(self) -> None:
+        """Keep what the next row of metrics says of this tick."""
         assert self.parent.heard is not None
-        heard = bool(self.parent.heard.choice[0])
-        now = time.monotonic()
-        if not heard and now - self._measured_at < METRIC_SECONDS:
+        self._news |= bool(self.parent.heard.choice[0])
+        if bool(self.saved.state.report.trained):
+            self._learnt = learnt(self.saved)
+
+    def _measure(self, at_once: bool) -> None:
+        """Write a row of metrics after the parent was heard, and once a second besides.
+
+        It waits until the next question is out: a person waits for that, and nobody for a row.
+        """
+        late = time.monotonic() - self._measured_at
+        if late < METRIC_SECONDS and (at_once or not self._news):
             return
-        self._measured_at = now
-        row = measure(self.saved, self.evaluation)
+        self._measured_at, self._news = time.monotonic(), False
+        row = {**measure(self.saved, self.evaluation), **self._learnt}
         self.optimal, self.waiting = bool(row["optimal"]), None
         record.write_metrics(self.db, self.mine, {self.tick: row})
         runs.report(self.db, self.mine, tick=self.tick, waiting=None, optimal=self.optimal)

@@ -7,23 +7,28 @@ from parents.evaluation import Evaluation
 from server.checkpoint import Saved
 
 
-def measure(saved: Saved, evaluation: Evaluation) -> dict[str, float | int | None]:
-    """Counts since birth, the last gradient step, and what the argmax policy does from the start.
+Row = dict[str, float | int | None]
 
-    `loss` and the entropies are null before the first gradient step, and after a tick that took none.
-    """
+NOTHING_LEARNT: Row = {"loss": None, "entropy_global": None, "entropy_local": None}
+"""Before the first gradient step."""
+
+
+def learnt(saved: Saved) -> Row:
+    """The last gradient step: loss (Eq. 2) and both entropies, a mean over the entries of X."""
+    report = saved.state.report
+    return {name: float(getattr(report, name)[0]) for name in NOTHING_LEARNT}
+
+
+def measure(saved: Saved, evaluation: Evaluation) -> Row:
+    """Counts since birth, and what the argmax policy does from the start."""
     state, tally = saved.state, saved.tally
-    report, live = state.report, state.learner.live
-    trained = bool(report.trained[0])
+    live = state.learner.live
     return {
         "deaths": int(tally.deaths[0]),
         "episodes": int(tally.episodes[0]),
         "guidance": int(tally.kinds[0, Kind.GUIDANCE]),
         "preference": int(tally.kinds[0, Kind.PREFERENCE]),
         **{choice.name.lower(): int(tally.choices[0, choice]) for choice in Choice if choice != Choice.NONE},
-        "loss": float(report.loss[0]) if trained else None,
-        "entropy_global": float(report.entropy_global[0]) if trained else None,
-        "entropy_local": float(report.entropy_local[0]) if trained else None,
         "return": float(evaluation.returns(live)[0]),
         "optimal_return": evaluation.best(),
         "optimal": int(evaluation.optimal(live)[0]),
