@@ -1,4 +1,4 @@
-"""Direct policy learning: pi is trained as a predictor of the parent's preferred actions (Sec. 2.3, Eq. 2)."""
+"""Direct policy learning: pi is trained to predict the parent's preferred actions (Sec. 2.3, Eq. 2)."""
 
 from __future__ import annotations
 
@@ -83,10 +83,16 @@ def differentiate(
     network: Network, config: Config, parameters: Float[Tensor, "N P"], rows: Rows
 ) -> tuple[Terms, Float[Tensor, "N P"]]:
     """The terms of the objective and its gradient, each trial's by itself."""
-    layers = [Affine(*(part.detach().requires_grad_() for part in layer)) for layer in network.unpack(parameters)]
+    layers = [
+        Affine(*(part.detach().requires_grad_() for part in layer)) for layer in network.unpack(parameters)
+    ]
     with torch.enable_grad():
         terms = objective(network.heads(layers, rows.s0, rows.near), rows)
-        value = terms.loss - config.lambda_global * terms.entropy_global - config.lambda_local * terms.entropy_local
+        value = (
+            terms.loss
+            - config.lambda_global * terms.entropy_global
+            - config.lambda_local * terms.entropy_local
+        )
         parts = torch.autograd.grad(value.sum(), [part for layer in layers for part in layer])
     return Terms(*(term.detach() for term in terms)), torch.cat([part.flatten(1) for part in parts], dim=1)
 
@@ -115,12 +121,17 @@ def entropy(logits: Float[Tensor, "N S 4"]) -> Float[Tensor, "N S"]:
 
 
 def adam(learner: Learner, gradient: Float[Tensor, "N P"], training: Bool[Tensor, "N"], rate: float) -> None:
-    """One step of Adam (Kingma & Ba 2014) in the trials that train; nothing moves in the others. In place."""
+    """One step of Adam (Kingma & Ba 2014) in the trials that train; nothing moves in the others. In place.
+
+    `gradient` serves as room for what is worked out, and is lost.
+    """
     learner.steps.add_(training)
     on = training.to(gradient.dtype)[:, None]
     t = learner.steps.clamp_min(1).to(torch.float64)[:, None]
     learner.first.lerp_(gradient, on * (1 - BETA1))
     learner.second.lerp_(gradient.square_(), on * (1 - BETA2))
-    size = (rate / (1 - BETA1**t)).to(gradient.dtype) * on
-    root = (1 - BETA2**t).sqrt().to(gradient.dtype)
-    learner.live.sub_(learner.second.sqrt().div_(root).add_(EPSILON).reciprocal_().mul_(learner.first).mul_(size))
+    # rate m / (sqrt(v) + EPSILON), m and v corrected for their start at zero, with fewer passes over [N, P]
+    root = (1 - BETA2**t).sqrt()
+    size = (rate * root / (1 - BETA1**t)).to(gradient.dtype) * on
+    scale = torch.sqrt(learner.second, out=gradient).add_((EPSILON * root).to(gradient.dtype))
+    learner.live.addcmul_(torch.div(learner.first, scale, out=scale), size, value=-1)

@@ -1,6 +1,7 @@
-"""The policy pi(a|s): a local and a global head, averaged, then softmax (Sec. 3.1.1). One network a trial, stacked.
+"""The policy pi(a|s): a local and a global head, averaged, then softmax (Sec. 3.1.1); stacked over the trials.
 
-All parameters of a trial stand in one flat row, so that freezing, copying and Adam are a few operations on `[N, P]`.
+All parameters of a trial stand in one flat row, so that freezing, copying and Adam are a few operations on
+`[N, P]`.
 Convolutions are matrix products of patches (im2col), so that every layer is one `baddbmm` over the trials.
 """
 
@@ -14,6 +15,7 @@ import torch
 import torch.nn.functional as F
 from jaxtyping import Float, Int64, UInt8
 from torch import Tensor
+from torch.autograd.function import FunctionCtx
 
 from envs.rng import Keys, Stream
 
@@ -23,7 +25,9 @@ ACTIONS = 4
 
 
 class Side(NamedTuple):
-    """What a convolution does to one side of the grid: cells of padding before and behind, and the length that is left."""
+    """What a convolution does to one side of the grid: cells of padding before and behind, and the length
+    that is left.
+    """
 
     before: int
     behind: int
@@ -31,14 +35,18 @@ class Side(NamedTuple):
 
 
 def side(length: int) -> Side:
-    """Longer than 3 shrinks by 2; 3 shrinks to 2 (one cell behind); 2 or less keeps its size (ours, Sec. 3.1.1)."""
+    """Longer than 3 shrinks by 2; 3 shrinks to 2 (one cell behind); 2 or less keeps its size (ours, Sec.
+    3.1.1).
+    """
     if length > 3:
         return Side(0, 0, length - 2)
     return Side(0, 1, 2) if length == 3 else Side(1, 1, length)
 
 
 class Layer(NamedTuple):
-    """One matrix of weights `[rows, columns]` and its biases, at `start` of the flat row; conv layers know their sides."""
+    """One matrix of weights `[rows, columns]` and its biases, at `start` of the flat row; conv layers know
+    their sides.
+    """
 
     rows: int
     columns: int
@@ -117,13 +125,17 @@ class Network:
         return [layer for layer in self.layers if layer.sides]
 
     def start(self, keys: Keys, dtype: torch.dtype) -> Float[Tensor, "N P"]:
-        """Glorot uniform weights and zero biases, drawn from the trials' keys (ours: TensorFlow 1.12's default)."""
+        """Glorot uniform weights and zero biases, drawn from the trials' keys (ours: TensorFlow 1.12's
+        default).
+        """
         parameters = torch.zeros(keys.seed.shape[0], self.size, dtype=dtype, device=keys.seed.device)
         for number, layer in enumerate(self.layers):
             bound = sqrt(6 / sum(layer.fans))
             drawn = (2 * keys.uniform(Stream.WEIGHTS + number, layer.rows, layer.columns) - 1) * bound
-            if layer.sides:  # drawn as (channel, row, column), kept as (row, column, channel): patches are copied in runs
-                drawn = drawn.unflatten(1, (-1, 9)).transpose(1, 2).flatten(1, 2)
+            if layer.sides:
+                # drawn as (channel, row, column), kept as (row, column, channel): patches are copied in runs
+                split = drawn.view(-1, layer.rows // 9, 9, layer.columns)
+                drawn = split.transpose(1, 2).flatten(1, 2)
             parameters[:, layer.start : layer.bias] = drawn.flatten(1).to(dtype)
         return parameters
 
@@ -137,17 +149,24 @@ class Network:
             for layer in self.layers
         ]
 
-    def heads(self, layers: list[Affine], seen: UInt8[Tensor, "N S H W"], near: UInt8[Tensor, "N S 4"]) -> Heads:
+    def heads(
+        self, layers: list[Affine], seen: UInt8[Tensor, "N S H W"], near: UInt8[Tensor, "N S 4"]
+    ) -> Heads:
         """Both heads' logits in S states a trial: `seen` the observations, `near` their local states l(s)."""
         local_in, local_out, *convolutions, dense, out = layers
-        x = F.one_hot(near.long(), self.codes).to(out.weight.dtype).flatten(2)
-        local = local_out(local_in(x).relu())
-        y = F.one_hot(seen.long(), self.codes).to(out.weight.dtype)
+        x = self._one_hot(near, out.weight.dtype).flatten(2)
+        local = local_out(local_in(x).relu_())
+        y = self._one_hot(seen, out.weight.dtype)
         for layer, affine in zip(self.convolutions, convolutions, strict=True):
             assert layer.sides
             patches = _patches(y, layer.sides)
-            y = affine(patches.flatten(1, 3)).relu().view(*patches.shape[:4], layer.columns)
-        return Heads(local, out(dense(y.flatten(2)).relu()))
+            y = affine(patches.flatten(1, 3)).relu_().view(*patches.shape[:4], layer.columns)
+        return Heads(local, out(dense(y.flatten(2)).relu_()))
+
+    def _one_hot(self, codes: UInt8[Tensor, "*places"], dtype: torch.dtype) -> Float[Tensor, "*places O"]:
+        # torch's one_hot would go by way of 64-bit integers
+        kinds = torch.arange(self.codes, dtype=torch.uint8, device=codes.device)
+        return (codes.unsqueeze(-1) == kinds).to(dtype)
 
     def logits(
         self, parameters: Float[Tensor, "N P"], seen: UInt8[Tensor, "N H W"], near: UInt8[Tensor, "N 4"]
@@ -163,16 +182,40 @@ def network(height: int, width: int, codes: int) -> Network:
     return Network(height, width, codes)
 
 
+class _Patches(torch.autograd.Function):
+    """The 3 x 3 surroundings of every place, one after the other: what a convolution multiplies.
+
+    Autograd's own way back through nine slices would make nine whole copies of the grid.
+    """
+
+    @staticmethod
+    def forward(context: FunctionCtx, x: Float[Tensor, "N S H W C"]) -> Float[Tensor, "N S H2 W2 9C"]:
+        """One copy of overlapping windows."""
+        context.shape = x.shape  # type: ignore[attr-defined]
+        return x.unfold(2, 3, 1).unfold(3, 3, 1).movedim(4, -1).flatten(4)
+
+    @staticmethod
+    def backward(context: FunctionCtx, gradient: Float[Tensor, "N S H2 W2 9C"]) -> Float[Tensor, "N S H W C"]:
+        """Every cell gathers from the places that it surrounds."""
+        tall, wide = gradient.shape[2:4]
+        total = gradient.new_zeros(context.shape)  # type: ignore[attr-defined]
+        for shift, part in enumerate(gradient.chunk(9, dim=-1)):
+            i, j = divmod(shift, 3)
+            total[:, :, i : i + tall, j : j + wide] += part
+        return total
+
+
 def _patches(x: Float[Tensor, "N S H W C"], sides: tuple[Side, Side]) -> Float[Tensor, "N S H2 W2 9C"]:
-    """The 3 x 3 surroundings of every place, one after the other: what a convolution multiplies with its weights."""
+    """The patches of a grid, padded first where its sides ask for it."""
     tall, wide = sides
     if tall.before or tall.behind or wide.before or wide.behind:
         x = F.pad(x, (0, 0, wide.before, wide.behind, tall.before, tall.behind))
-    shifts = [x[:, :, i : i + tall.length, j : j + wide.length] for i in range(3) for j in range(3)]
-    return torch.cat(shifts, dim=-1)
+    patches: Tensor = _Patches.apply(x)  # type: ignore[no-untyped-call]
+    return patches
 
 
 def draw(logits: Float[Tensor, "N 4"], noise: Float[Tensor, "N 4"]) -> Int64[Tensor, "N"]:
-    """An action drawn from pi = softmax(logits), given Gumbel noise. Works where the policy has saturated, too."""
+    """An action drawn from pi = softmax(logits), given Gumbel noise. Works where the policy has saturated,
+    too.
+    """
     return (logits.double() + noise).argmax(-1)
-
