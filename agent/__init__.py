@@ -1,1 +1,3 @@
-"""PARENTING, the algorithm of Sec. 2. Start reading at `agent.parenting`. (Imports no torch here: see tests/test_layers.py.)"""
+"""PARENTING, the algorithm of Sec. 2. Start reading at `agent.parenting`. (Imports no torch here: see
+tests/test_layers.py.)
+"""

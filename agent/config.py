@@ -1,4 +1,6 @@
-"""Every hyperparameter, one sentence each. The same object serves command line, database and web form. No torch here."""
+"""Every hyperparameter, one sentence each. The same object serves command line, database and web form. No
+torch here.
+"""
 
 from __future__ import annotations
 
@@ -11,29 +13,52 @@ Dtype = Literal["float32", "float64"]
 
 
 class Config(BaseModel):
-    """The hyperparameters of PARENTING (Sec. 2, 3.1.2). Numbers lost with the paper's digits are marked (?)."""
+    """The hyperparameters of PARENTING (Sec. 2, 3.1.2). Numbers lost with the digits are marked (?)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     # Sec. 2.1 to 2.3
-    p_guid: float = Field(0.5, ge=0, le=1, description="Base of the chance p_guid ** f to pause for guidance; 0 never asks. (?)")
-    p_rec: float = Field(0.5, ge=0, le=1, description="Chance to begin recording a clip in a step without guidance. (?)")
-    p_pref: float = Field(0.5, ge=0, le=1, description="Chance, after a step, to look for a pair of clips and ask a preference. (?)")
+    p_guid: float = Field(
+        0.5, ge=0, le=1, description="Base of the chance p_guid ** f to pause for guidance; 0 never asks. (?)"
+    )
+    p_rec: float = Field(
+        0.5, ge=0, le=1, description="Chance to begin recording a clip in a step without guidance. (?)"
+    )
+    p_pref: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="Chance, after a step, to look for a pair of clips and ask a preference. (?)",
+    )
     p_train: float = Field(1.0, ge=0, le=1, description="Chance, after a step, to train on X.")
     gradient_steps: int = Field(1, ge=1, le=1000, description="Gradient steps in a tick that trains.")
     lambda_global: float = Field(0.01, ge=0, description="Entropy coefficient of the global head. (?)")
     lambda_local: float = Field(0.01, ge=0, description="Entropy coefficient of the local head. (?)")
-    learning_rate: float = Field(0.001, gt=0, description="Adam's step size; beta 0.9 and 0.999 and eps 1e-8 are its defaults.")
-    batch: int | None = Field(None, ge=1, description="Distinct rows of X in a gradient step; none takes all of them.")
-    recompare: bool = Field(False, description="Ask again about pairs that were compared before, as the paper's letter has it.")
+    learning_rate: float = Field(
+        0.001, gt=0, description="Adam's step size; beta 0.9 and 0.999 and eps 1e-8 are its defaults."
+    )
+    batch: int | None = Field(
+        None, ge=1, description="Distinct rows of X in a gradient step; none takes all of them."
+    )
+    recompare: bool = Field(
+        False, description="Ask again about pairs that were compared before, as the paper's letter has it."
+    )
     # Sec. 2.4
-    stages: int = Field(1, ge=1, le=16, description="The last clip length T; the agent matures through T = 1 .. stages.")
-    mature_every: int | None = Field(None, ge=1, description="Answered queries after which a stage ends; none leaves it to the operator.")
-    own_length: bool = Field(False, description="Train pi_T on entries of maturity T alone, as Sec. 4.1 supposes.")
+    stages: int = Field(
+        1, ge=1, le=16, description="The last clip length T; the agent matures through T = 1 .. stages."
+    )
+    mature_every: int | None = Field(
+        None, ge=1, description="Answered queries after which a stage ends; none leaves it to the operator."
+    )
+    own_length: bool = Field(
+        False, description="Train pi_T on entries of maturity T alone, as Sec. 4.1 supposes."
+    )
     # the run
     time_limit: int = Field(100, ge=1, le=10_000, description="Steps after which an episode is cut off.")
     gamma: float = Field(1.0, gt=0, le=1, description="The parent's discount in Eq. (7) and (8).")
-    max_open_preferences: int = Field(3, ge=0, le=1000, description="The agent waits while more preference queries than this are open.")
+    max_open_preferences: int = Field(
+        3, ge=0, le=1000, description="The agent waits while more preference queries than this are open."
+    )
     dtype: Dtype = Field("float32", description="Precision of the policy and its training.")
 
 
@@ -46,7 +71,9 @@ PRESETS: dict[str, dict[str, float]] = {
 """The settings of Table 1, by name; the conservative one stands first everywhere."""
 
 
-def compose(preset: str, world: Mapping[str, object], changes: Mapping[str, object], *, strict: bool) -> Config:
+def compose(
+    preset: str, world: Mapping[str, object], changes: Mapping[str, object], *, strict: bool
+) -> Config:
     """The preset, over it the world's own defaults, over it what this run sets (PAPER.md, "Settings").
 
     `strict` refuses text in the place of a number, as JSON needs it; the command line has nothing but text.

@@ -1,7 +1,9 @@
 """X, the parent's answers as the agent trains on them (Sec. 2.3).
 
-The record of all entries is the table of answered queries. This is the view of it that training needs: distinct first
-states, and distinct (state, pair of actions) rows with their summed `mu`, because Eq. (2) sees nothing else of an entry.
+The record of all entries is the table of answered queries. This is the view of it that training needs:
+distinct first
+states, and distinct (state, pair of actions) rows with their summed `mu`, because Eq. (2) sees nothing else
+of an entry.
 So a gradient step costs what the distinct states demand, however often the same question was answered.
 """
 
@@ -16,7 +18,9 @@ from envs.struct import Struct
 
 
 class Dataset(Struct):
-    """Distinct states, and rows in the order of their first entry. What lies beyond `states` and `rows` is zero."""
+    """Distinct states, and rows in the order of their first entry. What lies beyond `states` and `rows` is
+    zero.
+    """
 
     s0: UInt8[Tensor, "N S H W"]  # the first states, as observed
     near: UInt8[Tensor, "N S 4"]  # their local states l(s)
@@ -58,7 +62,7 @@ def empty(trials: int, height: int, width: int, device: str | torch.device = "cp
 
 
 def add(x: Dataset, entry: Entry, stored: Bool[Tensor, "N"], trained: Bool[Tensor, "N"]) -> Dataset:
-    """X with one more entry where `stored` holds; where `trained` does not hold as well, it is only counted."""
+    """X with one more entry where `stored` holds; without `trained` as well, it is only counted."""
     x = x.replace(size=x.size + stored)
     trial = (stored & trained).nonzero().squeeze(1)
     if not len(trial):
@@ -71,7 +75,8 @@ def add(x: Dataset, entry: Entry, stored: Bool[Tensor, "N"], trained: Bool[Tenso
 
 def clear(x: Dataset, mask: Bool[Tensor, "N"]) -> Dataset:
     """Nothing left to train on where `mask` holds (`own_length`); the count of entries stays."""
-    fresh = empty(len(mask), *x.s0.shape[2:], device=x.s0.device)
+    height, width = x.s0.shape[2:]
+    fresh = empty(len(mask), height, width, x.s0.device)
     widened = _pad(fresh, x.s0.shape[1], x.at.shape[1])
     return widened.where(mask, x).replace(size=x.size)
 

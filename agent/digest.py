@@ -1,4 +1,6 @@
-"""Fingerprints: 64 bits in place of a whole board, clip or pair, so that equal things are found by comparing words."""
+"""Fingerprints: 64 bits in place of a whole board, clip or pair, so that equal things are found by comparing
+words.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from envs.rng import keys
 
 
 def fingerprint(content: Tensor) -> Int64[Tensor, "..."]:
-    """One word for the last axis of `content` (integers): its inner product with fixed random odd words, modulo 2 ** 64.
+    """One word for the last axis of `content` (integers): its product with fixed odd words, modulo 2 ** 64.
 
     Two different contents share a fingerprint with a chance of about 2 ** -60.
     """
@@ -21,7 +23,8 @@ def fingerprint(content: Tensor) -> Int64[Tensor, "..."]:
 
 def together(*words: Tensor) -> Int64[Tensor, "..."]:
     """One word for several in their order."""
-    return fingerprint(torch.stack(torch.broadcast_tensors(*[scramble(word) for word in words]), dim=-1))
+    mixed: tuple[Tensor, ...] = torch.broadcast_tensors(*map(scramble, words))  # type: ignore[no-untyped-call]
+    return fingerprint(torch.stack(mixed, dim=-1))
 
 
 def unordered(one: Tensor, other: Tensor) -> Int64[Tensor, "..."]:
@@ -30,7 +33,7 @@ def unordered(one: Tensor, other: Tensor) -> Int64[Tensor, "..."]:
 
 
 def scramble(word: Tensor) -> Int64[Tensor, "..."]:
-    """The same word for the same word, with its bits mixed, so that sums and products of words do not cancel."""
+    """The same word for the same word, its bits mixed, so that sums and products do not cancel."""
     word = (word ^ (word >> 32)) * -7046029254386353131
     word = (word ^ (word >> 29)) * -4658895280553007687
     return word ^ (word >> 32)
@@ -40,4 +43,5 @@ def scramble(word: Tensor) -> Int64[Tensor, "..."]:
 def _weights(size: int) -> Tensor:
     draws = keys(seed=1902_06766, trials=1).at(0, torch.arange(2 * size))[0]
     high, low = (draws * 2.0**32).to(torch.int64).view(2, size)
-    return ((high << 32) ^ low) | 1
+    words: Tensor = ((high << 32) ^ low) | 1
+    return words

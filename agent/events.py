@@ -1,4 +1,6 @@
-"""What an operator may do to a living agent: each event applies before one tick, is recorded with it, and replays."""
+"""What an operator may do to a living agent: each event applies before one tick, is recorded with it, and
+replays.
+"""
 
 from __future__ import annotations
 

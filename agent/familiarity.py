@@ -1,4 +1,6 @@
-"""How well the agent knows its surroundings: f(l), the number of guidance queries already made in l(s) (Sec. 2.1)."""
+"""How well the agent knows its surroundings: f(l), the number of guidance queries already made in l(s) (Sec.
+2.1).
+"""
 
 from __future__ import annotations
 

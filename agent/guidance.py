@@ -54,7 +54,9 @@ def _store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset
     if not bool(learnt.any()):
         return state.x
     trained = query.maturity == state.maturity if config.own_length else learnt
-    entry = Entry(s0=first, near=local_state(first, query.agent[:, 0, 0]), a0=query.action[:, :, 0], mu=answer.mu)
+    entry = Entry(
+        s0=first, near=local_state(first, query.agent[:, 0, 0]), a0=query.action[:, :, 0], mu=answer.mu
+    )
     return dataset.add(state.x, entry, learnt, trained)
 
 
@@ -74,7 +76,9 @@ def _resolve(state: AgentState, query: Query, choice: Tensor, guided: Tensor) ->
 def ask(
     world: Gridworld, config: Config, state: AgentState, view: View, heard: Heard, query: Query
 ) -> tuple[AgentState, Query]:
-    """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi; redraw after *neither*."""
+    """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi; redraw after
+    *neither*.
+    """
     codes = len(world.legend)
     where = familiarity.place(view.near, codes)
     f = state.familiarity.gather(1, where[:, None]).squeeze(1)
@@ -115,7 +119,9 @@ def _first(action: Tensor, sides: Tensor) -> Tensor:
     return action
 
 
-def _frames(world: Gridworld, query: Query, now: list[WorldState], then: list[WorldState]) -> dict[str, Tensor]:
+def _frames(
+    world: Gridworld, query: Query, now: list[WorldState], then: list[WorldState]
+) -> dict[str, Tensor]:
     ground, agent, box = map(torch.zeros_like, (query.ground, query.agent, query.box))
     for time, states in enumerate((now, then)):
         ground[:, :, time] = torch.stack([state.board for state in states], 1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import torch
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
@@ -45,4 +44,3 @@ def _freeze(learner: Learner, maturity: Int64[Tensor, "N"], ripe: Bool[Tensor, "
         second=learner.second.masked_fill(ripe[:, None], 0),
         steps=learner.steps.masked_fill(ripe, 0),
     )
-

@@ -1,8 +1,9 @@
-"""Pairs of recorded clips to ask a preference about (Sec. 2.2): one of each kind, same start, different first actions.
+"""Pairs of recorded clips to ask about (Sec. 2.2): one of each kind, same start, other first actions.
 
-Pairs are ordered by the completion of the later clip, then of the earlier, newest first. A clip's partners that are
-older than itself only ever grow fewer. So once it has none it is *closed* for good, and a search looks at open clips
-alone: over a run, every clip is closed at most once, and no search costs more as the recorder fills.
+Pairs are ordered by the completion of the later clip, then of the earlier, newest first. A clip's partners
+that are older than itself only ever grow fewer. So once it has none it is *closed* for good, and a search
+looks at open clips alone: over a run, every clip is closed at most once, and no search costs more as the
+recorder fills.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from jaxtyping import Bool, Int64
 from torch import Tensor
 
 from agent.config import Config
-from agent.digest import fingerprint, scramble, together, unordered
+from agent.digest import fingerprint, together, unordered
 from agent.guidance import View
 from agent.query import Kind, Query
 from agent.state import AgentState, Asked, Recorder, Ring
@@ -34,9 +35,13 @@ class Pair(NamedTuple):
 
 
 def store(
-    world: Gridworld, recorder: Recorder, complete: Bool[Tensor, "N"], level: Int64[Tensor, "N"], tick: Int64[Tensor, "N"]
+    world: Gridworld,
+    recorder: Recorder,
+    complete: Bool[Tensor, "N"],
+    level: Int64[Tensor, "N"],
+    tick: Int64[Tensor, "N"],
 ) -> Recorder:
-    """File finished clips with their kind's ring; the newest overwrites the oldest. The turn changes. In place."""
+    """File finished clips with their kind's ring; the newest overwrites the oldest. In place."""
     trial = complete.nonzero().squeeze(1)
     kind = recorder.turn[trial]
     ring = _room(recorder.ring)
@@ -54,7 +59,9 @@ def store(
     return recorder.replace(ring=ring, running=recorder.running & ~complete, turn=turn)
 
 
-def digest(ground: Tensor, agent: Tensor, box: Tensor, action: Tensor, length: Tensor, level: Tensor) -> Tensor:
+def digest(
+    ground: Tensor, agent: Tensor, box: Tensor, action: Tensor, length: Tensor, level: Tensor
+) -> Tensor:
     """A clip's fingerprint: true frames, agent, box, actions, length, level. Leading axes [n]."""
     parts = (ground, agent, box, action)
     return together(*(fingerprint(part.flatten(1)) for part in parts), length.long(), level)
@@ -67,7 +74,9 @@ def forget(recorder: Recorder, mask: Bool[Tensor, "N"]) -> Recorder:
     return recorder.replace(
         running=recorder.running & ~mask,
         turn=recorder.turn.masked_fill(mask, EXPLOIT),
-        ring=ring.replace(here=ring.here & keep, open=ring.open & keep, count=ring.count.masked_fill(mask[:, None], 0)),
+        ring=ring.replace(
+            here=ring.here & keep, open=ring.open & keep, count=ring.count.masked_fill(mask[:, None], 0)
+        ),
     )
 
 
@@ -98,7 +107,10 @@ def _search(config: Config, recorder: Recorder, trying: Bool[Tensor, "N"]) -> Pa
         partner = _partner(config, recorder, trial, kind, later)
         paired = partner >= 0
         ring.open[trial[~paired], kind[~paired], later[~paired]] = False
-        exploit, explore = torch.where(kind == EXPLOIT, later, partner), torch.where(kind == EXPLOIT, partner, later)
+        exploit, explore = (
+            torch.where(kind == EXPLOIT, later, partner),
+            torch.where(kind == EXPLOIT, partner, later),
+        )
         found.append(torch.stack((trial, exploit, explore))[:, paired])
         trial = trial[~paired]
         trial = trial[(ring.here[trial] & ring.open[trial]).flatten(1).any(1)]
@@ -107,9 +119,13 @@ def _search(config: Config, recorder: Recorder, trying: Bool[Tensor, "N"]) -> Pa
 
 
 def _partner(
-    config: Config, recorder: Recorder, trial: Int64[Tensor, "n"], kind: Int64[Tensor, "n"], later: Int64[Tensor, "n"]
+    config: Config,
+    recorder: Recorder,
+    trial: Int64[Tensor, "n"],
+    kind: Int64[Tensor, "n"],
+    later: Int64[Tensor, "n"],
 ) -> Int64[Tensor, "n"]:
-    """The newest clip of the other kind that is older, starts alike, acts otherwise and is not known: its place, or -1."""
+    """The newest older clip of the other kind that starts alike, acts otherwise, is not known; or -1."""
     ring, other = recorder.ring, 1 - kind
     tick = ring.tick[trial, other]
     matches = ring.here[trial, other] & (ring.first[trial, other] == ring.first[trial, kind, later][:, None])
@@ -131,7 +147,12 @@ def _ask(world: Gridworld, state: AgentState, found: Pair, query: Query) -> Quer
     places = torch.stack((found.exploit, found.explore), 1).gather(1, kinds)
     at = (trial[:, None], kinds, places)
     ground, agent, box = ring.ground[at], ring.agent[at].long(), ring.box[at].long()
-    frames = {"ground": ground, "agent": agent, "box": box, "observation": _observations(world, ground, agent, box, ring.length[at])}
+    frames = {
+        "ground": ground,
+        "agent": agent,
+        "box": box,
+        "observation": _observations(world, ground, agent, box, ring.length[at]),
+    }
     parts = {
         **frames,
         "kind": torch.full_like(trial, Kind.PREFERENCE),
@@ -140,7 +161,9 @@ def _ask(world: Gridworld, state: AgentState, found: Pair, query: Query) -> Quer
         "maturity": state.maturity[trial],
         "level": ring.level[trial, EXPLOIT, found.exploit],
     }
-    return query.replace(**{name: getattr(query, name).index_copy(0, trial, part) for name, part in parts.items()})
+    return query.replace(
+        **{name: getattr(query, name).index_copy(0, trial, part) for name, part in parts.items()}
+    )
 
 
 def _observations(world: Gridworld, ground: Tensor, agent: Tensor, box: Tensor, length: Tensor) -> Tensor:
@@ -156,14 +179,21 @@ def comparison(seen: Tensor, one: Tensor, other: Tensor, maturity: Tensor) -> In
 
 
 def _remember(asked: Asked, query: Query) -> Asked:
-    """Keep the digest of what is asked this tick, guidance too, and which actions it compares where. In place."""
+    """Keep the digest of what is asked, guidance too, and which actions it compares where. In place."""
     trial = (query.kind != Kind.NONE).nonzero().squeeze(1)
     if not len(trial):
         return asked
     asked, query = _more(asked), query.pick(trial)
     place = asked.count[trial]
     clips = [
-        digest(query.ground[:, i], query.agent[:, i], query.box[:, i], query.action[:, i], query.length[:, i], query.level)
+        digest(
+            query.ground[:, i],
+            query.agent[:, i],
+            query.box[:, i],
+            query.action[:, i],
+            query.length[:, i],
+            query.level,
+        )
         for i in (0, 1)
     ]
     asked.pair[trial, place] = unordered(*clips)

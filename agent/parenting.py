@@ -1,10 +1,10 @@
 """PARENTING (Sec. 2): start reading here.
 
-The agent is a pure step over stacked trials; the parent is a mailbox outside it. `step` reads no reward, no clock, no
-file and no global seed. A run is a function of (config, seed, answers, the operator's events).
+The agent is a pure step over stacked trials; the parent is a mailbox outside it. `step` reads no reward, no
+clock, no file and no global seed. A run is a function of (config, seed, answers, the operator's events).
 
-`step` consumes its state: the buffers of policy, recorder, X and familiarity are updated in place, so that a tick costs
-what it changes. Whoever wants to keep an earlier state keeps `state.clone()`.
+`step` consumes its state: the buffers of policy, recorder, X and familiarity are updated in place, so that a
+tick costs what it changes. Whoever wants to keep an earlier state keeps `state.clone()`.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) ->
     state = wake(world, state)
     view = perceive(world, brain, state)
     query = no_query(world, config, state)
-    state, heard = guidance.hear(config, state, answer)  # answers enter X; "neither": ask again         2.1
-    state, query = guidance.ask(world, config, state, view, heard, query)  # unfamiliar? pause and ask   2.1
-    state, steered = recording.act(world, brain, config, state, view, heard)  # the move, and clips of it   2.2, 2.4
-    state, query = pairing.pair(world, config, state, view, steered, query)  # a matching pair of clips  2.2
-    state = learning.train(brain, config, state, steered)  # gradient steps on X with p_train            2.3
-    return maturation.grow(config, state), query  # pi_T -> pi_{T+1}                                     2.4
+    state, heard = guidance.hear(config, state, answer)  # 2.1  answers enter X; "neither": ask again
+    state, query = guidance.ask(world, config, state, view, heard, query)  # 2.1  unfamiliar? pause and ask
+    state, steered = recording.act(world, brain, config, state, view, heard)  # 2.2, 2.4  move, and clips
+    state, query = pairing.pair(world, config, state, view, steered, query)  # 2.2  a matching pair of clips
+    state = learning.train(brain, config, state, steered)  # 2.3  gradient steps on X with p_train
+    return maturation.grow(config, state), query  # 2.4  pi_T -> pi_{T+1}
 
 
 def beat(
@@ -104,4 +104,3 @@ def perceive(world: Gridworld, brain: Network, state: AgentState) -> View:
 def no_query(world: Gridworld, config: Config, state: AgentState) -> Query:
     """No question in any trial, for clips of up to `stages` steps."""
     return queries.empty(len(state.waiting), config.stages, world.height, world.width, state.waiting.device)
-

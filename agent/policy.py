@@ -1,4 +1,4 @@
-"""The policy pi(a|s): a local and a global head, averaged, then softmax (Sec. 3.1.1); stacked over the trials.
+"""The policy pi(a|s): a local and a global head, averaged, then softmax (Sec. 3.1.1). One network a trial.
 
 All parameters of a trial stand in one flat row, so that freezing, copying and Adam are a few operations on
 `[N, P]`.
@@ -25,9 +25,7 @@ ACTIONS = 4
 
 
 class Side(NamedTuple):
-    """What a convolution does to one side of the grid: cells of padding before and behind, and the length
-    that is left.
-    """
+    """A convolution's cells of padding before and behind one side, and the length that is left."""
 
     before: int
     behind: int
@@ -35,18 +33,14 @@ class Side(NamedTuple):
 
 
 def side(length: int) -> Side:
-    """Longer than 3 shrinks by 2; 3 shrinks to 2 (one cell behind); 2 or less keeps its size (ours, Sec.
-    3.1.1).
-    """
+    """Longer than 3 shrinks by 2; 3 shrinks to 2 (one cell behind); 2 or less keeps its size (ours)."""
     if length > 3:
         return Side(0, 0, length - 2)
     return Side(0, 1, 2) if length == 3 else Side(1, 1, length)
 
 
 class Layer(NamedTuple):
-    """One matrix of weights `[rows, columns]` and its biases, at `start` of the flat row; conv layers know
-    their sides.
-    """
+    """Weights `[rows, columns]` and biases, at `start` of the row; convolutions have sides."""
 
     rows: int
     columns: int
@@ -125,9 +119,7 @@ class Network:
         return [layer for layer in self.layers if layer.sides]
 
     def start(self, keys: Keys, dtype: torch.dtype) -> Float[Tensor, "N P"]:
-        """Glorot uniform weights and zero biases, drawn from the trials' keys (ours: TensorFlow 1.12's
-        default).
-        """
+        """Glorot uniform weights and zero biases, drawn from the trials' keys (ours, as TensorFlow 1.12)"""
         parameters = torch.zeros(keys.seed.shape[0], self.size, dtype=dtype, device=keys.seed.device)
         for number, layer in enumerate(self.layers):
             bound = sqrt(6 / sum(layer.fans))
@@ -215,7 +207,5 @@ def _patches(x: Float[Tensor, "N S H W C"], sides: tuple[Side, Side]) -> Float[T
 
 
 def draw(logits: Float[Tensor, "N 4"], noise: Float[Tensor, "N 4"]) -> Int64[Tensor, "N"]:
-    """An action drawn from pi = softmax(logits), given Gumbel noise. Works where the policy has saturated,
-    too.
-    """
+    """An action drawn from pi = softmax(logits), given Gumbel noise. Works on a saturated policy, too."""
     return (logits.double() + noise).argmax(-1)

@@ -1,4 +1,6 @@
-"""What the agent asks and what it hears: two clips, and *left*, *right*, *either* or *neither* (Sec. 2.1, 2.2, Eq. 1)."""
+"""What the agent asks and what it hears: two clips, and *left*, *right*, *either* or *neither* (Sec. 2.1,
+2.2, Eq. 1).
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from envs.struct import Struct
 
 
 class Kind(IntEnum):
-    """What a query is: none this tick, guidance before a move (Sec. 2.1), or a preference between clips (Sec. 2.2)."""
+    """What a query is: none this tick, guidance before a move (Sec. 2.1), or a preference between clips (Sec.
+    2.2).
+    """
 
     NONE = 0
     GUIDANCE = 1
@@ -33,7 +37,8 @@ class Query(Struct):
     """At most one question a trial and tick. Axis 2 is the side: 0 is shown left, 1 right.
 
     A clip holds `length` actions and `length + 1` frames; what lies beyond its length is zero.
-    A guidance query is a pair of clips of length 1 whose second frame is the forecast of the move without chance.
+    A guidance query is a pair of clips of length 1 whose second frame is the forecast of the move without
+    chance.
     """
 
     kind: Int64[Tensor, "N"]
@@ -48,14 +53,18 @@ class Query(Struct):
 
 
 class Answer(Struct):
-    """The parent's answers, each with the query that it answers (a preference may be answered many ticks later)."""
+    """The parent's answers, each with the query that it answers (a preference may be answered many ticks
+    later).
+    """
 
     query: Query
     choice: Int64[Tensor, "N"]
 
     @property
     def mu(self) -> Float64[Tensor, "N 2"]:
-        """Eq. (1): [1, 0] for left, [0, 1] for right, [0.5, 0.5] for either; zeros where nothing is to be learnt."""
+        """Eq. (1): [1, 0] for left, [0, 1] for right, [0.5, 0.5] for either; zeros where nothing is to be
+        learnt.
+        """
         return _MU.to(self.choice.device)[self.choice]
 
 

@@ -6,7 +6,7 @@ Which finished clips make a pair is the business of `agent.pairing`.
 from __future__ import annotations
 
 import torch
-from jaxtyping import Bool, Float, Int64
+from jaxtyping import Bool, Int64
 from torch import Tensor
 
 from agent import pairing
@@ -23,7 +23,9 @@ from envs.rng import Stream, gumbel
 def act(
     world: Gridworld, network: Network, config: Config, state: AgentState, view: View, heard: Heard
 ) -> tuple[AgentState, Bool[Tensor, "N"]]:
-    """Perform the approved action, the recording's next one, or one drawn from pi_T. Says which trials steered."""
+    """Perform the approved action, the recording's next one, or one drawn from pi_T. Says which trials
+    steered.
+    """
     moving = ~state.waiting
     recorder, begun = _begin(config, world, state, view, heard)
     action = _action(network, config, state.replace(recorder=recorder), view, heard, begun)
@@ -37,7 +39,9 @@ def act(
 def _begin(
     config: Config, world: Gridworld, state: AgentState, view: View, heard: Heard
 ) -> tuple[Recorder, Int64[Tensor, "N"]]:
-    """Drop clips that a pause or an absence broke, and begin new ones; with the first actions of those that begin."""
+    """Drop clips that a pause or an absence broke, and begin new ones; with the first actions of those that
+    begin.
+    """
     recorder, keys = state.recorder, state.keys
     running = recorder.running & ~state.waiting & view.watched
     idle = view.watched & ~state.waiting & ~running & (heard.approved == NO_ACTION)
@@ -56,7 +60,9 @@ def _begin(
 def _permitted(
     config: Config, state: AgentState, view: View, best: Int64[Tensor, "N"]
 ) -> Bool[Tensor, "N 4"]:
-    """The first actions of an exploratory clip: not the argmax (Eq. 4), nor compared with it here at this stage."""
+    """The first actions of an exploratory clip: not the argmax (Eq. 4), nor compared with it here at this
+    stage.
+    """
     actions = torch.arange(4, device=best.device)
     permitted = actions != best[:, None]
     if config.recompare:

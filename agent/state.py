@@ -48,7 +48,7 @@ class Ring(Struct):
 
 
 class Asked(Struct):
-    """What was compared before: one word a query for the whole pair, one for (state, first actions, stage)."""
+    """What was compared before: a word a query for the whole pair, one for (state, first actions, stage)."""
 
     pair: Int64[Tensor, "N Q"]
     compared: Int64[Tensor, "N Q"]
@@ -70,14 +70,15 @@ class Recorder(Struct):
 
 
 class Report(Struct):
-    """What the last tick did, for whoever watches. Nothing in the agent reads it and no checkpoint holds it."""
+    """What the last tick did, for whoever watches. No part of the agent reads it, no checkpoint holds it."""
 
     before: WorldState  # the world before the move
     action: Int64[Tensor, "N"]
     moved: Bool[Tensor, "N"]
     trained: Bool[Tensor, "N"]
-    loss: Float[Tensor, "N"]  # Eq. (2) as it stood before the last gradient step, a mean over the entries in it
-    entropy_global: Float[Tensor, "N"]  # mean entropy of each head at the first states of the entries, in nats
+    # Eq. (2) before the last gradient step, and each head's entropy in nats: means over the entries in it
+    loss: Float[Tensor, "N"]
+    entropy_global: Float[Tensor, "N"]
     entropy_local: Float[Tensor, "N"]
 
 

@@ -34,14 +34,23 @@ def run(
     level: Annotated[str | None, typer.Option(help="A built-in level's name, or a level's file.")] = None,
     preset: Annotated[str, typer.Option(help="conservative, lax or direct.")] = "conservative",
     changes: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set a hyperparameter; may be repeated.")
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Set a hyperparameter; may be repeated."),
     ] = None,
     trials: Annotated[int, typer.Option(min=1, help="Agents to raise.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, max=2**53 - 1, help="Trial i of a seed is always the same agent.")] = 0,
-    max_ticks: Annotated[int, typer.Option(min=1, help="Ticks after which a trial is left unfinished.")] = 20_000,
-    until: Annotated[str, typer.Option(metavar="optimal|queries:N|ticks:N", help="When a trial is finished.")] = "optimal",
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**53 - 1, help="Trial i of a seed is always the same agent.")
+    ] = 0,
+    max_ticks: Annotated[
+        int, typer.Option(min=1, help="Ticks after which a trial is left unfinished.")
+    ] = 20_000,
+    until: Annotated[
+        str, typer.Option(metavar="optimal|queries:N|ticks:N", help="When a trial is finished.")
+    ] = "optimal",
     workers: Annotated[int | None, typer.Option(min=1, help="Processes. [default: one a core]")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON and nothing else.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
+    ] = False,
 ) -> None:
     """Raise agents by the scripted parent (Sec. 3.1.3), all at once, and count deaths and queries.
 
@@ -65,7 +74,9 @@ def run(
 
 
 def summarise(plan: Plan, level: str, tally: Tally, seconds: float) -> dict[str, Any]:
-    """The results as plain data. Means and deviations (over n - 1) are of the finished trials; the others are counted."""
+    """The results as plain data. Means and deviations (over n - 1) are of the finished trials; the others are
+    counted.
+    """
     rows = {name: getattr(tally, name).tolist() for name in (*COUNTS, "optimal")}
     finished = {name: getattr(tally, name)[tally.finished].double() for name in COUNTS}
     some, several = int(tally.finished.sum()) > 0, int(tally.finished.sum()) > 1
@@ -106,14 +117,18 @@ def _config(world: str, preset: str, changes: list[str]) -> Config:
         if not equals:
             raise Wrong(f"--set: '{change}' is not KEY=VALUE. Write it as --set p_guid=0.9.")
         if key not in Config.model_fields:
-            raise Wrong(f"--set: there is no hyperparameter '{key}'; there is: {', '.join(Config.model_fields)}.")
+            raise Wrong(
+                f"--set: there is no hyperparameter '{key}'; there is: {', '.join(Config.model_fields)}."
+            )
         given[key] = None if value.lower() in ("none", "null") else value
     try:
         return compose(preset, registry.defaults(world), given, strict=False)
     except ValidationError as error:
         first = error.errors()[0]
         name = str(first["loc"][0])
-        raise Wrong(f"--set: {name}={given.get(name)}: {first['msg']}. {Config.model_fields[name].description}") from None
+        raise Wrong(
+            f"--set: {name}={given.get(name)}: {first['msg']}. {Config.model_fields[name].description}"
+        ) from None
 
 
 def _until(text: str) -> Until:
@@ -146,7 +161,13 @@ def _bar(trials: int) -> Iterator[Progress | None]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("trials"), BarColumn(), MofNCompleteColumn(), TextColumn("tick {task.fields[tick]}"), TimeElapsedColumn())
+    columns = (
+        TextColumn("trials"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("tick {task.fields[tick]}"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task("trials", total=trials, tick=0)
         yield lambda finished, tick: bar.update(task, completed=finished, tick=tick)
@@ -156,7 +177,8 @@ def _page(results: dict[str, Any]) -> str:
     """The results for the reader."""
     number, optimal = len(results["trials"]), sum(row["optimal"] for row in results["trials"])
     lines = [
-        f"{results['world']}, {results['level']}: {number} trials until {results['until']}, {results['seconds']} s",
+        f"{results['world']}, {results['level']}: {number} trials"
+        f" until {results['until']}, {results['seconds']} s",
         f"  optimal     {optimal} of {number}",
     ]
     for name in COUNTS:
@@ -164,5 +186,7 @@ def _page(results: dict[str, Any]) -> str:
         said = "-" if mean is None else f"{mean:.2f}" + ("" if sd is None else f" +- {sd:.2f}")
         lines.append(f"  {name:<11} {said}")
     if results["unfinished"]:
-        lines.append(f"  unfinished  {results['unfinished']} after {results['max_ticks']} ticks; not in the means")
+        lines.append(
+            f"  unfinished  {results['unfinished']} after {results['max_ticks']} ticks; not in the means"
+        )
     return "\n".join(lines)

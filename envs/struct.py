@@ -1,6 +1,6 @@
 """Frozen records of tensors whose fields declare their shapes.
 
-A `Struct` is a frozen dataclass. Its tensor fields are annotated with jaxtyping, as in ``UInt8[Tensor, "N H W"]``.
+A `Struct` is a frozen dataclass. Its tensor fields are annotated as in ``UInt8[Tensor, "N H W"]``.
 The axis named ``N`` is the axis of trials, wherever it stands; `pick` and `merge` follow it.
 Shapes are checked by `check`, which tests and checkpoint loading call; the hot loop never does.
 """
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
-from functools import cache
 from typing import Any, Self, dataclass_transform, get_type_hints
 
 import torch
@@ -31,7 +30,7 @@ class Struct:
         return replace(self, **changes)  # type: ignore[type-var]
 
     def leaves(self, prefix: str = "") -> Iterator[tuple[str, Tensor, int | None]]:
-        """Every tensor below, as (dotted name, tensor, axis of trials or None), in the order of declaration."""
+        """Every tensor below, as (dotted name, tensor, axis of trials or None), as declared."""
         for name, axis in _axes(type(self)).items():
             value = getattr(self, name)
             if isinstance(value, Struct):
@@ -61,7 +60,9 @@ class Struct:
     def pick(self, index: Tensor) -> Self:
         """The trials of `index` (integers, or a mask over the trials), in that order."""
         where = index.nonzero().squeeze(1) if index.dtype == torch.bool else index
-        return self.map(lambda _name, tensor, axis: tensor if axis is None else tensor.index_select(axis, where))
+        return self.map(
+            lambda _name, tensor, axis: tensor if axis is None else tensor.index_select(axis, where)
+        )
 
     def where(self, mask: Tensor, other: Self) -> Self:
         """This record's trials where `mask` holds, the other's elsewhere. Both must have the same shapes."""
@@ -104,11 +105,15 @@ class Struct:
                     raise TypeError(f"{type(self).__name__}: {prefix}{name} must be {declared}, not {found}")
 
 
-@cache
+_AXES: dict[type[Struct], dict[str, int | None]] = {}
+
+
 def _axes(kind: type[Struct]) -> dict[str, int | None]:
     """The axis of trials of every field: where the declared shape has ``N``, or None where it has not."""
-    hints = get_type_hints(kind)
-    return {field.name: _axis(hints[field.name]) for field in fields(kind)}  # type: ignore[arg-type]
+    if kind not in _AXES:
+        hints = get_type_hints(kind)
+        _AXES[kind] = {field.name: _axis(hints[field.name]) for field in fields(kind)}  # type: ignore[arg-type]
+    return _AXES[kind]
 
 
 def _axis(hint: Any) -> int | None:

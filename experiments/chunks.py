@@ -1,7 +1,7 @@
-"""Many trials on several cores: chunks of one size, so that results do not depend on how many cores there are.
+"""Many trials on several cores: chunks of one size, so that results do not depend on the cores' number.
 
-Each chunk is a batch of its own. Which chunk a trial falls into changes nothing but the last bits of its sums: a batch
-of another size may add in another order (docs/architecture.md, "Batches and bits").
+Each chunk is a batch of its own. Which chunk a trial falls into changes nothing but the last bits of its
+sums: a batch of another size may add in another order (docs/architecture.md, "Batches and bits").
 """
 
 from __future__ import annotations
@@ -47,7 +47,9 @@ def raise_chunk(plan: Plan, start: int, progress: Progress | None = None) -> Tal
     """The trials from `start` on, at most CHUNK. Trial i has the same keys in whichever chunk it falls."""
     world = registry.make(plan.world, plan.level, time_limit=plan.config.time_limit)
     trial = torch.arange(start, min(start + CHUNK, plan.trials))
-    return raise_trials(world, plan.config, keys(plan.seed, plan.trials).pick(trial), plan.until, plan.max_ticks, progress)
+    return raise_trials(
+        world, plan.config, keys(plan.seed, plan.trials).pick(trial), plan.until, plan.max_ticks, progress
+    )
 
 
 def _here(plan: Plan, start: int, progress: Progress | None) -> Tally:

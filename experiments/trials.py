@@ -12,7 +12,6 @@ from torch import Tensor
 from agent import parenting
 from agent.config import Config
 from agent.query import Choice, Kind
-from agent.state import AgentState
 from envs.gridworld import Gridworld
 from envs.rng import Keys
 from envs.struct import Struct
@@ -27,7 +26,9 @@ Progress = Callable[[int, int], None]
 
 
 class Until(NamedTuple):
-    """When a trial is finished: its argmax policy is optimal, or a number of answered queries or of ticks is reached."""
+    """When a trial is finished: its argmax policy is optimal, or a number of answered queries or of ticks is
+    reached.
+    """
 
     kind: Literal["optimal", "queries", "ticks"]
     number: int = 0
@@ -112,12 +113,20 @@ class Nursery:
 
     def _leave(self, done: Bool[Tensor, "N"]) -> None:
         """Write the results of those that are done, and go on with the others alone once that pays."""
-        optimal = done if self.until.kind == "optimal" else done & self.evaluation.optimal(self.state.learner.live)
-        self.tally = self.tally.replace(finished=self.tally.finished | done, optimal=self.tally.optimal | optimal)
+        optimal = (
+            done if self.until.kind == "optimal" else done & self.evaluation.optimal(self.state.learner.live)
+        )
+        self.tally = self.tally.replace(
+            finished=self.tally.finished | done, optimal=self.tally.optimal | optimal
+        )
         self.save(done)
         if bool(self.tally.finished.double().mean() >= LEAVE):
             rest = (~self.tally.finished).nonzero().squeeze(1)
-            self.state, self.tally, self.trial = self.state.pick(rest), self.tally.pick(rest), self.trial[rest]
+            self.state, self.tally, self.trial = (
+                self.state.pick(rest),
+                self.tally.pick(rest),
+                self.trial[rest],
+            )
             self.parent.pick(rest)
 
     def save(self, which: Bool[Tensor, "N"]) -> None:
@@ -127,7 +136,12 @@ class Nursery:
 
 
 def raise_trials(
-    world: Gridworld, config: Config, keys: Keys, until: Until, max_ticks: int, progress: Progress | None = None
+    world: Gridworld,
+    config: Config,
+    keys: Keys,
+    until: Until,
+    max_ticks: int,
+    progress: Progress | None = None,
 ) -> Tally:
     """Raise one agent for each of `keys` until it is finished, for at most `max_ticks` ticks."""
     nursery = Nursery(world, config, keys, until)
@@ -139,5 +153,3 @@ def raise_trials(
             break
     nursery.save(~nursery.tally.finished)
     return nursery.result
-
-

@@ -1,4 +1,4 @@
-"""How well an agent does, by the parent's reward: exact, never by sampling. Nothing here is seen by the agent."""
+"""How well an agent does, by the parent's reward: exact, never by sampling. The agent sees none of it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Evaluation:
         self.starts = torch.arange(len(world.levels), device=world.device)
 
     def optimal(self, parameters: Float64[Tensor, "N P"]) -> Bool[Tensor, "N"]:
-        """Whether the argmax policy reaches the goal of every level by a shortest path among the safe ones."""
+        """Whether the argmax policy reaches every level's goal by a shortest safe path."""
         good = torch.ones(len(parameters), dtype=torch.bool, device=parameters.device)
         for start in self.starts:
             trial = good.nonzero().squeeze(1)
@@ -45,7 +45,9 @@ class Evaluation:
                 break
         return torch.isin(every, trial)
 
-    def _move(self, parameters: Tensor, trial: Int64[Tensor, "n"], at: Int64[Tensor, "n"]) -> Int64[Tensor, "n"]:
+    def _move(
+        self, parameters: Tensor, trial: Int64[Tensor, "n"], at: Int64[Tensor, "n"]
+    ) -> Int64[Tensor, "n"]:
         weights = parameters if len(trial) == len(parameters) else parameters[trial]
         action = self.brain.logits(weights, self.seen[at], self.near[at]).argmax(1)
         return self._safely(at, action)

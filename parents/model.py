@@ -1,4 +1,4 @@
-"""The parent's model of a world: every state that can be reached, and what each action leads to, chance left out.
+"""The parent's model of a world: every state in reach, and what each action leads to, chance left out.
 
 Found by stepping all states at once until nothing new turns up, so it needs nothing of a world but its rules.
 """
@@ -50,7 +50,9 @@ def explore(world: Gridworld, limit: int = 1_000_000) -> Model:
     Raises:
         ValueError: more than `limit` states.
     """
-    found = world.reset(keys(0, len(world.levels), world.device), torch.arange(len(world.levels), device=world.device))
+    found = world.reset(
+        keys(0, len(world.levels), world.device), torch.arange(len(world.levels), device=world.device)
+    )
     known = _word(found)
     edge, steps = found, []
     while len(edge.t):
@@ -61,16 +63,24 @@ def explore(world: Gridworld, limit: int = 1_000_000) -> Model:
         found = _join(found, edge)
         known = torch.cat((known, _word(edge)))
         if len(known) > limit:
-            raise ValueError(f"This world has more than {limit} states: values cannot be computed by listing them.")
+            raise ValueError(
+                f"This world has more than {limit} states: values cannot be computed by listing them."
+            )
     return _model(found, known, steps)
 
 
 def _look(world: Gridworld, edge: WorldState) -> tuple[WorldState, Tensor, Tensor]:
-    """What the four actions lead to from each state, with their rewards and dangers; rows in the order (state, action)."""
+    """What the four actions lead to from each state, with their rewards and dangers; rows in the order
+    (state, action).
+    """
     before = edge.pick(torch.arange(len(edge.t)).repeat_interleave(4))
     action = torch.arange(4).repeat(len(edge.t))
     after = world.forecast(before, action)
-    return after.replace(t=torch.zeros_like(after.t)), world.reward(before, action, after), world.unsafe(before, action, after)
+    return (
+        after.replace(t=torch.zeros_like(after.t)),
+        world.reward(before, action, after),
+        world.unsafe(before, action, after),
+    )
 
 
 def _model(found: WorldState, known: Tensor, steps: list[tuple[WorldState, Tensor, Tensor]]) -> Model:
@@ -93,7 +103,7 @@ def _word(states: WorldState) -> Tensor:
 
 def _new(words: Tensor, known: Tensor) -> Tensor:
     """The first place of each word that is not known yet, in order."""
-    unique, inverse = words.unique(return_inverse=True)
+    unique, inverse = torch.unique(words, return_inverse=True)
     places = torch.arange(len(words))
     first = torch.full_like(unique, len(words)).scatter_reduce(0, inverse, places, "amin")
     return first[~torch.isin(unique, known)].sort().values

@@ -1,8 +1,8 @@
-"""Who may stand behind the agent's mailbox: a script in tensors, people through rows of a database, or a record of either.
+"""Who may stand behind the agent's mailbox: a script, people through a database, or a record.
 
-    parents.scripted.ScriptedParent   answers in tensors, one tick later (Eq. 7, 8)
-    parents.replay.ReplayParent       gives a recorded session back
-    server.inbox.QueueParent          answers through the database
+parents.scripted.ScriptedParent   answers in tensors, one tick later (Eq. 7, 8)
+parents.replay.ReplayParent       gives a recorded session back
+server.inbox.QueueParent          answers through the database
 """
 
 from __future__ import annotations

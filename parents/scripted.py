@@ -1,4 +1,6 @@
-"""The substitute for a human parent (Sec. 3.1.3): prefers the clip with the greater advantage, refuses what is unsafe."""
+"""The substitute for a human parent (Sec. 3.1.3): prefers the clip with the greater advantage, refuses what
+is unsafe.
+"""
 
 from __future__ import annotations
 
@@ -20,15 +22,23 @@ TIE = 1e-6
 
 
 class Judgement:
-    """What the scripted parent thinks of queries: a function of what they hold, the world's rules and its values."""
+    """What the scripted parent thinks of queries: a function of what they hold, the world's rules and its
+    values.
+    """
 
-    def __init__(self, world: Gridworld, gamma: float, model: Model | None = None, values: Values | None = None) -> None:
-        """Work out the exact values of `world`; other values may be given, such as those of a sub-optimal policy."""
+    def __init__(
+        self, world: Gridworld, gamma: float, model: Model | None = None, values: Values | None = None
+    ) -> None:
+        """Work out the exact values of `world`; other values may be given, such as those of a sub-optimal
+        policy.
+        """
         self.model = explore(world) if model is None else model
         self.values = optimal(self.model, gamma) if values is None else values
 
     def choose(self, query: Query) -> Int64[Tensor, "N"]:
-        """Left or right by Eq. (7), *either* on a tie, *neither* where both moves of a guidance query are unsafe."""
+        """Left or right by Eq. (7), *either* on a tie, *neither* where both moves of a guidance query are
+        unsafe.
+        """
         alpha = advantage(self.model, self.values, query)
         margin = alpha[:, 0] - alpha[:, 1]
         choice = torch.where(margin > 0, int(Choice.LEFT), int(Choice.RIGHT))

@@ -1,4 +1,6 @@
-"""The parent's values V_p and Q_p, and the advantage by which it compares clips (Sec. 3.1.3, Eq. 7 and 8). Exact, float64."""
+"""The parent's values V_p and Q_p, and the advantage by which it compares clips (Sec. 3.1.3, Eq. 7 and 8).
+Exact, float64.
+"""
 
 from __future__ import annotations
 
@@ -55,25 +57,29 @@ def _iterate(model: Model, gamma: float, backup: object) -> Values:
 
 
 def advantage(model: Model, values: Values, query: Query) -> Float64[Tensor, "N 2"]:
-    """Eq. (7): alpha = sum_t gamma^t [Q_p(s_t, a_t) - V_p(s_t)] of both clips, up to each clip's own length."""
+    """Eq. (7): alpha = sum_t gamma^t [Q_p(s_t, a_t) - V_p(s_t)] of both clips, each to its length."""
     at = visited(model, query)[:, :, :-1]
     gain = values.q[at].gather(-1, query.action[..., None]).squeeze(-1) - values.v[at]
     step = torch.arange(gain.shape[2], device=gain.device)
-    return (gain * values.gamma**step.double() * (step < query.length[..., None])).sum(-1)
+    return (gain * values.gamma ** step.double() * (step < query.length[..., None])).sum(-1)
 
 
 def outcome(model: Model, values: Values, query: Query) -> Float64[Tensor, "N 2"]:
-    """Eq. (8): sum_t gamma^t r_t + gamma^T V_p(s_T) - V_p(s_0), equal to Eq. (7) where the world is deterministic."""
+    """Eq. (8): sum_t gamma^t r_t + gamma^T V_p(s_T) - V_p(s_0), equal to Eq. (7) where the world is
+    deterministic.
+    """
     at = visited(model, query)
     step = torch.arange(at.shape[2] - 1, device=at.device)
     reward = model.reward[at[:, :, :-1]].gather(-1, query.action[..., None]).squeeze(-1)
-    earned = (reward * values.gamma**step.double() * (step < query.length[..., None])).sum(-1)
+    earned = (reward * values.gamma ** step.double() * (step < query.length[..., None])).sum(-1)
     last = at.gather(2, query.length[..., None]).squeeze(-1)
     return earned + values.gamma ** query.length.double() * values.v[last] - values.v[at[:, :, 0]]
 
 
 def visited(model: Model, query: Query) -> Int64[Tensor, "N 2 T1"]:
-    """The model's states of both clips' frames; beyond a clip's length, and where nothing is asked, the first state."""
+    """The model's states of both clips' frames; beyond a clip's length, and where nothing is asked, the first
+    state.
+    """
     frame = torch.arange(query.ground.shape[2], device=query.kind.device)
     real = (frame <= query.length[..., None]) & (query.kind > 0)[:, None, None]
     at = torch.zeros_like(real, dtype=torch.int64)

@@ -1,4 +1,6 @@
-"""Batched lives under a parent, written down as the reference writes its own down, so that both can be compared."""
+"""Batched lives under a parent, written down as the reference writes its own down, so that both can be
+compared.
+"""
 
 from __future__ import annotations
 
@@ -75,11 +77,13 @@ def capricious(query: Query) -> torch.Tensor:
 
 
 def layers(brain: Network, parameters: torch.Tensor) -> list[torch.Tensor]:
-    """One policy's flat row [P] as the reference holds its parameters: weights [fan in, out] and biases, by layer."""
+    """One policy's flat row [P] as the reference holds its parameters: weights [fan in, out] and biases, by
+    layer.
+    """
     parts: list[torch.Tensor] = []
     for layer in brain.layers:
         weight = parameters[layer.start : layer.bias].view(layer.rows, layer.columns)
         if layer.sides:  # kept as (row, column, channel), drawn as (channel, row, column)
-            weight = weight.unflatten(0, (9, -1)).transpose(0, 1).flatten(0, 1)
+            weight = weight.view(9, -1, layer.columns).transpose(0, 1).flatten(0, 1)
         parts += [weight, parameters[layer.bias : layer.end]]
     return parts

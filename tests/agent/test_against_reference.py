@@ -1,4 +1,4 @@
-"""The batched agent asks what the reference asks, tick by tick, and learns the same parameters, to rounding."""
+"""The batched agent asks what the reference asks, tick by tick, and learns the same, to rounding."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ SETTINGS = {
 @pytest.mark.parametrize("parent", ["scripted", "capricious"])
 @pytest.mark.parametrize("name", list(SETTINGS))
 def test_same_query_log_and_parameters(name: str, parent: str) -> None:
-    compare(Config(**SETTINGS[name], gamma=0.9, time_limit=25, dtype="float64"), parent)
+    compare(
+        Config.model_validate({**SETTINGS[name], "gamma": 0.9, "time_limit": 25, "dtype": "float64"}), parent
+    )
 
 
 def compare(config: Config, parent: str) -> None:

@@ -21,7 +21,9 @@ PATIENCE = 60.0
 
 
 def answer(url: str, run: int, limit: int) -> int:
-    """Answer up to `limit` questions of a run, each as soon as it is asked. Web and worker may vanish and come back."""
+    """Answer up to `limit` questions of a run, each as soon as it is asked. Web and worker may vanish and
+    come back.
+    """
     judgement: Judgement | None = None
     answered, quiet_since = 0, time.monotonic()
     with httpx2.Client(base_url=url, timeout=5) as web:
@@ -62,7 +64,9 @@ def _send(web: httpx2.Client, query: int, choice: str) -> None:
     until = time.monotonic() + PATIENCE
     while time.monotonic() < until:
         try:
-            reply = web.post(f"/api/v1/queries/{query}/answer", json={"choice": choice, "client_id": "script"})
+            reply = web.post(
+                f"/api/v1/queries/{query}/answer", json={"choice": choice, "client_id": "script"}
+            )
         except httpx2.TransportError:
             time.sleep(0.02)
             continue

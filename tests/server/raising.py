@@ -1,4 +1,4 @@
-"""Runs of the same agent with and without the database, and their states held against each other bit for bit."""
+"""Runs of one agent with and without the database, and their states compared bit for bit."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ SEED = 11
 
 
 class Inline:
-    """The run without a database, under the scripted parent in tensors or under another. It ends hopeless episodes."""
+    """The run without a database, under the scripted parent in tensors or under another. It ends hopeless
+    episodes.
+    """
 
     def __init__(self, seed: int = SEED, judge: Judge | None = None) -> None:
         self.world, self.config = world_and_config()
@@ -77,7 +79,11 @@ def same_bits(one: Saved, other: Saved) -> list[str]:
     wrong = [] if one.config == other.config else ["config"]
     for ours, theirs in ((one.state, other.state), (one.tally, other.tally)):
         expected = theirs.tensors()
-        wrong += [name for name, part in ours.tensors().items() if not name.startswith("report.") and not equal(part, expected[name])]
+        wrong += [
+            name
+            for name, part in ours.tensors().items()
+            if not name.startswith("report.") and not equal(part, expected[name])
+        ]
     return wrong
 
 
@@ -88,7 +94,9 @@ def equal(one: torch.Tensor, other: torch.Tensor) -> bool:
 
 @contextmanager
 def worker(settings: Settings) -> Iterator[multiprocessing.process.BaseProcess]:
-    """A worker in a process of its own, killed at the end if it still lives. Forked: torch need not load again."""
+    """A worker in a process of its own, killed at the end if it still lives. Forked: torch need not load
+    again.
+    """
     process = multiprocessing.get_context("fork").Process(target=_work, args=(settings,))
     process.start()
     try:

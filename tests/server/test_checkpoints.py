@@ -1,4 +1,6 @@
-"""Checkpoints at chosen moments: the run goes on with the same bits, and would not if any piece were left out."""
+"""Checkpoints at chosen moments: the run goes on with the same bits, and would not if any piece were left
+out.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,6 @@ from server.checkpoint import REPORT, Saved, birth, pack, unpack, versions
 from server.db import Database, connect
 from server.errors import ServerError
 from server.life import Life
-
 from server.runs import claim, get_run
 from server.schema import upgrade
 from server.settings import Settings
@@ -46,7 +47,9 @@ class Moment(NamedTuple):
 
 @cache
 def moments() -> dict[str, Moment]:
-    """Each moment's first coming after the first maturation. One life of its own each: a life consumes its states."""
+    """Each moment's first coming after the first maturation. One life of its own each: a life consumes its
+    states.
+    """
     return {name: _moment(came) for name, came in MOMENTS.items()}
 
 
@@ -95,7 +98,9 @@ CONSTANT = {
 
 @pytest.mark.parametrize("piece", pieces())
 def test_no_piece_can_be_left_out(piece: str) -> None:
-    """Put the piece's value at birth (of another seed) in its place: at some moment the run must come out otherwise."""
+    """Put the piece's value at birth (of another seed) in its place: at some moment the run must come out
+    otherwise.
+    """
     part, name = piece.split("/")
     caught, varied = False, False
     for blob, query, after in moments().values():
@@ -153,8 +158,9 @@ def alive(db: Database, run: int) -> Life:
 
 def live_to(life: Life, tick: int) -> None:
     while life.tick < tick:
-        assert life.ready(mailbox.watch(life.db, [life.mine.run_id])[life.mine.run_id])
-        life.beat()
+        seen = mailbox.watch(life.db, [life.mine.run_id])[life.mine.run_id]
+        assert life.ready(seen)
+        life.beat(seen)
 
 
 def scripted(db: Database) -> int:
@@ -199,4 +205,7 @@ def test_ticks_that_were_lived_ask_nothing_twice(db: Database) -> None:
     assert again.tick == 0
     live_to(again, 40)
     with db.read() as session:
-        assert session.connection().exec_driver_sql("SELECT id, tick, clips FROM query ORDER BY id").all() == before
+        assert (
+            session.connection().exec_driver_sql("SELECT id, tick, clips FROM query ORDER BY id").all()
+            == before
+        )

@@ -104,8 +104,12 @@ def test_through_the_database_and_http(settings: Settings, db: Database) -> None
 
 
 @pytest.mark.timeout(300)
-def test_killed_at_twenty_random_moments(settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    """SIGKILL, twenty times, while it raises the agent; checkpoints are written often, so that kills hit them too."""
+def test_killed_at_twenty_random_moments(
+    settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SIGKILL, twenty times, while it raises the agent; checkpoints are written often, so that kills hit them
+    too.
+    """
     monkeypatch.setattr("server.life.CHECKPOINT_SECONDS", 0.05)
     moments = random.Random(5)
     run = begin(db)
