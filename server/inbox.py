@@ -35,16 +35,21 @@ class QueueParent:
         self.stages = config.stages
         self.tick = 0
         self.heard: Answer | None = None
+        self.answers = self.events_wait = True
+
+    def expect(self, answers: bool, events: bool) -> None:
+        """Whether the next tick has to look for answers and events; who has just looked spares it the way."""
+        self.answers, self.events_wait = answers, events
 
     def events(self, state: AgentState) -> Sequence[Event]:
         """The operator's events that apply before the tick that comes."""
         self.tick = int(state.keys.tick[0]) + 1
-        rows = mailbox.take_events(self.db, self.mine, self.tick)
+        rows = mailbox.take_events(self.db, self.mine, self.tick) if self.events_wait else ()
         return [_EVENTS.validate_python({"kind": row.kind, **row.payload}) for row in rows]
 
     def take(self, state: AgentState) -> Answer:
         """The answer to be heard in the tick that comes, or none."""
-        taken = mailbox.take_answer(self.db, self.mine, self.tick)
+        taken = mailbox.take_answer(self.db, self.mine, self.tick) if self.answers else None
         nothing = queries.empty(1, self.stages, self.world.height, self.world.width)
         self.heard = queries.silence(nothing)
         if taken is not None:

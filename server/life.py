@@ -96,8 +96,13 @@ class Life:
 
     # A tick
 
-    def beat(self) -> bool:
-        """One tick; whether the next may follow at once, because nothing was asked and nothing is awaited."""
+    def beat(self, seen: Watch | None = None) -> bool:
+        """One tick; whether the next may follow at once, because nothing was asked and nothing is awaited.
+
+        `seen` is what a look at the mailbox has just shown; None is a tick right after another, which does not look.
+        """
+        replayed = self.tick < self.record_ends
+        self.parent.expect(replayed or bool(seen and seen.answers), replayed or bool(seen and seen.events))
         state, config, query = parenting.beat(self.world, self.saved.config, self.saved.state, self.parent)
         assert self.parent.heard is not None
         tally = count(self.world, self.saved.tally, self.parent.heard, state)

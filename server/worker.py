@@ -109,8 +109,9 @@ class Worker:
             life.wait(seen)
             return False
         until = time.monotonic() + SLICE_SECONDS
-        while life.beat() and time.monotonic() < until and not life.finished():
-            continue
+        lively = life.beat(seen)
+        while lively and time.monotonic() < until and not life.finished():
+            lively = life.beat()
         if life.finished():
             life.save()
             runs.finish(self.db, life.mine, "finished", "Its argmax policy is optimal.")
