@@ -1,4 +1,4 @@
-"""Draws the pictures of the documentation: `make pictures`. Needs Chromium (PARENTING_CHROMIUM, or on the path)."""
+"""Draws the pictures of the documentation: `make pictures`. Needs Chromium."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def main(folder: Path) -> None:
 
 
 def shoot_parent(browser: Browser, url: str, folder: Path) -> None:
-    """The parent's page with a question: a run of its own for each picture, since a question is shown to one browser."""
+    """The parent's page with a question: a run for each picture, since a question goes to one browser."""
     for number, (device, size) in enumerate((("desktop", DESKTOP), ("phone", PHONE))):
         for scheme in ("light", "dark"):
             page = browser.new_page(viewport=size, color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]

@@ -1,1 +1,4 @@
-"""The worlds. They know nothing of agents, parents or databases. (Imports no torch: see tests/test_layers.py.)"""
+"""The worlds. They know nothing of agents, parents or databases.
+
+This file loads no torch (tests/test_layers.py).
+"""

@@ -1,7 +1,7 @@
 """Counter-based randomness: a draw is a hash of (seed, tick, stream, place).
 
-No generator is advanced, so a draw does not depend on what was drawn before, on the other trials of the batch or on
-their number. The hash is the finaliser of SplitMix64 (Steele, Lea & Flood 2014), applied once for each word.
+No generator is advanced, so a draw does not depend on what was drawn before, on the other trials of the batch
+or on their number. The hash is the finaliser of SplitMix64 (Steele, Lea & Flood 2014), applied once for each word.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Stream(IntEnum):
     PREFER = 8  # []  : try a preference query if u < p_pref
     PAIR_SIDES = 9  # [] : the exploitative clip is shown on the left if u < 0.5
     TRAIN = 10  # []  : take a gradient step if u < p_train
-    BATCH = 11  # place 65536 g + r : for row r of X in gradient step g; the rows with the smallest u are taken
+    BATCH = 11  # place 65536 g + r : row r of X in gradient step g; the smallest are taken
     # the worlds (envs/)
     DRYING = 21  # [H, W] : a watered plant dries if u < drying
     INTERRUPTS = 22  # [] : this episode interrupts if u < 0.5 (drawn at its start)

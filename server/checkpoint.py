@@ -28,7 +28,7 @@ class Diverged(ServerError):
 
 
 class Saved(NamedTuple):
-    """What a checkpoint holds: the agent, what was counted, and the config as the operator's events left it."""
+    """What a checkpoint holds: agent, counts, and the config as the operator's events left it."""
 
     state: AgentState
     tally: Tally

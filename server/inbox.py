@@ -1,4 +1,4 @@
-"""QueueParent: a parent behind the database. People answer in the browser; a script may answer in their place."""
+"""QueueParent: a parent behind the database. People answer in the browser, or a script for them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class QueueParent:
     def __init__(
         self, db: Database, mine: Claim, world: Gridworld, config: Config, asked: Callable[[], None]
     ) -> None:
-        """A mailbox for the run of a claim; `asked` is called after a query was stored, so that pages wake."""
+        """A mailbox for the run of a claim; `asked` is called once a query is stored: pages wake."""
         self.db, self.mine, self.world, self.asked = db, mine, world, asked
         self.stages = config.stages
         self.tick = 0

@@ -99,7 +99,7 @@ class Life:
     def beat(self, seen: Watch | None = None) -> bool:
         """One tick; whether the next may follow at once, because nothing was asked and nothing is awaited.
 
-        `seen` is what a look at the mailbox has just shown; None is a tick right after another, which does not look.
+        `seen` is what a look at the mailbox has just shown; a tick right after another does not look.
         """
         replayed = self.tick < self.record_ends
         self.parent.expect(replayed or bool(seen and seen.answers), replayed or bool(seen and seen.events))

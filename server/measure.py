@@ -6,7 +6,6 @@ from agent.query import Choice, Kind
 from parents.evaluation import Evaluation
 from server.checkpoint import Saved
 
-
 Row = dict[str, float | int | None]
 
 NOTHING_LEARNT: Row = {"loss": None, "entropy_global": None, "entropy_local": None}

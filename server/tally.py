@@ -1,4 +1,4 @@
-"""What is counted of one run, for the dashboard. It is in every checkpoint, so that no restart counts anything twice."""
+"""What is counted of one run. It is in every checkpoint, so that no restart counts anything twice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A person at the parent's page, played by a real browser: reads the question from the page and presses keys."""
+"""A person at the parent's page, played by a real browser: reads the page and presses keys."""
 
 from __future__ import annotations
 
@@ -17,7 +17,13 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from envs import registry
 
 ROOT = Path(__file__).parents[1]
-FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 FAR = 1000
 Cell = tuple[int, int]
 
@@ -87,7 +93,10 @@ def answer(page: Page, to_goal: dict[Cell, int]) -> str:
 
 
 def _paths(page: Page) -> list[str]:
-    return [board.get_attribute("data-path") or "" for board in page.query_selector_all("#question .board .agent[data-path]")]
+    return [
+        board.get_attribute("data-path") or ""
+        for board in page.query_selector_all("#question .board .agent[data-path]")
+    ]
 
 
 def _end(path: str) -> Cell:
