@@ -1,7 +1,7 @@
 """Counter-based randomness: a draw is a hash of (seed, tick, stream, place).
 
 No generator is advanced, so a draw does not depend on what was drawn before, on the other trials of the batch
-or on their number. The hash is the finaliser of SplitMix64 (Steele, Lea & Flood 2014), applied once for each word.
+or on their number. The hash is the finaliser of SplitMix64 (Steele, Lea & Flood 2014), once for each word.
 """
 
 from __future__ import annotations
