@@ -10,14 +10,14 @@ from __future__ import annotations
 import importlib
 import json
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from sqlalchemy import Connection, Engine, create_engine, event, make_url
+from sqlalchemy import Connection, Engine, PoolProxiedConnection, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError
 from sqlalchemy.orm import Session
 
@@ -27,6 +27,7 @@ from server.settings import Settings
 SAFE_SQLITE = (3, 51, 3)
 """Older ones may corrupt a database in WAL: a race between the log's reset and a checkpoint."""
 BUSY_SECONDS = 5.0
+Seen = TypeVar("Seen")
 PRAGMAS = {
     "journal_mode": "wal",
     "synchronous": "full",
@@ -49,7 +50,9 @@ class Database:
         self._writing = engine.execution_options(begin="IMMEDIATE")
         # One writer of this process at a time: fairer than many threads that sleep on SQLite's lock.
         self._turn = threading.Lock()
-        self._ear: Connection | None = None
+        self._listening = threading.Lock()
+        self._ear: PoolProxiedConnection | None = None
+        self._last: tuple[int, Hashable, Any] | None = None
 
     @contextmanager
     def read(self) -> Iterator[Session]:
@@ -78,19 +81,31 @@ class Database:
         finally:
             self._turn.release()
 
-    def pulse(self) -> int | None:
-        """A number that is another one once anybody else has committed; None where the database keeps none.
+    def remembered(self, key: Hashable, look: Callable[[], Seen]) -> Seen:
+        """What `look()` gives, or what the last look under this key gave if nobody has committed since.
 
-        It costs a hundredth of a transaction, so a poll asks this first. Not for two threads at once.
+        For polls: SQLite tells cheaply whether anything was committed. The last look alone is kept.
         """
+        with self._listening:
+            pulse = self._pulse()  # before the look: what is committed meanwhile belongs to the next one
+            if pulse is None:
+                return look()
+            if self._last is None or self._last[:2] != (pulse, key):
+                self._last = (pulse, key, look())
+            seen: Seen = self._last[2]
+            return seen
+
+    def _pulse(self) -> int | None:
+        """SQLite's number that changes with every commit of another connection; None in other databases."""
         if self.engine.dialect.name != "sqlite":
             return None
-        if self._ear is None:
-            self._ear = self.engine.connect()  # a connection of its own: what it commits itself does not count
         with _said_plainly():
-            cursor = self._ear.connection.cursor()
-            found: int = cursor.execute("PRAGMA data_version").fetchone()[0]
-            return found
+            if self._ear is None:
+                self._ear = self.engine.raw_connection()  # it never writes, so all commits are others' to it
+            cursor = self._ear.cursor()
+            cursor.execute("PRAGMA data_version")
+            number: int = cursor.fetchall()[0][0]
+            return number
 
     def close(self) -> None:
         """Close every connection."""

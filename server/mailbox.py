@@ -49,9 +49,13 @@ class Taken:
 
 
 def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
-    """The state of some runs, by id."""
-    with db.read() as session:
-        return {run_id: seen for run_id in run_ids if (seen := _watch(session, run_id)) is not None}
+    """The state of some runs, by id. While nobody commits anything, asking again costs next to nothing."""
+
+    def look() -> dict[int, Watch]:
+        with db.read() as session:
+            return {run_id: seen for run_id in run_ids if (seen := _watch(session, run_id)) is not None}
+
+    return db.remembered(("watch", *run_ids), look)
 
 
 def high_water(db: Database, run_id: int) -> int:

@@ -172,3 +172,33 @@ def test_answer_after_reopening(db: Database, settings: Settings, guidance: int)
     again = connect(settings)
     assert answer(again, guidance, "left", "a", "human") == stored
     again.close()
+
+
+def test_poll_looks_again_only_after_a_commit(db: Database, settings: Settings, run: Run) -> None:
+    other, looks = connect(settings), []
+
+    def look() -> int:
+        looks.append(1)
+        return len(looks)
+
+    assert [db.remembered("a", look) for _ in range(3)] == [1, 1, 1]
+    for writer in (other, db):
+        before = len(looks)
+        with writer.write() as session:
+            session.get_one(Run, run.id).tick += 1
+            assert db.remembered("a", look) == before, "not committed yet"
+        assert [db.remembered("a", look) for _ in range(2)] == [before + 1, before + 1]
+    assert db.remembered("b", look) == len(looks) == 4, "another question is not answered by the old look"
+    other.close()
+
+
+def test_commit_during_a_look_is_seen_by_the_next(db: Database, run: Run) -> None:
+    def look() -> int:
+        with db.read() as session:
+            seen = session.get_one(Run, run.id).tick
+        if not seen:
+            with db.write() as session:
+                session.get_one(Run, run.id).tick = 1
+        return seen
+
+    assert [db.remembered("a", look) for _ in range(2)] == [0, 1]
