@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import httpx2
 
@@ -56,7 +57,7 @@ class Stream:
     """A browser's tab: an open stream, read in a thread."""
 
     def __init__(self, url: str) -> None:
-        self.events: list[tuple[str, object, float]] = []
+        self.events: list[tuple[str, Any, float]] = []
         self.opened, self.ended = threading.Event(), threading.Event()
         self.headers: dict[str, str] = {}
         self._arrived = threading.Condition()
@@ -87,10 +88,10 @@ class Stream:
             self.events.append((name, data, time.monotonic()))
             self._arrived.notify_all()
 
-    def wait_for(self, name: str, count: int = 1, seconds: float = 10) -> list[object]:
+    def wait_for(self, name: str, count: int = 1, seconds: float = 10) -> list[Any]:
         """The data of the events of that name, once there are `count` of them."""
 
-        def found() -> list[object]:
+        def found() -> list[Any]:
             return [data for event, data, _ in self.events if event == name]
 
         with self._arrived:

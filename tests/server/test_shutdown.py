@@ -51,7 +51,7 @@ def test_web_stops_with_a_tab_open(data: Path, number: signal.Signals) -> None:
         stream = tab(url)
         assert seconds_to_end(web, number) < SOON
         assert stream.ended.wait(1)
-        assert "Traceback" not in web.communicate()[1]
+        assert web.communicate()[1] == "", "the stream ended by itself; uvicorn had not to cut it off"
 
 
 @pytest.mark.parametrize("number", SIGNALS)
