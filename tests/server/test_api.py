@@ -14,7 +14,7 @@ from server.db import Database
 from server.log import set_up_log
 from server.mailbox import take_events
 from server.record import write_metrics
-from server.runs import Claim, claim, get_run, report, set_status
+from server.runs import Claim, get_run, report
 from server.tables import Run
 from tests.server.conftest import Clock
 
@@ -274,34 +274,3 @@ def test_large_body_is_refused_with_and_without_length(client: httpx2.Client) ->
 def test_health(client: httpx2.Client) -> None:
     assert client.get("/healthz").json() == {"status": "ok"}
     assert client.get("/readyz").json()["migrations"] == "ok"
-
-
-def test_plotly_is_served_from_its_package(client: httpx2.Client) -> None:
-    served = client.get("/static/vendor/plotly.min.js")
-    assert served.status_code == 200
-    assert served.headers["content-type"].startswith("text/javascript")
-    assert "max-age" in served.headers["cache-control"]
-    assert b"plotly.js v" in served.content[:200]
-
-
-def test_api_describes_itself(client: httpx2.Client) -> None:
-    described = client.get("/api/v1/openapi.json").json()
-    assert {path for path in described["paths"] if path.startswith("/api/v1")} >= {
-        "/api/v1/runs",
-        "/api/v1/runs/{run_id}/queries/lease",
-        "/api/v1/queries/{query_id}/answer",
-    }
-
-
-def test_readiness_tells_of_the_worker(client: httpx2.Client, db: Database, run: Run, clock: Clock) -> None:
-    def worker() -> str:
-        found: str = client.get("/readyz").json()["worker"]
-        return found
-
-    assert worker() == "silent"
-    claim(db, "worker-1")
-    assert worker() == "alive"
-    clock.pass_seconds(6)
-    assert worker() == "silent"
-    set_status(db, run.id, "stopped")
-    assert worker() == "idle"

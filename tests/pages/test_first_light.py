@@ -6,14 +6,15 @@ from pathlib import Path
 
 import httpx2
 import pytest
+from playwright.sync_api import Browser
 
-from tests.by_hand import answer, chromium, distances, start, up
+from tests.by_hand import answer, distances, start, up
 from tests.pages.watched import Watched
 
 
 @pytest.mark.timeout(300)
-def test_an_agent_is_raised_by_keyboard(chromium_path: str, tmp_path: Path) -> None:
-    with up(tmp_path) as url, chromium(chromium_path) as browser:
+def test_an_agent_is_raised_by_keyboard(browser: Browser, tmp_path: Path) -> None:
+    with up(tmp_path) as url:
         watched = Watched(browser, url)
         page = watched.open("/")
         start(page, url)
