@@ -1,7 +1,6 @@
 """Who may stand behind the agent's mailbox: a script, people through a database, or a record.
 
 parents.scripted.ScriptedParent   answers in tensors, one tick later (Eq. 7, 8)
-parents.replay.ReplayParent       gives a recorded session back
 server.inbox.QueueParent          answers through the database
 """
 
