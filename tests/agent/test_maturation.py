@@ -1,0 +1,109 @@
+"""Maturation (Sec. 2.4): what a stage leaves behind, and how clips of two steps act (Eq. 5, 6)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from agent import parenting
+from agent.birth import network_of
+from agent.config import PRESETS, Config
+from agent.events import Mature
+from agent.pairing import EXPLOIT, EXPLORE
+from agent.query import Answer, Choice, Kind, Query, silence
+from agent.state import AgentState
+from envs import registry
+from envs.rng import keys
+from tests.agent.lives import live
+
+WORLD = registry.make("unsafe-exploration", time_limit=25)
+LAX = Config.model_validate({**PRESETS["lax"], "stages": 2, "time_limit": 25})
+
+
+def agreeable(query: Query) -> Tensor:
+    """Always *left*: nobody gets stuck."""
+    return (query.kind != Kind.NONE).long() * Choice.LEFT
+
+
+def mature(config: Config, state: AgentState) -> AgentState:
+    """The operator's event, on a copy, so that before and after can be compared."""
+    after, same = parenting.apply(WORLD, config, state.clone(), Mature())
+    assert same == config
+    return after.check()
+
+
+def test_a_stage_ends() -> None:
+    before, _ = live(WORLD, LAX, agreeable, seed=5, trials=3, ticks=80)
+    recorder = before.recorder
+    assert bool((before.learner.steps > 0).all())
+    assert bool((before.answered > 0).all())
+    assert bool(recorder.ring.here.flatten(1).any(1).all())
+    after = mature(LAX, before)
+    assert after.maturity.tolist() == [2, 2, 2]
+    assert after.answered.tolist() == [0, 0, 0]
+    # pi_1 is frozen, pi_2 begins as its copy, Adam begins anew
+    assert torch.equal(after.learner.elders[0], before.learner.live)
+    assert torch.equal(after.learner.live, before.learner.live)
+    assert not bool(after.learner.first.any() | after.learner.second.any() | after.learner.steps.any())
+    # the recorder is empty; what was asked, X and familiarity stay
+    assert not bool(after.recorder.ring.here.any() | after.recorder.ring.open.any())
+    assert not bool(after.recorder.ring.count.any() | after.recorder.running.any())
+    assert after.recorder.turn.tolist() == [EXPLOIT] * 3
+    assert torch.equal(after.recorder.asked.pair, recorder.asked.pair)
+    assert torch.equal(after.x.mu, before.x.mu)
+    assert torch.equal(after.familiarity, before.familiarity)
+
+
+def test_the_frozen_policy_stays_as_it_was() -> None:
+    state, _ = live(WORLD, LAX, agreeable, seed=5, trials=2, ticks=80)
+    state = mature(LAX, state)
+    frozen = state.learner.elders.clone()
+    query = parenting.no_query(WORLD, LAX, state)
+    for _ in range(30):
+        state, query = parenting.step(WORLD, LAX, state, Answer(query=query, choice=agreeable(query)))
+    assert bool((state.learner.steps > 0).any())
+    assert torch.equal(state.learner.elders, frozen)
+    assert not torch.equal(state.learner.live, frozen[0])
+
+
+def test_the_last_stage_never_ends() -> None:
+    state, _ = live(WORLD, LAX.model_copy(update={"stages": 1}), agreeable, seed=5, trials=2, ticks=60)
+    after = mature(LAX.model_copy(update={"stages": 1}), state)
+    for (name, ours), theirs in zip(state.tensors().items(), after.tensors().values(), strict=True):
+        assert torch.equal(ours, theirs), name
+
+
+def test_the_budget_of_answers_ends_a_stage() -> None:
+    config = LAX.model_copy(update={"stages": 3, "mature_every": 5})
+    state = parenting.init(WORLD, config, keys(1, 3))
+    for answered, stage, left in [(4, 1, 4), (5, 2, 0), (4, 2, 4), (9, 3, 0), (100, 3, 100)]:
+        state.answered.fill_(answered)
+        state, _ = parenting.step(WORLD, config, state, silence(parenting.no_query(WORLD, config, state)))
+        assert state.maturity.tolist() == [stage] * 3
+        assert state.answered.tolist() == [left] * 3
+
+
+def prefers(state: AgentState, action: int) -> None:
+    """A policy that has this argmax everywhere: no weights, and one bias in each head."""
+    brain = network_of(WORLD)
+    state.learner.live.zero_()
+    for layer in (brain.layers[1], brain.layers[-1]):
+        state.learner.live[:, layer.bias + action] = 1
+
+
+def test_the_second_action_of_a_clip_of_two_is_pi_1s() -> None:
+    config = Config(p_guid=0, p_rec=1, p_pref=0, p_train=0, stages=2, time_limit=25)
+    state = parenting.init(WORLD, config, keys(3, 4))
+    prefers(state, 3)
+    state = mature(config, state)
+    prefers(state, 1)
+    for _ in range(60):
+        state, _ = parenting.step(WORLD, config, state, silence(parenting.no_query(WORLD, config, state)))
+    ring = state.recorder.ring
+    for kind, first in ((EXPLOIT, [1]), (EXPLORE, [0, 2, 3])):  # Eq. (4): anything but the argmax
+        here = ring.here[:, kind]
+        action, length = ring.action[:, kind][here], ring.length[:, kind][here]
+        assert sorted(set(action[:, 0].tolist())) == first
+        assert set(action[length == 2, 1].tolist()) == {3}
+        assert int((length == 2).sum()) > 20
+        assert int(length.max()) == 2
