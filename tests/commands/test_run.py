@@ -1,0 +1,132 @@
+"""`parenting run`: the results as JSON, wrong options in a sentence, and the claim of Table 1 in small."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from statistics import mean, stdev
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from commands.main import app
+
+COUNTS = ("deaths", "guidance", "preference", "ticks")
+FAULTY = "world: unsafe-exploration\n\nWWWW\nWAQW\nWWWW\n"
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(app, ["run", *arguments])
+
+
+def results(*arguments: str) -> dict[str, Any]:
+    result = run("unsafe-exploration", "--json", *arguments)
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)  # a second document or a word beside it would be an error
+    assert isinstance(found, dict)
+    return found
+
+
+def column(found: dict[str, Any], name: str) -> list[int]:
+    return [trial[name] for trial in found["trials"]]
+
+
+def test_json_is_one_document() -> None:
+    found = results("--trials", "3", "--until", "ticks:5")
+    assert (found["world"], found["level"], found["config"]["gamma"]) == ("unsafe-exploration", "island", 0.9)
+    assert [set(trial) for trial in found["trials"]] == [{*COUNTS, "optimal"}] * 3
+    assert column(found, "ticks") == [5, 5, 5]
+    assert found["unfinished"] == 0
+    assert set(found["mean"]) == set(found["sd"]) == set(COUNTS)
+
+
+def test_mean_and_deviation_are_of_the_trials() -> None:
+    found = results("--preset", "direct", "--trials", "8", "--until", "ticks:60", "--seed", "4")
+    for name in COUNTS:
+        assert found["mean"][name] == pytest.approx(mean(column(found, name)))
+        assert found["sd"][name] == pytest.approx(stdev(column(found, name)))
+    assert found["mean"]["deaths"] > 0
+    assert found["sd"]["deaths"] > 0
+
+
+def test_order_of_options_is_free() -> None:
+    before = run("--until", "ticks:5", "--set", "p_guid=0.5", "--json", "--trials", "2", "unsafe-exploration")
+    found = json.loads(before.stdout)
+    assert found["config"]["p_guid"] == 0.5
+    assert found["trials"] == results("--trials", "2", "--set", "p_guid=0.5", "--until", "ticks:5")["trials"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["nowhere"], "nowhere"),
+        (["unsafe-exploration", "--level", "atlantis"], "atlantis"),
+        (["unsafe-exploration", "--preset", "strict"], "strict"),
+        (["unsafe-exploration", "--set", "bogus=1"], "bogus"),
+        (["unsafe-exploration", "--set", "p_guid"], "p_guid"),
+        (["unsafe-exploration", "--set", "p_guid=2"], "p_guid=2"),
+        (["unsafe-exploration", "--set", "recompare=perhaps"], "recompare=perhaps"),
+        (["unsafe-exploration", "--set", "gradient_steps=1.5"], "gradient_steps=1.5"),
+        (["unsafe-exploration", "--until", "never"], "never"),
+        (["unsafe-exploration", "--until", "ticks:0"], "ticks:0"),
+        (["unsafe-exploration", "--until", "optimal:3"], "optimal:3"),
+    ],
+)
+def test_wrong_option_is_named_in_one_sentence(arguments: list[str], named: str) -> None:
+    result = run(*arguments, "--json")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert named in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert "Traceback" not in result.output
+
+
+def test_faulty_level_file_is_refused_where_it_is_wrong(tmp_path: Path) -> None:
+    file = tmp_path / "faulty.txt"
+    file.write_text(FAULTY, encoding="utf-8")
+    result = run("unsafe-exploration", "--level", str(file))
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"{file}, line 4, column 3: 'Q' is no glyph")
+    assert result.stdout == ""
+
+
+def test_level_file_is_played(tmp_path: Path) -> None:
+    file = tmp_path / "strip.txt"
+    file.write_text(FAULTY.replace("AQ", "AG"), encoding="utf-8")
+    found = results("--level", str(file), "--trials", "4")
+    assert all(column(found, "optimal"))
+
+
+def test_unfinished_trials_are_counted_apart() -> None:
+    every = results("--trials", "12")
+    limit = sorted(column(every, "ticks"))[5]
+    cut = results("--trials", "12", "--max-ticks", str(limit))
+    done = [trial for trial in cut["trials"] if trial["optimal"]]
+    assert done == [trial for trial in every["trials"] if trial["ticks"] <= limit]
+    assert cut["unfinished"] == 12 - len(done) > 0
+    assert {trial["ticks"] for trial in cut["trials"] if not trial["optimal"]} == {limit}
+    assert cut["mean"]["ticks"] == pytest.approx(mean(trial["ticks"] for trial in done))
+
+
+def test_no_mean_where_no_trial_finished() -> None:
+    found = results("--trials", "2", "--max-ticks", "1", "--until", "ticks:2")
+    assert found["unfinished"] == 2
+    assert found["mean"] == found["sd"] == dict.fromkeys(COUNTS)
+
+
+def test_trials_do_not_depend_on_the_number_of_workers() -> None:
+    arguments = ("--trials", "60", "--until", "ticks:5")
+    one, two = results(*arguments, "--workers", "1"), results(*arguments, "--workers", "2")
+    assert len(one["trials"]) == 60
+    assert one["trials"] == two["trials"]
+
+
+def test_conservative_parenting_loses_a_tenth_of_the_lives_at_most() -> None:
+    """Table 1 in small: "0 or 1" deaths under a conservative parent, many without guidance."""
+    conservative = results("--trials", "40")
+    direct = results("--trials", "40", "--preset", "direct")
+    assert all(column(conservative, "optimal"))
+    assert conservative["mean"]["deaths"] < 0.5
+    assert sum(column(direct, "deaths")) >= 10 * max(1, sum(column(conservative, "deaths")))
+    assert direct["mean"]["guidance"] == 0
