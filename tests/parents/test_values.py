@@ -1,0 +1,139 @@
+"""The parent's model and values (Sec. 3.1.3): by hand on the island, and Eq. (7) against Eq. (8)."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from agent.query import Kind
+from envs.rng import keys
+from parents.model import explore
+from parents.values import HOPELESS, advantage, of_policy, optimal, outcome
+from tests.by_hand import distances
+from tests.parents.walking import at, island, place, query, random_queries
+
+LEVELS = ("island", "island-bottleneck")
+UP, DOWN, LEFT, RIGHT = range(4)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_value_falls_by_gamma_with_every_step_to_the_goal(level: str) -> None:
+    model = explore(island(level))
+    values = optimal(model, 0.9)
+    for cell, distance in distances(level).items():
+        expected = 0.9 ** (distance - 1) if distance else 0.0
+        assert float(values.v[place(model, cell)]) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_step_into_water_is_worth_minus_one(level: str) -> None:
+    model = explore(island(level))
+    values = optimal(model, 0.9)
+    assert bool(model.unsafe.any())
+    assert set(values.q[model.unsafe].tolist()) == {-1.0}
+    assert bool((values.q[~model.unsafe] > -1).all())
+
+
+def test_values_at_the_start_of_the_island() -> None:
+    """From (1, 4) the goal at (4, 3) is 4 steps away: down and left come nearer, up is a wall."""
+    model = explore(island())
+    q = optimal(model, 0.9).q[place(model, (1, 4))].tolist()
+    assert q == pytest.approx([0.9**4, 0.9**3, 0.9**3, 0.9**5])
+
+
+def test_gamma_one_values_every_way_to_the_goal_alike() -> None:
+    model = explore(island())
+    assert set(optimal(model, 1.0).v[~model.over].tolist()) == {1.0}
+
+
+def test_a_policy_that_never_arrives_is_hopeless_only_where_rewards_say_so() -> None:
+    """Walking into the wall above for ever earns 0, and 0 is what it is worth."""
+    model = explore(island())
+    policy = torch.zeros(len(model.over), 4, dtype=torch.float64)
+    policy[:, UP] = 1
+    v = of_policy(model, 0.9, policy).v
+    assert float(v[place(model, (1, 4))]) == pytest.approx(0, abs=1e-9)
+    assert bool((v > HOPELESS).all())
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("gamma", [0.9, 1.0])
+def test_both_forms_of_the_advantage_agree(level: str, gamma: float) -> None:
+    world = island(level)
+    model = explore(world)
+    values = optimal(model, gamma)
+    asked = random_queries(world, model, 200, Kind.PREFERENCE)
+    assert {1, 2, 3} <= set(asked.length.flatten().tolist())
+    alpha = advantage(model, values, asked)
+    assert float(alpha.min()) < -1
+    assert float(alpha.max()) > -1e-9
+    torch.testing.assert_close(alpha, outcome(model, values, asked), rtol=0, atol=1e-9)
+    assert bool((alpha <= 1e-9).all())  # nothing is better than optimal
+
+
+def test_advantage_of_clips_by_hand() -> None:
+    """Left, then down is on a shortest way; right three times ends in water."""
+    world = island()
+    model = explore(world)
+    asked = query(world, Kind.PREFERENCE, at(model, (1, 4)), [LEFT, DOWN], [RIGHT, RIGHT, RIGHT])
+    assert asked.agent[0, 1, :4].tolist() == [[1, 4], [1, 5], [1, 6], [1, 7]]
+    alpha = advantage(model, optimal(model, 0.9), asked)[0].tolist()
+    assert alpha == pytest.approx([0.0, -(0.9**2) - 0.9**3])
+
+
+def test_a_random_policy_against_plain_evaluation() -> None:
+    model = explore(island())
+    dice = torch.Generator().manual_seed(5)
+    policy = torch.rand(len(model.over), 4, generator=dice, dtype=torch.float64)
+    policy /= policy.sum(1, keepdim=True)
+    values = of_policy(model, 0.9, policy)
+    v = [0.0] * len(model.over)
+    for _ in range(400):
+        v = [
+            0.0
+            if model.over[s]
+            else sum(
+                float(policy[s, a]) * (float(model.reward[s, a]) + 0.9 * v[int(model.then[s, a])])
+                for a in range(4)
+            )
+            for s in range(len(v))
+        ]
+    assert values.v.tolist() == pytest.approx(v, abs=1e-9)
+    q = [float(model.reward[s, a]) + 0.9 * v[int(model.then[s, a])] for s in range(len(v)) for a in range(4)]
+    assert values.q.flatten().tolist() == pytest.approx(q, abs=1e-9)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_the_model_is_what_step_does(level: str) -> None:
+    world = island(level)
+    model = explore(world)
+    states, key = model.states, keys(0, len(model.over))
+    assert model.find(states.board, states.agent, states.box, states.level).tolist() == list(
+        range(len(key.seed))
+    )
+    for number in range(4):
+        action = torch.full((len(key.seed),), number)
+        after = world.step(states, action, key)
+        reached = model.find(after.board, after.agent, after.box, after.level)
+        assert torch.equal(model.then[:, number], reached)
+        assert torch.equal(model.over[reached], after.over)
+        assert torch.equal(model.reward[:, number], world.reward(states, action, after))
+        assert torch.equal(model.unsafe[:, number], world.unsafe(states, action, after))
+
+
+def test_every_cell_in_reach_is_found_and_no_other() -> None:
+    world = island()
+    cells = {tuple(cell) for cell in explore(world).states.agent.tolist()}
+    assert cells == world.kind.reach(world.levels[0])
+
+
+def test_a_state_out_of_reach_is_refused() -> None:
+    model = explore(island())
+    lost = at(model, (1, 4))
+    with pytest.raises(LookupError, match="cannot be reached"):
+        model.find(lost.board, torch.tensor([[0, 0]]), lost.box, lost.level)
+
+
+def test_too_many_states_are_refused() -> None:
+    with pytest.raises(ValueError, match="more than 5 states"):
+        explore(island(), limit=5)
