@@ -1,0 +1,118 @@
+"""Exact evaluation against plain roll-outs of the argmax policy through the world's own `step`."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+import torch
+from torch import Tensor
+
+from agent import parenting
+from agent.birth import network_of
+from agent.config import compose
+from envs import registry
+from envs.gridworld import Gridworld, local_state
+from envs.rng import keys
+from parents.evaluation import Evaluation
+from parents.model import explore
+from parents.scripted import Judgement, ScriptedParent
+from parents.values import optimal
+from tests.by_hand import distances
+from tests.parents.walking import island, place
+
+LEVELS = ("island", "island-bottleneck")
+TICKS = {"island": 60, "island-bottleneck": 120}
+"""After so many some policies are optimal and some are not."""
+GAMMA = 0.9
+
+
+def random(world: Gridworld, trials: int = 20) -> Tensor:
+    return network_of(world).start(keys(3, trials), torch.float64)
+
+
+@cache
+def trained(level: str, trials: int = 20) -> Tensor:
+    """Policies on their way: some are optimal by now and some are not."""
+    world = island(level)
+    config = compose("conservative", registry.defaults(world.name), {}, strict=False)
+    state = parenting.init(world, config, keys(0, trials))
+    parent = ScriptedParent(Judgement(world, GAMMA), parenting.no_query(world, config, state))
+    for _ in range(TICKS[level]):
+        state, query = parenting.step(world, config, state, parent.take(state))
+        parent.post(query)
+    return state.learner.live
+
+
+def roll_out(world: Gridworld, parameters: Tensor) -> list[tuple[float, int, bool, bool]]:
+    """Of each policy: its return, its steps, whether it drowned, whether it reached the goal."""
+    rolled = []
+    brain, key = network_of(world), keys(0, 1)
+    for row in parameters:
+        state, total, drowned = world.reset(key, torch.zeros(1, dtype=torch.int64)), 0.0, False
+        while not bool(state.over | world.truncated(state)):
+            seen = world.observe(state.board, state.agent, state.box)
+            action = brain.logits(row[None], seen, local_state(seen, state.agent)).argmax(1)
+            after = world.step(state, action, key)
+            total += GAMMA ** int(state.t) * float(world.reward(state, action, after))
+            drowned |= bool(world.unsafe(state, action, after))
+            state = after
+        rolled.append((total, int(state.t), drowned, bool(state.over) and not drowned))
+    return rolled
+
+
+def policies(level: str) -> dict[str, Tensor]:
+    return {"random": random(island(level)), "trained": trained(level)}
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("kind", ["random", "trained"])
+def test_against_roll_outs(level: str, kind: str) -> None:
+    world, parameters = island(level), policies(level)[kind]
+    evaluation = Evaluation(world, explore(world), GAMMA)
+    rolled = roll_out(world, parameters)
+    assert evaluation.returns(parameters).tolist() == pytest.approx([row[0] for row in rolled], abs=1e-12)
+    shortest = distances(level)[world.levels[0].find("A")[0]]
+    expected = [arrived and steps == shortest for _, steps, _, arrived in rolled]
+    assert evaluation.optimal(parameters).tolist() == expected
+    if kind == "trained":
+        assert set(expected) == {True, False}  # else nothing would be told apart
+    else:
+        assert any(row[2] for row in rolled)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_optimal_policies_earn_the_best_return(level: str) -> None:
+    world = island(level)
+    evaluation = Evaluation(world, explore(world), GAMMA)
+    parameters = torch.cat((random(world).float(), trained(level)))
+    reached = (evaluation.returns(parameters) - evaluation.best()).abs() < 1e-9
+    assert torch.equal(evaluation.optimal(parameters), reached)
+    assert bool((evaluation.returns(parameters) <= evaluation.best() + 1e-9).all())
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("gamma", [0.9, 1.0])
+def test_best_is_the_value_of_the_start(level: str, gamma: float) -> None:
+    world = island(level)
+    model = explore(world)
+    assert Evaluation(world, model, gamma).best() == pytest.approx(
+        float(optimal(model, gamma).v[0]), abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_distances_are_those_of_the_drawing(level: str) -> None:
+    world = island(level)
+    model = explore(world)
+    distance = Evaluation(world, model, GAMMA).distance
+    for cell, steps in distances(level).items():
+        assert int(distance[place(model, cell)]) == steps
+
+
+def test_return_is_cut_off_at_the_time_limit() -> None:
+    """The shortest way takes 4 steps: with 3 the goal's reward is never earned, whatever the policy."""
+    world = registry.make("unsafe-exploration", "island", time_limit=3)
+    found = Evaluation(world, explore(world), GAMMA).returns(trained("island"))
+    assert bool((found <= 0).all())
+    assert bool((Evaluation(island(), explore(island()), GAMMA).returns(trained("island")) > 0).any())
