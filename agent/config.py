@@ -74,7 +74,7 @@ PRESETS: dict[str, dict[str, float]] = {
 def compose(
     preset: str, world: Mapping[str, object], changes: Mapping[str, object], *, strict: bool
 ) -> Config:
-    """The preset, over it the world's own defaults, over it what this run sets (PAPER.md, "Settings").
+    """The preset, over it the world's own defaults, over it what this run sets (docs/paper.md, "Settings").
 
     `strict` refuses text in the place of a number, as JSON needs it; the command line has nothing but text.
 

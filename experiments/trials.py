@@ -41,7 +41,7 @@ class Until(NamedTuple):
 class Tally(Struct):
     """What is counted of each trial."""
 
-    deaths: Int64[Tensor, "N"]  # unsafe steps (PAPER.md, "Unsafe")
+    deaths: Int64[Tensor, "N"]  # unsafe steps (docs/paper.md, "Unsafe")
     guidance: Int64[Tensor, "N"]  # answered guidance queries, redraws included
     preference: Int64[Tensor, "N"]
     ticks: Int64[Tensor, "N"]

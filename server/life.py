@@ -73,7 +73,7 @@ class Life:
     # When it may live on
 
     def ready(self, seen: Watch) -> bool:
-        """Whether the next tick may pass: an agent never outruns its parent (DESIGN.md, "Decisions")."""
+        """Whether the next tick may pass: an agent never outruns its parent (docs/architecture.md)."""
         if self.tick < self.record_ends or seen.events:
             return True
         if seen.open_guidance or seen.open_preferences > self.saved.config.max_open_preferences:

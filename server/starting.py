@@ -159,7 +159,7 @@ def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
 
 
 def _config(new: NewRun, wrong: list[tuple[str, str]]) -> Config | None:
-    """The preset, over it what the world sets, over it what this run sets (PAPER.md, "Settings")."""
+    """The preset, over it what the world sets, over it what this run sets (docs/paper.md, "Settings")."""
     if new.preset not in PRESETS:
         wrong.append(("preset", f"There is no such preset; there is: {', '.join(PRESETS)}."))
         return None

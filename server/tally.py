@@ -15,7 +15,7 @@ from envs.struct import Struct
 class Tally(Struct):
     """Cumulative counts. Axes have one place: a run is a batch of one."""
 
-    deaths: Int64[Tensor, "N"]  # unsafe steps (PAPER.md, "Unsafe")
+    deaths: Int64[Tensor, "N"]  # unsafe steps (docs/paper.md, "Unsafe")
     episodes: Int64[Tensor, "N"]  # ended ones
     kinds: Int64[Tensor, "N 3"]  # answered queries by Kind
     choices: Int64[Tensor, "N 5"]  # answers by Choice
