@@ -76,6 +76,13 @@ def capricious(query: Query) -> torch.Tensor:
     return torch.where(query.kind == Kind.NONE, 0, 1 + (moves + places) % len(list(Choice)[1:]))
 
 
+def wayward(query: Query) -> torch.Tensor:
+    """The same, but *neither* only where a first action is up: so no life is ever stuck."""
+    choice = capricious(query)
+    upward = (query.action[:, :, 0] == 0).any(1)
+    return torch.where((choice == Choice.NEITHER) & ~upward, int(Choice.EITHER), choice)
+
+
 def layers(brain: Network, parameters: torch.Tensor) -> list[torch.Tensor]:
     """One policy's flat row [P] as the reference holds its parameters: weights [fan in, out] and biases, by
     layer.

@@ -11,7 +11,7 @@ from agent.query import Query
 from envs import registry
 from parents.scripted import Judgement
 from server.codec import CHOICE_NAMES
-from tests.agent.lives import Judge, as_query, capricious, layers, live
+from tests.agent.lives import Judge, as_query, layers, live, wayward
 from tests.reference import Reference
 from tests.reference_clips import Clip
 
@@ -33,7 +33,7 @@ SETTINGS = {
 }
 
 
-@pytest.mark.parametrize("parent", ["scripted", "capricious"])
+@pytest.mark.parametrize("parent", ["scripted", "wayward"])
 @pytest.mark.parametrize("name", list(SETTINGS))
 def test_same_query_log_and_parameters(name: str, parent: str) -> None:
     compare(
@@ -42,7 +42,7 @@ def test_same_query_log_and_parameters(name: str, parent: str) -> None:
 
 
 def compare(config: Config, parent: str) -> None:
-    judge: Judge = Judgement(WORLD, config.gamma).choose if parent == "scripted" else capricious
+    judge: Judge = Judgement(WORLD, config.gamma).choose if parent == "scripted" else wayward
     state, logs = live(WORLD, config, judge, seed=7, trials=TRIALS, ticks=TICKS)
     for trial in range(TRIALS):
 
@@ -54,7 +54,8 @@ def compare(config: Config, parent: str) -> None:
         for _ in range(TICKS):
             reference.tick()
         assert logs[trial] == reference.log
-        assert len(reference.log) > 0
+        assert reference.refused is None or len(reference.refused) < 4  # a stuck life would compare nothing
+        assert len(reference.log) > 5
         assert reference.stage == int(state.maturity[trial])
         ours = [*state.learner.elders[: reference.stage - 1, trial], state.learner.live[trial]]
         for policy, expected in zip(ours, reference.parameters(), strict=True):
