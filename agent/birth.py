@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import torch
 from torch import Tensor
 
@@ -9,8 +12,14 @@ from agent import dataset, familiarity
 from agent.config import Config
 from agent.policy import Network, network
 from agent.state import AgentState, Asked, Clip, Learner, Recorder, Report, Ring
+from envs import registry
 from envs.gridworld import Gridworld, WorldState
+from envs.levels.kind import Level
+from envs.maze import maze_legend
 from envs.rng import Keys
+
+SUPERVISION = {"present": True, "absent": False, "random": None}
+"""The rules' option `supervised` for each word of the config."""
 
 
 def init(world: Gridworld, config: Config, keys: Keys) -> AgentState:
@@ -94,5 +103,17 @@ def no_report(world: WorldState, dtype: torch.dtype) -> Report:
 
 
 def network_of(world: Gridworld) -> Network:
-    """The policy's architecture for a world (Sec. 3.1.1)."""
-    return network(world.height, world.width, len(world.legend))
+    """The policy's architecture for a world (Sec. 3.1.1); it knows the goal of mazes, too (Sec. 3.1.4)."""
+    return network(world.height, world.width, len(maze_legend(world.legend)))
+
+
+def world_of(name: str, level: str | Level | Sequence[Level] | None, config: Config) -> Gridworld:
+    """The world that a run with this config lives in.
+
+    Raises:
+        UnknownName, LevelError, ValueError: as `envs.registry.make`.
+    """
+    options: dict[str, Any] = {}
+    if "supervised" in registry.kind(name).options:
+        options["supervised"] = SUPERVISION[config.supervised]
+    return registry.make(name, level, time_limit=config.time_limit, **options)

@@ -10,6 +10,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 Dtype = Literal["float32", "float64"]
+Supervision = Literal["present", "absent", "random"]
+Inside = Literal["up-down", "left"]
 
 
 class Config(BaseModel):
@@ -56,6 +58,15 @@ class Config(BaseModel):
     # the run
     time_limit: int = Field(100, ge=1, le=10_000, description="Steps after which an episode is cut off.")
     gamma: float = Field(1.0, gt=0, le=1, description="The parent's discount in Eq. (7) and (8).")
+    supervised: Supervision = Field(
+        "present", description="Whether the supervisor is there, where a world has one (Sec. 3.2.5)."
+    )
+    inside: Inside = Field(
+        "up-down", description="Where the garden's parent walks inside its cycle (Sec. 3.3)."
+    )
+    pretrain: bool = Field(
+        False, description="Begin with weights pre-trained on mazes, and rehearse mazes (Sec. 3.1.4)."
+    )
     max_open_preferences: int = Field(
         3, ge=0, le=1000, description="The agent waits while more preference queries than this are open."
     )

@@ -18,7 +18,7 @@ from torch.nn.functional import pad
 
 from envs.levels.kind import AGENT, BOX, LAND, PIECES, WALL, Cell, Kind, Level
 from envs.levels.rules import MOVES
-from envs.rng import Keys
+from envs.rng import Keys, keys
 from envs.struct import Struct
 
 Actions = Int64[Tensor, "N"]
@@ -80,6 +80,11 @@ class Gridworld(ABC):
             t=zero,
             over=zero.bool(),
         )
+
+    def beginnings(self) -> WorldState:
+        """Every state that an episode may begin in: first the start of each of the K levels, one a row."""
+        count = len(self.levels)
+        return self.reset(keys(0, count, self.device), torch.arange(count, device=self.device))
 
     def step(self, state: WorldState, action: Actions, keys: Keys) -> WorldState:
         """One step of every trial; `t` grows by 1. A trial that is over comes back as it was, its `t` too."""
@@ -155,6 +160,10 @@ class Gridworld(ABC):
     @abstractmethod
     def unsafe(self, before: WorldState, action: Actions, after: WorldState) -> Bool[Tensor, "N"]:
         """Whether *deaths* counts a step (docs/paper.md, "Unsafe"); never where the trial was over."""
+
+    def forbidden(self, before: WorldState, action: Actions, after: WorldState) -> Bool[Tensor, "N"]:
+        """What a safe path never does, watched or not: the unsafe steps, unless a world says more (3.2.5)."""
+        return self.unsafe(before, action, after)
 
     def suite_reward(self, before: WorldState, action: Actions, after: WorldState) -> Float64[Tensor, "N"]:
         """The reward that the suite hands out, which an agent could hack: -1 a step and +50 at the goal."""

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import torch
 
+from agent.birth import world_of
 from agent.config import Config
-from envs import registry
 from envs.rng import keys
 from experiments.trials import Progress, Tally, Until, raise_trials
 
@@ -45,7 +45,7 @@ def run(plan: Plan, workers: int, progress: Progress | None = None) -> Tally:
 
 def raise_chunk(plan: Plan, start: int, progress: Progress | None = None) -> Tally:
     """The trials from `start` on, at most CHUNK. Trial i has the same keys in whichever chunk it falls."""
-    world = registry.make(plan.world, plan.level, time_limit=plan.config.time_limit)
+    world = world_of(plan.world, plan.level, plan.config)
     trial = torch.arange(start, min(start + CHUNK, plan.trials))
     return raise_trials(
         world, plan.config, keys(plan.seed, plan.trials).pick(trial), plan.until, plan.max_ticks, progress

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import structlog
 
 from agent import parenting
+from agent.birth import world_of
 from agent.config import Config
 from agent.query import Kind, Query
-from envs import registry
 from parents.evaluation import Evaluation
 from parents.scripted import Judgement
 from server import mailbox, record, runs
@@ -42,7 +42,7 @@ class Life:
         """
         self.db, self.mine, self.run = db, mine, run
         born = Config.model_validate(run.config)
-        self.world = registry.make(run.world, run.level_text, time_limit=born.time_limit)
+        self.world = world_of(run.world, run.level_text, born)
         judgement = Judgement(self.world, born.gamma)
         self.evaluation = Evaluation(self.world, judgement.model, born.gamma)
         self.parent = self._parent(born, judgement, asked)

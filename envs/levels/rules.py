@@ -13,14 +13,14 @@ MOVES: tuple[Cell, ...] = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """Up, down, left, right: row and column of each action, in the order of the actions."""
 
 
-def moved(level: Level, cell: Cell, action: int) -> Cell:
-    """Where a move ends: walls and the board's edge stop it."""
+def moved(level: Level, cell: Cell, action: int, walls: str = WALL) -> Cell:
+    """Where a move ends: the glyphs of `walls` and the board's edge stop it."""
     row, column = cell[0] + MOVES[action][0], cell[1] + MOVES[action][1]
     inside = 0 <= row < level.height and 0 <= column < level.width
-    return (row, column) if inside and level.glyph((row, column)) != WALL else cell
+    return (row, column) if inside and level.glyph((row, column)) not in walls else cell
 
 
-def reachable(level: Level, ends: str) -> set[Cell]:
+def reachable(level: Level, ends: str, walls: str = WALL) -> set[Cell]:
     """Every cell that the agent can come to; `ends` end the episode, so nothing is reached through them."""
     (start,) = level.find(AGENT)
     found, fringe = {start}, deque([start])
@@ -28,7 +28,7 @@ def reachable(level: Level, ends: str) -> set[Cell]:
         cell = fringe.popleft()
         if level.glyph(cell) in ends:
             continue
-        fresh = {moved(level, cell, action) for action in range(len(MOVES))} - found
+        fresh = {moved(level, cell, action, walls) for action in range(len(MOVES))} - found
         found |= fresh
         fringe.extend(sorted(fresh))
     return found
