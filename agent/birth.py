@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from agent import dataset, familiarity
 from agent.config import Config
 from agent.policy import Network, network
-from agent.state import AgentState, Asked, Clip, Learner, Recorder, Report, Ring
+from agent.state import AgentState, Asked, Clip, Learner, Recorder, Rehearsal, Report, Ring
 from envs import registry
 from envs.gridworld import Gridworld, WorldState
 from envs.levels.kind import Level
@@ -22,10 +23,15 @@ SUPERVISION = {"present": True, "absent": False, "random": None}
 """The rules' option `supervised` for each word of the config."""
 
 
-def init(world: Gridworld, config: Config, keys: Keys) -> AgentState:
-    """Agents at tick 0, one a trial of `keys`: weights and first episode are drawn from them."""
+def init(
+    world: Gridworld, config: Config, keys: Keys, weights: Float[Tensor, "P"] | None = None
+) -> AgentState:
+    """Agents at tick 0, one a trial of `keys`. Weights are drawn from them, or are the pre-trained `weights`.
+
+    Raises:
+        ValueError: the config has pre-training on and no weights came, or the other way round.
+    """
     trials, device = len(keys.seed), keys.seed.device
-    brain = network_of(world)
 
     def zeros(*shape: int, dtype: torch.dtype = torch.int64) -> Tensor:
         return torch.zeros(trials, *shape, dtype=dtype, device=device)
@@ -41,13 +47,35 @@ def init(world: Gridworld, config: Config, keys: Keys) -> AgentState:
         refused=zeros(4, dtype=torch.bool),
         x=dataset.empty(trials, world.height, world.width, device),
         recorder=_recorder(world, config.stages, trials, device),
-        learner=_learner(brain, config, keys),
+        learner=_learner(network_of(world), config, keys, weights),
+        rehearsal=_rehearsal(network_of(world), config, keys),
         report=no_report(start, getattr(torch, config.dtype)),
     )
 
 
-def _learner(brain: Network, config: Config, keys: Keys) -> Learner:
-    live = brain.start(keys, getattr(torch, config.dtype))
+def _rehearsal(brain: Network, config: Config, keys: Keys) -> Rehearsal:
+    trials, size = len(keys.seed), brain.size if config.pretrain else 0
+    first = torch.zeros(trials, size, dtype=getattr(torch, config.dtype), device=keys.seed.device)
+    nothing = torch.zeros_like(keys.tick)
+    return Rehearsal(first=first, second=torch.zeros_like(first), steps=nothing, owed=nothing.bool())
+
+
+def _start(brain: Network, config: Config, keys: Keys, weights: Tensor | None) -> Float[Tensor, "N P"]:
+    dtype = getattr(torch, config.dtype)
+    if config.pretrain != (weights is not None):
+        wanted = "needs pre-trained weights" if config.pretrain else "takes no pre-trained weights"
+        raise ValueError(f"A run with pretrain = {config.pretrain} {wanted}.")
+    if weights is None:
+        return brain.start(keys, dtype)
+    if weights.shape != (brain.size,):
+        raise ValueError(
+            f"weights must hold {brain.size} numbers for this world, not {tuple(weights.shape)}."
+        )
+    return weights.to(keys.seed.device, dtype).repeat(len(keys.seed), 1)
+
+
+def _learner(brain: Network, config: Config, keys: Keys, weights: Tensor | None) -> Learner:
+    live = _start(brain, config, keys, weights)
     return Learner(
         live=live,
         first=torch.zeros_like(live),

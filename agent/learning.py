@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import torch
 import torch.nn.functional as F
@@ -12,7 +12,7 @@ from torch import Tensor
 from agent.config import Config
 from agent.dataset import Dataset
 from agent.policy import Affine, Heads, Network
-from agent.state import AgentState, Learner
+from agent.state import AgentState
 from envs.rng import Keys, Stream
 
 BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam's default parameters (Sec. 3.1.2)
@@ -51,7 +51,7 @@ def train(network: Network, config: Config, state: AgentState, acted: Bool[Tenso
     for step in range(config.gradient_steps):
         rows = choose(config, state.x, state.keys, step)
         terms, gradient = differentiate(network, config, state.learner.live, rows)
-        adam(state.learner, gradient, training, config.learning_rate)
+        adam(state.learner.live, state.learner, gradient, training, config.learning_rate)
     entries = rows.mu.sum((-1, -2)).clamp_min(1)
     return state.replace(
         report=state.report.replace(
@@ -120,18 +120,43 @@ def entropy(logits: Float[Tensor, "N S 4"]) -> Float[Tensor, "N S"]:
     return -(logs.exp() * logs).sum(-1)
 
 
-def adam(learner: Learner, gradient: Float[Tensor, "N P"], training: Bool[Tensor, "N"], rate: float) -> None:
+class Moments(Protocol):
+    """What Adam remembers between its steps."""
+
+    @property
+    def first(self) -> Float[Tensor, "N P"]:
+        """The first moments."""
+        ...
+
+    @property
+    def second(self) -> Float[Tensor, "N P"]:
+        """The second moments."""
+        ...
+
+    @property
+    def steps(self) -> Int64[Tensor, "N"]:
+        """Steps taken."""
+        ...
+
+
+def adam(
+    live: Float[Tensor, "N P"],
+    moments: Moments,
+    gradient: Float[Tensor, "N P"],
+    training: Bool[Tensor, "N"],
+    rate: float,
+) -> None:
     """One step of Adam (Kingma & Ba 2014) in the trials that train; nothing moves in the others. In place.
 
     `gradient` serves as room for what is worked out, and is lost.
     """
-    learner.steps.add_(training)
+    moments.steps.add_(training)
     on = training.to(gradient.dtype)[:, None]
-    t = learner.steps.clamp_min(1).to(torch.float64)[:, None]
-    learner.first.lerp_(gradient, on * (1 - BETA1))
-    learner.second.lerp_(gradient.square_(), on * (1 - BETA2))
+    t = moments.steps.clamp_min(1).to(torch.float64)[:, None]
+    moments.first.lerp_(gradient, on * (1 - BETA1))
+    moments.second.lerp_(gradient.square_(), on * (1 - BETA2))
     # rate m / (sqrt(v) + EPSILON), m and v corrected for their start at zero, with fewer passes over [N, P]
     root = (1 - BETA2**t).sqrt()
     size = (rate * root / (1 - BETA1**t)).to(gradient.dtype) * on
-    scale = torch.sqrt(learner.second, out=gradient).add_((EPSILON * root).to(gradient.dtype))
-    learner.live.addcmul_(torch.div(learner.first, scale, out=scale), size, value=-1)
+    scale = torch.sqrt(moments.second, out=gradient).add_((EPSILON * root).to(gradient.dtype))
+    live.addcmul_(torch.div(moments.first, scale, out=scale), size, value=-1)

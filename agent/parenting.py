@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 import torch
 
-from agent import guidance, learning, maturation, pairing, recording
+from agent import guidance, learning, maturation, pairing, pretraining, recording
 from agent import query as queries
 from agent.birth import init, network_of, no_report
 from agent.config import Config
@@ -25,7 +25,7 @@ from agent.query import Answer, Query
 from agent.state import AgentState
 from envs.gridworld import Gridworld, local_state
 
-__all__ = ["apply", "beat", "init", "live", "no_query", "step"]
+__all__ = ["apply", "beat", "init", "live", "no_query", "rehearse", "step"]
 
 
 def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Query]:
@@ -45,12 +45,17 @@ def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) ->
 def beat(
     world: Gridworld, config: Config, state: AgentState, parent: Mailbox
 ) -> tuple[AgentState, Config, Query]:
-    """One tick with its parent: the operator's events, an answer, a step, a question."""
+    """One tick with its parent: the operator's events, an answer, a step, a question; then mazes."""
     for event in parent.events(state):
         state, config = apply(world, config, state, event)
     state, query = step(world, config, state, parent.take(state))
     parent.post(query)
-    return state, config, query
+    return rehearse(world, config, state), config, query
+
+
+def rehearse(world: Gridworld, config: Config, state: AgentState) -> AgentState:
+    """The step of pre-training that the tick before owes (Sec. 3.1.4). Consumes `state`."""
+    return pretraining.rehearse(world, network_of(world), config, state)
 
 
 def live(

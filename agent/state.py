@@ -21,6 +21,18 @@ class Learner(Struct):
     elders: Float[Tensor, "M N P"]
 
 
+class Rehearsal(Struct):
+    """What pre-training keeps during parenting: Adam's state, and whether a step is owed (Sec. 3.1.4).
+
+    Q is P, or 0 in a run without pre-training.
+    """
+
+    first: Float[Tensor, "N Q"]  # Adam's first moments
+    second: Float[Tensor, "N Q"]  # Adam's second moments
+    steps: Int64[Tensor, "N"]  # gradient steps
+    owed: Bool[Tensor, "N"]  # the last tick trained
+
+
 class Clip(Struct):
     """The clip that is being recorded."""
 
@@ -95,6 +107,7 @@ class AgentState(Struct):
     x: Dataset
     recorder: Recorder
     learner: Learner
+    rehearsal: Rehearsal
     report: Report
 
     @property

@@ -62,7 +62,7 @@ def test_adam_is_torchs_and_leaves_other_trials_alone() -> None:
         gradient = torch.tensor([[0.5, -2.0, 0.1]] * 2, dtype=DOUBLE) * step
         theirs.grad = gradient[0].clone()
         optimiser.step()
-        adam(learner, gradient, torch.tensor([True, False]), 0.01)
+        adam(learner.live, learner, gradient, torch.tensor([True, False]), 0.01)
     torch.testing.assert_close(learner.live[0], theirs.detach(), rtol=1e-10, atol=1e-12)
     assert torch.equal(learner.live[1], start[1])
     assert learner.steps.tolist() == [5, 0]

@@ -1,0 +1,128 @@
+"""Pre-training on random path-connected mazes, so that an agent can walk before it is parented (Sec. 3.1.4).
+
+A step is 16 whole episodes and one step of Adam: REINFORCE with returns to go, less their mean and divided by
+their standard deviation over the step (ours); and a little entropy, so that the policy stays open to its
+parent.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Float, Float64, UInt8
+from torch import Tensor
+
+from agent.config import Config
+from agent.learning import adam, entropy
+from agent.maze_walks import Batch, Pool, Walks, draw_mazes, pool, walk
+from agent.policy import Affine, Network
+from agent.state import AgentState
+from envs.gridworld import Gridworld
+from envs.rng import Keys
+
+GOAL, STEP = 50.0, -1.0
+"""Rewards in a maze: +50 at the goal, -1 (?) a step."""
+ENTROPY = 0.1
+"""What a nat of entropy is worth, where returns have a standard deviation of 1 (ours)."""
+RATE = 0.001
+"""Adam's step size, its default."""
+
+
+class Visits(NamedTuple):
+    """The distinct states that a trial's episodes came by, with their shares in the gradient."""
+
+    seen: UInt8[Tensor, "N V H W"]
+    near: UInt8[Tensor, "N V 4"]
+    worth: Float[Tensor, "N V 4"]  # normalised returns to go, summed by action, over the number of steps
+    share: Float[Tensor, "N V"]  # of all steps
+
+
+def rehearse(world: Gridworld, network: Network, config: Config, state: AgentState) -> AgentState:
+    """The step of pre-training that the training of the tick before owes; so mazes are not forgotten.
+
+    It is taken when this tick's query is out: nobody waits for it. Updates the learner in place.
+    """
+    if not config.pretrain:
+        return state
+    mine = state.rehearsal
+    trial = mine.owed.nonzero().squeeze(1)
+    if len(trial):
+        everyone = len(trial) == len(mine.owed)
+        live = state.learner.live
+        some, keys = (live, state.keys) if everyone else (live[trial], state.keys.pick(trial))
+        found, _ = policy_gradient(network, some, pool(*_size(world)), keys)
+        whole = found if everyone else torch.zeros_like(live).index_put((trial,), found)
+        adam(live, mine, whole, mine.owed, RATE)
+    return state.replace(rehearsal=mine.replace(owed=state.report.trained))
+
+
+def _size(world: Gridworld) -> tuple[int, int, str, str]:
+    return world.height, world.width, world.legend, str(world.device)
+
+
+def policy_gradient(
+    network: Network, parameters: Float[Tensor, "N P"], pool: Pool, keys: Keys
+) -> tuple[Float[Tensor, "N P"], Float64[Tensor, "N"]]:
+    """The gradient of one step, each trial's by itself, and the mean return of its 16 episodes."""
+    batch = draw_mazes(pool, keys)
+    with torch.no_grad():
+        logits = network.heads(network.unpack(parameters), batch.seen, batch.near).logits
+    walks = walk(batch, logits.double().softmax(2), keys)
+    earned = returns_to_go(walks)
+    visits = visited(batch, walks, earned, logits.dtype)
+    return _differentiate(network, parameters, visits), earned[:, 0].mean(1)
+
+
+def returns_to_go(walks: Walks) -> Float64[Tensor, "N T E"]:
+    """What each episode earns from each of its steps on; 0 once it has ended."""
+    left = walks.alive.flip(1).cumsum(1).flip(1).double()
+    return (STEP * left + GOAL * walks.arrived[:, None].double()) * walks.alive
+
+
+def visited(batch: Batch, walks: Walks, earned: Float64[Tensor, "N T E"], dtype: torch.dtype) -> Visits:
+    """All steps of the episodes, summed over the distinct states that they were taken in."""
+    rows = batch.seen.shape[1]
+    steps = walks.alive.sum((1, 2))
+    share = _total(walks.state, walks.alive.double() / steps[:, None, None], rows + 1)[:, :rows]
+    taken = 4 * walks.state + walks.action
+    worth = _total(taken, _normalised(earned, walks) / steps[:, None, None], 4 * rows + 4)
+    worth = worth.view(-1, rows + 1, 4)[:, :rows]
+    came = share > 0
+    place = came.long().argsort(dim=1, descending=True, stable=True)[:, : int(came.sum(1).max())]
+    every = torch.arange(len(place), device=place.device)[:, None]
+    return Visits(
+        seen=batch.seen[every, place],
+        near=batch.near[every, place],
+        worth=worth[every, place].to(dtype),
+        share=share[every, place].to(dtype),
+    )
+
+
+def _normalised(earned: Float64[Tensor, "N T E"], walks: Walks) -> Float64[Tensor, "N T E"]:
+    """Returns to go, less their mean and divided by their standard deviation over the step (ours)."""
+    steps = walks.alive.sum((1, 2))
+    centred = (earned - (earned.sum((1, 2)) / steps)[:, None, None]) * walks.alive
+    deviation = (centred.square().sum((1, 2)) / steps).sqrt()
+    return centred / deviation.clamp_min(1e-8)[:, None, None]
+
+
+def _total(place: Tensor, amount: Tensor, size: int) -> Tensor:
+    """Amounts summed by place."""
+    zero = amount.new_zeros(len(amount), size)
+    return zero.scatter_add_(1, place.flatten(1), amount.flatten(1))
+
+
+def _differentiate(
+    network: Network, parameters: Float[Tensor, "N P"], visits: Visits
+) -> Float[Tensor, "N P"]:
+    layers = [
+        Affine(*(part.detach().requires_grad_() for part in layer)) for layer in network.unpack(parameters)
+    ]
+    with torch.enable_grad():
+        logits = network.heads(layers, visits.seen, visits.near).logits
+        gain = (visits.worth * logits.log_softmax(2)).sum((1, 2))
+        open_minded = (visits.share * entropy(logits)).sum(1)
+        loss = -gain - ENTROPY * open_minded
+        parts = torch.autograd.grad(loss.sum(), [part for layer in layers for part in layer])
+    return torch.cat([part.flatten(1) for part in parts], dim=1)
