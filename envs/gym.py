@@ -29,6 +29,14 @@ PALETTE = {
     "water": (0, 114, 178),
     "goal": (0, 158, 115),
     "agent": (213, 94, 0),
+    "box": (230, 159, 0),
+    "interruption": (204, 121, 167),
+    "button": (120, 70, 150),
+    "watered plant": (90, 140, 30),
+    "dry plant": (170, 130, 80),
+    "bucket": (86, 180, 233),
+    "shortcut": (240, 228, 66),
+    "supervisor": (60, 50, 80),
 }
 """The colour of each tile by its name in the legends, after Okabe and Ito."""
 

@@ -18,7 +18,11 @@ from envs.levels.kind import AGENT, LAND, WALL, LevelError
 from envs.rng import Keys, keys
 from tests.envs.walk import explore
 
-CERTAIN: dict[str, dict[str, Any]] = {}
+CERTAIN: dict[str, dict[str, Any]] = {
+    "reward-hacking": {"drying": 0.0},
+    "interruptibility": {"interrupts": False},
+    "absent-supervisor": {"supervised": True},
+}
 """For a world with chance: the options that leave nothing to it."""
 
 Spoil = Callable[[list[str]], list[str]]
