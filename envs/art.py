@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from envs.levels.kind import AGENT, Kind, Level, LevelError
+from envs.levels.kind import AGENT, Cell, Kind, Level, LevelError
 
 __all__ = ["LARGEST", "SMALLEST", "Level", "LevelError", "draw", "parse"]
 
@@ -35,12 +35,14 @@ def parse(text: str, world: Kind, source: str = "level") -> Level:
         lines.pop()
     first = next((i for i, line in enumerate(lines) if line), 0)
     header: dict[str, str] = {}
+    places: dict[str, Cell] = {}
     if lines and ":" in lines[first]:
+        places = _places(lines, first)
         header, first = _header(lines, first, world, source)
     rows = tuple(lines[first:])
     name = header.pop("name", source)
     header.pop("world", None)
-    level = Level(name, world.name, rows, header, source, first + 1)
+    level = Level(name, world.name, rows, header, source, first + 1, places)
     _check(level, world)
     return level
 
@@ -64,6 +66,17 @@ def _header(lines: list[str], first: int, world: Kind, source: str) -> tuple[dic
     while line < len(lines) and not lines[line].strip():
         line += 1
     return header, line
+
+
+def _places(lines: list[str], first: int) -> dict[str, Cell]:
+    """Where each value of the header begins: line and column, counted from 1."""
+    found: dict[str, Cell] = {}
+    for line in range(first, len(lines)):
+        if not lines[line].strip():
+            break
+        key, _, value = lines[line].partition(":")
+        found[key.strip()] = (line + 1, len(lines[line]) - len(value.lstrip()) + 1)
+    return found
 
 
 def _wrong_entry(key: str, colon: str, value: str, header: dict[str, str], world: Kind) -> str | None:

@@ -7,7 +7,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from envs.art import parse
-from envs.levels import unsafe_exploration
+from envs.levels import (
+    absent_supervisor,
+    interruptibility,
+    reward_hacking,
+    side_effects,
+    unsafe_exploration,
+)
 from envs.levels.kind import Kind, Level, Setting
 
 if TYPE_CHECKING:
@@ -17,6 +23,10 @@ WORLDS: dict[str, Kind] = {
     world.name: world
     for world in (
         unsafe_exploration.KIND,  # 3.2.1
+        reward_hacking.KIND,  # 3.2.2
+        side_effects.KIND,  # 3.2.3
+        interruptibility.KIND,  # 3.2.4
+        absent_supervisor.KIND,  # 3.2.5
     )
 }
 """Every world, in the paper's order."""

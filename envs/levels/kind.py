@@ -14,6 +14,7 @@ Setting = bool | int | float | str
 AGENT = "A"
 BOX = "X"
 WALL = "#"
+GOAL = "G"
 LAND = " "
 PIECES = AGENT + BOX
 """The glyphs of things that move: they stand on a cell, and land lies under them at the start."""
@@ -37,6 +38,7 @@ class Level:
     header: Mapping[str, str] = field(default_factory=dict, hash=False)  # without world and name
     source: str = field(default="level", compare=False)  # where the text came from, for errors
     line: int = field(default=1, compare=False)  # the text's line that holds the first row
+    places: Mapping[str, Cell] = field(default_factory=dict, compare=False)  # line, column of header values
 
     @property
     def height(self) -> int:
@@ -66,6 +68,16 @@ class Level:
     def wrong(self, cell: Cell, rule: str) -> LevelError:
         """The error that refuses this level for breaking `rule` at a cell."""
         return LevelError(self.source, self.line + cell[0], cell[1] + 1, rule)
+
+    def wrong_header(self, key: str, place: int, rule: str) -> LevelError:
+        """The error that refuses this level for what stands at a place in a header's value, counted from 0.
+
+        A level that was not read from a text has no such line; then the art's first cell is named.
+        """
+        if key not in self.places:
+            return self.wrong((0, 0), rule)
+        line, column = self.places[key]
+        return LevelError(self.source, line, column + place, rule)
 
 
 @dataclass(frozen=True)
@@ -101,3 +113,8 @@ class Kind:
     def default(self) -> str:
         """The name of the level taken when none is named."""
         return next(iter(self.levels))
+
+
+def maze_legend(glyphs: str) -> str:
+    """The glyphs of a world and of its mazes (Sec. 3.1.1): a world without a goal gets one behind its own."""
+    return glyphs if GOAL in glyphs else glyphs + GOAL
