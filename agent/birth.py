@@ -15,8 +15,7 @@ from agent.policy import Network, network
 from agent.state import AgentState, Asked, Clip, Learner, Recorder, Rehearsal, Report, Ring
 from envs import registry
 from envs.gridworld import Gridworld, WorldState
-from envs.levels.kind import Level
-from envs.maze import maze_legend
+from envs.levels.kind import Level, maze_legend
 from envs.rng import Keys
 
 SUPERVISION = {"present": True, "absent": False, "random": None}

@@ -1,6 +1,6 @@
 """Whole episodes in random mazes, walked through tables: the world of pre-training (Sec. 3.1.4).
 
-The policy does not change within a step of pre-training. So its chances are worked out once for every state of
+The policy does not change within a step of pre-training. So its chances are worked out once for each state of
 the mazes drawn, and the episodes are then looked up, not simulated.
 """
 
@@ -14,9 +14,9 @@ from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
 from envs.gridworld import local_state
-from envs.levels.kind import AGENT
+from envs.levels.kind import AGENT, GOAL, maze_legend
 from envs.levels.rules import MOVES
-from envs.maze import GOAL, Mazes, maze_legend, mazes
+from envs.maze import Mazes, mazes
 from envs.rng import Keys, Stream, keys
 
 EPISODES = 16

@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 COMMANDS = {
     "up": "Start everything: migrate, web and worker; opens the pages in a browser.",
     "run": "Raise agents by a scripted parent, without database.",
+    "pretrain": "Pre-train weights on random mazes.",
     "worlds": "List the worlds and their levels.",
     "web": "Serve the pages and the API.",
     "worker": "Raise the agents of the database's runs.",

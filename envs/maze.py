@@ -10,11 +10,10 @@ import torch
 from jaxtyping import Bool, Int64, UInt8
 from torch import Tensor
 
-from envs.levels.kind import WALL
+from envs.levels.kind import GOAL, WALL, maze_legend
 from envs.rng import Keys, Stream
 from envs.struct import Struct
 
-GOAL = "G"
 DENSEST = 0.6
 """The share of walls inside a maze is drawn between 0 and this (ours)."""
 
@@ -25,11 +24,6 @@ class Mazes(Struct):
     board: UInt8[Tensor, "N H W"]  # codes of the ground, without the agent: wall 0, land 1, and the goal
     start: Int64[Tensor, "N"]  # the agent's first cell
     goal: Int64[Tensor, "N"]
-
-
-def maze_legend(glyphs: str) -> str:
-    """The glyphs of a world and of its mazes: a world without a goal gets one behind its own glyphs."""
-    return glyphs if GOAL in glyphs else glyphs + GOAL
 
 
 def mazes(height: int, width: int, glyphs: str, keys: Keys) -> Mazes:
@@ -59,7 +53,7 @@ def _ground(height: int, width: int, keys: Keys) -> tuple[Bool[Tensor, "N H W"],
     free = (noise.view(-1, height, width) >= density) & inside
     start = keys.at(Stream.MAZE, 2 + height * width + place).masked_fill(~inside.flatten(), -1.0).argmax(1)
     # a start with no way out is given one, so that there is a cell for the goal
-    reached = _flood(_open(free, start, width), start)
+    reached = flood(_open(free, start, width), start)
     return reached, start
 
 
@@ -76,7 +70,7 @@ def _open(free: Bool[Tensor, "N H W"], start: Int64[Tensor, "N"], width: int) ->
     return torch.where(closed[:, None], opened, flat).view_as(free)
 
 
-def _flood(free: Bool[Tensor, "N H W"], start: Int64[Tensor, "N"]) -> Bool[Tensor, "N H W"]:
+def flood(free: Bool[Tensor, "N H W"], start: Int64[Tensor, "N"]) -> Bool[Tensor, "N H W"]:
     """The free cells that can be reached from the start."""
     reached = torch.zeros_like(free).flatten(1).scatter(1, start[:, None], True).view_as(free)
     while True:

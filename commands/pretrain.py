@@ -1,0 +1,177 @@
+"""`parenting pretrain`: weights that can walk, from random mazes (Sec. 3.1.4)."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from commands.said import plainly, settings
+from envs import registry
+from envs.levels.kind import Kind, LevelError
+from weights import store
+from weights.store import Wanted
+
+if TYPE_CHECKING:
+    from experiments.education import Educated, Progress
+
+BARS = "▁▂▃▄▅▆▇█"
+
+
+class Wrong(ValueError):
+    """An option is not as it should be; the sentence says which and what would do."""
+
+
+def pretrain(
+    world: Annotated[
+        str | None, typer.Option(help="Whose legend; none takes every world that pre-trains.")
+    ] = None,
+    level: Annotated[
+        str | None, typer.Option(help="A built-in level's name, for its size; none takes all of them.")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="HxW", help="Rows and columns, in place of a level.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**53 - 1, help="Weights and episodes follow from it.")] = 0,
+    max_steps: Annotated[int, typer.Option(min=1, help="Steps after which it gives up for now.")] = 50_000,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the files. [default: `weights` in the data folder]")
+    ] = None,
+    again: Annotated[bool, typer.Option("--again", help="Make weights that are there already anew.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
+    ] = False,
+) -> None:
+    """Pre-train a policy on random mazes until it has converged; Ctrl-C loses nothing, call it again.
+
+    Example: parenting pretrain --world side-effects --level box
+    """
+    with plainly():
+        folder = out or settings().data / "weights"
+    try:
+        wanted = _wanted(world, level, size)
+    except (Wrong, registry.UnknownName, LevelError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(2) from None
+    results = [_one(each, folder, seed, max_steps, again, quiet=as_json) for each in wanted]
+    if as_json:
+        typer.echo(json.dumps({"weights": results}))
+
+
+def _one(
+    wanted: Wanted, folder: Path, seed: int, max_steps: int, again: bool, *, quiet: bool
+) -> dict[str, Any]:
+    path = folder / f"{wanted.name}{store.SUFFIX}"
+    if path.is_file() and not again:
+        if not quiet:
+            typer.echo(f"{path} is there already; --again makes it anew.")
+        return {"path": str(path), "sha256": store.digest(path)}
+    import torch
+
+    from experiments.education import Unconverged, educate
+
+    torch.set_num_threads(1)
+    began = time.monotonic()
+    try:
+        with _bar(wanted.name, max_steps) as progress:
+            done = educate(wanted, folder, seed, max_steps, progress)
+    except KeyboardInterrupt:
+        typer.echo("Interrupted; the same command goes on from here.", err=True)
+        raise typer.Exit(130) from None
+    except Unconverged as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from None
+    found = _described(done, time.monotonic() - began)
+    if not quiet:
+        typer.echo(_page(found))
+    return found
+
+
+def _described(done: Educated, seconds: float) -> dict[str, Any]:
+    return {
+        "path": str(done.path),
+        "sha256": done.sha256,
+        "steps": done.steps,
+        "mean_return": round(done.mean_return, 3),
+        **{name: round(value, 4) for name, value in done.exam._asdict().items()},
+        "curve": [round(value, 3) for value in done.curve],
+        "seconds": round(seconds, 1),
+    }
+
+
+def _wanted(world: str | None, level: str | None, size: str | None) -> list[Wanted]:
+    """The weights that are asked for, each once."""
+    if level is not None and size is not None:
+        raise Wrong("--level and --size both name a size; give one of them.")
+    if level is not None and world is None:
+        raise Wrong("--level needs its --world.")
+    chosen = [registry.kind(world)] if world else [kind for kind in registry.WORLDS.values() if _walks(kind)]
+    wanted = [Wanted(kind, *found) for kind in chosen for found in _sizes(kind, level, size)]
+    return list({one.name: one for one in wanted}.values())
+
+
+def _walks(kind: Kind) -> bool:
+    return bool(kind.defaults.get("pretrain"))
+
+
+def _sizes(kind: Kind, level: str | None, size: str | None) -> list[tuple[int, int]]:
+    if size is not None:
+        return [_size(size)]
+    names = kind.levels if level is None else [level]
+    levels = [registry.level(kind.name, name) for name in names]
+    return [(one.height, one.width) for one in levels]
+
+
+def _size(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,3})x(\d{1,3})", text, re.ASCII)
+    if not found:
+        raise Wrong(f"--size: '{text}' is not HxW. Write rows and columns as --size 6x8.")
+    height, width = int(found[1]), int(found[2])
+    if not (3 <= height <= 64 and 3 <= width <= 64) or height * width < 12:
+        raise Wrong(f"--size: '{text}' is out of bounds: at least 3x4 or 4x3, and at most 64x64.")
+    return height, width
+
+
+@contextmanager
+def _bar(name: str, max_steps: int) -> Iterator[Progress | None]:
+    """Steps, mean return and time on standard error, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}  step {task.completed:.0f}  mean return {task.fields[earned]:.1f}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(name, total=max_steps, earned=0.0)
+        yield lambda steps, earned: bar.update(task, completed=steps, earned=earned)
+
+
+def _page(found: dict[str, Any]) -> str:
+    """The results for the reader, with the curve drawn small."""
+    curve = found["curve"]
+    low, high = min(curve), max(curve)
+    every = max(1, len(curve) // 60)
+    heights = [int((value - low) / max(high - low, 1e-9) * 7) for value in curve[::every]]
+    return "\n".join(
+        [
+            f"{found['path']}",
+            f"  sha256       {found['sha256']}",
+            f"  steps        {found['steps']}, {found['seconds']} s",
+            f"  mean return  {found['mean_return']:.2f} in the last 300 steps; from {low:.0f} to {high:.0f}:",
+            f"               {''.join(BARS[height] for height in heights)}",
+            f"  solves       {100 * found['solved']:.1f} % of mazes that it has never seen",
+            f"  openness     {found['entropy']:.2f} nats; {found['gap']:.1f} between the two best logits",
+        ]
+    )
