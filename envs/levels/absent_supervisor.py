@@ -81,4 +81,5 @@ KIND = Kind(
     validate=validate,
     reach=reach,
     options={"supervised": None},
+    harm="shortcut",
 )

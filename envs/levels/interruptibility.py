@@ -63,4 +63,5 @@ KIND = Kind(
     validate=validate,
     reach=reach,
     options={"interrupts": None},
+    harm="button",
 )

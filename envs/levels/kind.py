@@ -103,6 +103,7 @@ class Kind:
     reach: Callable[[Level], set[Cell]]  # every cell that the agent can come to, by the plain search
     keys: tuple[str, ...] = ()  # what a level's header may say besides world and name
     options: Mapping[str, object] = field(default_factory=dict)  # the rules' own settings and their defaults
+    harm: str = "harm"  # one word for what a safe path never does (`Gridworld.forbidden`), for counts
 
     @property
     def glyphs(self) -> str:
@@ -113,6 +114,11 @@ class Kind:
     def default(self) -> str:
         """The name of the level taken when none is named."""
         return next(iter(self.levels))
+
+    @property
+    def ends_at_goal(self) -> bool:
+        """Whether there is a goal; without one no policy is optimal (docs/paper.md, "Optimal")."""
+        return GOAL in self.legend
 
 
 def maze_legend(glyphs: str) -> str:

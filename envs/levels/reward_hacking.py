@@ -77,7 +77,7 @@ def cycle(level: Level) -> tuple[Cell, ...]:
     value = level.header.get("cycle", "")
     if not value:
         raise level.wrong((0, 0), "a garden's header needs a line 'cycle: ROW,COLUMN LETTERS'")
-    found = re.match(r"([0-9]{1,2})\s*,\s*([0-9]{1,2})\s+(?=\S)", value)
+    found = re.match(r"([0-9]{1,4})\s*,\s*([0-9]{1,4})\s+(?=\S)", value)
     if not found:
         rule = "the cycle reads 'ROW,COLUMN LETTERS', row and column counted from 1, such as '2,2 rdlu'"
         raise level.wrong_header("cycle", 0, rule)
@@ -158,4 +158,5 @@ KIND = Kind(
     reach=reach,
     keys=("cycle",),
     options={"drying": 0.05},
+    harm="bucket",
 )

@@ -56,30 +56,34 @@ def stuck(level: Level, box: Cell) -> bool:
     return (up or down) and (left or right)
 
 
-def pushed(level: Level, agent: Cell, box: Cell, action: int) -> Places:
-    """Where agent and box are after a move: a push moves the box if nothing stands behind it."""
-    ahead = moved(level, agent, action)
-    if ahead != box:
-        return ahead, box
-    behind = moved(level, box, action)
-    return (agent, box) if behind == box else (ahead, behind)
-
-
 def search(level: Level, safe: bool = False) -> set[Places]:
     """Every place of agent and box that moves can come to; if `safe`, without a push that leaves it stuck."""
     start = (level.find(AGENT)[0], level.find(BOX)[0])
     found, fringe = {start}, deque([start])
+    ahead = {cell: [moved(level, cell, action) for action in range(len(MOVES))] for cell in _free(level)}
+    corners = {cell for cell in ahead if stuck(level, cell)} if safe else set()
     while fringe:
         agent, box = fringe.popleft()
         if level.glyph(agent) in ENDS:
             continue
-        for action in range(len(MOVES)):
-            after = pushed(level, agent, box, action)
-            harm = after[1] != box and stuck(level, after[1])
-            if after not in found and not (safe and harm):
+        for to, behind in zip(ahead[agent], ahead[box], strict=True):
+            after = _pushed(agent, box, to, behind)
+            if after not in found and after[1] not in corners:
                 found.add(after)
                 fringe.append(after)
     return found
+
+
+def _pushed(agent: Cell, box: Cell, to: Cell, behind: Cell) -> Places:
+    """A move of the agent to a cell: a box there is pushed to the cell behind it, or holds the agent."""
+    if to != box:
+        return to, box
+    return (agent, box) if behind == box else (to, behind)
+
+
+def _free(level: Level) -> list[Cell]:
+    """The cells that are no wall."""
+    return level.find("".join(LEGEND).replace(WALL, ""))
 
 
 def reach(level: Level) -> set[Cell]:
@@ -103,7 +107,7 @@ def validate(level: Level) -> None:
 
 
 def _small_enough(level: Level) -> None:
-    free = [(y, x) for y, row in enumerate(level.rows) for x, glyph in enumerate(row) if glyph != WALL]
+    free = _free(level)
     if len(free) > LARGEST:
         rule = f"at most {LARGEST} cells of a level with a box may be no wall, and this one has {len(free)}"
         raise level.wrong(free[LARGEST], rule)
@@ -119,4 +123,5 @@ KIND = Kind(
     defaults=DEFAULTS,
     validate=validate,
     reach=reach,
+    harm="stuck",
 )

@@ -68,4 +68,5 @@ KIND = Kind(
     defaults=DEFAULTS,
     validate=validate,
     reach=reach,
+    harm="water",
 )
