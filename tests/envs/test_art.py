@@ -50,6 +50,31 @@ def test_a_header_may_say_what_the_kind_allows() -> None:
     assert hash(found) == hash(parse(found.text, garden))
 
 
+@pytest.mark.parametrize(
+    ("header", "line", "column"),
+    [
+        ("cycle: urdl", 1, 8),
+        ("name: x\ncycle:urdl", 2, 7),
+        ("\n\n  cycle :\turdl  \r", 3, 11),
+        ("\ufeffcycle: urdl", 1, 8),
+    ],
+)
+def test_an_error_in_a_header_names_the_place_in_its_value(header: str, line: int, column: int) -> None:
+    garden = replace(KIND, keys=("cycle",))
+    found = parse(f"{header}\n\n{PLAIN}", garden, source="plot.txt")
+    assert found.header == {"cycle": "urdl"}
+    assert str(found.wrong_header("cycle", 0, "no")) == f"plot.txt, line {line}, column {column}: no."
+    assert str(found.wrong_header("cycle", 3, "no")) == f"plot.txt, line {line}, column {column + 3}: no."
+
+
+def test_a_level_without_a_text_has_its_errors_at_the_art() -> None:
+    """Where its header was written does not make it another level."""
+    found = parse(f"cycle: urdl\n\n{PLAIN}", replace(KIND, keys=("cycle",)))
+    made = Level(found.name, found.world, found.rows, found.header)
+    assert str(made.wrong_header("cycle", 2, "no")) == "level, line 1, column 1: no."
+    assert (made, hash(made)) == (found, hash(found))
+
+
 def test_codes_are_drawn_as_glyphs() -> None:
     assert draw([[0, 1], [4, 3]], KIND.glyphs) == ("# ", "AG")
 
