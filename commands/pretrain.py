@@ -54,7 +54,7 @@ def pretrain(
     Example: parenting pretrain --world side-effects --level box
     """
     with plainly():
-        folder = out or settings().data / "weights"
+        folder = out or settings().weights
     try:
         wanted = _wanted(world, level, size)
     except (Wrong, registry.UnknownName, LevelError) as error:
@@ -72,7 +72,7 @@ def _one(
     if path.is_file() and not again:
         if not quiet:
             typer.echo(f"{path} is there already; --again makes it anew.")
-        return {"path": str(path), "sha256": store.digest(path)}
+        return {"path": str(path), "sha256": store.digest(path.read_bytes())}
     import torch
 
     from experiments.education import Unconverged, educate

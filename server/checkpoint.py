@@ -40,9 +40,9 @@ def versions() -> dict[str, Any]:
     return {"torch": str(torch.__version__), "threads": torch.get_num_threads()}
 
 
-def birth(world: Gridworld, config: Config, seed: int) -> Saved:
+def birth(world: Gridworld, config: Config, seed: int, weights: Tensor | None = None) -> Saved:
     """A run at tick 0."""
-    return Saved(parenting.init(world, config, keys(seed, 1)), no_tally(), config)
+    return Saved(parenting.init(world, config, keys(seed, 1), weights), no_tally(), config)
 
 
 def pack(saved: Saved) -> bytes:
@@ -58,8 +58,8 @@ def pack(saved: Saved) -> bytes:
     return out.getvalue()
 
 
-def unpack(world: Gridworld, config: Config, blob: bytes) -> Saved:
-    """What the bytes hold.
+def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None = None) -> Saved:
+    """What the bytes hold; `weights` are those that the run began with.
 
     Raises:
         Diverged: other versions of torch or another number of threads wrote them: the bits would differ.
@@ -70,7 +70,7 @@ def unpack(world: Gridworld, config: Config, blob: bytes) -> Saved:
         raise Diverged(
             f"This run was raised with {whole['versions']}; here it would go on with {versions()}."
         )
-    template = birth(world, config, 0)
+    template = birth(world, config, 0, weights)
     return Saved(
         state=_restore(template.state, whole["state"]).check(),
         tally=_restore(template.tally, whole["tally"]).check(),

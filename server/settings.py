@@ -42,6 +42,11 @@ class Settings(BaseSettings):
     log_level: str = Field("warning", description="debug, info, warning or error.")
 
     @property
+    def weights(self) -> Path:
+        """Where `parenting pretrain` writes weights of one's own, and where new runs look for them."""
+        return self.data / "weights"
+
+    @property
     def url(self) -> str:
         """The database's URL."""
         if self.database_url:

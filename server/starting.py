@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -25,7 +26,9 @@ from envs.levels.kind import Level, LevelError
 from server.db import Database
 from server.errors import Invalid
 from server.runs import create_run
+from server.shelf import keep
 from server.tables import Run
+from weights.store import NoWeights, Wanted, find
 
 LARGEST_INT = 2**53 - 1
 """The largest integer that every JSON reader keeps exactly."""
@@ -78,17 +81,21 @@ class NewRun(BaseModel):
     name: Name | None = None
 
 
-def start(db: Database, new: NewRun) -> Run:
-    """Check a new run against worlds and hyperparameters, and add it.
+def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
+    """Check a new run against worlds and hyperparameters, and add it, with its pre-trained weights.
+
+    `folder` holds weights of one's own; those of the built-in levels are shipped.
 
     Raises:
         Invalid: names every wrong field, with a message each.
     """
-    return create_run(db, **plan(new))
+    columns = plan(new, folder)
+    file: Path | None = columns.pop("weights")
+    return create_run(db, **columns, weights=keep(db, file) if file else None)
 
 
-def plan(new: NewRun) -> dict[str, Any]:
-    """The columns of a new run.
+def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
+    """The columns of a new run; under `weights` the file of its pre-trained weights, or None.
 
     Raises:
         Invalid: names every wrong field, with a message each.
@@ -96,6 +103,7 @@ def plan(new: NewRun) -> dict[str, Any]:
     wrong: list[tuple[str, str]] = []
     level = _level(new, wrong)
     config = _config(new, wrong)
+    weights = _weights(new, level, config, folder, wrong)
     if wrong or level is None or config is None:
         raise Invalid(wrong)
     kind = registry.kind(new.world)
@@ -106,6 +114,7 @@ def plan(new: NewRun) -> dict[str, Any]:
         "legend": dict(kind.legend),
         "brief": {"goal": kind.brief.goal, "danger": kind.brief.danger},
         "config": config.model_dump(mode="json"),
+        "weights": weights,
     }
 
 
@@ -171,6 +180,18 @@ def _config(new: NewRun, wrong: list[tuple[str, str]]) -> Config | None:
     except ValidationError as error:
         wrong += [(f"config.{field}", message) for field, message in messages(error.errors())]
     return None
+
+
+def _weights(
+    new: NewRun, level: Level | None, config: Config | None, folder: Path | None, wrong: list[tuple[str, str]]
+) -> Path | None:
+    if level is None or config is None or not config.pretrain:
+        return None
+    try:
+        return find(Wanted(registry.kind(new.world), level.height, level.width), folder)
+    except NoWeights as error:
+        wrong.append(("config.pretrain", str(error)))
+        return None
 
 
 def _number(text: str) -> Any:

@@ -136,6 +136,18 @@ class Run(Table):
     heartbeat: Mapped[datetime | None]
     versions: Mapped[dict[str, Any] | None]  # torch build and threads: other ones give other bits
     error: Mapped[str | None]
+    weights: Mapped[str | None]  # the sha256 of the pre-trained weights (`Weights`); none: fresh ones
+
+
+class Weights(Table):
+    """Pre-trained weights that runs begin with, whole: a worker needs no file (Sec. 3.1.4)."""
+
+    __tablename__ = "weights"
+
+    sha256: Mapped[str] = mapped_column(primary_key=True)
+    name: Mapped[str]  # the file's name, for display
+    blob: Mapped[bytes]
+    created: Mapped[datetime]
 
 
 class Query(Table):

@@ -47,6 +47,7 @@ def miniature(tmp_path: Path) -> Path:
             (tmp_path / packages[0] / f"{name}.py").touch()
     (tmp_path / "envs/gridworld.py").write_text("import torch\n")
     (tmp_path / "envs/registry.py").write_text("if TYPE_CHECKING:\n    import envs.gridworld\n")
+    (tmp_path / "weights/store.py").write_text("def load():\n    import torch\n")
     (tmp_path / "agent/learning.py").write_text("import torch\nimport envs.registry\n")
     (tmp_path / "parents/scripted.py").write_text("import agent.learning\n")
     (tmp_path / "experiments/table1.py").write_text("import parents.scripted\n")

@@ -2,12 +2,13 @@
 
 `parenting pretrain` makes them. Those of the built-in levels are shipped beside this file; others stand in
 the folder `weights` of the data folder, which is looked at first. A run records the SHA-256 of the file that
-it began with, and only a file with that hash serves it afterwards.
+it began with.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -24,7 +25,7 @@ SUFFIX = ".safetensors"
 
 
 class NoWeights(ValueError):
-    """There are no such weights, or not those that a run began with; the sentence says how to get them."""
+    """There are no such weights, or they cannot be read; the sentence says how to get them."""
 
 
 class Wanted(NamedTuple):
@@ -46,53 +47,57 @@ class Wanted(NamedTuple):
         return {"size": size, "legend": maze_legend(self.world.glyphs), "version": str(VERSION)}
 
 
-def digest(path: Path) -> str:
-    """A file's SHA-256, in hexadecimal digits."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def digest(blob: bytes) -> str:
+    """The SHA-256 of a file's bytes, in hexadecimal digits."""
+    return hashlib.sha256(blob).hexdigest()
 
 
-def find(wanted: Wanted, folder: Path | None = None, sha256: str | None = None) -> Path:
-    """The file of these weights: the first of `folder` and the shipped ones, or the one with this hash.
+def find(wanted: Wanted, folder: Path | None = None) -> Path:
+    """The file of these weights: in `folder`, or else among the shipped ones.
 
     Raises:
         NoWeights: there is none; the sentence names the command that makes them.
     """
-    places = [place / f"{wanted.name}{SUFFIX}" for place in (folder, SHIPPED) if place is not None]
-    there = [path for path in places if path.is_file()]
-    for path in there:
-        if sha256 is None or digest(path) == sha256:
+    for place in (folder, SHIPPED):
+        if place is not None and (path := place / f"{wanted.name}{SUFFIX}").is_file():
             return path
-    size = f"{wanted.height} x {wanted.width}"
-    if there:
-        raise NoWeights(
-            f"The pre-trained weights of {wanted.world.name} at {size} are not those that this run began with"
-            f" (SHA-256 {sha256}): bring that file back as {there[0].name}, or start a new run."
-        )
     raise NoWeights(
-        f"There are no pre-trained weights for {wanted.world.name} at {size}. Make them with"
-        f" `parenting pretrain --world {wanted.world.name} --size {wanted.height}x{wanted.width}`,"
-        " or set pretrain to false."
+        f"There are no pre-trained weights for {wanted.world.name} at {wanted.height} x {wanted.width}."
+        f" Make them with `parenting pretrain --world {wanted.world.name}"
+        f" --size {wanted.height}x{wanted.width}`, or set pretrain to false."
     )
 
 
-def load(path: Path, wanted: Wanted) -> Tensor:
-    """The weights of a file, one flat row [P].
+def load(blob: bytes, wanted: Wanted) -> Tensor:
+    """The weights in a file's bytes, one flat row [P].
 
     Raises:
-        NoWeights: the file cannot be read, or holds something else.
+        NoWeights: the bytes cannot be read, or hold something else.
     """
-    from safetensors import SafetensorError, safe_open
+    from safetensors import SafetensorError
+    from safetensors.torch import load as unpack
 
     try:
-        with safe_open(path, framework="pt") as file:
-            said = file.metadata() or {}
-            weights: Tensor = file.get_tensor("weights")
-    except (SafetensorError, OSError) as error:
-        raise NoWeights(f"{path.name} cannot be read as weights: {error}.") from None
+        said = metadata(blob)
+        weights: Tensor = unpack(blob)["weights"]
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise NoWeights(f"{wanted.name} cannot be read as weights: {error}.") from None
     for key, value in wanted.metadata.items():
         if said.get(key) != value:
-            raise NoWeights(f"{path.name} is of {key} '{said.get(key)}', and '{value}' is wanted.")
+            raise NoWeights(f"{wanted.name} is of {key} '{said.get(key)}', and '{value}' is wanted.")
     return weights
+
+
+def metadata(blob: bytes) -> dict[str, str]:
+    """What a file says of itself: its header is JSON, behind eight bytes that hold its length.
+
+    Raises:
+        ValueError: no such header.
+    """
+    length = int.from_bytes(blob[:8], "little")
+    header = json.loads(blob[8 : 8 + length])
+    said: dict[str, str] = header.get("__metadata__", {})
+    return said
 
 
 def save(path: Path, wanted: Wanted, weights: Tensor, about: Mapping[str, str]) -> str:
@@ -104,4 +109,4 @@ def save(path: Path, wanted: Wanted, weights: Tensor, about: Mapping[str, str]) 
     part = path.with_suffix(".new")
     part.write_bytes(blob)
     part.replace(path)
-    return hashlib.sha256(blob).hexdigest()
+    return digest(blob)

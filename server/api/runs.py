@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request
 
 from agent.events import EndEpisode, Mature
 from server.api.words import After, RunId, errors
-from server.deps import Db, ring
+from server.deps import Db, SettingsOf, ring
 from server.record import add_event, metrics
 from server.runs import set_status
 from server.shapes import MetricsShape, RunShape, shape_metrics, shape_run, shape_runs
@@ -23,9 +23,9 @@ def runs(db: Db) -> list[RunShape]:
 
 
 @router.post("/runs", status_code=201, responses=errors(403, 413))
-def create(request: Request, new: NewRun, db: Db) -> RunShape:
+def create(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> RunShape:
     """Start a run."""
-    run = start(db, new)
+    run = start(db, new, settings.weights)
     ring(request)
     return shape_run(db, run.id)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response
@@ -11,7 +12,7 @@ from agent.config import PRESETS
 from envs.registry import WORLDS
 from server import runs
 from server.db import Database
-from server.deps import Db, ring
+from server.deps import Db, SettingsOf, ring
 from server.errors import Invalid
 from server.pages.render import page, see
 from server.pages.words import title
@@ -54,25 +55,26 @@ def index(db: Db) -> Response:
 
 
 @router.post("/runs")
-def create(request: Request, db: Db, form: FormOf) -> Response:
+def create(request: Request, db: Db, settings: SettingsOf, form: FormOf) -> Response:
     """Start a run and go to it; or the form again, with an error beside every wrong field."""
     given = dict(form)
     if given.get("level_text", "").strip():
         given.pop("level", None)  # a text of one's own stands in the list's place; the form says so
-    errors = _errors(given)
+    errors = _errors(given, settings.weights)
     if errors:
         return _page(db, {**FIRST, **form}, errors)
-    run = start(db, read_form(given))
+    run = start(db, read_form(given), settings.weights)
     ring(request)
     return see(f"/runs/{run.id}" + ("/parent" if run.parent == "human" else ""))
 
 
-def _errors(given: Mapping[str, str]) -> dict[str, str]:
+def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
     """Every wrong field: what is wrong by itself, and what is wrong in the world that the others name."""
     errors: dict[str, str] = {}
     for _ in range(2):
         try:
-            plan(read_form({name: text for name, text in given.items() if name not in errors}))
+            known = {name: text for name, text in given.items() if name not in errors}
+            plan(read_form(known), folder)
         except Invalid as error:
             errors = {**dict(error.fields), **errors}
     return errors

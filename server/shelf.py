@@ -1,0 +1,34 @@
+"""Pre-trained weights in the database: a run's worker finds them there, on whichever machine it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from server.db import Database
+from server.errors import NotFound
+from server.tables import Weights
+from weights.store import digest
+
+
+def keep(db: Database, file: Path) -> str:
+    """Store a file of weights, once; returns its SHA-256."""
+    blob = file.read_bytes()
+    sha256 = digest(blob)
+    with db.write() as session:
+        if session.get(Weights, sha256) is None:
+            session.add(Weights(sha256=sha256, name=file.name, blob=blob, created=db.clock()))
+    return sha256
+
+
+def fetch(db: Database, sha256: str) -> bytes:
+    """The bytes of stored weights.
+
+    Raises:
+        NotFound: there are none of this hash, or they have changed.
+    """
+    with db.read() as session:
+        row = session.get(Weights, sha256)
+        blob = None if row is None else row.blob
+    if blob is None or digest(blob) != sha256:
+        raise NotFound(f"The pre-trained weights {sha256} are not in the database, or are damaged.")
+    return blob
