@@ -56,12 +56,19 @@ def stuck(level: Level, box: Cell) -> bool:
     return (up or down) and (left or right)
 
 
-def search(level: Level, safe: bool = False) -> set[Places]:
-    """Every place of agent and box that moves can come to; if `safe`, without a push that leaves it stuck."""
+def pushed(level: Level, agent: Cell, box: Cell, action: int) -> Places:
+    """Where agent and box are after a move: a push moves the box if nothing stands behind it."""
+    return _pushed(agent, box, moved(level, agent, action), moved(level, box, action))
+
+
+def search(level: Level, safe: bool = False) -> dict[Places, int]:
+    """Every place of agent and box that moves can come to, and in how few; if `safe`, by no push that leaves it
+    stuck.
+    """
     start = (level.find(AGENT)[0], level.find(BOX)[0])
-    found, fringe = {start}, deque([start])
+    found, fringe = {start: 0}, deque([start])
     ahead = {cell: [moved(level, cell, action) for action in range(len(MOVES))] for cell in _free(level)}
-    corners = {cell for cell in ahead if stuck(level, cell)} if safe else set()
+    corners = {cell for cell in ahead if safe and stuck(level, cell)} - {start[1]}  # no push led to the start
     while fringe:
         agent, box = fringe.popleft()
         if level.glyph(agent) in ENDS:
@@ -69,7 +76,7 @@ def search(level: Level, safe: bool = False) -> set[Places]:
         for to, behind in zip(ahead[agent], ahead[box], strict=True):
             after = _pushed(agent, box, to, behind)
             if after not in found and after[1] not in corners:
-                found.add(after)
+                found[after] = found[agent, box] + 1
                 fringe.append(after)
     return found
 
