@@ -11,12 +11,16 @@ from torch import Tensor
 
 from agent.digest import fingerprint, together
 from envs.gridworld import Gridworld, WorldState
-from envs.rng import keys
 from envs.struct import Struct
+
+MOST = 1_000_000
+"""States of a model, at the most."""
+ROOM = 2**30
+"""Cells of all its boards together, at the most: a gigabyte."""
 
 
 class Model(Struct):
-    """S states in the order of their discovery; the first K are the starts of the world's K levels."""
+    """S states in the order of their discovery, first the world's beginnings: the starts of its K levels."""
 
     states: WorldState
     known: Int64[Tensor, "S"]  # the states' words, sorted
@@ -24,7 +28,9 @@ class Model(Struct):
     then: Int64[Tensor, "S 4"]  # the state that each action leads to
     reward: Float64[Tensor, "S 4"]
     unsafe: Bool[Tensor, "S 4"]
+    forbidden: Bool[Tensor, "S 4"]
     over: Bool[Tensor, "S"]
+    goal: Bool[Tensor, "S"]  # over, and not by harm alone: on a goal, or where some safe step led
 
     def find(self, board: Tensor, agent: Tensor, box: Tensor, level: Tensor) -> Int64[Tensor, "..."]:
         """The states of given boards, for any leading axes.
@@ -40,61 +46,82 @@ class Model(Struct):
 
 
 def word(board: Tensor, agent: Tensor, box: Tensor, level: Tensor) -> Int64[Tensor, "..."]:
-    """One word for a state: board, agent, box and level."""
+    """One word for a state: board, agent, box and level.
+
+    Flags are no part of it. Supervision stands on the board, as bars (3.2.5); whether an episode interrupts
+    changes nothing in a model without interruption (3.2.4).
+    """
     return together(fingerprint(board.flatten(-2)), fingerprint(agent), fingerprint(box), level)
 
 
-def explore(world: Gridworld, limit: int = 1_000_000) -> Model:
-    """Every state that can be reached.
+def explore(world: Gridworld, limit: int | None = None) -> Model:
+    """Every state that can be reached from the world's beginnings.
 
     Raises:
-        ValueError: more than `limit` states.
+        ValueError: more than `limit` states, or two beginnings that a query could not tell apart.
     """
-    found = world.reset(
-        keys(0, len(world.levels), world.device), torch.arange(len(world.levels), device=world.device)
-    )
-    known = _word(found)
-    edge, steps = found, []
+    most = min(MOST, ROOM // (world.height * world.width)) if limit is None else limit
+    edge = world.beginnings()
+    known = _word(edge)
+    if len(torch.unique(known)) < len(known):
+        raise ValueError(
+            "Two of the world's beginnings look alike: a flag that matters must show on the board."
+        )
+    found, steps = [edge], []
     while len(edge.t):
-        steps.append(_look(world, edge))
-        arrived = steps[-1][0]
-        fresh = _new(_word(arrived), known)
-        edge = arrived.pick(fresh)
-        found = _join(found, edge)
+        arrived, step = _look(world, edge)
+        steps.append(step)
+        edge = arrived.pick(_new(step["word"], known))
+        found.append(edge)
         known = torch.cat((known, _word(edge)))
-        if len(known) > limit:
+        if len(known) > most:
             raise ValueError(
-                f"This world has more than {limit} states: values cannot be computed by listing them."
+                f"This world has more than {most} states, too many for the scripted parent to list; "
+                "take a smaller level, or fewer levels at once."
             )
-    return _model(found, known, steps)
+    return _model(world, _join(found), known, steps)
 
 
-def _look(world: Gridworld, edge: WorldState) -> tuple[WorldState, Tensor, Tensor]:
-    """What the four actions lead to from each state, with their rewards and dangers; rows in the order
+def _look(world: Gridworld, edge: WorldState) -> tuple[WorldState, dict[str, Tensor]]:
+    """What the four actions lead to from each state, and what is said of these steps; rows in the order
     (state, action).
     """
-    before = edge.pick(torch.arange(len(edge.t)).repeat_interleave(4))
-    action = torch.arange(4).repeat(len(edge.t))
+    number = torch.arange(len(edge.t), device=edge.t.device)
+    before = edge.pick(number.repeat_interleave(4))
+    action = torch.arange(4, device=number.device).repeat(len(number))
     after = world.forecast(before, action)
-    return (
-        after.replace(t=torch.zeros_like(after.t)),
-        world.reward(before, action, after),
-        world.unsafe(before, action, after),
-    )
+    after = after.replace(t=torch.zeros_like(after.t))
+    said = {
+        "word": _word(after),
+        "reward": world.reward(before, action, after),
+        "unsafe": world.unsafe(before, action, after),
+        "forbidden": world.forbidden(before, action, after),
+    }
+    return after, said
 
 
-def _model(found: WorldState, known: Tensor, steps: list[tuple[WorldState, Tensor, Tensor]]) -> Model:
+def _model(world: Gridworld, found: WorldState, known: Tensor, steps: list[dict[str, Tensor]]) -> Model:
     ordered = known.sort()
-    arrived = torch.cat([_word(step[0]) for step in steps])
+    said = {name: torch.cat([step[name] for step in steps]).view(-1, 4) for name in steps[0]}
+    then = ordered.indices[torch.searchsorted(ordered.values, said["word"])]
+    on_goal = world.lookup("G")[world.tile(found.board, found.agent)]
     return Model(
         states=found,
         known=ordered.values,
         order=ordered.indices,
-        then=ordered.indices[torch.searchsorted(ordered.values, arrived)].view(-1, 4),
-        reward=torch.cat([step[1] for step in steps]).view(-1, 4),
-        unsafe=torch.cat([step[2] for step in steps]).view(-1, 4),
+        then=then,
+        reward=said["reward"],
+        unsafe=said["unsafe"],
+        forbidden=said["forbidden"],
         over=found.over,
+        goal=found.over & (on_goal | _entered_safely(found.over, then, said["unsafe"])),
     )
+
+
+def _entered_safely(over: Tensor, then: Tensor, unsafe: Tensor) -> Bool[Tensor, "S"]:
+    entered = torch.zeros_like(over)
+    entered[then[~unsafe & ~over[:, None]]] = True
+    return entered
 
 
 def _word(states: WorldState) -> Tensor:
@@ -104,11 +131,11 @@ def _word(states: WorldState) -> Tensor:
 def _new(words: Tensor, known: Tensor) -> Tensor:
     """The first place of each word that is not known yet, in order."""
     unique, inverse = torch.unique(words, return_inverse=True)
-    places = torch.arange(len(words))
+    places = torch.arange(len(words), device=words.device)
     first = torch.full_like(unique, len(words)).scatter_reduce(0, inverse, places, "amin")
     return first[~torch.isin(unique, known)].sort().values
 
 
-def _join(one: WorldState, other: WorldState) -> WorldState:
-    theirs = other.tensors()
-    return one.map(lambda name, tensor, _axis: torch.cat((tensor, theirs[name])))
+def _join(parts: list[WorldState]) -> WorldState:
+    every = [part.tensors() for part in parts]
+    return parts[0].map(lambda name, _tensor, _axis: torch.cat([part[name] for part in every]))

@@ -10,12 +10,14 @@ import torch
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
+from agent.config import Inside
 from agent.events import Event
 from agent.query import Answer, Choice, Kind, Query
 from agent.state import AgentState
 from envs.gridworld import Gridworld
-from parents.model import Model, explore
-from parents.values import Values, advantage, optimal, visited
+from parents import values
+from parents.model import Model
+from parents.values import Listed, Valuation
 
 TIE = 1e-6
 """Advantages within this are *either* (ours)."""
@@ -27,20 +29,36 @@ class Judgement:
     """
 
     def __init__(
-        self, world: Gridworld, gamma: float, model: Model | None = None, values: Values | None = None
+        self,
+        world: Gridworld,
+        gamma: float,
+        valuation: Valuation | None = None,
+        inside: Inside = "up-down",
     ) -> None:
-        """Work out the exact values of `world`; other values may be given, such as those of a sub-optimal
-        policy.
+        """Work out the exact values of `world`; another valuation may be given, such as that of a sub-optimal
+        policy. `inside` is how the garden's parent walks inside its cycle (Sec. 3.3).
+
+        Raises:
+            ValueError: too many states to list; in the garden, gamma is 1 or there is no such `inside`.
         """
-        self.model = explore(world) if model is None else model
-        self.values = optimal(self.model, gamma) if values is None else values
+        self.valuation = values.valuation(world, gamma, inside) if valuation is None else valuation
+
+    @property
+    def model(self) -> Model:
+        """The list of all states.
+
+        Raises:
+            TypeError: in the garden, whose states are not listed.
+        """
+        if not isinstance(self.valuation, Listed):
+            raise TypeError("This world's values are in closed form: there is no list of its states.")
+        return self.valuation.model
 
     def choose(self, query: Query) -> Int64[Tensor, "N"]:
         """Left or right by Eq. (7), *either* on a tie, *neither* where both moves of a guidance query are
         unsafe.
         """
-        alpha = advantage(self.model, self.values, query)
-        margin = alpha[:, 0] - alpha[:, 1]
+        margin = self.valuation.margin(query)
         choice = torch.where(margin > 0, int(Choice.LEFT), int(Choice.RIGHT))
         choice = torch.where(margin.abs() <= TIE, int(Choice.EITHER), choice)
         choice = torch.where(self.refuses(query), int(Choice.NEITHER), choice)
@@ -48,9 +66,7 @@ class Judgement:
 
     def refuses(self, query: Query) -> Bool[Tensor, "N"]:
         """Both actions of a guidance query are unsafe; never so for clips."""
-        first = visited(self.model, query)[:, :, 0]
-        unsafe = self.model.unsafe[first].gather(-1, query.action[:, :, :1]).squeeze(-1)
-        return unsafe.all(1) & (query.kind == Kind.GUIDANCE)
+        return self.valuation.unsafe(query).all(1) & (query.kind == Kind.GUIDANCE)
 
 
 class ScriptedParent:

@@ -4,19 +4,59 @@ Exact, float64.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import torch
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
+from agent.config import Inside
 from agent.query import Query
-from parents.model import Model
+from envs.gridworld import Gridworld
+from envs.reward_hacking import RewardHacking
+from parents.garden import Garden
+from parents.model import Model, explore
 
 HOPELESS = -100.0
 """V_p where the goal can no longer be reached (ours)."""
-CLOSE = 1e-12
+CLOSE = 1e-13
 PATIENCE = 100_000
+
+
+class Valuation(Protocol):
+    """What the scripted parent knows of a world: the advantage of clips, and which first moves are unsafe."""
+
+    @property
+    def gamma(self) -> float:
+        """The discount of Eq. (7)."""
+        ...
+
+    def alpha(self, query: Query) -> Float64[Tensor, "N 2"]:
+        """Eq. (7) of both clips, each to its own length."""
+        ...
+
+    def margin(self, query: Query) -> Float64[Tensor, "N"]:
+        """How much better the left clip is: by this the parent decides."""
+        ...
+
+    def unsafe(self, query: Query) -> Bool[Tensor, "N 2"]:
+        """Whether each clip's first move is unsafe (docs/paper.md, "Unsafe")."""
+        ...
+
+
+def valuation(world: Gridworld, gamma: float, inside: Inside = "up-down") -> Valuation:
+    """The exact values of a world: the garden's in closed form, any other's by listing its states.
+
+    Raises:
+        ValueError: too many states to list; in the garden, gamma is 1 or there is no such `inside`.
+        ArithmeticError: values grow without end, because gamma is 1.
+    """
+    if isinstance(world, RewardHacking):
+        return Garden(world, gamma, inside)
+    model = explore(world)
+    return Listed(model, optimal(model, gamma))
 
 
 class Values(NamedTuple):
@@ -27,33 +67,91 @@ class Values(NamedTuple):
     q: Float64[Tensor, "S 4"]
 
 
+@dataclass(frozen=True)
+class Listed:
+    """The valuation by listing all states: of the optimal policy of r, or of any other."""
+
+    model: Model
+    values: Values
+
+    @property
+    def gamma(self) -> float:
+        """The discount of Eq. (7)."""
+        return self.values.gamma
+
+    def alpha(self, query: Query) -> Float64[Tensor, "N 2"]:
+        """Eq. (7) of both clips, each to its own length."""
+        return advantage(self.model, self.values, query)
+
+    def margin(self, query: Query) -> Float64[Tensor, "N"]:
+        """The left clip's advantage over the right one's."""
+        alpha = self.alpha(query)
+        return alpha[:, 0] - alpha[:, 1]
+
+    def unsafe(self, query: Query) -> Bool[Tensor, "N 2"]:
+        """Whether each clip's first move is unsafe."""
+        first = visited(self.model, query)[:, :, 0]
+        return self.model.unsafe[first].gather(-1, query.action[:, :, :1]).squeeze(-1)
+
+
 def optimal(model: Model, gamma: float) -> Values:
-    """Values of the optimal policy of r, by value iteration.
+    """Values of the optimal policy of r, by value iteration. It never gives up a goal that is in reach.
 
     Raises:
         ArithmeticError: no fixed point was found.
     """
-    return _iterate(model, gamma, lambda q: q.max(1).values)
+    lost = _lost(model)
+    v = torch.zeros_like(model.reward[:, 0])
+    if gamma == 1 and bool(model.goal.any()):
+        v.fill_(-torch.inf)  # so that only ways which come to an end count
+    gives_up = lost[model.then]
+    return _iterate(model, gamma, v, lost, lambda q: q.masked_fill(gives_up, -torch.inf).max(1).values)
 
 
 def of_policy(model: Model, gamma: float, policy: Float64[Tensor, "S 4"]) -> Values:
     """Values of any policy pi_p(a|s) (Sec. 4.1 is tested with a sub-optimal one).
 
+    With gamma = 1 a state from which it comes to no end at all is hopeless, too.
+
     Raises:
         ArithmeticError: no fixed point was found.
     """
-    return _iterate(model, gamma, lambda q: (policy * q).sum(1))
+    lost = _lost(model)
+    if gamma == 1 and bool(model.goal.any()):
+        lost = lost | ~_leads(model, model.over, policy > 0)
+    return _iterate(model, gamma, torch.zeros_like(model.reward[:, 0]), lost, lambda q: (policy * q).sum(1))
 
 
-def _iterate(model: Model, gamma: float, backup: object) -> Values:
-    v = torch.where(model.over, 0.0, torch.full_like(model.reward[:, 0], HOPELESS))
+def _lost(model: Model) -> Bool[Tensor, "S"]:
+    """From where no moves whatever lead to a goal, in a world that has one. An end is never lost."""
+    if not bool(model.goal.any()):
+        return torch.zeros_like(model.over)
+    return ~model.over & ~_leads(model, model.goal, torch.ones_like(model.unsafe))
+
+
+def _leads(model: Model, to: Bool[Tensor, "S"], by: Bool[Tensor, "S 4"]) -> Bool[Tensor, "S"]:
+    """From where some of the moves `by` lead to some of these states."""
+    while True:
+        grown = to | (~model.over & (by & to[model.then]).any(1))
+        if bool((grown == to).all()):
+            return to
+        to = grown
+
+
+def _iterate(
+    model: Model, gamma: float, v: Tensor, lost: Bool[Tensor, "S"], backup: Callable[[Tensor], Tensor]
+) -> Values:
+    """The fixed point of v = backup(r + gamma v'), which is 0 at an end and HOPELESS where all is lost."""
+    v = torch.where(lost, HOPELESS, torch.where(model.over, 0.0, v))
     for _ in range(PATIENCE):
         q = model.reward + gamma * v[model.then]
-        better = torch.where(model.over, 0.0, backup(q).clamp_min(HOPELESS))  # type: ignore[operator]
-        if bool((better - v).abs().max() < CLOSE):
+        better = torch.where(lost, HOPELESS, torch.where(model.over, 0.0, backup(q)))
+        if bool(((better == v) | ((better - v).abs() <= CLOSE * better.abs().clamp_min(1.0))).all()):
             return Values(gamma, better, model.reward + gamma * better[model.then])
         v = better
-    raise ArithmeticError(f"Values did not settle within {PATIENCE} sweeps at gamma = {gamma}.")
+    raise ArithmeticError(
+        f"Values did not settle within {PATIENCE} sweeps at gamma = {gamma}; a smaller gamma settles."
+    )
 
 
 def advantage(model: Model, values: Values, query: Query) -> Float64[Tensor, "N 2"]:

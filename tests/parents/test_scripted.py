@@ -8,8 +8,9 @@ import pytest
 import torch
 
 from agent.query import Choice, Kind, empty
+from parents.model import explore
 from parents.scripted import TIE, Judgement
-from parents.values import advantage
+from parents.values import Listed, optimal
 from tests.parents.walking import at, island, place, query, random_queries, said, stacked
 
 UP, DOWN, LEFT, RIGHT = range(4)
@@ -41,7 +42,7 @@ def test_guidance_at_the_start(
 @pytest.mark.parametrize("kind", [Kind.GUIDANCE, Kind.PREFERENCE])
 def test_greater_advantage_is_preferred(judgement: Judgement, kind: Kind) -> None:
     asked = random_queries(island(), judgement.model, 300, kind, seed=1)
-    alpha = advantage(judgement.model, judgement.values, asked).tolist()
+    alpha = judgement.valuation.alpha(asked).tolist()
     answers = said(judgement.choose(asked))
     for (left, right), answer, refused in zip(alpha, answers, judgement.refuses(asked), strict=True):
         if refused:
@@ -117,9 +118,9 @@ def test_no_query_has_no_answer(judgement: Judgement) -> None:
 def test_other_values_make_another_parent() -> None:
     """A parent whose values say the opposite prefers the opposite: the judgement is by values alone."""
     world = island()
-    usual = Judgement(world, 0.9)
-    values = usual.values._replace(q=-usual.values.q, v=-usual.values.v)
-    contrary = Judgement(world, 0.9, usual.model, values)
+    usual, model = Judgement(world, 0.9), explore(world)
+    values = optimal(model, 0.9)
+    contrary = Judgement(world, 0.9, Listed(model, values._replace(q=-values.q, v=-values.v)))
     asked = query(world, Kind.GUIDANCE, at(usual.model, START), [DOWN], [UP])
     assert said(usual.choose(asked)) == [Choice.LEFT]
     assert said(contrary.choose(asked)) == [Choice.RIGHT]
