@@ -24,11 +24,11 @@ class Learner(Struct):
 class Rehearsal(Struct):
     """What pre-training keeps during parenting: Adam's state, and whether a step is owed (Sec. 3.1.4).
 
-    Q is P, or 0 in a run without pre-training.
+    P0 is P, or 0 in a run without pre-training.
     """
 
-    first: Float[Tensor, "N Q"]  # Adam's first moments
-    second: Float[Tensor, "N Q"]  # Adam's second moments
+    first: Float[Tensor, "N P0"]  # Adam's first moments
+    second: Float[Tensor, "N P0"]  # Adam's second moments
     steps: Int64[Tensor, "N"]  # gradient steps
     owed: Bool[Tensor, "N"]  # the last tick trained
 
