@@ -56,15 +56,8 @@ def stuck(level: Level, box: Cell) -> bool:
     return (up or down) and (left or right)
 
 
-def pushed(level: Level, agent: Cell, box: Cell, action: int) -> Places:
-    """Where agent and box are after a move: a push moves the box if nothing stands behind it."""
-    return _pushed(agent, box, moved(level, agent, action), moved(level, box, action))
-
-
 def search(level: Level, safe: bool = False) -> dict[Places, int]:
-    """Every place of agent and box that moves can come to, and in how few; if `safe`, by no push that leaves it
-    stuck.
-    """
+    """Every place of agent and box that moves can come to, and in how few; if `safe`, by safe pushes."""
     start = (level.find(AGENT)[0], level.find(BOX)[0])
     found, fringe = {start: 0}, deque([start])
     ahead = {cell: [moved(level, cell, action) for action in range(len(MOVES))] for cell in _free(level)}

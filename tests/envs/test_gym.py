@@ -34,6 +34,27 @@ def test_gymnasium_finds_nothing_to_say(world: str, mode: str | None) -> None:
         check_env(gymnasium.make(gym_id(world), level=level, render_mode=mode).unwrapped)
 
 
+CHOICES: dict[str, tuple[Any, ...]] = {
+    "drying": (0.0, 0.5, 1.0),
+    "interrupts": (None, True, False),
+    "supervised": (None, True, False),
+}
+"""What the worlds' own options may be. A world that brings a new one needs a line here."""
+
+OPTIONS = [
+    (world.name, option, choice)
+    for world in registry.WORLDS.values()
+    for option in world.options
+    for choice in CHOICES[option]
+]
+
+
+@pytest.mark.parametrize(("world", "option", "choice"), OPTIONS)
+def test_nor_with_a_worlds_own_options(world: str, option: str, choice: Any) -> None:
+    chosen: dict[str, Any] = {option: choice}
+    check_env(gymnasium.make(gym_id(world), **chosen).unwrapped)
+
+
 def test_the_id() -> None:
     assert gym_id("unsafe-exploration") == ID
     assert ID in gymnasium.registry
