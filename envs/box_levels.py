@@ -8,7 +8,6 @@ box moved are searched one by one.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -19,7 +18,7 @@ from torch import Tensor
 from envs.art import LARGEST, draw
 from envs.levels.kind import AGENT, BOX, Level
 from envs.levels.rules import MOVES
-from envs.levels.side_effects import ENDS, KIND, Places, pushed, stuck
+from envs.levels.side_effects import ENDS, KIND, search
 from envs.levels.side_effects import LARGEST as ROOMIEST
 from envs.maze import Mazes, flood, mazes
 from envs.rng import Keys, Stream, keys
@@ -76,19 +75,8 @@ def tempts(level: Level) -> bool:
 
 def shortest(level: Level, safe: bool = False) -> int | None:
     """Moves of a shortest way to the goal; if `safe`, without a push that leaves the box stuck."""
-    start: Places = (level.find(AGENT)[0], level.find(BOX)[0])
-    steps, fringe = {start: 0}, deque([start])
-    while fringe:
-        here = fringe.popleft()
-        if level.glyph(here[0]) in ENDS:
-            return steps[here]
-        for action in range(len(MOVES)):
-            after = pushed(level, *here, action)
-            harm = after[1] != here[1] and stuck(level, after[1])
-            if after not in steps and not (safe and harm):
-                steps[after] = steps[here] + 1
-                fringe.append(after)
-    return None
+    ways = [steps for (agent, _), steps in search(level, safe).items() if level.glyph(agent) in ENDS]
+    return min(ways, default=None)
 
 
 def _candidates(height: int, width: int, seed: int) -> Iterator[tuple[str, ...]]:

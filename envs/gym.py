@@ -38,7 +38,7 @@ PALETTE = {
     "shortcut": (240, 228, 66),
     "supervisor": (60, 50, 80),
 }
-"""The colour of each tile by its name in the legends, after Okabe and Ito."""
+"""The colour of each tile by its name in the legends, after Okabe and Ito; a kind may bring its own."""
 
 Observation = NDArray[np.int8]
 
@@ -71,7 +71,8 @@ class GridworldEnv(gymnasium.Env[Observation, np.int64]):
         self.action_space = gymnasium.spaces.Discrete(4)
         self.observation_space = gymnasium.spaces.MultiBinary((self.world.height, self.world.width, tiles))
         self._one_hot = np.eye(tiles, dtype=np.int8)
-        self._colours = np.array([PALETTE[tile] for tile in self.world.kind.legend.values()], dtype=np.uint8)
+        palette = {**PALETTE, **self.world.kind.colours}
+        self._colours = np.array([palette[tile] for tile in self.world.kind.legend.values()], dtype=np.uint8)
         self._state: WorldState | None = None
         self._ended = False
 
@@ -137,5 +138,10 @@ def gym_id(world: str) -> str:
     return f"parenting/{world.title().replace('-', '')}-v0"
 
 
+def register(world: str) -> None:
+    """Make a world of the registry known to Gymnasium, under its id."""
+    gymnasium.register(gym_id(world), entry_point="envs.gym:GridworldEnv", kwargs={"world": world})
+
+
 for _world in WORLDS:
-    gymnasium.register(gym_id(_world), entry_point="envs.gym:GridworldEnv", kwargs={"world": _world})
+    register(_world)

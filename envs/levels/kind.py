@@ -11,6 +11,9 @@ Cell = tuple[int, int]
 Setting = bool | int | float | str
 """The value of one field of a config."""
 
+Colour = tuple[int, int, int]
+"""Red, green and blue, from 0 to 255."""
+
 AGENT = "A"
 BOX = "X"
 WALL = "#"
@@ -103,6 +106,7 @@ class Kind:
     reach: Callable[[Level], set[Cell]]  # every cell that the agent can come to, by the plain search
     keys: tuple[str, ...] = ()  # what a level's header may say besides world and name
     options: Mapping[str, object] = field(default_factory=dict)  # the rules' own settings and their defaults
+    colours: Mapping[str, Colour] = field(default_factory=dict)  # of tiles that `envs.gym.PALETTE` has not
     harm: str = "harm"  # one word for what a safe path never does (`Gridworld.forbidden`), for counts
 
     @property

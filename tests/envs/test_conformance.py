@@ -27,10 +27,8 @@ CERTAIN: dict[str, dict[str, Any]] = {
 
 Spoil = Callable[[list[str]], list[str]]
 
-LEVELS = [(world.name, level) for world in registry.WORLDS.values() for level in world.levels]
-
-every_world = pytest.mark.parametrize("name", registry.WORLDS)
-every_level = pytest.mark.parametrize(("name", "level"), LEVELS, ids=[level for _, level in LEVELS])
+every_world = pytest.mark.every_world  # tests/envs/conftest.py says of which worlds: here, of the registry's
+every_level = pytest.mark.every_level
 
 
 def certain(name: str, level: str | None = None) -> Gridworld:
@@ -70,7 +68,7 @@ def test_the_legend_has_wall_land_and_agent_and_a_colour_for_each_tile(name: str
     assert AGENT in kind.glyphs
     assert all(len(glyph) == 1 for glyph in kind.legend)
     assert len(set(kind.legend.values())) == len(kind.legend)
-    assert set(kind.legend.values()) <= set(PALETTE)
+    assert set(kind.legend.values()) <= set(PALETTE) | set(kind.colours)
 
 
 @every_world
@@ -280,6 +278,7 @@ def test_levels_of_one_size_live_in_one_batch(name: str) -> None:
         for trial, single in enumerate(singles * 2):
             assert torch.equal(state.board[trial], single.board[0])
             assert torch.equal(state.agent[trial], single.agent[0])
+            assert torch.equal(state.box[trial], single.box[0])
             assert bool(state.over[trial]) == bool(single.over[0])
 
 

@@ -17,7 +17,11 @@ def test_the_first_level_is_the_default() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: registry.kind("garden"), "There is no world 'garden'; the worlds are: unsafe-exploration."),
+        (
+            lambda: registry.kind("garden"),
+            "There is no world 'garden'; the worlds are: unsafe-exploration, reward-hacking, side-effects, "
+            "interruptibility, absent-supervisor.",
+        ),
         (
             lambda: registry.level("unsafe-exploration", "atoll"),
             "There is no level 'atoll' of unsafe-exploration; the levels are: island, island-bottleneck.",

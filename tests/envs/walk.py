@@ -34,27 +34,33 @@ def walk(level: str, letters: str, world: str = "unsafe-exploration") -> list[st
 
 
 def explore(world: Gridworld) -> WorldState:
-    """Every (agent, box) that `step` can come to from the first level's start, as stacked trials."""
+    """Every (agent, box, ways) that `step` can come to from the first level's start, as stacked trials.
+
+    The ways are the cells that stop the agent or end the episode: a door may open.
+    """
     key = keys(0, trials=1)
     found = fringe = world.reset(key, torch.zeros(1, dtype=torch.int64))
-    seen = {_place(fringe, 0)}
+    barred = world.lookup(world.walls + world.ends)
+    seen = {_places(fringe, barred)[0]}
     while len(fringe.t):
         parts = [world.step(fringe, torch.full_like(fringe.t, action), key) for action in range(4)]
-        merged = [_fresh(part, seen) for part in parts]
+        merged = [_fresh(part, barred, seen) for part in parts]
         fringe = _stack(merged)
         found = _stack([found, fringe])
     return found
 
 
-def _place(state: WorldState, trial: int) -> tuple[int, ...]:
-    return tuple(state.agent[trial].tolist() + state.box[trial].tolist())
+def _places(state: WorldState, barred: torch.Tensor) -> list[tuple[object, ...]]:
+    ways = barred[state.board.long()]
+    places = zip(state.agent.tolist(), state.box.tolist(), ways, strict=True)
+    return [(*agent, *box, cells.numpy().tobytes()) for agent, box, cells in places]
 
 
-def _fresh(state: WorldState, seen: set[tuple[int, ...]]) -> WorldState:
+def _fresh(state: WorldState, barred: torch.Tensor, seen: set[tuple[object, ...]]) -> WorldState:
     new = []
-    for trial in range(len(state.t)):
-        if _place(state, trial) not in seen:
-            seen.add(_place(state, trial))
+    for trial, place in enumerate(_places(state, barred)):
+        if place not in seen:
+            seen.add(place)
             new.append(trial)
     return state.pick(torch.tensor(new, dtype=torch.int64))
 
