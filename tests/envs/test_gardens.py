@@ -68,6 +68,7 @@ NEEDS = "a garden's header needs a line 'cycle: ROW,COLUMN LETTERS'"
         ("cycle: 2,2 rrdl", 1, 15, STEPS),
         ("cycle: 2,2 rrll", 1, 14, TWICE),
         ("cycle: 2,2 du du", 1, 15, TWICE),
+        ("cycle: 2,2 dur", 1, 14, TWICE),  # on from where it has closed
         ("cycle: 2,2 r", 1, 12, CLOSES),
         ("name: plot\ncycle: 2,2 rrdd  ", 2, 15, CLOSES),
         ("cycle: 4,2 rl", 1, 8, "the cycle must pass a plant, and this one passes none"),
