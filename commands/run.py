@@ -9,20 +9,19 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from pydantic import ValidationError
 
 from agent.config import Config, UnknownPreset, compose
+from commands.results import page
 from envs import registry
 from envs.levels.kind import Level, LevelError
 
 if TYPE_CHECKING:
     from experiments.chunks import Plan
-    from experiments.trials import Progress, Tally, Until
-
-COUNTS = ("deaths", "guidance", "preference", "ticks")
+    from experiments.trials import Progress, Standing, Until
 
 
 class Wrong(ValueError):
@@ -45,8 +44,12 @@ def run(
         int, typer.Option(min=1, help="Ticks after which a trial is left unfinished.")
     ] = 20_000,
     until: Annotated[
-        str, typer.Option(metavar="optimal|queries:N|ticks:N", help="When a trial is finished.")
-    ] = "optimal",
+        str | None,
+        typer.Option(
+            metavar="optimal|queries:N|ticks:N",
+            help="When a trial is finished. [default: optimal; queries:1000 in reward-hacking]",
+        ),
+    ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes. [default: one a core]")] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
@@ -54,45 +57,27 @@ def run(
 ) -> None:
     """Raise agents by the scripted parent (Sec. 3.1.3), all at once, and count deaths and queries.
 
+    At the end it says what their argmax policies do.
+
     Example: parenting run unsafe-exploration --preset conservative --trials 100
     """
     with _plainly():
         found = _level(world, level)
         config = _config(world, preset, changes or [])
-        goal = _until(until)
+        goal = _until(world, until)
+    _hint(config)
     import torch
 
     from experiments.chunks import Plan, run
+    from experiments.summary import summarise
 
     torch.set_num_threads(1)
     plan = Plan(world, found.text, config, seed, trials, goal, max_ticks)
     began = time.monotonic()
-    with _bar(trials) as progress:
-        tally = run(plan, workers or os.cpu_count() or 1, progress)
-    results = summarise(plan, found.name, tally, time.monotonic() - began)
-    typer.echo(json.dumps(results) if as_json else _page(results))
-
-
-def summarise(plan: Plan, level: str, tally: Tally, seconds: float) -> dict[str, Any]:
-    """The results as plain data. Means and deviations (over n - 1) are of the finished trials; the others are
-    counted.
-    """
-    rows = {name: getattr(tally, name).tolist() for name in (*COUNTS, "optimal")}
-    finished = {name: getattr(tally, name)[tally.finished].double() for name in COUNTS}
-    some, several = int(tally.finished.sum()) > 0, int(tally.finished.sum()) > 1
-    return {
-        "world": plan.world,
-        "level": level,
-        "seed": plan.seed,
-        "until": str(plan.until),
-        "max_ticks": plan.max_ticks,
-        "config": plan.config.model_dump(mode="json"),
-        "trials": [dict(zip(rows, row, strict=True)) for row in zip(*rows.values(), strict=True)],
-        "unfinished": int((~tally.finished).sum()),
-        "mean": {name: float(values.mean()) if some else None for name, values in finished.items()},
-        "sd": {name: float(values.std()) if several else None for name, values in finished.items()},
-        "seconds": round(seconds, 2),
-    }
+    with _bar(plan) as progress:
+        ending = run(plan, workers or os.cpu_count() or 1, progress)
+    results = summarise(plan, found.name, ending, time.monotonic() - began)
+    typer.echo(json.dumps(results) if as_json else page(results))
 
 
 def _level(world: str, name_or_file: str | None) -> Level:
@@ -111,35 +96,57 @@ def _level(world: str, name_or_file: str | None) -> Level:
 
 
 def _config(world: str, preset: str, changes: list[str]) -> Config:
+    """Preset, world and `--set` together; every change that is wrong has its sentence."""
     given: dict[str, object] = {}
+    wrong: list[str] = []
     for change in changes:
         key, equals, value = change.partition("=")
         if not equals:
-            raise Wrong(f"--set: '{change}' is not KEY=VALUE. Write it as --set p_guid=0.9.")
-        if key not in Config.model_fields:
-            raise Wrong(
-                f"--set: there is no hyperparameter '{key}'; there is: {', '.join(Config.model_fields)}."
-            )
-        given[key] = None if value.lower() in ("none", "null") else value
+            wrong.append(f"--set: '{change}' is not KEY=VALUE. Write it as --set p_guid=0.9.")
+        elif key not in Config.model_fields:
+            known = ", ".join(Config.model_fields)
+            wrong.append(f"--set: there is no hyperparameter '{key}'; there is: {known}.")
+        else:
+            given[key] = None if value.lower() in ("none", "null") else value
     try:
-        return compose(preset, registry.defaults(world), given, strict=False)
+        config = compose(preset, registry.defaults(world), given, strict=False)
     except ValidationError as error:
-        first = error.errors()[0]
-        name = str(first["loc"][0])
-        raise Wrong(
-            f"--set: {name}={given.get(name)}: {first['msg']}. {Config.model_fields[name].description}"
-        ) from None
+        wrong += [_said(str(one["loc"][0]), given, one["msg"]) for one in error.errors()]
+        raise Wrong("\n".join(wrong)) from None
+    if config.gamma == 1 and not registry.kind(world).ends_at_goal:
+        wrong.append(f"--set: gamma must be below 1 in {world}, where rewards never end; 0.9 is the default.")
+    if wrong:
+        raise Wrong("\n".join(wrong))
+    return config
 
 
-def _until(text: str) -> Until:
+def _said(name: str, given: dict[str, object], rule: str) -> str:
+    return f"--set: {name}={given.get(name)}: {rule}. {Config.model_fields[name].description}"
+
+
+def _until(world: str, text: str | None) -> Until:
+    """When a trial is finished; where no goal ends an episode no policy is optimal."""
     from experiments.trials import Until
 
-    kind, colon, number = text.partition(":")
+    endless = not registry.kind(world).ends_at_goal
+    kind, colon, number = (text or ("queries:1000" if endless else "optimal")).partition(":")
     if kind == "optimal" and not colon:
+        if endless:
+            raise Wrong(
+                f"--until: no policy counts as optimal in {world}, which has no goal."
+                " Use --until queries:N or ticks:N; the default is queries:1000."
+            )
         return Until("optimal")
     if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
         return Until(kind, int(number))  # type: ignore[arg-type]
     raise Wrong(f"--until: '{text}' is none of optimal, queries:N, ticks:N with N at least 1.")
+
+
+def _hint(config: Config) -> None:
+    """Say what was set and changes nothing."""
+    if config.mature_every is not None and config.stages == 1:
+        said = "--set: mature_every changes nothing while stages is 1: the last stage never ends."
+        typer.echo(f"{said} Set stages=2 or more to mature.", err=True)
 
 
 @contextmanager
@@ -153,40 +160,26 @@ def _plainly() -> Iterator[None]:
 
 
 @contextmanager
-def _bar(trials: int) -> Iterator[Progress | None]:
-    """A progress bar on standard error, where that is a terminal."""
+def _bar(plan: Plan) -> Iterator[Progress | None]:
+    """A progress bar on standard error, where that is a terminal: of queries where they are the goal."""
     if not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+    asking = plan.until.kind == "queries"
     columns = (
-        TextColumn("trials"),
+        TextColumn("queries" if asking else "trials"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("tick {task.fields[tick]}"),
         TimeElapsedColumn(),
     )
+
+    def show(now: Standing) -> None:
+        bar.update(task, completed=now.queries if asking else now.trials, tick=now.ticks)
+
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("trials", total=trials, tick=0)
-        yield lambda finished, tick: bar.update(task, completed=finished, tick=tick)
-
-
-def _page(results: dict[str, Any]) -> str:
-    """The results for the reader."""
-    number, optimal = len(results["trials"]), sum(row["optimal"] for row in results["trials"])
-    lines = [
-        f"{results['world']}, {results['level']}: {number} trials"
-        f" until {results['until']}, {results['seconds']} s",
-        f"  optimal     {optimal} of {number}",
-    ]
-    for name in COUNTS:
-        mean, sd = results["mean"][name], results["sd"][name]
-        said = "-" if mean is None else f"{mean:.2f}" + ("" if sd is None else f" +- {sd:.2f}")
-        lines.append(f"  {name:<11} {said}")
-    if results["unfinished"]:
-        lines.append(
-            f"  unfinished  {results['unfinished']} after {results['max_ticks']} ticks; not in the means"
-        )
-    return "\n".join(lines)
+        task = bar.add_task("", total=plan.trials * (plan.until.number if asking else 1), tick=0)
+        yield show

@@ -1,4 +1,4 @@
-"""Many trials on several cores: chunks of one size, so that results do not depend on the cores' number.
+"""Many trials on several cores: in chunks that depend on their number alone, not on that of the cores.
 
 Each chunk is a batch of its own. Which chunk a trial falls into changes nothing but the last bits of its
 sums: a batch of another size may add in another order (docs/architecture.md, "Batches and bits").
@@ -9,16 +9,20 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Iterator
 from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import torch
 
 from agent.birth import world_of
 from agent.config import Config
 from envs.rng import keys
-from experiments.trials import Progress, Tally, Until, raise_trials
+from experiments.endings import Ending, examine
+from experiments.trials import Progress, Standing, Until, raise_trials
 
 CHUNK = 50
+"""Trials of a chunk at most. Two trials and more are two chunks at least, so that two cores have work."""
+FIELDS = len(Standing._fields)
 LOOK_SECONDS = 0.2
 """How often the counters of the other processes are read, for the progress bar."""
 
@@ -35,41 +39,54 @@ class Plan(NamedTuple):
     max_ticks: int
 
 
-def run(plan: Plan, workers: int, progress: Progress | None = None) -> Tally:
+def chunks(trials: int) -> list[range]:
+    """The trials of every chunk, which depend on the number of trials alone."""
+    number = max(min(2, trials), -(-trials // CHUNK))
+    edges = [trials * place // number for place in range(number + 1)]
+    return [range(start, end) for start, end in pairwise(edges)]
+
+
+def run(plan: Plan, workers: int, progress: Progress | None = None) -> Ending:
     """Raise all trials of a plan, on up to `workers` processes."""
-    starts = range(0, plan.trials, CHUNK)
-    if len(starts) == 1 or workers == 1:
-        return _join([_here(plan, start, progress) for start in starts])
-    return _join(list(_elsewhere(plan, list(starts), min(workers, len(starts)), progress)))
+    every = chunks(plan.trials)
+    if len(every) == 1 or workers == 1:
+        return _join(list(_here(plan, every, progress)))
+    return _join(list(_elsewhere(plan, every, min(workers, len(every)), progress)))
 
 
-def raise_chunk(plan: Plan, start: int, progress: Progress | None = None) -> Tally:
-    """The trials from `start` on, at most CHUNK. Trial i has the same keys in whichever chunk it falls."""
+def raise_chunk(plan: Plan, chunk: range, progress: Progress | None = None) -> Ending:
+    """The trials of one chunk, and how they end. Trial i has the same keys in whichever chunk it falls."""
     world = world_of(plan.world, plan.level, plan.config)
-    trial = torch.arange(start, min(start + CHUNK, plan.trials))
-    return raise_trials(
-        world, plan.config, keys(plan.seed, plan.trials).pick(trial), plan.until, plan.max_ticks, progress
-    )
+    mine = keys(plan.seed, plan.trials).pick(torch.arange(chunk.start, chunk.stop))
+    raised = raise_trials(world, plan.config, mine, plan.until, plan.max_ticks, progress)
+    return examine(world, plan.config, raised)
 
 
-def _here(plan: Plan, start: int, progress: Progress | None) -> Tally:
-    if progress is None:
-        return raise_chunk(plan, start)
-    return raise_chunk(plan, start, lambda finished, ticks: progress(start + finished, ticks))
+def _here(plan: Plan, every: list[range], progress: Progress | None) -> Iterator[Ending]:
+    """One chunk after the other."""
+    counters = [0] * FIELDS * len(every)
+    for place, chunk in enumerate(every):
+
+        def note(standing: Standing, place: int = place) -> None:
+            _write(counters, place, standing)
+            if progress:
+                progress(_read(counters))
+
+        yield raise_chunk(plan, chunk, note if progress else None)
 
 
-def _elsewhere(plan: Plan, starts: list[int], workers: int, progress: Progress | None) -> Iterator[Tally]:
+def _elsewhere(plan: Plan, every: list[range], workers: int, progress: Progress | None) -> Iterator[Ending]:
     """Every chunk in a process of a pool; their counters are read while they live."""
     context = multiprocessing.get_context("spawn")
-    counters = context.Array("q", 2 * len(starts))
+    counters = context.Array("q", FIELDS * len(every))
     with ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(counters,)) as pool:
-        futures = [pool.submit(_child, plan, place, start) for place, start in enumerate(starts)]
+        futures = [pool.submit(_child, plan, place, chunk) for place, chunk in enumerate(every)]
         try:
             pending = set(futures)
             while pending:
                 _, pending = wait(pending, LOOK_SECONDS, FIRST_EXCEPTION)
                 if progress:
-                    progress(sum(counters[::2]), max(counters[1::2]))
+                    progress(_read(counters))
             yield from (future.result() for future in futures)
         except BaseException:
             pool.terminate_workers() if hasattr(pool, "terminate_workers") else _terminate(pool)
@@ -87,15 +104,21 @@ def _begin(counters: object) -> None:
     globals()["_counters"] = counters
 
 
-def _child(plan: Plan, place: int, start: int) -> Tally:
+def _child(plan: Plan, place: int, chunk: range) -> Ending:
     counters = globals()["_counters"]
-
-    def note(finished: int, ticks: int) -> None:
-        counters[2 * place], counters[2 * place + 1] = finished, ticks
-
-    return raise_chunk(plan, start, note)
+    return raise_chunk(plan, chunk, lambda standing: _write(counters, place, standing))
 
 
-def _join(parts: list[Tally]) -> Tally:
+def _write(counters: Any, place: int, standing: Standing) -> None:
+    counters[FIELDS * place : FIELDS * (place + 1)] = standing
+
+
+def _read(counters: Any) -> Standing:
+    """The standing of all chunks together."""
+    trials, ticks, queries = (counters[place::FIELDS] for place in range(FIELDS))
+    return Standing(sum(trials), max(ticks), sum(queries))
+
+
+def _join(parts: list[Ending]) -> Ending:
     every = [part.tensors() for part in parts]
     return parts[0].map(lambda name, _tensor, _axis: torch.cat([one[name] for one in every]))

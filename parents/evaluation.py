@@ -1,20 +1,84 @@
-"""How well an agent does, by the parent's reward: exact, never by sampling. The agent sees none of it."""
+"""How well an agent does, by the parent's reward: what its argmax policy does. The agent sees none of it.
+
+Exact where the states can be listed. In the garden, where drying is left to chance, means over episodes.
+"""
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import torch
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
 from agent.birth import network_of
 from envs.gridworld import Gridworld, local_state
+from parents import waterings
+from parents.conduct import UNREACHABLE, distances, outcome, walk
+from parents.garden import Garden
 from parents.model import Model
+from parents.values import Listed, Valuation
 
-UNREACHABLE = 1_000_000
+GLANCE = 16
+"""Episodes of the garden's mean that a dashboard draws. Even these cost a quarter of a second."""
+REST = 3.0
+"""Seconds between two such means, so that a life goes on meanwhile."""
 
 
-class Evaluation:
+class Evaluation(Protocol):
+    """What a run's watchers ask about the argmax policies of its trials."""
+
+    rest: float  # seconds to let pass between two looks at `returns`
+
+    def optimal(self, parameters: Float[Tensor, "N P"]) -> Bool[Tensor, "N"]:
+        """Whether the argmax policy is optimal (docs/paper.md, "Optimal"); never in the garden."""
+        ...
+
+    def returns(self, parameters: Float[Tensor, "N P"], level: int = 0) -> Float64[Tensor, "N"]:
+        """What the argmax policy earns in an episode on one level."""
+        ...
+
+    def best(self, level: int = 0) -> float:
+        """What the agent's return is to reach."""
+        ...
+
+
+def evaluation(world: Gridworld, valuation: Valuation, gamma: float) -> Evaluation:
+    """The evaluation that suits what the parent knows of a world."""
+    match valuation:
+        case Garden():
+            return GardenEvaluation(world, valuation)
+        case Listed():
+            return ListedEvaluation(world, valuation.model, gamma)
+    raise TypeError(f"There is no evaluation of a world that is valued by {type(valuation).__name__}.")
+
+
+class GardenEvaluation:
+    """Waterings (Sec. 3.3): of the argmax policy a mean over a few episodes, of the parent's own exactly."""
+
+    rest = REST
+
+    def __init__(self, world: Gridworld, garden: Garden, episodes: int = GLANCE) -> None:
+        """`episodes` is how many a mean is taken over."""
+        self.world, self.garden, self.episodes = world, garden, episodes
+
+    def optimal(self, parameters: Float[Tensor, "N P"]) -> Bool[Tensor, "N"]:
+        """Never: nobody says what an optimal policy waters."""
+        return torch.zeros(len(parameters), dtype=torch.bool, device=parameters.device)
+
+    def returns(self, parameters: Float[Tensor, "N P"], level: int = 0) -> Float64[Tensor, "N"]:
+        """Waterings in an episode of the whole time limit."""
+        return waterings.roll_out(self.world, parameters, self.episodes, level).waterings
+
+    def best(self, level: int = 0) -> float:
+        """The waterings that the parent's own policy is to be expected to do; an agent may do more."""
+        return float(self.garden.waterings(self.world.time_limit)[level])
+
+
+class ListedEvaluation:
     """What the argmax policy does from the start of each level, with no chance events."""
+
+    rest = 0.0
 
     def __init__(self, world: Gridworld, model: Model, gamma: float) -> None:
         """Prepare the observations of all states, and the distance of each to the goal by safe moves."""
@@ -23,10 +87,10 @@ class Evaluation:
         self.brain = network_of(world)
         self.seen = world.observe(states.board, states.agent, states.box)
         self.near = local_state(self.seen, states.agent)
-        self.distance = _distances(model)
+        self.distance = distances(model)
         self.starts = torch.arange(len(world.levels), device=world.device)
 
-    def optimal(self, parameters: Float64[Tensor, "N P"]) -> Bool[Tensor, "N"]:
+    def optimal(self, parameters: Float[Tensor, "N P"]) -> Bool[Tensor, "N"]:
         """Whether the argmax policy reaches every level's goal by a shortest safe path."""
         good = torch.ones(len(parameters), dtype=torch.bool, device=parameters.device)
         for start in self.starts:
@@ -38,69 +102,62 @@ class Evaluation:
         """All on one way: the first step that does not bring the goal nearer ends a trial's walk."""
         every, at = trial, start.expand(len(trial))
         for left in range(int(self.distance[start]), 0, -1):
-            at = self._move(parameters, trial, at)
+            weights = parameters if len(trial) == len(parameters) else parameters[trial]
+            action = self.brain.logits(weights, self.seen[at], self.near[at]).argmax(1)
+            at = self._safely(at, action)
             nearer = self.distance[at] == left - 1
             trial, at = trial[nearer], at[nearer]
             if not len(trial):
                 break
         return torch.isin(every, trial)
 
-    def _move(
-        self, parameters: Tensor, trial: Int64[Tensor, "n"], at: Int64[Tensor, "n"]
-    ) -> Int64[Tensor, "n"]:
-        weights = parameters if len(trial) == len(parameters) else parameters[trial]
-        action = self.brain.logits(weights, self.seen[at], self.near[at]).argmax(1)
-        return self._safely(at, action)
-
     def _safely(self, at: Tensor, action: Tensor) -> Tensor:
-        """The next state; an unsafe step leads nowhere, so that it never counts as nearer."""
-        then = self.model.then[at, action]
-        return torch.where(self.model.unsafe[at, action], at, then)
+        """The next state; a forbidden step leads nowhere, so that it never counts as nearer."""
+        return torch.where(self.model.forbidden[at, action], at, self.model.then[at, action])
 
-    def returns(self, parameters: Float64[Tensor, "N P"], level: int = 0) -> Float64[Tensor, "N"]:
+    def outcomes(self, parameters: Float[Tensor, "N P"]) -> Int64[Tensor, "N"]:
+        """The `Outcome` of every argmax policy; with several levels that of its worst."""
+        policy = Argmax(self, parameters)
+        worst = torch.zeros(len(parameters), dtype=torch.int64, device=parameters.device)
+        for start in self.starts:
+            path = walk(self.model, policy, start.expand(len(parameters)), self.world.time_limit)
+            worst = torch.maximum(worst, outcome(self.model, self.distance, path))
+        return worst
+
+    def returns(self, parameters: Float[Tensor, "N P"], level: int = 0) -> Float64[Tensor, "N"]:
         """The discounted return of the argmax policy's episode on one level, cut off at the time limit."""
-        action = self.actions(parameters)
-        trial = torch.arange(len(action), device=action.device)
-        at = self.starts[level].expand(len(trial))
-        total = torch.zeros(len(trial), dtype=torch.float64, device=action.device)
-        for t in range(self.world.time_limit):
-            move = action[trial, at]
-            total += self.gamma**t * self.model.reward[at, move]
-            at = self.model.then[at, move]
-        return total
-
-    def actions(self, parameters: Float64[Tensor, "N P"]) -> Int64[Tensor, "N S"]:
-        """The argmax action of every policy in every state."""
-        layers = self.brain.unpack(parameters)
-        seen = self.seen.expand(len(parameters), *self.seen.shape)
-        with torch.no_grad():
-            heads = self.brain.heads(layers, seen, self.near.expand(len(parameters), *self.near.shape))
-        return heads.logits.argmax(-1)
+        start = self.starts[level].expand(len(parameters))
+        path = walk(self.model, Argmax(self, parameters), start, self.world.time_limit)
+        earned = self.model.reward[path.at[:-1], path.action]
+        step = torch.arange(len(earned), device=earned.device)
+        return (self.gamma ** step.double() * earned.T).sum(1)
 
     def best(self, level: int = 0) -> float:
         """The discounted return of a shortest safe path: the line that the agent's return is to reach."""
         at, total = self.starts[level], 0.0
         for t in range(int(self.distance[at])):
-            then = torch.where(self.model.unsafe[at], UNREACHABLE, self.distance[self.model.then[at]])
+            then = torch.where(self.model.forbidden[at], UNREACHABLE, self.distance[self.model.then[at]])
             action = then.argmin()
             total += self.gamma**t * float(self.model.reward[at, action])
             at = self.model.then[at, action]
         return total
 
 
-def _distances(model: Model) -> Int64[Tensor, "S"]:
-    """Safe steps to the goal from every state; UNREACHABLE where there is no safe way."""
-    arrived = model.over & ~_entered_unsafely(model)
-    distance = torch.where(arrived, 0, UNREACHABLE)
-    while True:
-        then = torch.where(model.unsafe, UNREACHABLE, distance[model.then]).min(1).values + 1
-        nearer = torch.where(model.over, distance, torch.minimum(distance, then))
-        if bool((nearer == distance).all()):
-            return distance
-        distance = nearer
+class Argmax:
+    """The argmax policy of every trial, read off its network where it comes to, and remembered."""
 
+    def __init__(self, of: ListedEvaluation, parameters: Float[Tensor, "N P"]) -> None:
+        """Nothing is read yet."""
+        self.of, self.parameters = of, parameters
+        self.known = torch.full((len(parameters), len(of.near)), -1, dtype=torch.int8)
+        self.trial = torch.arange(len(parameters))
 
-def _entered_unsafely(model: Model) -> Bool[Tensor, "S"]:
-    entered = torch.zeros_like(model.over)
-    entered[model.then[model.unsafe]] = True
-    return entered
+    def __call__(self, at: Int64[Tensor, "N"]) -> Int64[Tensor, "N"]:
+        """The action of every trial in its state."""
+        fresh = (self.known[self.trial, at] < 0).nonzero().squeeze(1)
+        if len(fresh):
+            weights = self.parameters if len(fresh) == len(self.parameters) else self.parameters[fresh]
+            there, of = at[fresh], self.of
+            read = of.brain.logits(weights, of.seen[there], of.near[there]).argmax(1)
+            self.known[fresh, there] = read.to(torch.int8)
+        return self.known[self.trial, at].long()

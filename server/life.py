@@ -6,14 +6,15 @@ import time
 from collections.abc import Callable
 
 import structlog
+from torch import Tensor
 
 from agent import parenting
 from agent.birth import world_of
 from agent.config import Config
 from agent.query import Kind, Query
-from parents.evaluation import Evaluation
+from parents.evaluation import evaluation
 from parents.scripted import Judgement
-from server import mailbox, record, runs
+from server import mailbox, record, runs, shelf
 from server.checkpoint import Diverged, Saved, birth, pack, unpack, versions
 from server.codec import encode, kind_name
 from server.db import Database
@@ -23,6 +24,7 @@ from server.measure import NOTHING_LEARNT, learnt, measure
 from server.runs import Claim
 from server.tables import Run
 from server.tally import count
+from weights.store import Wanted, load
 
 log = structlog.get_logger()
 
@@ -43,9 +45,10 @@ class Life:
         self.db, self.mine, self.run = db, mine, run
         born = Config.model_validate(run.config)
         self.world = world_of(run.world, run.level_text, born)
-        judgement = Judgement(self.world, born.gamma)
-        self.evaluation = Evaluation(self.world, judgement.model, born.gamma)
+        judgement = Judgement(self.world, born.gamma, inside=born.inside)
+        self.evaluation = evaluation(self.world, judgement.valuation, born.gamma)
         self.parent = self._parent(born, judgement, asked)
+        self._weights = self._begun_with()
         self.saved = self._recall(born)
         self.record_ends = mailbox.high_water(db, mine.run_id)
         self.optimal, self.waiting = run.optimal, run.waiting
@@ -58,12 +61,19 @@ class Life:
             return ScriptedQueueParent(self.db, self.mine, self.world, config, asked, judgement)
         return QueueParent(self.db, self.mine, self.world, config, asked)
 
+    def _begun_with(self) -> Tensor | None:
+        """The pre-trained weights of tick 0 (Sec. 3.1.4)."""
+        if self.run.weights is None:
+            return None
+        wanted = Wanted(self.world.kind, self.world.height, self.world.width)
+        return load(shelf.fetch(self.db, self.run.weights), wanted)
+
     def _recall(self, config: Config) -> Saved:
         for checkpoint in record.load_checkpoints(self.db, self.mine.run_id):
             if checkpoint.intact:
-                return unpack(self.world, config, checkpoint.blob)
+                return unpack(self.world, config, checkpoint.blob, self._weights)
             log.warning("damaged checkpoint passed over", run=self.mine.run_id, tick=checkpoint.tick)
-        return birth(self.world, config, self.run.seed)
+        return birth(self.world, config, self.run.seed, self._weights)
 
     @property
     def tick(self) -> int:
@@ -139,7 +149,8 @@ class Life:
         It waits until the next question is out: a person waits for that, and nobody for a row.
         """
         late = time.monotonic() - self._measured_at
-        if late < METRIC_SECONDS and (at_once or not self._news):
+        due = late >= METRIC_SECONDS or (self._news and not at_once)
+        if not due or late < self.evaluation.rest:
             return
         self._measured_at, self._news = time.monotonic(), False
         row = {**measure(self.saved, self.evaluation), **self._learnt}

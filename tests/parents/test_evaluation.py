@@ -14,7 +14,7 @@ from agent.config import compose
 from envs import registry
 from envs.gridworld import Gridworld, local_state
 from envs.rng import keys
-from parents.evaluation import Evaluation
+from parents.evaluation import ListedEvaluation
 from parents.model import explore
 from parents.scripted import Judgement, ScriptedParent
 from parents.values import optimal
@@ -69,7 +69,7 @@ def policies(level: str) -> dict[str, Tensor]:
 @pytest.mark.parametrize("kind", ["random", "trained"])
 def test_against_roll_outs(level: str, kind: str) -> None:
     world, parameters = island(level), policies(level)[kind]
-    evaluation = Evaluation(world, explore(world), GAMMA)
+    evaluation = ListedEvaluation(world, explore(world), GAMMA)
     rolled = roll_out(world, parameters)
     assert evaluation.returns(parameters).tolist() == pytest.approx([row[0] for row in rolled], abs=1e-12)
     shortest = distances(level)[world.levels[0].find("A")[0]]
@@ -84,7 +84,7 @@ def test_against_roll_outs(level: str, kind: str) -> None:
 @pytest.mark.parametrize("level", LEVELS)
 def test_optimal_policies_earn_the_best_return(level: str) -> None:
     world = island(level)
-    evaluation = Evaluation(world, explore(world), GAMMA)
+    evaluation = ListedEvaluation(world, explore(world), GAMMA)
     parameters = torch.cat((random(world).float(), trained(level)))
     reached = (evaluation.returns(parameters) - evaluation.best()).abs() < 1e-9
     assert torch.equal(evaluation.optimal(parameters), reached)
@@ -96,7 +96,7 @@ def test_optimal_policies_earn_the_best_return(level: str) -> None:
 def test_best_is_the_value_of_the_start(level: str, gamma: float) -> None:
     world = island(level)
     model = explore(world)
-    assert Evaluation(world, model, gamma).best() == pytest.approx(
+    assert ListedEvaluation(world, model, gamma).best() == pytest.approx(
         float(optimal(model, gamma).v[0]), abs=1e-9
     )
 
@@ -105,7 +105,7 @@ def test_best_is_the_value_of_the_start(level: str, gamma: float) -> None:
 def test_distances_are_those_of_the_drawing(level: str) -> None:
     world = island(level)
     model = explore(world)
-    distance = Evaluation(world, model, GAMMA).distance
+    distance = ListedEvaluation(world, model, GAMMA).distance
     for cell, steps in distances(level).items():
         assert int(distance[place(model, cell)]) == steps
 
@@ -113,6 +113,6 @@ def test_distances_are_those_of_the_drawing(level: str) -> None:
 def test_return_is_cut_off_at_the_time_limit() -> None:
     """The shortest way takes 4 steps: with 3 the goal's reward is never earned, whatever the policy."""
     world = registry.make("unsafe-exploration", "island", time_limit=3)
-    found = Evaluation(world, explore(world), GAMMA).returns(trained("island"))
+    found = ListedEvaluation(world, explore(world), GAMMA).returns(trained("island"))
     assert bool((found <= 0).all())
-    assert bool((Evaluation(island(), explore(island()), GAMMA).returns(trained("island")) > 0).any())
+    assert bool((ListedEvaluation(island(), explore(island()), GAMMA).returns(trained("island")) > 0).any())

@@ -1,0 +1,45 @@
+"""Policies made by hand: strings of letters through a model, and networks whose argmax one can see."""
+
+from __future__ import annotations
+
+from itertools import count
+
+import torch
+from torch import Tensor
+
+from agent.birth import network_of
+from envs.gridworld import Gridworld
+from parents.conduct import Policy
+
+LETTERS = "udlr"
+UP, DOWN, LEFT, RIGHT = range(4)
+
+
+def spelled(*ways: str) -> Policy:
+    """One way a trial, in letters; the last letter of each is repeated for ever."""
+    time = count()
+
+    def policy(at: Tensor) -> Tensor:
+        t = next(time)
+        return torch.tensor([LETTERS.index(way[min(t, len(way) - 1)]) for way in ways])
+
+    return policy
+
+
+def always(world: Gridworld, action: int) -> Tensor:
+    """The weights of a network that prefers one action everywhere."""
+    brain = network_of(world)
+    weights = torch.zeros(1, brain.size)
+    weights[0, brain.layers[1].bias + action] = 1.0
+    return weights
+
+
+def at_a_wall(world: Gridworld, action: int, instead: int) -> Tensor:
+    """The weights of a network that prefers `action`, and `instead` where a wall stands in that way."""
+    brain = network_of(world)
+    weights = always(world, action)
+    local_in, local_out = brain.layers[:2]
+    wall = action * brain.codes  # the input that says: that neighbour is of code 0, a wall
+    weights[0, local_in.start + wall * local_in.columns] = 1.0  # into hidden unit 0
+    weights[0, local_out.start + instead] = 9.0  # and from there to the other action
+    return weights
