@@ -1,4 +1,4 @@
-"""Random clips of the island, walked by the world itself, and written down as queries."""
+"""Clips of any world, walked by the world itself, and written down as queries."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from torch import Tensor
 from agent.query import Choice, Kind, Query, empty
 from envs import registry
 from envs.gridworld import Gridworld, WorldState
+from envs.reward_hacking import RewardHacking
 from envs.rng import keys
 from parents.model import Model
 
@@ -16,6 +17,12 @@ Place = tuple[int, int]
 
 def island(level: str = "island") -> Gridworld:
     return registry.make("unsafe-exploration", level)
+
+
+def garden(level: str = "garden", drying: float = 0.05) -> RewardHacking:
+    world = registry.make("reward-hacking", level, drying=drying)
+    assert isinstance(world, RewardHacking)
+    return world
 
 
 def place(model: Model, cell: Place) -> int:
@@ -28,21 +35,34 @@ def at(model: Model, cell: Place) -> WorldState:
     return model.states.pick(torch.tensor([place(model, cell)]))
 
 
-def query(world: Gridworld, kind: Kind, start: WorldState, left: list[int], right: list[int]) -> Query:
-    """Two clips from one state: the frames are what `step` makes of the moves, and an end cuts a clip off."""
-    asked = empty(1, 3, world.height, world.width)
-    asked.kind[0] = kind
-    asked.maturity[0] = 1
+def begun(world: Gridworld, level: int = 0) -> WorldState:
+    """The start of a level, as an episode finds it."""
+    return world.reset(keys(0, 1), torch.tensor([level]))
+
+
+def walked(world: Gridworld, start: WorldState, moves: list[int], seed: int = 0) -> list[WorldState]:
+    """The states that `step` makes of the moves, up to an end or an interruption, as in a clip."""
+    states, key = [start], keys(seed, 1)
+    for move in moves:
+        if bool(states[-1].over | world.frozen(states[-1])):
+            break
+        key = key.next()
+        states.append(world.step(states[-1], torch.tensor([move]), key))
+    return states
+
+
+def query(
+    world: Gridworld, kind: Kind, start: WorldState, left: list[int], right: list[int], seed: int = 0
+) -> Query:
+    """Two clips from one state."""
+    asked = empty(1, max(3, len(left), len(right)), world.height, world.width)
+    asked.kind[0], asked.maturity[0], asked.level[0] = kind, 1, start.level[0]
     for side, moves in enumerate((left, right)):
-        state = start
-        _frame(world, asked, side, 0, state)
-        for number, move in enumerate(moves):
-            if bool(state.over):
-                break
-            state = world.step(state, torch.tensor([move]), keys(0, 1))
-            asked.action[0, side, number] = move
-            asked.length[0, side] = number + 1
-            _frame(world, asked, side, number + 1, state)
+        states = walked(world, start, moves, seed + side)
+        for number, state in enumerate(states):
+            _frame(world, asked, side, number, state)
+        asked.length[0, side] = len(states) - 1
+        asked.action[0, side, : len(states) - 1] = torch.tensor(moves[: len(states) - 1])
     return asked.check()
 
 
@@ -59,19 +79,43 @@ def stacked(queries: list[Query]) -> Query:
     return queries[0].map(lambda name, _tensor, _axis: torch.cat([one[name] for one in every]))
 
 
-def random_queries(world: Gridworld, model: Model, number: int, kind: Kind, seed: int = 0) -> Query:
-    """Pairs of clips of 1 to 3 steps (guidance: 1) from random states that are not over."""
-    dice = torch.Generator().manual_seed(seed)
+class Dice:
+    """Rolls with any number of sides."""
+
+    def __init__(self, seed: int) -> None:
+        self.dice = torch.Generator().manual_seed(seed)
+
+    def roll(self, sides: int) -> int:
+        return int(torch.randint(sides, (1,), generator=self.dice))
+
+    def moves(self, longest: int) -> list[int]:
+        """`longest` moves at most, one at least."""
+        return [self.roll(4) for _ in range(1 + self.roll(longest))]
+
+
+def random_queries(
+    world: Gridworld, model: Model, number: int, kind: Kind, seed: int = 0, longest: int = 3
+) -> Query:
+    """Pairs of clips of 1 to `longest` steps (guidance: 1) from random states that are not over."""
+    dice, limit = Dice(seed), 1 if kind == Kind.GUIDANCE else longest
     living = (~model.over).nonzero().squeeze(1)
+    starts = [model.states.pick(living[[dice.roll(len(living))]]) for _ in range(number)]
+    asked = [query(world, kind, start, dice.moves(limit), dice.moves(limit)) for start in starts]
+    return stacked([padded(one, longest) for one in asked])
 
-    def roll(sides: int) -> int:
-        return int(torch.randint(sides, (1,), generator=dice))
 
-    def moves() -> list[int]:
-        return [roll(4) for _ in range(1 if kind == Kind.GUIDANCE else 1 + roll(3))]
+def padded(asked: Query, length: int) -> Query:
+    """The same query with room for clips of `length` steps."""
+    room = max(3, length)
+    wide = empty(1, room, asked.ground.shape[-2], asked.ground.shape[-1]).tensors()
 
-    starts = [model.states.pick(living[[roll(len(living))]]) for _ in range(number)]
-    return stacked([query(world, kind, start, moves(), moves()) for start in starts])
+    def fill(name: str, tensor: Tensor, _axis: int | None) -> Tensor:
+        if tensor.dim() < 3:
+            return tensor
+        wide[name][:, :, : tensor.shape[2]] = tensor
+        return wide[name]
+
+    return asked.map(fill)
 
 
 def said(choice: Tensor) -> list[Choice]:

@@ -1,0 +1,88 @@
+"""What the parent's values do in a world that nobody has written yet, and what they refuse."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from jaxtyping import Float64
+from torch import Tensor
+
+from envs import registry
+from envs.absent_supervisor import AbsentSupervisor
+from envs.gridworld import Actions, WorldState
+from envs.unsafe_exploration import UnsafeExploration
+from parents import values
+from parents.garden import Garden
+from parents.model import explore
+from parents.scripted import Judgement
+from parents.values import Listed, valuation
+
+ISLAND = (registry.level("unsafe-exploration"),)
+
+
+class Endless(UnsafeExploration):
+    """Nothing ends here, and each step that ends on the goal earns 1."""
+
+    ends = ""
+
+    def reward(self, before: WorldState, action: Actions, after: WorldState) -> Float64[Tensor, "N"]:
+        return (self.tile(after.board, after.agent) == self.code("G")).double()
+
+
+class Exit(UnsafeExploration):
+    """Its end is water, and entering it is what one should do."""
+
+    ends = "W"
+
+    def reward(self, before: WorldState, action: Actions, after: WorldState) -> Float64[Tensor, "N"]:
+        return torch.where(before.over, 0.0, torch.full_like(before.t, -1, dtype=torch.float64))
+
+    def unsafe(self, before: WorldState, action: Actions, after: WorldState) -> Tensor:
+        return torch.zeros_like(before.over)
+
+
+class Unseen(AbsentSupervisor):
+    """Its supervisor shows nowhere."""
+
+    def _bars(self, state: WorldState) -> WorldState:
+        return state
+
+
+def test_a_world_without_an_end_has_no_hopeless_state() -> None:
+    """Below the goal is a wall: staying there is worth 1 / (1 - 0.9). The start is 4 steps away."""
+    found = valuation(Endless(ISLAND, time_limit=100), 0.9)
+    assert isinstance(found, Listed)
+    assert float(found.values.v[0]) == pytest.approx(10 * 0.9**3)
+    assert bool((found.values.v > 0).all())
+
+
+def test_a_world_without_an_end_needs_a_smaller_gamma(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(values, "PATIENCE", 50)
+    with pytest.raises(ArithmeticError, match=r"at gamma = 1\.0; a smaller gamma"):
+        valuation(Endless(ISLAND, time_limit=100), 1.0)
+
+
+def test_an_end_that_a_safe_step_leads_to_is_a_goal() -> None:
+    """From (1, 4) water is 3 steps to the left."""
+    found = valuation(Exit(ISLAND, time_limit=100), 1.0)
+    assert isinstance(found, Listed)
+    assert float(found.values.v[0]) == -3
+    assert torch.equal(found.model.goal, found.model.over)
+
+
+def test_the_garden_alone_is_in_closed_form() -> None:
+    for name in registry.WORLDS:
+        found = valuation(registry.make(name), 0.9)
+        assert type(found) is (Garden if name == "reward-hacking" else Listed)
+        assert found.gamma == 0.9
+        assert type(Judgement(registry.make(name), 0.9).valuation) is type(found)
+
+
+def test_flags_that_do_not_show_are_refused() -> None:
+    with pytest.raises(ValueError, match="look alike"):
+        explore(Unseen((registry.level("absent-supervisor"),), time_limit=100))
+
+
+def test_too_many_states_are_refused_with_a_remedy() -> None:
+    with pytest.raises(ValueError, match=r"more than 30 states.*take a smaller level"):
+        explore(registry.make("side-effects"), limit=30)
