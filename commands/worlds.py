@@ -1,26 +1,68 @@
-"""`parenting worlds`: the worlds and their levels, with the art."""
+"""`parenting worlds`: the worlds and their levels, with the art; random levels; pictures of both."""
 
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from envs import registry
-from envs.levels.kind import Kind
+from envs.levels.kind import Kind, Level
+
+if TYPE_CHECKING:
+    from envs.box_levels import Survey
+
+RANDOM = "side-effects"
+"""The world that has random levels (Sec. 3.4)."""
 
 
 def worlds(
+    random: Annotated[
+        str | None,
+        typer.Option(metavar="WORLD", help=f"Print random levels of a world; {RANDOM} has them (Sec. 3.4)."),
+    ] = None,
+    size: Annotated[str, typer.Option(metavar="HxW", help="Rows and columns of the random levels.")] = "6x6",
+    count: Annotated[int, typer.Option(min=1, help="How many random levels; all of them differ.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**53 - 1, help="Fewer levels of a seed are the first of more.")
+    ] = 0,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Folder for a file with each random level.")
+    ] = None,
+    draw: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder to draw each level to, a picture (SVG) each."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
     """List the worlds and their levels, with the art.
 
-    Example: parenting worlds --json
+    With --random: levels that only moving the box solves, as texts that `parenting run --level` takes.
+
+    Example: parenting worlds --random side-effects --size 6x6 --seed 3 > level.txt
     """
-    found = [describe(world) for world in registry.WORLDS.values()]
-    text = json.dumps({"worlds": found}, indent=2) if as_json else "\n".join(map(_page, found))
-    typer.echo(text)
+    try:
+        if random is None:
+            _listed(draw, as_json)
+        else:
+            found = _survey(random, _size(size), count, seed)
+            _keep(found.levels, out, draw)
+            _shown(found, as_json)
+    except ValueError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(2) from None
+
+
+def _listed(draw: Path | None, as_json: bool) -> None:
+    kinds = list(registry.WORLDS.values())
+    if draw:
+        _draw(draw, [registry.level(kind.name, name) for kind in kinds for name in kind.levels])
+    found = [describe(kind) for kind in kinds]
+    typer.echo(json.dumps({"worlds": found}, indent=2) if as_json else "\n".join(map(_page, found)))
 
 
 def describe(world: Kind) -> dict[str, Any]:
@@ -33,8 +75,73 @@ def describe(world: Kind) -> dict[str, Any]:
         "danger": world.brief.danger,
         "legend": dict(world.legend),
         "defaults": registry.defaults(world.name),
-        "levels": [{"name": level.name, "rows": list(level.rows), "text": level.text} for level in levels],
+        "levels": [_plain(level) for level in levels],
     }
+
+
+def _plain(level: Level) -> dict[str, Any]:
+    return {"name": level.name, "rows": list(level.rows), "text": level.text}
+
+
+def _survey(world: str, size: tuple[int, int], count: int, seed: int) -> Survey:
+    """Random levels of a world.
+
+    Raises:
+        ValueError: a world that has none, or as `envs.box_levels.survey`.
+    """
+    if registry.kind(world).name != RANDOM:
+        raise ValueError(f"--random: {world} has no random levels; {RANDOM} has.")
+    from envs.box_levels import survey
+
+    return survey(count, *size, seed)
+
+
+def _keep(levels: Iterable[Level], out: Path | None, draw: Path | None) -> None:
+    if out:
+        _write(out, ((f"{level.name}.txt", level.text) for level in levels))
+    if draw:
+        _draw(draw, levels)
+
+
+def _shown(found: Survey, as_json: bool) -> None:
+    """The levels; for a reader, what it took to find them is said on standard error."""
+    from envs.box_levels import tempts
+
+    if as_json:
+        levels = [{**_plain(level), "tempts": tempts(level)} for level in found.levels]
+        typer.echo(json.dumps({"levels": levels, "solvable": found.solvable}, indent=2))
+        return
+    typer.echo("\n".join(level.text for level in found.levels), nl=False)
+    said = f"{found.solvable} levels that only moving the box solves: {len(found.levels)} with a safe way, "
+    typer.echo(f"{said}{found.tempting} of them tempt (the shortest way is unsafe).", err=True)
+
+
+def _size(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,3})x(\d{1,3})", text, re.ASCII)
+    if not found:
+        raise ValueError(f"--size: '{text}' is not HxW. Write rows and columns as --size 6x8.")
+    return int(found[1]), int(found[2])
+
+
+def _draw(folder: Path, levels: Iterable[Level]) -> None:
+    from server.pages.picture import picture
+
+    pictures = ((f"world-{level.world}-{level.name}.svg", level) for level in levels)
+    _write(folder, ((name, picture(level, registry.kind(level.world))) for name, level in pictures))
+
+
+def _write(folder: Path, texts: Iterable[tuple[str, str]]) -> None:
+    """Files into a folder, which is made if it is not there.
+
+    Raises:
+        ValueError: a file cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in texts:
+            (folder / name).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ValueError(f"{folder} cannot be written to: {error}.") from None
 
 
 def _page(world: dict[str, Any]) -> str:

@@ -24,8 +24,12 @@ _templates = Environment(
 
 def page(template: str, status: int = 200, **context: object) -> HTMLResponse:
     """A page, or a part of one. It is not stored by the browser: it shows what is true now."""
-    text = _templates.get_template(template).render(**context)
-    return HTMLResponse(text, status_code=status, headers={"Cache-Control": "no-store"})
+    return HTMLResponse(fill(template, **context), status_code=status, headers={"Cache-Control": "no-store"})
+
+
+def fill(template: str, **context: object) -> str:
+    """A template's text."""
+    return _templates.get_template(template).render(**context)
 
 
 def see(path: str) -> RedirectResponse:

@@ -1,16 +1,21 @@
 """`parenting worlds`: what it prints, for people and for programs."""
 
 import json
+from pathlib import Path
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
+from commands.run import run
 from commands.worlds import worlds
 from envs import registry
 
 app = typer.Typer()
 app.command()(worlds)
+
+running = typer.Typer()
+running.command()(run)
 
 
 def output(*arguments: str) -> str:
@@ -38,3 +43,79 @@ def test_json_holds_levels_that_can_be_read_back() -> None:
         for level in world["levels"]:
             parsed = registry.level(world["name"], level["text"])
             assert (parsed.name, list(parsed.rows)) == (level["name"], level["rows"])
+
+
+# Random levels (Sec. 3.4)
+
+
+def refused(*arguments: str) -> str:
+    result = CliRunner().invoke(app, list(arguments))
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    return result.stderr
+
+
+def test_a_random_level_is_a_text_that_run_takes(tmp_path: Path) -> None:
+    shown = output("--random", "side-effects", "--size", "5x6", "--seed", "3")
+    (tmp_path / "mine.txt").write_text(shown)
+    level = registry.level("side-effects", shown)
+    assert (level.height, level.width) == (5, 6)
+    options = ["--until", "ticks:2", "--set", "pretrain=false", "--workers", "1", "--json"]
+    raised = CliRunner().invoke(running, ["side-effects", "--level", str(tmp_path / "mine.txt"), *options])
+    assert json.loads(raised.stdout)["level"] == level.name
+
+
+def test_fewer_random_levels_are_the_first_of_more() -> None:
+    one, three = (output("--random", "side-effects", "--count", count) for count in "13")
+    assert three.startswith(one)
+    texts = three.split("\n\nworld")
+    assert len(texts) == 3
+
+
+def test_what_it_took_is_said_beside_the_levels() -> None:
+    arguments = ["--random", "side-effects", "--count", "50"]
+    result = CliRunner().invoke(app, arguments)
+    shown = json.loads(output(*arguments, "--json"))
+    tempting = sum(level["tempts"] for level in shown["levels"])
+    assert shown["solvable"] > len(shown["levels"]) == 50
+    assert 0 < tempting < 50
+    assert f"{shown['solvable']} levels that only moving the box solves: 50 with a safe way" in result.stderr
+    assert f"{tempting} of them tempt" in result.stderr
+    assert result.stdout == "\n".join(level["text"] for level in shown["levels"])
+
+
+def test_random_levels_as_files_and_as_pictures(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "levels"
+    chosen = ["--random", "side-effects", "--count", "2"]
+    output(*chosen, "--out", str(folder), "--draw", str(folder))
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == [
+        "random-0-1.txt",
+        "random-0-2.txt",
+        "world-side-effects-random-0-1.svg",
+        "world-side-effects-random-0-2.svg",
+    ]
+    texts = [(folder / name).read_text() for name in names[:2]]
+    assert output(*chosen) == "\n".join(texts)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--random", "atoll"], "There is no world 'atoll'"),
+        (["--random", "reward-hacking"], "--random: reward-hacking has no random levels; side-effects has."),
+        (["--random", "side-effects", "--size", "6"], "--size: '6' is not HxW"),
+        (["--random", "side-effects", "--size", "4x5"], "4 x 6, 5 x 5 or 6 x 4 cells at least, not 4 x 5."),
+        (["--random", "side-effects", "--size", "4x6", "--count", "99999"], "Ask for "),
+    ],
+)
+def test_what_cannot_be_found_is_refused_with_a_sentence(
+    arguments: list[str], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("envs.box_levels.BATCHES", 2)
+    assert said in refused(*arguments)
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    assert "cannot be written to" in refused("--draw", str(tmp_path / "file"))

@@ -1,0 +1,69 @@
+"""The pictures of the levels in the docs: up to date, by themselves, and in the page's own colours."""
+
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from envs import registry
+from envs.levels.kind import Kind, Level
+from server.pages.picture import picture, style
+from tests.tree import ROOT
+
+LEVELS = [
+    (kind, registry.level(kind.name, name)) for kind in registry.WORLDS.values() for name in kind.levels
+]
+every_level = pytest.mark.parametrize(("kind", "level"), LEVELS, ids=[level.name for _, level in LEVELS])
+
+FOLDER = ROOT / "docs/pictures"
+
+
+@every_level
+def test_the_picture_in_the_docs_is_up_to_date(kind: Kind, level: Level) -> None:
+    path = FOLDER / f"world-{kind.name}-{level.name}.svg"
+    anew = "draw it anew: parenting worlds --draw docs/pictures"
+    assert path.is_file(), f"{path.name} is missing; {anew}"
+    assert path.read_text(encoding="utf-8") == picture(level, kind), f"{path.name} is out of date; {anew}"
+
+
+def test_there_is_no_picture_of_a_level_that_is_gone() -> None:
+    drawn = {path.stem for path in FOLDER.glob("world-*")}
+    assert drawn == {f"world-{kind.name}-{level.name}" for kind, level in LEVELS}
+
+
+@every_level
+def test_it_stands_by_itself(kind: Kind, level: Level) -> None:
+    """An XML document in which every pattern and every colour that is used is there, for light and for dark."""
+    text = picture(level, kind)
+    root = ElementTree.fromstring(text)
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(re.findall(r'id="([^"]+)"', text))
+    light, dark = re.findall(r":root \{([^}]*)\}", text)
+    used = set(re.findall(r"var\(--([\w-]+)\)", text))
+    assert used
+    for colours in (light, dark):
+        assert set(re.findall(r"--([\w-]+):", colours)) == used
+    assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
+
+
+@every_level
+def test_every_tile_of_the_level_is_in_it(kind: Kind, level: Level) -> None:
+    text = picture(level, kind)
+    for glyph in set("".join(level.rows)) - set("# AX"):
+        assert f"url(#tile-{glyph})" in text
+    assert text.count('<g class="agent"') == 1
+    assert text.count('<g class="box"') == len(level.find("X"))
+
+
+def test_every_class_has_its_rule() -> None:
+    """A style sheet that was moved or renamed would leave a picture black."""
+    text = picture(registry.level("side-effects", "box"), registry.kind("side-effects"))
+    named = {name for names in re.findall(r'class="([^"]*)"', text) for name in names.split()}
+    ruled = set(re.findall(r"\.([a-z][\w-]*)", style(text)))
+    assert named - ruled <= {"sprite", "board", "body", "box"}
+
+
+def test_a_tile_without_a_pattern_is_drawn_as_its_letter() -> None:
+    kind = registry.kind("interruptibility")
+    level = Level("odd", kind.name, ("#####", "#AZG#", "#####"))
+    assert '<text class="letter" x="50" y="30">Z</text>' in picture(level, kind)
