@@ -73,11 +73,10 @@ def _one(
         if not quiet:
             typer.echo(f"{path} is there already; --again makes it anew.")
         return {"path": str(path), "sha256": store.digest(path.read_bytes())}
-    import torch
-
+    from agent.process import settle
     from experiments.education import Unconverged, educate
 
-    torch.set_num_threads(1)
+    settle()
     began = time.monotonic()
     try:
         with _bar(wanted.name, max_steps) as progress:

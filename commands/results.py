@@ -31,8 +31,7 @@ def page(results: dict[str, Any]) -> str:
         lines.append(_line("unfinished", _unfinished(results)))
     lines += _endings("at the end", results["evaluation"])
     for stage in results.get("stages", ()):
-        queries = "no trial came to it" if stage["queries"] is None else f"{stage['queries']:.0f} queries"
-        lines += _endings(f"stage {stage['stage']}", stage, f"; {queries}")
+        lines += _stage(f"stage {stage['stage']}", stage)
     return "\n".join(lines)
 
 
@@ -45,8 +44,16 @@ def _spread(mean: float | None, sd: float | None) -> str:
 
 
 def _unfinished(results: dict[str, Any]) -> str:
-    stuck = f"{results['stuck']} with no acceptable action, " if results["stuck"] else ""
-    return f"{results['unfinished']}: {stuck}none after {results['max_ticks']} ticks; not in the means"
+    stuck, rest = results["stuck"], results["unfinished"] - results["stuck"]
+    said = [f"{stuck} with no acceptable action"] if stuck else []
+    said += [f"{rest} after {results['max_ticks']} ticks"] if rest else []
+    return f"{', '.join(said)}; not in the means"
+
+
+def _stage(name: str, found: dict[str, Any]) -> list[str]:
+    if found["queries"] is None:
+        return [_line(name, "no trial came to it")]
+    return _endings(name, found, f"; {found['queries']:.0f} queries")
 
 
 def _endings(name: str, found: dict[str, Any], behind: str = "") -> list[str]:

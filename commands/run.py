@@ -16,12 +16,17 @@ from pydantic import ValidationError
 
 from agent.config import Config, UnknownPreset, compose
 from commands.results import page
+from commands.said import plainly, settings
 from envs import registry
 from envs.levels.kind import Level, LevelError
+from weights.store import NoWeights, Wanted, find
 
 if TYPE_CHECKING:
     from experiments.chunks import Plan
     from experiments.trials import Progress, Standing, Until
+
+
+MOST_STAGES = 16
 
 
 class Wrong(ValueError):
@@ -61,18 +66,18 @@ def run(
 
     Example: parenting run unsafe-exploration --preset conservative --trials 100
     """
-    with _plainly():
+    with plainly(), _plainly():
         found = _level(world, level)
         config = _config(world, preset, changes or [])
         goal = _until(world, until)
-    _hint(config)
-    import torch
-
+        config = _mature(config, goal, changes or [])
+        weights = _weights(found, config)
+    from agent.process import settle
     from experiments.chunks import Plan, run
     from experiments.summary import summarise
 
-    torch.set_num_threads(1)
-    plan = Plan(world, found.text, config, seed, trials, goal, max_ticks)
+    settle()
+    plan = Plan(world, found.text, config, seed, trials, goal, max_ticks, weights)
     began = time.monotonic()
     with _bar(plan) as progress:
         ending = run(plan, workers or os.cpu_count() or 1, progress)
@@ -142,11 +147,26 @@ def _until(world: str, text: str | None) -> Until:
     raise Wrong(f"--until: '{text}' is none of optimal, queries:N, ticks:N with N at least 1.")
 
 
-def _hint(config: Config) -> None:
-    """Say what was set and changes nothing."""
-    if config.mature_every is not None and config.stages == 1:
-        said = "--set: mature_every changes nothing while stages is 1: the last stage never ends."
-        typer.echo(f"{said} Set stages=2 or more to mature.", err=True)
+def _mature(config: Config, until: Until, changes: list[str]) -> Config:
+    """A budget of queries for each stage and one for all of them say how many stages there are."""
+    if config.mature_every is None or any(change.startswith("stages=") for change in changes):
+        return config
+    if until.kind != "queries":
+        raise Wrong(
+            "--set: mature_every alone ends no stage, since the last one never ends."
+            " Say how many there are, such as --set stages=2, or use --until queries:N."
+        )
+    stages = min(MOST_STAGES, max(1, -(-until.number // config.mature_every)))
+    return config.model_copy(update={"stages": stages})
+
+
+def _weights(level: Level, config: Config) -> bytes | None:
+    """The file of pre-trained weights that these trials begin with (Sec. 3.1.4)."""
+    if not config.pretrain:
+        return None
+    return find(
+        Wanted(registry.kind(level.world), level.height, level.width), settings().weights
+    ).read_bytes()
 
 
 @contextmanager
@@ -154,7 +174,7 @@ def _plainly() -> Iterator[None]:
     """Print what is wrong as a sentence, and exit with 2."""
     try:
         yield
-    except (Wrong, UnknownPreset, registry.UnknownName, LevelError) as error:
+    except (Wrong, UnknownPreset, registry.UnknownName, LevelError, NoWeights) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(2) from None
 

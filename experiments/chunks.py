@@ -16,9 +16,11 @@ import torch
 
 from agent.birth import world_of
 from agent.config import Config
+from agent.process import settle
 from envs.rng import keys
 from experiments.endings import Ending, examine
 from experiments.trials import Progress, Standing, Until, raise_trials
+from weights.store import Wanted, load
 
 CHUNK = 50
 """Trials of a chunk at most. Two trials and more are two chunks at least, so that two cores have work."""
@@ -37,6 +39,7 @@ class Plan(NamedTuple):
     trials: int
     until: Until
     max_ticks: int
+    weights: bytes | None = None  # the file of pre-trained weights (Sec. 3.1.4)
 
 
 def chunks(trials: int) -> list[range]:
@@ -58,7 +61,10 @@ def raise_chunk(plan: Plan, chunk: range, progress: Progress | None = None) -> E
     """The trials of one chunk, and how they end. Trial i has the same keys in whichever chunk it falls."""
     world = world_of(plan.world, plan.level, plan.config)
     mine = keys(plan.seed, plan.trials).pick(torch.arange(chunk.start, chunk.stop))
-    raised = raise_trials(world, plan.config, mine, plan.until, plan.max_ticks, progress)
+    weights = (
+        None if plan.weights is None else load(plan.weights, Wanted(world.kind, world.height, world.width))
+    )
+    raised = raise_trials(world, plan.config, mine, plan.until, plan.max_ticks, progress, weights)
     return examine(world, plan.config, raised)
 
 
@@ -100,7 +106,7 @@ def _terminate(pool: ProcessPoolExecutor) -> None:
 
 
 def _begin(counters: object) -> None:
-    torch.set_num_threads(1)
+    settle()
     globals()["_counters"] = counters
 
 

@@ -16,6 +16,7 @@ from parents.conduct import counts, name
 from parents.evaluation import evaluation
 from parents.scripted import Judgement
 from parents.waterings import EPISODES
+from weights.store import digest
 
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 
@@ -34,6 +35,7 @@ def summarise(plan: Plan, level: str, ending: Ending, seconds: float) -> dict[st
         "until": str(plan.until),
         "max_ticks": plan.max_ticks,
         "config": plan.config.model_dump(mode="json"),
+        "weights": None if plan.weights is None else digest(plan.weights),
         "trials": _rows(ending, report),
         "unfinished": int((~tally.finished).sum()),
         "stuck": int(tally.stuck.sum()),

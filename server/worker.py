@@ -13,8 +13,8 @@ import traceback
 from types import FrameType
 
 import structlog
-import torch
 
+from agent.process import settle
 from server import mailbox, runs
 from server.db import Database, connect
 from server.errors import Busy, DiskFull, LostClaim
@@ -140,7 +140,7 @@ class Worker:
 
 def main(settings: Settings) -> int:
     """Raise the runs of this database until SIGTERM or SIGINT."""
-    torch.set_num_threads(1)
+    settle()
     db = connect(settings)
     require(db)
     worker = Worker(db, settings)
