@@ -71,9 +71,10 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
     while len(edge.t):
         arrived, step = _look(world, edge)
         steps.append(step)
-        edge = arrived.pick(_new(step["word"], known))
+        fresh = _new(step["word"], known)
+        edge = arrived.pick(fresh)
         found.append(edge)
-        known = torch.cat((known, _word(edge)))
+        known = torch.cat((known, step["word"][fresh]))
         if len(known) > most:
             raise ValueError(
                 f"This world has more than {most} states, too many for the scripted parent to list; "
