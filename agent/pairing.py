@@ -86,16 +86,18 @@ def pair(
     """After a step, with probability p_pref, ask about the newest pair. Remembers whatever this tick asks."""
     trying = steered & view.watched & (state.keys.uniform(Stream.PREFER) < config.p_pref)
     recorder = state.recorder
-    found = _search(config, recorder, trying)
+    found = _search(config, recorder, state.maturity, trying)
     if len(found.trial):
         query = _ask(world, state, found, query)
         recorder.ring.here[found.trial, EXPLOIT, found.exploit] = False
         recorder.ring.here[found.trial, EXPLORE, found.explore] = False
-    recorder = recorder.replace(asked=_remember(recorder.asked, query))
+    recorder = recorder.replace(asked=_remember(config, recorder.asked, query))
     return state.replace(recorder=recorder), query
 
 
-def _search(config: Config, recorder: Recorder, trying: Bool[Tensor, "N"]) -> Pair:
+def _search(
+    config: Config, recorder: Recorder, maturity: Int64[Tensor, "N"], trying: Bool[Tensor, "N"]
+) -> Pair:
     ring = recorder.ring
     trial = (trying & (ring.here & ring.open).flatten(1).any(1)).nonzero().squeeze(1)
     found: list[Tensor] = []
@@ -104,7 +106,7 @@ def _search(config: Config, recorder: Recorder, trying: Bool[Tensor, "N"]) -> Pa
         candidate = (ring.here[trial] & ring.open[trial]).flatten(1)
         newest = torch.where(candidate, ring.tick[trial].flatten(1), -1).max(1)
         later, kind = newest.indices % capacity, newest.indices // capacity
-        partner = _partner(config, recorder, trial, kind, later)
+        partner = _partner(config, recorder, maturity, trial, kind, later)
         paired = partner >= 0
         ring.open[trial[~paired], kind[~paired], later[~paired]] = False
         exploit, explore = (
@@ -121,6 +123,7 @@ def _search(config: Config, recorder: Recorder, trying: Bool[Tensor, "N"]) -> Pa
 def _partner(
     config: Config,
     recorder: Recorder,
+    maturity: Int64[Tensor, "N"],
     trial: Int64[Tensor, "n"],
     kind: Int64[Tensor, "n"],
     later: Int64[Tensor, "n"],
@@ -133,7 +136,8 @@ def _partner(
     matches &= tick < ring.tick[trial, kind, later][:, None]
     if not config.recompare:
         row, place = matches.nonzero(as_tuple=True)
-        word = unordered(ring.digest[trial[row], other[row], place], ring.digest[trial, kind, later][row])
+        clips = ring.digest[trial[row], other[row], place], ring.digest[trial, kind, later][row]
+        word = same_pair(config, *clips, maturity[trial[row]])
         matches[row, place] = ~(word[:, None] == recorder.asked.pair[trial[row]]).any(1)
     newest = torch.where(matches, tick, -1).max(1)
     return torch.where(newest.values >= 0, newest.indices, -1)
@@ -178,14 +182,23 @@ def comparison(seen: Tensor, one: Tensor, other: Tensor, maturity: Tensor) -> In
     return together(seen, (1 << one) + (1 << other), maturity)
 
 
-def _remember(asked: Asked, query: Query) -> Asked:
+def same_pair(config: Config, one: Tensor, other: Tensor, maturity: Tensor) -> Int64[Tensor, "..."]:
+    """One word for a pair of clips in either order.
+
+    With `own_length` also for its stage: what another stage has compared is not in X, so it is not known.
+    """
+    word = unordered(one, other)
+    return together(word, maturity) if config.own_length else word
+
+
+def _remember(config: Config, asked: Asked, query: Query) -> Asked:
     """Keep the digest of what is asked, guidance too, and which actions it compares where. In place."""
     trial = (query.kind != Kind.NONE).nonzero().squeeze(1)
     if not len(trial):
         return asked
     asked, query = _more(asked), query.pick(trial)
     place = asked.count[trial]
-    clips = [
+    one, other = (
         digest(
             query.ground[:, i],
             query.agent[:, i],
@@ -195,8 +208,8 @@ def _remember(asked: Asked, query: Query) -> Asked:
             query.level,
         )
         for i in (0, 1)
-    ]
-    asked.pair[trial, place] = unordered(*clips)
+    )
+    asked.pair[trial, place] = same_pair(config, one, other, query.maturity)
     seen, first = fingerprint(query.observation[:, 0, 0].flatten(1)), query.action[:, :, 0]
     asked.compared[trial, place] = comparison(seen, first[:, 0], first[:, 1], query.maturity)
     asked.count[trial] += 1

@@ -113,7 +113,7 @@ class Reference:
         """Ask. From now on the pair is known, and so are its first actions in this state at this stage."""
         kind, left, right, maturity = self.query = query
         self.log.append((int(self.keys.tick), kind, left, right))
-        self.compared.add(same_pair(left, right))
+        self.compared.add(self.known_pair(left, right, maturity))
         self.compared.add(same_moves(left.start, left.actions[0], right.actions[0], maturity))
 
     # ---- 2.2 Human preferences, about clips that are recorded as 2.4 has it ----
@@ -179,7 +179,12 @@ class Reference:
 
     def match(self, e: Clip, x: Clip) -> bool:
         """Whether the clips may be compared."""
-        return e.start == x.start and e.actions[0] != x.actions[0] and self.is_new(same_pair(e, x))
+        new = self.is_new(self.known_pair(e, x, self.stage))
+        return e.start == x.start and e.actions[0] != x.actions[0] and new
+
+    def known_pair(self, left: Clip, right: Clip, maturity: int) -> object:
+        """A pair as it is remembered: for its stage alone where a stage trains on its own entries alone."""
+        return same_pair(left, right), maturity if self.config.own_length else None
 
     # ---- 2.3 Direct policy learning ----
 

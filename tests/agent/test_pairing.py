@@ -77,6 +77,7 @@ def test_search_finds_what_a_plain_search_finds(seed: int, recompare: bool) -> N
     config = Config(recompare=recompare)
     recorder = parenting.init(WORLD, config, keys(0, trials)).recorder
     recorder = recorder.replace(asked=recorder.asked.map(lambda _name, part, axis: _wide(part)))
+    first = torch.ones(trials, dtype=torch.int64)  # the stage
     hits = misses = 0
     for tick in range(1, 120):
         for trial in range(trials):
@@ -84,7 +85,7 @@ def test_search_finds_what_a_plain_search_finds(seed: int, recompare: bool) -> N
             put(recorder, trial, kind, tick, dice)
         trying = torch.rand(trials, generator=dice) < 0.6
         expected = [plain(recorder, t, recompare) if trying[t] else None for t in range(trials)]
-        found = pairing._search(config, recorder, trying)
+        found = pairing._search(config, recorder, first, trying)
         got = {int(t): (int(a), int(b)) for t, a, b in zip(*found, strict=True)}
         assert [got.get(trial) for trial in range(trials)] == expected
         take(recorder, found)
@@ -136,8 +137,10 @@ def test_every_clip_is_closed_at_most_once(monkeypatch: pytest.MonkeyPatch) -> N
     closed: list[tuple[int, int, int]] = []
     partner = pairing._partner
 
-    def counting(config: Config, recorder: Recorder, trial: Tensor, kind: Tensor, later: Tensor) -> Tensor:
-        found = partner(config, recorder, trial, kind, later)
+    def counting(
+        config: Config, recorder: Recorder, maturity: Tensor, trial: Tensor, kind: Tensor, later: Tensor
+    ) -> Tensor:
+        found = partner(config, recorder, maturity, trial, kind, later)
         without = found < 0
         ticks = recorder.ring.tick[trial, kind, later]
         closed.extend(zip(*(part[without].tolist() for part in (trial, kind, ticks)), strict=True))
