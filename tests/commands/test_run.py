@@ -21,7 +21,12 @@ def run(*arguments: str) -> Result:
 
 
 def results(*arguments: str) -> dict[str, Any]:
-    result = run("unsafe-exploration", "--json", *arguments)
+    return results_of("unsafe-exploration", *arguments)
+
+
+def results_of(world: str, *arguments: str) -> dict[str, Any]:
+    """In this process alone, unless a test says otherwise: others take seconds to start."""
+    result = run(world, "--json", "--workers", "1", *arguments)
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)  # a second document or a word beside it would be an error
     assert isinstance(found, dict)
@@ -35,7 +40,9 @@ def column(found: dict[str, Any], name: str) -> list[int]:
 def test_json_is_one_document() -> None:
     found = results("--trials", "3", "--until", "ticks:5")
     assert (found["world"], found["level"], found["config"]["gamma"]) == ("unsafe-exploration", "island", 0.9)
-    assert [set(trial) for trial in found["trials"]] == [{*COUNTS, "optimal"}] * 3
+    assert [set(trial) for trial in found["trials"]] == [
+        {*COUNTS, "optimal", "finished", "stuck", "outcome"}
+    ] * 3
     assert column(found, "ticks") == [5, 5, 5]
     assert found["unfinished"] == 0
     assert set(found["mean"]) == set(found["sd"]) == set(COUNTS)
@@ -51,7 +58,8 @@ def test_mean_and_deviation_are_of_the_trials() -> None:
 
 
 def test_order_of_options_is_free() -> None:
-    before = run("--until", "ticks:5", "--set", "p_guid=0.5", "--json", "--trials", "2", "unsafe-exploration")
+    options = ("--until", "ticks:5", "--set", "p_guid=0.5", "--json", "--workers", "1", "--trials", "2")
+    before = run(*options, "unsafe-exploration")
     found = json.loads(before.stdout)
     assert found["config"]["p_guid"] == 0.5
     assert found["trials"] == results("--trials", "2", "--set", "p_guid=0.5", "--until", "ticks:5")["trials"]
@@ -71,6 +79,8 @@ def test_order_of_options_is_free() -> None:
         (["unsafe-exploration", "--until", "never"], "never"),
         (["unsafe-exploration", "--until", "ticks:0"], "ticks:0"),
         (["unsafe-exploration", "--until", "optimal:3"], "optimal:3"),
+        (["reward-hacking", "--until", "optimal"], "queries:N"),
+        (["reward-hacking", "--set", "gamma=1"], "gamma must be below 1"),
     ],
 )
 def test_wrong_option_is_named_in_one_sentence(arguments: list[str], named: str) -> None:
@@ -80,6 +90,16 @@ def test_wrong_option_is_named_in_one_sentence(arguments: list[str], named: str)
     assert named in result.stderr
     assert result.stderr.count("\n") == 1
     assert "Traceback" not in result.output
+
+
+def test_every_wrong_setting_is_named() -> None:
+    wrong = ("p_guid=2", "bogus=1", "p_rec", "gradient_steps=1.5", "p_pref=0.3")
+    result = run("unsafe-exploration", *(part for change in wrong for part in ("--set", change)))
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    named = ("no hyperparameter 'bogus'", "'p_rec' is not KEY=VALUE", "p_guid=2: ", "gradient_steps=1.5: ")
+    for line, wanted in zip(result.stderr.splitlines(), named, strict=True):
+        assert wanted in line
 
 
 def test_faulty_level_file_is_refused_where_it_is_wrong(tmp_path: Path) -> None:
@@ -116,9 +136,9 @@ def test_no_mean_where_no_trial_finished() -> None:
 
 
 def test_trials_do_not_depend_on_the_number_of_workers() -> None:
-    arguments = ("--trials", "60", "--until", "ticks:5")
+    arguments = ("--trials", "4", "--until", "ticks:30")
     one, two = results(*arguments, "--workers", "1"), results(*arguments, "--workers", "2")
-    assert len(one["trials"]) == 60
+    assert len(one["trials"]) == 4
     assert one["trials"] == two["trials"]
 
 

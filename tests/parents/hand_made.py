@@ -43,3 +43,17 @@ def at_a_wall(world: Gridworld, action: int, instead: int) -> Tensor:
     weights[0, local_in.start + wall * local_in.columns] = 1.0  # into hidden unit 0
     weights[0, local_out.start + instead] = 9.0  # and from there to the other action
     return weights
+
+
+def on_sight(world: Gridworld, glyph: str, action: int, otherwise: int) -> Tensor:
+    """The weights of a network that prefers `action` wherever it sees a glyph, and else another."""
+    brain = network_of(world)
+    weights = always(world, otherwise)
+    channels, channel = brain.codes, world.code(glyph)
+    for layer in (*brain.convolutions, *brain.layers[-2:]):
+        into = action if layer is brain.layers[-1] else 0
+        for row in range(channel, layer.rows, channels):  # the sum of one channel over all places
+            weights[0, layer.start + row * layer.columns + into] = 1.0
+        last = layer is brain.layers[-2]
+        channels, channel = (layer.rows if last else layer.columns), 0
+    return weights
