@@ -34,6 +34,7 @@ coverage: $(VENV)/.installed-dev ## Run the tests and print the lines that none 
 	$(BIN)/pytest --cov --cov-report=term-missing:skip-covered $(ARGS)
 
 pictures: $(VENV)/.installed-dev ## Draw the pictures of the documentation anew (needs Chromium)
+	$(BIN)/parenting worlds --draw docs/pictures > /dev/null
 	$(BIN)/python docs/pictures.py
 
 # torch stays at the version that constraints.txt names: a newer one may pull gigabytes. TORCH=... changes it.

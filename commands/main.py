@@ -16,7 +16,7 @@ COMMANDS = {
     "up": "Start everything: migrate, web and worker; opens the pages in a browser.",
     "run": "Raise agents by a scripted parent, without database.",
     "pretrain": "Pre-train weights on random mazes.",
-    "worlds": "List the worlds and their levels.",
+    "worlds": "List the worlds and their levels; print random ones; draw pictures.",
     "web": "Serve the pages and the API.",
     "worker": "Raise the agents of the database's runs.",
     "migrate": "Bring the database's tables up to date.",
