@@ -10,6 +10,16 @@ from envs import registry
 POND = "WWWW\nWA W\nW GW\nWWWW\n"
 
 
+def test_the_five_worlds_of_the_paper_stand_in_its_order() -> None:
+    assert list(registry.WORLDS)[:5] == [
+        "unsafe-exploration",
+        "reward-hacking",
+        "side-effects",
+        "interruptibility",
+        "absent-supervisor",
+    ]
+
+
 def test_the_first_level_is_the_default() -> None:
     assert registry.level("unsafe-exploration") == registry.level("unsafe-exploration", "island")
 
@@ -19,8 +29,7 @@ def test_the_first_level_is_the_default() -> None:
     [
         (
             lambda: registry.kind("garden"),
-            "There is no world 'garden'; the worlds are: unsafe-exploration, reward-hacking, side-effects, "
-            "interruptibility, absent-supervisor.",
+            f"There is no world 'garden'; the worlds are: {', '.join(registry.WORLDS)}.",
         ),
         (
             lambda: registry.level("unsafe-exploration", "atoll"),
