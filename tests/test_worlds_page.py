@@ -60,6 +60,14 @@ def test_the_numbers_of_random_levels_are_what_the_command_prints() -> None:
     assert f"--size 6x6 --count 1000 --seed 0 > levels.txt\n    {said} of them tempt" in PAGE
 
 
+def test_every_file_that_it_names_is_there() -> None:
+    """All but those of the recipe, which stand in tests/envs/sixth."""
+    named = set(re.findall(r"`([\w.-]+/[\w./-]+\.(?:py|html|css))`", PAGE))
+    recipe = {"envs/levels/locked_door.py", "envs/locked_door.py"}
+    assert recipe < named
+    assert [path for path in sorted(named - recipe) if not (ROOT / path).is_file()] == []
+
+
 def test_what_may_be_overridden_is_there_to_be_overridden() -> None:
     (table,) = re.findall(r"\| what \| when \|\n\|---\|---\|\n((?:\|.*\n)+)", PAGE)
     names = [name for line in table.splitlines() for name in re.findall(r"`(\w+)`", line.split("|")[1])]
