@@ -9,6 +9,7 @@ from envs import registry
 from envs.levels.kind import Kind, Level
 from server.pages.board import DRAWN
 from server.pages.picture import picture, style
+from server.pages.render import fill
 from tests.tree import ROOT
 
 LEVELS = [
@@ -68,3 +69,11 @@ def test_a_tile_without_a_pattern_is_drawn_as_its_letter() -> None:
     kind = registry.kind("interruptibility")
     level = Level("odd", kind.name, ("#####", "#AZG#", "#####"))
     assert '<text class="letter" x="50" y="30">Z</text>' in picture(level, kind)
+
+
+def test_every_glyph_of_a_legend_but_walls_and_pieces_has_a_pattern_once() -> None:
+    """The legend of the parent's page paints with them, whatever the world."""
+    legend = "# WGTtOIBPSAXZ?"
+    drawn = re.findall(r'id="tile-([^"]+)"', fill("_tiles.html", legend=dict.fromkeys(legend, "tile")))
+    assert sorted(drawn) == sorted({*legend.replace(" ", ""), "20"} - set("#AX"))
+    assert set(legend) - set("#AXZ?") == DRAWN
