@@ -188,11 +188,11 @@ class Reference:
 
     # ---- 2.3 Direct policy learning ----
 
-    def train(self) -> None:
-        """Gradient steps of pi_T on X."""
+    def train(self) -> bool:
+        """Gradient steps of pi_T on X. Says whether there were any."""
         entries = [e for e in self.X if e.maturity == self.stage or not self.config.own_length]
         if not entries or self.u(Stream.TRAIN) >= self.config.p_train:
-            return
+            return False
         rows = distinct([entry[:3] for entry in entries])
         lambdas = self.config.lambda_global, self.config.lambda_local
         for g in range(self.config.gradient_steps):
@@ -201,6 +201,7 @@ class Reference:
             self.adam.zero_grad()
             loss(self.pi, [rows[r] for r in smallest], *lambdas).backward()  # type: ignore[no-untyped-call]
             self.adam.step()
+        return True
 
     # ---- 2.4 Maturation ----
 

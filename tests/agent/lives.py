@@ -22,10 +22,16 @@ LogEntry = tuple[int, str, Clip, Clip]
 
 
 def live(
-    world: Gridworld, config: Config, judge: Judge, seed: int, trials: int, ticks: int
+    world: Gridworld,
+    config: Config,
+    judge: Judge,
+    seed: int,
+    trials: int,
+    ticks: int,
+    weights: torch.Tensor | None = None,
 ) -> tuple[AgentState, list[list[LogEntry]]]:
     """`trials` lives of `ticks` ticks; the state they end in, and what each asked."""
-    state = parenting.init(world, config, keys(seed, trials))
+    state = parenting.init(world, config, keys(seed, trials), weights)
     query = parenting.no_query(world, config, state)
     logs: list[list[LogEntry]] = [[] for _ in range(trials)]
     for tick in range(1, ticks + 1):
@@ -34,6 +40,7 @@ def live(
         for trial in (query.kind != Kind.NONE).nonzero().squeeze(1).tolist():
             kind = Kind(int(query.kind[trial])).name.lower()
             logs[trial].append((tick, kind, clip(query, trial, 0), clip(query, trial, 1)))
+        state = parenting.rehearse(world, config, state)
     state.check()
     return state, logs
 
