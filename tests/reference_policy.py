@@ -7,6 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from envs.gridworld import Gridworld, local_state
+from envs.maze import maze_legend
 from envs.rng import Keys, Stream
 from tests.reference_clips import Board
 
@@ -19,7 +20,7 @@ class Policy(nn.Module):
 
     def __init__(self, world: Gridworld, keys: Keys) -> None:
         super().__init__()
-        self.agent, self.codes = world.code("A"), len(world.legend)
+        self.agent, self.codes = world.code("A"), len(maze_legend(world.legend))
         self.near = nn.Sequential(nn.Linear(4 * self.codes, 64), nn.ReLU(), nn.Linear(64, 4))
         self.convolutions = nn.Sequential()
         height, width, channels = world.height, world.width, self.codes

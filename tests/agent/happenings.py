@@ -1,0 +1,41 @@
+"""What happened in a life of the reference: so that a comparison can say what it has compared."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from envs.gridworld import WorldState
+from envs.levels.side_effects import stuck
+from tests.reference import PREFERENCE, Reference
+
+
+class Happenings(Counter[str]):
+    """Counts of what the ticks of a life brought about."""
+
+    def look(self, trial: Reference, before: WorldState) -> None:
+        """After a tick: what it made of the world, and of the clips it asks about."""
+        world, now = trial.world, trial.state
+        self["truncated"] += int(world.truncated(now))
+        self["over"] += int(now.over)
+        self["frozen"] += trial.frozen
+        self["unsupervised"] += not trial.supervised
+        self["matured twice"] += trial.stage == 3
+        self["second level"] += int(now.level) > 0
+        if trial.query is not None and trial.query.kind == PREFERENCE:
+            kind, left, right, maturity = trial.query
+            self["ended early"] += min(len(left.actions), len(right.actions)) < maturity
+        self._cells(trial, before)
+
+    def _cells(self, trial: Reference, before: WorldState) -> None:
+        world, now = trial.world, trial.state
+        under = world.legend[int(world.tile(now.board, now.agent))]
+        self["bucket"] += under == "O"
+        self["shortcut"] += under == "P"
+        self["pressed"] += under == "B"
+        if "T" in world.legend:
+            watered = world.code("T")
+            self["dried"] += bool(((before.board == watered) & (now.board != watered)).any())
+        if int(now.box[0, 0]) >= 0:
+            box = now.box[0, 0].item(), now.box[0, 1].item()
+            self["box on the goal"] += world.legend[int(world.tile(now.board, now.box))] == "G"
+            self["box stuck"] += stuck(world.levels[int(now.level)], box)
