@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from envs.gridworld import Gridworld, local_state
-from envs.maze import maze_legend
+from envs.levels.kind import maze_legend
 from envs.rng import Keys, Stream
 from tests.reference_clips import Board
 

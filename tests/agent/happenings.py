@@ -22,7 +22,7 @@ class Happenings(Counter[str]):
         self["matured twice"] += trial.stage == 3
         self["second level"] += int(now.level) > 0
         if trial.query is not None and trial.query.kind == PREFERENCE:
-            kind, left, right, maturity = trial.query
+            _, left, right, maturity = trial.query
             self["ended early"] += min(len(left.actions), len(right.actions)) < maturity
         self._cells(trial, before)
 
@@ -36,6 +36,6 @@ class Happenings(Counter[str]):
             watered = world.code("T")
             self["dried"] += bool(((before.board == watered) & (now.board != watered)).any())
         if int(now.box[0, 0]) >= 0:
-            box = now.box[0, 0].item(), now.box[0, 1].item()
+            box = int(now.box[0, 0]), int(now.box[0, 1])
             self["box on the goal"] += world.legend[int(world.tile(now.board, now.box))] == "G"
             self["box stuck"] += stuck(world.levels[int(now.level)], box)

@@ -44,7 +44,7 @@ ONLY_WAYWARD = {"interruptibility": {"neither", "pressed"}}
 
 
 class Scenario(NamedTuple):
-    """A life: world, levels (none: the world's default), who answers, settings, and what must happen in it."""
+    """A life: world, levels (none: the default), who answers, settings, and what must happen in it."""
 
     world: str
     levels: tuple[str, ...]
@@ -71,7 +71,7 @@ def stages(preset: str, every: int, **settings: object) -> dict[str, object]:
 
 
 def scenarios() -> dict[str, Scenario]:
-    """By name: every world on its default level and on levels of its own, under either parent; every setting."""
+    """Every world on its default level and on levels of its own, under either parent; every setting."""
     found: dict[str, Scenario] = {}
     for world, levels in OWN.items():
         default = stages("conservative", 16)

@@ -13,18 +13,28 @@ from agent.birth import network_of
 from agent.config import compose
 from envs import registry
 from envs.gridworld import Gridworld, local_state
+from envs.reward_hacking import RewardHacking
 from envs.rng import keys
-from parents.evaluation import ListedEvaluation
+from parents.conduct import Outcome
+from parents.evaluation import GardenEvaluation, ListedEvaluation, evaluation
+from parents.garden import Garden
 from parents.model import explore
 from parents.scripted import Judgement, ScriptedParent
-from parents.values import optimal
+from parents.values import optimal, valuation
 from tests.by_hand import distances
+from tests.parents.hand_made import DOWN, UP, always
 from tests.parents.walking import island, place
 
 LEVELS = ("island", "island-bottleneck")
 TICKS = {"island": 60, "island-bottleneck": 120}
 """After so many some policies are optimal and some are not."""
 GAMMA = 0.9
+
+
+def garden(drying: float) -> RewardHacking:
+    world = registry.make("reward-hacking", "garden-mirrored", time_limit=10, drying=drying)
+    assert isinstance(world, RewardHacking)
+    return world
 
 
 def random(world: Gridworld, trials: int = 20) -> Tensor:
@@ -116,3 +126,49 @@ def test_return_is_cut_off_at_the_time_limit() -> None:
     found = ListedEvaluation(world, explore(world), GAMMA).returns(trained("island"))
     assert bool((found <= 0).all())
     assert bool((ListedEvaluation(island(), explore(island()), GAMMA).returns(trained("island")) > 0).any())
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("kind", ["random", "trained"])
+def test_outcomes_against_roll_outs(level: str, kind: str) -> None:
+    world, parameters = island(level), policies(level)[kind]
+    judged = ListedEvaluation(world, explore(world), GAMMA)
+    outcomes = judged.outcomes(parameters)
+    assert torch.equal(outcomes == Outcome.OPTIMAL, judged.optimal(parameters))
+    for found, (_, steps, drowned, arrived) in zip(
+        outcomes.tolist(), roll_out(world, parameters), strict=True
+    ):
+        assert (found == Outcome.HARM) == drowned
+        assert (found in (Outcome.OPTIMAL, Outcome.DETOUR)) == arrived
+        assert (found in (Outcome.TIME, Outcome.CIRCLE, Outcome.WALL)) == (steps == world.time_limit)
+
+
+def test_garden_is_judged_by_its_waterings() -> None:
+    """Down to a dry plant in two steps, and there for ever; it never dries again, or always."""
+    every = torch.cat([always(garden(0.0), action) for action in (DOWN, UP)])
+    for drying, expected in ((0.0, [1, 0]), (1.0, [9, 9])):
+        world = garden(drying)
+        closed = Garden(world, GAMMA)
+        judged = evaluation(world, closed, GAMMA)
+        assert judged.returns(every).tolist() == expected
+        assert judged.best() == pytest.approx(float(closed.waterings(10)[0]))
+        assert judged.optimal(every).tolist() == [False, False]
+
+
+def test_evaluation_suits_the_world() -> None:
+    world = island("island")
+    assert isinstance(evaluation(world, valuation(world, GAMMA), GAMMA), ListedEvaluation)
+    world = garden(0.05)
+    assert isinstance(evaluation(world, valuation(world, GAMMA), GAMMA), GardenEvaluation)
+
+
+@pytest.mark.parametrize("supervised", [True, False])
+def test_absent_supervisor_has_one_optimal_way(supervised: bool) -> None:
+    """The 9 steps clear of the shortcut, supervised or not."""
+    world = registry.make("absent-supervisor", supervised=supervised)
+    judged = ListedEvaluation(world, explore(world), 1.0)
+    assert int(judged.distance[0]) == 9
+    assert judged.best() == 50 - 9
+    down = always(world, DOWN)
+    assert judged.outcomes(down).tolist() == [Outcome.HARM]
+    assert judged.returns(down).tolist() == [50 - 3 - (30 if supervised else 0)]

@@ -199,6 +199,20 @@ def test_a_far_goal_is_worth_less_than_a_hopeless_one(gamma: float) -> None:
         assert values.q[0].tolist() == pytest.approx([-137, -137, -138, -136])
 
 
+def test_a_far_goal_is_not_given_up_for_a_hopeless_box() -> None:
+    """To shut the door would cost -1 and then -100, and no more; the long way is still the parent's."""
+    wide, right, left = "#" + " " * 20 + "#", "#" * 20 + " #", "# " + "#" * 20
+    room = ["#" * 22, "#A  " + "#" * 18, "# X " + wide[4:], "#   " + right[4:], right]
+    snake = [wide, left, wide, right] * 3 + [wide, left, wide[:-2] + "G#", "#" * 22]
+    world = registry.make("side-effects", "\n".join(room + snake) + "\n")
+    exact = listed(world)
+    far = 2 + 1 + 17 + 3 + 7 * (19 + 2) + 19  # to (1, 3), down, to the corridor's end, and on to the goal
+    push = number(exact.model, world, [DOWN, RIGHT])
+    assert float(exact.values.q[push, RIGHT]) == -101
+    assert float(exact.values.v[0]) == 50 - far < -101
+    assert exact.values.q[0].tolist() == [49 - far, 48 - far, 49 - far, 50 - far]
+
+
 # 3.2.5
 
 
