@@ -10,6 +10,7 @@ from torch import Tensor
 from envs import registry
 from envs.absent_supervisor import AbsentSupervisor
 from envs.gridworld import Actions, WorldState
+from envs.levels.kind import Level
 from envs.unsafe_exploration import UnsafeExploration
 from parents import values
 from parents.garden import Garden
@@ -68,6 +69,17 @@ def test_an_end_that_a_safe_step_leads_to_is_a_goal() -> None:
     assert isinstance(found, Listed)
     assert float(found.values.v[0]) == -3
     assert torch.equal(found.model.goal, found.model.over)
+
+
+def test_to_drown_is_no_way_to_the_goal() -> None:
+    """Of two levels one has its goal behind a wall, which `registry` would refuse: all is lost there."""
+    sealed = Level("sealed", "unsafe-exploration", ("######", "WA #G#", "######"))
+    open_ = Level("open", "unsafe-exploration", ("######", "WA  G#", "######"))
+    for gamma in (0.9, 1.0):
+        found = valuation(UnsafeExploration((sealed, open_), time_limit=100), gamma)
+        assert isinstance(found, Listed)
+        assert found.values.v[:2].tolist() == pytest.approx([-100, gamma**2])
+        assert found.values.q[0].tolist() == pytest.approx([-100 * gamma] * 2 + [-1, -100 * gamma])
 
 
 def test_the_garden_alone_is_in_closed_form() -> None:
