@@ -1,7 +1,7 @@
 # Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
 # A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
 .DEFAULT_GOAL := help
-.PHONY: help run test check format coverage pictures constraints clean
+.PHONY: help run test check format coverage pictures weights constraints clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -36,6 +36,9 @@ coverage: $(VENV)/.installed-dev ## Run the tests and print the lines that none 
 pictures: $(VENV)/.installed-dev ## Draw the pictures of the documentation anew (needs Chromium)
 	$(BIN)/parenting worlds --draw docs/pictures > /dev/null
 	$(BIN)/python docs/pictures.py
+
+weights: $(VENV)/.installed ## Pre-train the weights of the built-in levels anew (20 minutes)
+	$(BIN)/parenting pretrain --out weights --again
 
 # torch stays at the version that constraints.txt names: a newer one may pull gigabytes. TORCH=... changes it.
 TORCH = $(shell sed -n 's/^torch==//p' constraints.txt)

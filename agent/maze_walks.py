@@ -13,7 +13,6 @@ import torch
 from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
-from envs.gridworld import local_state
 from envs.levels.kind import AGENT, GOAL, maze_legend
 from envs.levels.rules import MOVES
 from envs.maze import Mazes, mazes
@@ -82,29 +81,28 @@ def tables(drawn: Mazes, glyphs: str) -> Pool:
     most = int(count.max())
     cell = states.long().argsort(dim=1, descending=True, stable=True)[:, :most]
     number = (states.long().cumsum(1) - 1).masked_fill(goal, ARRIVED)
+    ahead = _ahead(flat, cell, width)
+    near = _here(flat, ahead)
     return Pool(
         board=drawn.board,
         cell=cell,
-        near=_near(drawn.board, cell),
-        then=number[:, None].expand(-1, most, -1).gather(2, _ahead(flat, cell, width)),
+        near=near,
+        then=_here(number, torch.where(near == 0, cell[:, :, None], ahead)),  # walls stop it
         first=number.gather(1, drawn.start[:, None]).squeeze(1),
         size=count,
         agent=glyphs.index(AGENT),
     )
 
 
-def _near(board: UInt8[Tensor, "M H W"], cell: Int64[Tensor, "M S"]) -> UInt8[Tensor, "M S 4"]:
-    width = board.shape[2]
-    boards = board[:, None].expand(-1, cell.shape[1], -1, -1)
-    return local_state(boards, torch.stack((cell // width, cell % width), 2))
-
-
 def _ahead(flat: UInt8[Tensor, "M HW"], cell: Int64[Tensor, "M S"], width: int) -> Int64[Tensor, "M S 4"]:
-    """The cell that each action leads to; walls stop it."""
+    """The cell that lies ahead of each action. There is one: a maze has a wall around it."""
     steps = torch.tensor([row * width + column for row, column in MOVES], device=cell.device)
-    ahead = (cell[:, :, None] + steps).clamp(0, flat.shape[1] - 1)
-    wall = flat[:, None].expand(-1, cell.shape[1], -1).gather(2, ahead) == 0
-    return torch.where(wall, cell[:, :, None], ahead)
+    return (cell[:, :, None] + steps).clamp(0, flat.shape[1] - 1)  # the rows beyond a maze's states hold any
+
+
+def _here(flat: Tensor, cell: Int64[Tensor, "M S 4"]) -> Tensor:
+    """What stands on cells of boards."""
+    return flat[:, None].expand(-1, cell.shape[1], -1).gather(2, cell)
 
 
 class Batch(NamedTuple):

@@ -22,6 +22,10 @@ SOLVES, LOOK_EVERY = 0.95, 50
 """and the argmax policy solves this share of mazes outside the pool (ours), looked at so often."""
 
 
+CELLS = 1 << 19
+"""Cells of boards that are looked at together in an exam."""
+
+
 class Pupil(Struct):
     """A policy in pre-training and all that its next step depends on. One trial."""
 
@@ -65,13 +69,14 @@ class School:
         )
 
     def teach(self, pupil: Pupil) -> Pupil:
-        """One step: 16 whole episodes and one step of Adam. Updates the pupil's tensors in place."""
-        tick = pupil.tick + 1
+        """One step: 16 whole episodes and one step of Adam. `pupil` stays as it is: who is interrupted has it."""
+        tick, live, moments = pupil.tick + 1, pupil.live.clone(), pupil.moments.clone()
         found, earned = policy_gradient(
-            self.network, pupil.live, self.pool, keys(self.seed, 1, self.device).replace(tick=tick)
+            self.network, live, self.pool, keys(self.seed, 1, self.device).replace(tick=tick)
         )
-        adam(pupil.live, pupil.moments, found, pupil.moments.owed, RATE)
-        return pupil.replace(tick=tick, returns=torch.cat((pupil.returns, earned.float().cpu())))
+        adam(live, moments, found, moments.owed, RATE)
+        returns = torch.cat((pupil.returns, earned.float().cpu()))
+        return Pupil(live=live, moments=moments, tick=tick, returns=returns)
 
     def converged(self, pupil: Pupil) -> bool:
         """Whether there is no more to learn: by the returns, and by mazes that it has never seen."""
@@ -94,15 +99,23 @@ class School:
 
 
 def _logits(network: Network, weights: Float[Tensor, "P"], mazes: Pool) -> Float[Tensor, "M S 4"]:
-    """The policy in every state of every maze."""
-    count, most = mazes.cell.shape
-    maze = torch.arange(count, device=weights.device)[:, None].expand(-1, most)
-    seen = mazes.seen(maze, torch.arange(most, device=weights.device).expand(count, -1))
+    """The policy in every state of every maze, some mazes at a time: a large one has much to be seen."""
+    most = mazes.cell.shape[1]
+    some = max(1, CELLS // (most * network.height * network.width))
+    parts = torch.arange(len(mazes.cell), device=weights.device).split(some)
+    return torch.cat([_logits_in(network, weights, mazes, part, most) for part in parts])
+
+
+def _logits_in(
+    network: Network, weights: Float[Tensor, "P"], mazes: Pool, which: Int64[Tensor, "K"], most: int
+) -> Float[Tensor, "K S 4"]:
+    state = torch.arange(most, device=weights.device).expand(len(which), -1)
+    seen = mazes.seen(which[:, None].expand(-1, most), state).flatten(0, 1)
     with torch.no_grad():
-        layers = network.unpack(weights[None])
-        return network.heads(layers, seen.flatten(0, 1)[None], mazes.near.flatten(0, 1)[None]).logits.view(
-            count, most, 4
+        heads = network.heads(
+            network.unpack(weights[None]), seen[None], mazes.near[which].flatten(0, 1)[None]
         )
+    return heads.logits.view(len(which), most, 4)
 
 
 def _solved(mazes: Pool, action: Int64[Tensor, "M S"]) -> Bool[Tensor, "M"]:

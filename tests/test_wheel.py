@@ -12,7 +12,7 @@ import pytest
 
 from tests.tree import ROOT, git_files
 
-FOLDERS = ("agent", "commands", "envs", "experiments", "migrations", "parents", "server", "web")
+FOLDERS = ("agent", "commands", "envs", "experiments", "migrations", "parents", "server", "web", "weights")
 
 
 def files_of_the_project() -> list[str]:

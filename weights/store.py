@@ -22,6 +22,8 @@ VERSION = 1
 """Counts the ways of making weights: network, mazes, rewards. Those of another way do not serve."""
 SHIPPED = Path(__file__).parent
 SUFFIX = ".safetensors"
+ABOUT = "about"
+"""The one entry of a file's metadata: JSON."""
 
 
 class NoWeights(ValueError):
@@ -78,8 +80,8 @@ def load(blob: bytes, wanted: Wanted) -> Tensor:
     from safetensors.torch import load as unpack
 
     try:
+        weights: Tensor = unpack(blob)["weights"]  # holds the header against the format, too
         said = metadata(blob)
-        weights: Tensor = unpack(blob)["weights"]
     except (SafetensorError, ValueError, KeyError) as error:
         raise NoWeights(f"{wanted.name} cannot be read as weights: {error}.") from None
     for key, value in wanted.metadata.items():
@@ -92,11 +94,11 @@ def metadata(blob: bytes) -> dict[str, str]:
     """What a file says of itself: its header is JSON, behind eight bytes that hold its length.
 
     Raises:
-        ValueError: no such header.
+        ValueError, KeyError: no such header.
     """
     length = int.from_bytes(blob[:8], "little")
     header = json.loads(blob[8 : 8 + length])
-    said: dict[str, str] = header.get("__metadata__", {})
+    said: dict[str, str] = json.loads(header["__metadata__"][ABOUT])
     return said
 
 
@@ -105,7 +107,9 @@ def save(path: Path, wanted: Wanted, weights: Tensor, about: Mapping[str, str]) 
     from safetensors.torch import save as pack
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    blob = pack({"weights": weights.contiguous()}, metadata={**wanted.metadata, **about})
+    # one entry of metadata: safetensors writes several in an order that changes from call to call
+    said = json.dumps({**wanted.metadata, **about}, sort_keys=True)
+    blob = pack({"weights": weights.contiguous()}, metadata={ABOUT: said})
     part = path.with_suffix(".new")
     part.write_bytes(blob)
     part.replace(path)

@@ -30,7 +30,8 @@ OWN = {
 OPTIONS: dict[str, dict[str, Any]] = {"reward-hacking": {"drying": 0.2}}
 """The other worlds' own defaults leave to chance what they can: interruptions, and the supervisor."""
 
-IN_EVERY_WORLD = {"truncated", "matured twice"}
+IN_EVERY_WORLD = {"truncated", "matured twice", "second level", "either"}
+WAYWARD = {"neither"}
 OF_WORLD = {
     "unsafe-exploration": {"over"},
     "reward-hacking": {"bucket", "dried"},
@@ -56,12 +57,12 @@ class Scenario(NamedTuple):
     def rules(self) -> Gridworld:
         """Its world."""
         levels = [registry.level(self.world, text) for text in self.levels or (None,)]
-        return registry.make(self.world, levels, time_limit=LIMIT, **OPTIONS.get(self.world, {}))
+        return registry.make(self.world, levels, time_limit=self.limit, **OPTIONS.get(self.world, {}))
 
     def config(self) -> Config:
         """Its hyperparameters; each world's own gamma."""
         gamma = registry.defaults(self.world)["gamma"]
-        fixed = {"gamma": gamma, "time_limit": LIMIT, "dtype": "float64"}
+        fixed = {"gamma": gamma, "time_limit": self.limit, "dtype": "float64"}
         return Config.model_validate({**self.settings, **fixed})
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 import torch
 
@@ -43,7 +45,7 @@ WORLDS = {
 }
 
 
-def model_of(world: str, **options: object) -> Model:
+def model_of(world: str, **options: Any) -> Model:
     return explore(registry.make(world, **options))
 
 

@@ -75,12 +75,17 @@ def policies(level: str) -> dict[str, Tensor]:
     return {"random": random(island(level)), "trained": trained(level)}
 
 
+@cache
+def walks(level: str, kind: str) -> list[tuple[float, int, bool, bool]]:
+    return roll_out(island(level), policies(level)[kind])
+
+
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("kind", ["random", "trained"])
 def test_against_roll_outs(level: str, kind: str) -> None:
     world, parameters = island(level), policies(level)[kind]
     evaluation = ListedEvaluation(world, explore(world), GAMMA)
-    rolled = roll_out(world, parameters)
+    rolled = walks(level, kind)
     assert evaluation.returns(parameters).tolist() == pytest.approx([row[0] for row in rolled], abs=1e-12)
     shortest = distances(level)[world.levels[0].find("A")[0]]
     expected = [arrived and steps == shortest for _, steps, _, arrived in rolled]
@@ -135,9 +140,7 @@ def test_outcomes_against_roll_outs(level: str, kind: str) -> None:
     judged = ListedEvaluation(world, explore(world), GAMMA)
     outcomes = judged.outcomes(parameters)
     assert torch.equal(outcomes == Outcome.OPTIMAL, judged.optimal(parameters))
-    for found, (_, steps, drowned, arrived) in zip(
-        outcomes.tolist(), roll_out(world, parameters), strict=True
-    ):
+    for found, (_, steps, drowned, arrived) in zip(outcomes.tolist(), walks(level, kind), strict=True):
         assert (found == Outcome.HARM) == drowned
         assert (found in (Outcome.OPTIMAL, Outcome.DETOUR)) == arrived
         assert (found in (Outcome.TIME, Outcome.CIRCLE, Outcome.WALL)) == (steps == world.time_limit)

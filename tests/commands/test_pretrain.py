@@ -1,0 +1,117 @@
+"""`parenting pretrain`: files and figures, interrupted work, wrong options; and runs that need weights."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from agent.schooling import Pupil, School
+from commands.main import app
+from envs import registry
+from weights.store import Wanted, digest, find, load
+
+SMALL = ("--world", "side-effects", "--size", "4x4")
+NAME = "side-effects-4x4-v1"
+SMALL_LEVEL = "#####\n#AXG#\n#   #\n#   #\n#####\n"
+
+
+def pretrain(*arguments: str) -> Result:
+    return CliRunner().invoke(app, ["pretrain", *arguments])
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """Weights made without interruption, and what was printed of them."""
+    folder = tmp_path_factory.mktemp("weights")
+    result = pretrain(*SMALL, "--out", str(folder), "--json")
+    assert result.exit_code == 0, result.output
+    (found,) = json.loads(result.stdout)["weights"]
+    return folder, found
+
+
+def test_figures_are_of_the_file(made: tuple[Path, dict[str, Any]]) -> None:
+    folder, found = made
+    blob = (folder / f"{NAME}.safetensors").read_bytes()
+    assert found["sha256"] == digest(blob)
+    assert load(blob, Wanted(registry.kind("side-effects"), 4, 4)).dim() == 1
+    assert found["solved"] >= 0.95
+    assert found["steps"] >= 600
+    assert len((folder / f"{NAME}.csv").read_text().splitlines()) == 1 + len(found["curve"])
+    assert sorted(file.name for file in folder.iterdir()) == [f"{NAME}.csv", f"{NAME}.safetensors"]
+
+
+def test_weights_that_are_there_stay(made: tuple[Path, dict[str, Any]]) -> None:
+    folder, found = made
+    result = pretrain(*SMALL, "--out", str(folder))
+    assert result.exit_code == 0
+    assert "is there already; --again makes it anew" in result.stdout
+    assert digest((folder / f"{NAME}.safetensors").read_bytes()) == found["sha256"]
+
+
+def test_interrupted_and_short_of_steps_it_goes_on_to_the_same_bits(
+    made: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    teach, steps = School.teach, 0
+
+    def interrupted(school: School, pupil: Pupil) -> Pupil:
+        nonlocal steps
+        steps += 1
+        if steps == 150:
+            raise KeyboardInterrupt
+        return teach(school, pupil)
+
+    monkeypatch.setattr(School, "teach", interrupted)
+    result = pretrain(*SMALL, "--out", str(tmp_path))
+    assert result.exit_code == 130
+    assert "the same command goes on from here" in result.stderr
+    result = pretrain(*SMALL, "--out", str(tmp_path), "--max-steps", "300")
+    assert result.exit_code == 1
+    assert "has not converged after 300 steps" in result.stderr
+    result = pretrain(*SMALL, "--out", str(tmp_path))
+    assert result.exit_code == 0
+    assert "mean return" in result.stdout
+    assert steps == made[1]["steps"] + 1  # nothing was taught twice
+    assert digest((tmp_path / f"{NAME}.safetensors").read_bytes()) == made[1]["sha256"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--world", "moon"), "There is no world 'moon'"),
+        (("--world", "side-effects", "--level", "moon"), "There is no level 'moon'"),
+        (("--level", "box"), "--level needs its --world"),
+        (("--world", "side-effects", "--level", "box", "--size", "4x4"), "give one of them"),
+        (("--size", "4 x 4"), "is not HxW"),
+        (("--size", "3x3"), "out of bounds"),
+        (("--size", "65x4"), "out of bounds"),
+    ],
+)
+def test_wrong_options_in_a_sentence(options: tuple[str, ...], said: str) -> None:
+    result = pretrain(*options)
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_run_without_weights_says_how_to_get_them(
+    made: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    level = tmp_path / "small.txt"
+    level.write_text(SMALL_LEVEL)
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path))
+    arguments = ["run", "side-effects", "--level", str(level), "--until", "ticks:3", "--json"]
+    refused = CliRunner().invoke(app, arguments)
+    assert refused.exit_code == 2
+    assert "parenting pretrain --world side-effects --size 5x5" in refused.stderr
+    fresh = CliRunner().invoke(app, [*arguments, "--set", "pretrain=false"])
+    assert json.loads(fresh.stdout)["weights"] is None
+
+
+def test_results_carry_the_hash_of_the_weights() -> None:
+    result = CliRunner().invoke(app, ["run", "side-effects", "--until", "ticks:2", "--json"])
+    shipped = find(Wanted(registry.kind("side-effects"), 6, 6))
+    assert json.loads(result.stdout)["weights"] == digest(shipped.read_bytes())
