@@ -57,12 +57,12 @@ class Scenario(NamedTuple):
     def rules(self) -> Gridworld:
         """Its world."""
         levels = [registry.level(self.world, text) for text in self.levels or (None,)]
-        return registry.make(self.world, levels, time_limit=self.limit, **OPTIONS.get(self.world, {}))
+        return registry.make(self.world, levels, time_limit=LIMIT, **OPTIONS.get(self.world, {}))
 
     def config(self) -> Config:
         """Its hyperparameters; each world's own gamma."""
         gamma = registry.defaults(self.world)["gamma"]
-        fixed = {"gamma": gamma, "time_limit": self.limit, "dtype": "float64"}
+        fixed = {"gamma": gamma, "time_limit": LIMIT, "dtype": "float64"}
         return Config.model_validate({**self.settings, **fixed})
 
 
