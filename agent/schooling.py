@@ -22,7 +22,7 @@ SOLVES, LOOK_EVERY = 0.95, 50
 """and the argmax policy solves this share of mazes outside the pool (ours), looked at so often."""
 
 
-CELLS = 1 << 19
+CELLS = 1 << 17
 """Cells of boards that are looked at together in an exam."""
 
 
@@ -69,7 +69,7 @@ class School:
         )
 
     def teach(self, pupil: Pupil) -> Pupil:
-        """One step: 16 whole episodes and one step of Adam. `pupil` stays as it is: who is interrupted has it."""
+        """One step: 16 whole episodes and one step of Adam. An interruption leaves `pupil` as it was."""
         tick, live, moments = pupil.tick + 1, pupil.live.clone(), pupil.moments.clone()
         found, earned = policy_gradient(
             self.network, live, self.pool, keys(self.seed, 1, self.device).replace(tick=tick)
@@ -100,22 +100,25 @@ class School:
 
 def _logits(network: Network, weights: Float[Tensor, "P"], mazes: Pool) -> Float[Tensor, "M S 4"]:
     """The policy in every state of every maze, some mazes at a time: a large one has much to be seen."""
-    most = mazes.cell.shape[1]
+    count, most = mazes.cell.shape
+    logits = weights.new_empty(count, most, 4)
     some = max(1, CELLS // (most * network.height * network.width))
-    parts = torch.arange(len(mazes.cell), device=weights.device).split(some)
-    return torch.cat([_logits_in(network, weights, mazes, part, most) for part in parts])
+    for first in range(0, count, some):
+        maze = torch.arange(first, min(first + some, count), device=weights.device)
+        logits[maze] = _logits_in(network, weights, mazes, maze)
+    return logits
 
 
 def _logits_in(
-    network: Network, weights: Float[Tensor, "P"], mazes: Pool, which: Int64[Tensor, "K"], most: int
+    network: Network, weights: Float[Tensor, "P"], mazes: Pool, maze: Int64[Tensor, "K"]
 ) -> Float[Tensor, "K S 4"]:
-    state = torch.arange(most, device=weights.device).expand(len(which), -1)
-    seen = mazes.seen(which[:, None].expand(-1, most), state).flatten(0, 1)
+    near = mazes.near[maze]
+    state = torch.arange(near.shape[1], device=weights.device).expand(len(maze), -1)
+    seen = mazes.seen(maze[:, None].expand_as(state), state)
     with torch.no_grad():
-        heads = network.heads(
-            network.unpack(weights[None]), seen[None], mazes.near[which].flatten(0, 1)[None]
-        )
-    return heads.logits.view(len(which), most, 4)
+        layers = network.unpack(weights[None])
+        heads = network.heads(layers, seen.flatten(0, 1)[None], near.flatten(0, 1)[None])
+    return heads.logits.view(near.shape)
 
 
 def _solved(mazes: Pool, action: Int64[Tensor, "M S"]) -> Bool[Tensor, "M"]:

@@ -74,7 +74,7 @@ def _one(
             typer.echo(f"{path} is there already; --again makes it anew.")
         return {"path": str(path), "sha256": store.digest(path.read_bytes())}
     from agent.process import settle
-    from experiments.education import Unconverged, educate
+    from experiments.education import Damaged, Unconverged, educate
 
     settle()
     began = time.monotonic()
@@ -84,9 +84,12 @@ def _one(
     except KeyboardInterrupt:
         typer.echo("Interrupted; the same command goes on from here.", err=True)
         raise typer.Exit(130) from None
-    except Unconverged as error:
+    except (Unconverged, Damaged) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from None
+    except OSError as error:
+        typer.echo(f"{folder} cannot be written: {error}.", err=True)
+        raise typer.Exit(2) from None
     found = _described(done, time.monotonic() - began)
     if not quiet:
         typer.echo(_page(found))

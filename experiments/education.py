@@ -7,6 +7,7 @@ import io
 import time
 from collections.abc import Callable
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any, NamedTuple
 
 import torch
@@ -30,6 +31,10 @@ class Unconverged(RuntimeError):
     """Pre-training did not converge within its steps; what was learnt is kept and can be taken up again."""
 
 
+class Damaged(RuntimeError):
+    """The file of interrupted work cannot be read; the sentence names it."""
+
+
 class Educated(NamedTuple):
     """What pre-training left."""
 
@@ -50,7 +55,10 @@ def educate(
 
     Raises:
         Unconverged: `max_steps` were not enough.
+        Damaged: the interrupted work cannot be read.
+        OSError: `folder` cannot be written.
     """
+    folder.mkdir(parents=True, exist_ok=True)
     school = School(
         network(wanted.height, wanted.width, len(wanted.metadata["legend"])), wanted.world.glyphs, seed
     )
@@ -97,7 +105,6 @@ def _table(curve: list[float]) -> str:
 
 def _keep(part: Path, pupil: Pupil) -> None:
     """Write the whole pupil, or leave the older file as it is."""
-    part.parent.mkdir(parents=True, exist_ok=True)
     fresh = part.with_suffix(".keep")
     torch.save(pupil.tensors(), fresh)
     fresh.replace(part)
@@ -106,8 +113,12 @@ def _keep(part: Path, pupil: Pupil) -> None:
 def _recall(part: Path, pupil: Pupil) -> Pupil:
     if not part.is_file():
         return pupil
-    kept: dict[str, Any] = torch.load(part, weights_only=True)
-    moments = {name: kept[f"moments.{name}"] for name in ("first", "second", "steps", "owed")}
-    return pupil.replace(
-        live=kept["live"], moments=Rehearsal(**moments), tick=kept["tick"], returns=kept["returns"]
-    ).check()
+    try:
+        kept: dict[str, Any] = torch.load(part, weights_only=True)
+        moments = {name: kept[f"moments.{name}"] for name in ("first", "second", "steps", "owed")}
+        found = Pupil(kept["live"], Rehearsal(**moments), kept["tick"], kept["returns"]).check()
+    except (EOFError, KeyError, RuntimeError, TypeError, UnpicklingError):
+        found = pupil.replace(live=pupil.live[:, :0])
+    if found.live.shape != pupil.live.shape:
+        raise Damaged(f"{part} cannot be read as interrupted work. Delete it to begin anew.")
+    return found
