@@ -5,14 +5,15 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import torch
 
 from agent import parenting
-from agent.config import PRESETS, Config
+from agent.birth import world_of
+from agent.config import Config, compose
 from agent.events import EndEpisode
 from agent.query import Answer
 from envs import registry
@@ -22,14 +23,55 @@ from server.checkpoint import Saved, birth, unpack
 from server.db import Database
 from server.record import load_checkpoints
 from server.settings import Settings
+from server.starting import NewRun
 from server.tally import count
 from server.worker import main
 from tests.agent.lives import Judge
+from weights.store import Wanted, find, load
 
-WORLD = "unsafe-exploration"
 CONFIG: dict[str, Any] = {"stages": 3, "mature_every": 12, "max_open_preferences": 0, "time_limit": 12}
 """Clips of up to three steps, early ends, truncations and two maturations within some sixty answers."""
 SEED = 11
+
+
+class Begun(NamedTuple):
+    """What a run is started with, worked out here and not by the server."""
+
+    world: str
+    level: str
+    changes: Mapping[str, Any]
+    preset: str = "lax"
+    seed: int = SEED
+
+    def new(self, parent: Literal["human", "scripted"]) -> NewRun:
+        """The same for the server."""
+        kept = {"world": self.world, "level": self.level, "preset": self.preset, "seed": self.seed}
+        return NewRun(**kept, config=dict(self.changes), parent=parent)  # type: ignore[arg-type]
+
+    @property
+    def config(self) -> Config:
+        return compose(self.preset, registry.defaults(self.world), self.changes, strict=True)
+
+    def make(self) -> Gridworld:
+        """The world that the run lives in."""
+        return world_of(self.world, self.level, self.config)
+
+    def weights(self) -> torch.Tensor | None:
+        """The shipped weights, where the run begins with some."""
+        world = self.make()
+        wanted = Wanted(world.kind, world.height, world.width)
+        return load(find(wanted).read_bytes(), wanted) if self.config.pretrain else None
+
+    def birth(self, seed: int | None = None) -> Saved:
+        """The run at tick 0, with its own seed or another."""
+        return birth(self.make(), self.config, self.seed if seed is None else seed, self.weights())
+
+    def unpack(self, blob: bytes) -> Saved:
+        """A checkpoint of the run."""
+        return unpack(self.make(), self.config, blob, self.weights())
+
+
+ISLAND = Begun("unsafe-exploration", "island", CONFIG)
 
 
 class Inline:
@@ -37,10 +79,10 @@ class Inline:
     episodes.
     """
 
-    def __init__(self, seed: int = SEED, judge: Judge | None = None) -> None:
-        self.world, self.config = world_and_config()
-        self.judge = judge or Judgement(self.world, self.config.gamma).choose
-        self.saved = birth(self.world, self.config, seed)
+    def __init__(self, begun: Begun = ISLAND, seed: int | None = None, judge: Judge | None = None) -> None:
+        self.world, self.config = begun.make(), begun.config
+        self.judge = judge or Judgement(self.world, self.config.gamma, inside=self.config.inside).choose
+        self.saved = begun.birth(seed)
         self.query = parenting.no_query(self.world, self.config, self.saved.state)
 
     def tick(self) -> None:
@@ -49,29 +91,23 @@ class Inline:
             state, config = parenting.apply(self.world, config, state, EndEpisode())
         answer = Answer(query=self.query, choice=self.judge(self.query))
         state, self.query = parenting.step(self.world, config, state, answer)
-        self.saved = Saved(state, count(self.world, tally, answer, state), config)
+        tally = count(self.world, tally, answer, state)
+        self.saved = Saved(parenting.rehearse(self.world, config, state), tally, config)
 
 
-def inline(ticks: int) -> Saved:
+def inline(ticks: int, begun: Begun = ISLAND) -> Saved:
     """The state of the run after `ticks` ticks."""
-    run = Inline()
+    run = Inline(begun)
     for _ in range(ticks):
         run.tick()
     return run.saved
 
 
-def world_and_config() -> tuple[Gridworld, Config]:
-    """What the run was started with."""
-    config = Config(**{**PRESETS["lax"], "gamma": 0.9, **CONFIG})
-    return registry.make(WORLD, time_limit=config.time_limit), config
-
-
-def last(db: Database, run_id: int) -> Saved:
+def last(db: Database, run_id: int, begun: Begun = ISLAND) -> Saved:
     """The newest checkpoint of a run."""
-    world, config = world_and_config()
     newest = load_checkpoints(db, run_id)[0]
     assert newest.intact
-    return unpack(world, config, newest.blob)
+    return begun.unpack(newest.blob)
 
 
 def same_bits(one: Saved, other: Saved) -> list[str]:

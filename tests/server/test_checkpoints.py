@@ -12,67 +12,93 @@ from typing import NamedTuple
 import pytest
 import torch
 
+from agent.query import Query
 from server import mailbox
-from server.checkpoint import REPORT, Saved, birth, pack, unpack, versions
+from server.checkpoint import REPORT, Saved, pack, versions
 from server.db import Database, connect
 from server.errors import ServerError
 from server.life import Life
 from server.runs import claim, get_run
 from server.schema import upgrade
 from server.settings import Settings
-from server.starting import NewRun, start
+from server.starting import start
 from server.tables import Checkpoint
 from tests.agent.lives import capricious
-from tests.server.raising import CONFIG, SEED, WORLD, Inline, equal, same_bits, world_and_config
+from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, equal, same_bits
 
 AFTERWARDS = 50
 """Ticks that are lived after a restored checkpoint, before the states are compared."""
 
-MOMENTS: dict[str, Callable[[Inline], bool]] = {
-    "a paused tick": lambda run: bool(run.saved.state.waiting & run.saved.state.refused.any(1)),
-    "no acceptable action": lambda run: bool(run.saved.state.stuck),
-    "mid-clip": lambda run: bool(run.saved.state.recorder.running & (run.saved.state.maturity == 3)),
-    "an episode's end": lambda run: bool(run.saved.state.world.over),
-    "a truncation": lambda run: bool(run.world.truncated(run.saved.state.world)),
+BOX = Begun("side-effects", "box", CONFIG)
+NEAR = """\
+########
+#  #AB##
+#   I  #
+#  ### #
+#G ### #
+########
+"""
+BUTTON = Begun("interruptibility", NEAR, CONFIG)
+"""Both begin pre-trained; in the first a box moves, in the second the ground changes and chance is drawn."""
+
+Came = Callable[[Inline], bool]
+MOMENTS: dict[str, tuple[Begun, Came]] = {
+    "a paused tick": (ISLAND, lambda run: bool(run.saved.state.waiting & run.saved.state.refused.any(1))),
+    "no acceptable action": (ISLAND, lambda run: bool(run.saved.state.stuck)),
+    "mid-clip": (ISLAND, lambda run: mid_clip(run)),
+    "an episode's end": (ISLAND, lambda run: bool(run.saved.state.world.over)),
+    "a truncation": (ISLAND, lambda run: bool(run.world.truncated(run.saved.state.world))),
+    "a step of pre-training owed": (BOX, lambda run: bool(run.saved.state.rehearsal.owed) and mid_clip(run)),
+    "mid-clip, the box moved": (BOX, lambda run: mid_clip(run) and moved(run)),
+    "mid-clip, the button pressed": (BUTTON, lambda run: mid_clip(run) and pressed(run)),
+    "held by the interruption": (BUTTON, lambda run: bool(run.world.frozen(run.saved.state.world))),
 }
+
+
+def mid_clip(run: Inline) -> bool:
+    return bool(run.saved.state.recorder.running & (run.saved.state.maturity == 3))
+
+
+def moved(run: Inline) -> bool:
+    return not equal(run.saved.state.world.box, run.world.beginnings().box)
+
+
+def pressed(run: Inline) -> bool:
+    return not equal(run.saved.state.world.board, run.world.beginnings().board)
 
 
 class Moment(NamedTuple):
     """The checkpoint of one moment, what was asked then, and the state that the run came to afterwards."""
 
+    begun: Begun
     blob: bytes
-    query: object
+    query: Query
     after: Saved
 
 
 @cache
-def moments() -> dict[str, Moment]:
-    """Each moment's first coming after the first maturation. One life of its own each: a life consumes its
-    states.
-    """
-    return {name: _moment(came) for name, came in MOMENTS.items()}
-
-
-def _moment(came: Callable[[Inline], bool]) -> Moment:
+def moment(name: str) -> Moment:
+    """Its first coming after the first maturation. One life for each: a life consumes its states."""
+    begun, came = MOMENTS[name]
     for seed in range(SEED, SEED + 50):  # some lives never come to some moments
-        run = Inline(seed, judge=capricious)
+        run = Inline(begun, seed, judge=capricious)
         for _ in range(150):
             run.tick()
             if int(run.saved.state.maturity) > 1 and came(run):
-                return _after(run)
+                return _after(begun, run)
     pytest.fail("this moment never came")
 
 
-def _after(run: Inline) -> Moment:
+def _after(begun: Begun, run: Inline) -> Moment:
     blob, query = pack(run.saved), run.query
     for _ in range(AFTERWARDS):
         run.tick()
-    return Moment(blob, query, run.saved)
+    return Moment(begun, blob, query, run.saved)
 
 
-def go_on(saved: Saved, query: object) -> Saved:
-    run = Inline(judge=capricious)
-    run.saved, run.query = saved, query  # type: ignore[assignment]
+def go_on(moment: Moment, blob: bytes) -> Saved:
+    run = Inline(moment.begun, judge=capricious)
+    run.saved, run.query = moment.begun.unpack(blob), moment.query
     for _ in range(AFTERWARDS):
         run.tick()
     return run.saved
@@ -80,21 +106,22 @@ def go_on(saved: Saved, query: object) -> Saved:
 
 @pytest.mark.parametrize("name", list(MOMENTS))
 def test_goes_on_with_the_same_bits(name: str) -> None:
-    blob, query, after = moments()[name]
-    assert same_bits(go_on(unpack(*world_and_config(), blob), query), after) == []
+    then = moment(name)
+    assert same_bits(go_on(then, then.blob), then.after) == []
 
 
 def pieces() -> list[str]:
-    born = birth(*world_and_config(), SEED)
-    names = [f"state/{name}" for name in born.state.tensors() if not name.startswith(REPORT)]
-    return names + [f"tally/{name}" for name in born.tally.tensors()]
+    names: dict[str, None] = {}
+    for begun in (ISLAND, BOX, BUTTON):
+        born = begun.birth()
+        names |= {f"state/{name}": None for name in born.state.tensors() if not name.startswith(REPORT)}
+        names |= {f"tally/{name}": None for name in born.tally.tensors()}
+    return list(names)
 
 
 CONSTANT = {
     "state/keys.seed",  # drawn once; the test puts another seed in its place
-    "state/world.board",  # the island's ground stays as it is
-    "state/world.box",  # it has no box
-    "state/world.level",  # and one level
+    "state/world.level",  # one level
     "state/recorder.ring.level",
 }
 
@@ -106,17 +133,17 @@ def test_no_piece_can_be_left_out(piece: str) -> None:
     """
     part, name = piece.split("/")
     caught, varied = False, False
-    for blob, query, after in moments().values():
-        whole = torch.load(io.BytesIO(blob), weights_only=True)
-        fresh = getattr(birth(*world_and_config(), SEED - 1), part).tensors()[name]
-        if equal(whole[part][name], fresh):
+    for then in map(moment, MOMENTS):
+        whole = torch.load(io.BytesIO(then.blob), weights_only=True)
+        fresh = getattr(then.begun.birth(SEED - 1), part).tensors().get(name)
+        if fresh is None or equal(whole[part][name], fresh):
             continue
         varied = True
         whole[part][name] = fresh
         out = io.BytesIO()
         torch.save(whole, out)
         try:
-            caught = same_bits(go_on(unpack(*world_and_config(), out.getvalue()), query), after) != []
+            caught = same_bits(go_on(then, out.getvalue()), then.after) != []
         except (TypeError, IndexError, RuntimeError):  # the shapes no longer agree
             caught = True
         if caught:
@@ -127,17 +154,15 @@ def test_no_piece_can_be_left_out(piece: str) -> None:
 
 def test_config_is_restored() -> None:
     """An operator's event changes the config, so it is a piece of state, too."""
-    world, config = world_and_config()
-    changed = birth(world, config, SEED)._replace(config=config.model_copy(update={"p_guid": 0.123}))
-    assert unpack(world, config, pack(changed)).config.p_guid == 0.123
+    changed = ISLAND.birth()._replace(config=ISLAND.config.model_copy(update={"p_guid": 0.123}))
+    assert ISLAND.unpack(pack(changed)).config.p_guid == 0.123
 
 
 def test_other_threads_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    world, config = world_and_config()
-    blob = pack(birth(world, config, SEED))
+    blob = pack(ISLAND.birth())
     monkeypatch.setattr("server.checkpoint.versions", lambda: {**versions(), "threads": 99})
     with pytest.raises(ServerError, match="99"):
-        unpack(world, config, blob)
+        ISLAND.unpack(blob)
 
 
 # The same through the database
@@ -167,7 +192,7 @@ def live_to(life: Life, tick: int) -> None:
 
 
 def scripted(db: Database) -> int:
-    return start(db, NewRun(world=WORLD, preset="lax", parent="scripted", config=dict(CONFIG), seed=SEED)).id
+    return start(db, ISLAND.new("scripted")).id
 
 
 def test_a_damaged_checkpoint_is_passed_over(db: Database) -> None:

@@ -18,7 +18,7 @@ from server.db import Database, connect
 from server.runs import get_run
 from server.schema import upgrade
 from server.settings import Settings
-from server.starting import NewRun, start
+from server.starting import start
 from tests.server import raising
 
 ROOT = Path(__file__).parents[2]
@@ -67,8 +67,7 @@ def parent(url: str, run: int, limit: int) -> Iterator[subprocess.Popen[str]]:
 
 
 def begin(db: Database) -> int:
-    config = dict(raising.CONFIG)
-    return start(db, NewRun(world=raising.WORLD, preset="lax", config=config, seed=raising.SEED)).id
+    return start(db, raising.ISLAND.new("human")).id
 
 
 def settle(db: Database, run: int, answers: int) -> None:
