@@ -91,6 +91,17 @@ def test_the_gradient_is_that_of_every_single_step() -> None:
         assert float(mean[trial]) == pytest.approx(earned)
 
 
+def test_a_gradient_does_not_depend_on_the_trials_beside_it() -> None:
+    brain, mazes, key = network(4, 6, len(GLYPHS)), pool(4, 6, GLYPHS), keys(8, 5)
+    start = brain.start(key, torch.float64)
+    together, earned = policy_gradient(brain, start, mazes, key)
+    for trial in range(5):
+        mine = torch.tensor([trial])
+        alone, mean = policy_gradient(brain, start[mine], mazes, key.pick(mine))
+        torch.testing.assert_close(together[trial], alone[0], rtol=1e-9, atol=1e-12)
+        assert float(mean) == float(earned[trial])
+
+
 def plainly(start: torch.Tensor, key: object) -> tuple[torch.Tensor, float]:
     brain, mazes = network(4, 4, len(GLYPHS)), pool(4, 4, GLYPHS)
     batch = draw_mazes(mazes, key)  # type: ignore[arg-type]
