@@ -133,6 +133,7 @@ def _partner(
     tick = ring.tick[trial, other]
     matches = ring.here[trial, other] & (ring.first[trial, other] == ring.first[trial, kind, later][:, None])
     matches &= ring.action[trial, other, :, 0] != ring.action[trial, kind, later, 0][:, None]
+    matches &= ring.level[trial, other] == ring.level[trial, kind, later][:, None]  # a query has one level
     matches &= tick < ring.tick[trial, kind, later][:, None]
     if not config.recompare:
         row, place = matches.nonzero(as_tuple=True)

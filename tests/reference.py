@@ -178,9 +178,9 @@ class Reference:
         self.post(Query(PREFERENCE, left.clip, right.clip, self.stage))
 
     def match(self, e: Clip, x: Clip) -> bool:
-        """Whether the clips may be compared."""
-        new = self.is_new(self.known_pair(e, x, self.stage))
-        return e.start == x.start and e.actions[0] != x.actions[0] and new
+        """Whether the clips may be compared. Levels may look alike, and a query has one level."""
+        alike = (e.start, e.level) == (x.start, x.level) and e.actions[0] != x.actions[0]
+        return alike and self.is_new(self.known_pair(e, x, self.stage))
 
     def known_pair(self, left: Clip, right: Clip, maturity: int) -> object:
         """A pair as it is remembered: for its stage alone where a stage trains on its own entries alone."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import product
 
 from envs.gridworld import WorldState
 from envs.levels.side_effects import stuck
-from tests.reference import PREFERENCE, Reference
+from tests.reference import EXPLOIT, EXPLORE, PREFERENCE, Reference
 
 
 class Happenings(Counter[str]):
@@ -24,6 +25,7 @@ class Happenings(Counter[str]):
         if trial.query is not None and trial.query.kind == PREFERENCE:
             _, left, right, maturity = trial.query
             self["ended early"] += min(len(left.actions), len(right.actions)) < maturity
+        self["levels look alike"] += look_alike(trial)
         self._cells(trial, before)
 
     def _cells(self, trial: Reference, before: WorldState) -> None:
@@ -39,3 +41,11 @@ class Happenings(Counter[str]):
             box = int(now.box[0, 0]), int(now.box[0, 1])
             self["box on the goal"] += world.legend[int(world.tile(now.board, now.box))] == "G"
             self["box stuck"] += stuck(world.levels[int(now.level)], box)
+
+
+def look_alike(trial: Reference) -> bool:
+    """Whether two clips of the recorder begin alike on different levels, with different actions."""
+    clips = [[recorded.clip for recorded in trial.clips[kind] if recorded] for kind in (EXPLOIT, EXPLORE)]
+    return any(
+        e.start == x.start and e.level != x.level and e.actions[0] != x.actions[0] for e, x in product(*clips)
+    )

@@ -87,7 +87,8 @@ def scenarios() -> dict[str, Scenario]:
             found[f"{world}, {parent}"] = life
     for name, (world, parent, settings) in SPECIAL.items():
         levels = OWN[world]
-        found[name] = Scenario(world, levels, parent, settings, frozenset({"truncated"}))
+        shows = {"truncated"} | ALSO.get(name, set())
+        found[name] = Scenario(world, levels, parent, settings, frozenset(shows))
     return found
 
 
@@ -98,5 +99,8 @@ SPECIAL: dict[str, tuple[str, str, dict[str, object]]] = {
     "batches": ("reward-hacking", "scripted", {**PRESETS["lax"], "gradient_steps": 2, "batch": 3}),
     "seldom trained": ("absent-supervisor", "scripted", {**PRESETS["conservative"], "p_train": 0.3}),
     "own length": ("unsafe-exploration", "scripted", stages("direct", 4, own_length=True)),
+    "levels that look alike": ("reward-hacking", "wayward", {"p_guid": 0, "p_rec": 1, "p_pref": 0.3}),
     "own length, guided": ("interruptibility", "wayward", stages("lax", 8, own_length=True)),
 }
+ALSO = {"levels that look alike": {"levels look alike"}, "own length": {"ended early"}}
+"""What must happen in these lives besides."""

@@ -34,6 +34,7 @@ def plain(recorder: Recorder, trial: int, recompare: bool) -> tuple[int, int] | 
         matches = (
             bool(ring.here[0, EXPLOIT, one] & ring.here[0, EXPLORE, other])
             and int(ring.first[0, EXPLOIT, one]) == int(ring.first[0, EXPLORE, other])
+            and int(ring.level[0, EXPLOIT, one]) == int(ring.level[0, EXPLORE, other])
             and int(ring.action[0, EXPLOIT, one, 0]) != int(ring.action[0, EXPLORE, other, 0])
             and int(unordered(ring.digest[0, EXPLOIT, one], ring.digest[0, EXPLORE, other])) not in known
         )
@@ -52,7 +53,7 @@ def put(recorder: Recorder, trial: int, kind: int, tick: int, dice: torch.Genera
     ring = recorder.ring
     at = (trial, kind, int(ring.count[trial, kind]) % SIZE)
     start, action = roll(4), roll(3)
-    ring.first[at], ring.tick[at] = start, tick
+    ring.first[at], ring.tick[at], ring.level[at] = start, tick, roll(2)
     ring.action[trial, kind, at[2], 0] = action
     ring.digest[at] = 100 * start + 10 * action + roll(2)
     ring.here[at] = ring.open[at] = True
