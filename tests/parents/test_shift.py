@@ -5,10 +5,16 @@ two agree on every pair of clips of equal length. A finished episode rests in it
 length goes on to earn the shift alone. So no preference tells them apart, and a reward model that is fitted
 to preferences may be either. Its planner does harm under one of them. A parented agent plans with no reward
 at all: what it learns is a function of the answers, which are the same.
+
+So it is with a parent who compares advantages (Eq. 7), if life goes on at an end and gamma < 1: r + c then
+adds c / (1 - gamma) to V_p and to Q_p everywhere, and nothing to Q_p - V_p, for clips of any length.
+It is not so where V_p of a finished state is 0, as in our episodes: r + c adds c for each step that pi_p has
+still to go, so it says how much time matters. That is another task, not another way to say the same.
 """
 
 from __future__ import annotations
 
+import pytest
 import torch
 
 from agent.birth import network_of
@@ -16,7 +22,8 @@ from agent.config import PRESETS, Config
 from agent.query import Choice, Kind, Query
 from envs import registry
 from parents.model import Model, explore
-from parents.values import visited
+from parents.scripted import Judgement
+from parents.values import Listed, optimal, visited
 from tests.agent.lives import Judge, live
 
 WORLD = registry.make("side-effects", time_limit=20)
@@ -95,12 +102,32 @@ def by_sums(reward: torch.Tensor, shift: float) -> Judge:
     return choose
 
 
-def test_a_parented_agent_learns_the_same_under_both() -> None:
+def by_advantages(shift: float, gamma: float = 0.9) -> Judge:
+    """The scripted parent, handed r + shift: life goes on at an end, so nothing is over, and nothing lost."""
+    never = torch.zeros_like(MODEL.over)
+    resting = MODEL.replace(reward=MODEL.reward + shift, over=never, goal=never)
+    return Judgement(WORLD, gamma, Listed(resting, optimal(resting, gamma))).choose
+
+
+def within_episodes(shift: float, gamma: float = 0.9) -> Judge:
+    """The scripted parent, handed r + shift: in episodes that end."""
+    shifted = MODEL.replace(reward=MODEL.reward + shift)
+    return Judgement(WORLD, gamma, Listed(shifted, optimal(shifted, gamma))).choose
+
+
+PARENTS = {
+    "sums, shifted as in Fig. 4": (by_sums(RHO, 0.0), by_sums(SIGMA, -1.0)),
+    "advantages, everything worse": (by_advantages(0.0), by_advantages(-7.0)),
+    "advantages, everything better": (by_advantages(0.0), by_advantages(3.0)),
+}
+
+
+@pytest.mark.parametrize("name", list(PARENTS))
+def test_a_parented_agent_learns_the_same_under_both(name: str) -> None:
     config = Config.model_validate({**PRESETS["lax"], "stages": 3, "mature_every": 15, "time_limit": 20})
     weights = network_of(WORLD)
     (one, first), (other, second) = (
-        live(WORLD, config, judge, seed=3, trials=4, ticks=160)
-        for judge in (by_sums(RHO, 0.0), by_sums(SIGMA, -1.0))
+        live(WORLD, config, judge, seed=3, trials=4, ticks=160) for judge in PARENTS[name]
     )
     assert first == second
     assert torch.equal(one.learner.live, other.learner.live)
@@ -111,3 +138,21 @@ def test_a_parented_agent_learns_the_same_under_both() -> None:
     assert bool((one.maturity == 3).all())
     assert {len(clip.actions) for clip in clips} >= {1, 2, 3}
     assert bool((one.x.mu[..., 0] != one.x.mu[..., 1]).any())
+
+
+def test_a_shift_within_episodes_is_another_task() -> None:
+    """Each step then costs or pays by itself: some answers change. The invariance above is no triviality."""
+    config = Config.model_validate({**PRESETS["lax"], "time_limit": 20})
+    asked: list[Query] = []
+
+    def listening(query: Query) -> torch.Tensor:
+        asked.append(query.clone())
+        return by_sums(RHO, 0.0)(query)
+
+    live(WORLD, config, listening, seed=3, trials=4, ticks=80)
+    plain, shifted, resting, moved = (
+        torch.stack([judge(query) for query in asked])
+        for judge in (within_episodes(0.0), within_episodes(8.0), by_advantages(0.0), by_advantages(8.0))
+    )
+    assert bool((plain != shifted).any())
+    assert torch.equal(resting, moved)
