@@ -94,11 +94,18 @@ class ProgressShape(BaseModel):
     open: int
 
 
+class ParentShape(BaseModel):
+    """What the parent's own values depend on: Eq. (7)'s gamma, and the garden's way inside (Sec. 3.3)."""
+
+    gamma: float
+    inside: str
+
+
 class LeasedShape(QueryShape):
     """A leased question, with what a parent who knows nothing else needs to answer it."""
 
     world: WorldShape
-    parent: dict[str, float]
+    parent: ParentShape
     progress: ProgressShape
 
 
@@ -161,7 +168,7 @@ def shape_leased(db: Database, query: Query) -> LeasedShape:
     return LeasedShape(
         **shape_query(query).model_dump(),
         world=world,
-        parent={"gamma": run.config["gamma"]},
+        parent=ParentShape(gamma=run.config["gamma"], inside=run.config["inside"]),
         progress=ProgressShape(answered=run.answers, open=opened.guidance + opened.preference),
     )
 

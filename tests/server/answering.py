@@ -1,6 +1,6 @@
 """A parent as a program of its own: leases questions over HTTP and answers as the scripted parent would.
 
-It knows nothing but what the lease reply holds: the clips, the level's text, the parent's gamma.
+It knows nothing but what the lease reply holds: the clips, the level's text, the parent's settings.
 Run as: python -m tests.server.answering URL RUN LIMIT
 """
 
@@ -14,26 +14,49 @@ import httpx2
 import torch
 
 from envs import registry
+from envs.gridworld import Gridworld
 from parents.scripted import Judgement
 from server.codec import CHOICE_NAMES, decode
 
 PATIENCE = 60.0
 
 
+class Parent:
+    """Answers questions one by one; what it knows of the run's world it has from the first lease reply."""
+
+    def __init__(self) -> None:
+        self.world: Gridworld | None = None
+        self.judgement: Judgement | None = None
+
+    def answer_one(self, web: httpx2.Client, run: int) -> bool:
+        """Answer the most urgent question, if there is one."""
+        question = _lease(web, run)
+        if question is not None:
+            _send(web, question["id"], self.choice(question))
+        return question is not None
+
+    def choice(self, question: dict[str, Any]) -> str:
+        """What the scripted parent would say."""
+        if self.world is None or self.judgement is None:
+            said = question["parent"]
+            self.world = registry.make(question["world"]["name"], question["world"]["text"])
+            self.judgement = Judgement(self.world, said["gamma"], inside=said["inside"])
+        longest = max(question["left"]["length"], question["right"]["length"])
+        query = decode(self.world, longest, question["kind"], question["maturity"], question)
+        return CHOICE_NAMES[int(self.judgement.choose(query)[0])]
+
+
 def answer(url: str, run: int, limit: int) -> int:
     """Answer up to `limit` questions of a run, each as soon as it is asked. Web and worker may vanish and
     come back.
     """
-    judgement: Judgement | None = None
+    parent = Parent()
     answered, quiet_since = 0, time.monotonic()
     with httpx2.Client(base_url=url, timeout=5) as web:
         while answered < limit and time.monotonic() - quiet_since < PATIENCE:
-            question = _lease(web, run)
-            if question is None:
+            if not parent.answer_one(web, run):
                 time.sleep(0.005)
                 continue
-            judgement = judgement or _judgement(question)
-            _send(web, question["id"], _choice(judgement, question))
             answered, quiet_since = answered + 1, time.monotonic()
     return answered
 
@@ -45,18 +68,6 @@ def _lease(web: httpx2.Client, run: int) -> dict[str, Any] | None:
         return None
     reply.raise_for_status()
     return None if reply.status_code == 204 else reply.json()
-
-
-def _judgement(question: dict[str, Any]) -> Judgement:
-    world = registry.make(question["world"]["name"], question["world"]["text"])
-    return Judgement(world, question["parent"]["gamma"])
-
-
-def _choice(judgement: Judgement, question: dict[str, Any]) -> str:
-    level = registry.make(question["world"]["name"], question["world"]["text"])
-    longest = max(question["left"]["length"], question["right"]["length"])
-    query = decode(level, longest, question["kind"], question["maturity"], question)
-    return CHOICE_NAMES[int(judgement.choose(query)[0])]
 
 
 def _send(web: httpx2.Client, query: int, choice: str) -> None:

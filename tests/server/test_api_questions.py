@@ -44,7 +44,7 @@ def test_leased_question_tells_all_that_a_parent_needs(
         "legend": run.legend,
         "brief": run.brief,
     }
-    assert shown["parent"] == {"gamma": 0.9}
+    assert shown["parent"] == {"gamma": 0.9, "inside": "up-down"}
     assert shown["progress"] == {"answered": 0, "open": 1}
 
 

@@ -1,140 +1,148 @@
-"""Every world in the database: a run begins with its weights, and lives as it would in tensors."""
+"""A run in each world and built-in level, from its start to a checkpoint: raised by a script behind the
+database, and by a parent who knows nothing but the lease reply. Each equals the run in tensors.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import httpx2
 import pytest
-import torch
+from fastapi.testclient import TestClient
 
-from agent import parenting
-from agent.birth import world_of
-from agent.config import Config
-from agent.query import Choice
 from envs import registry
-from parents.scripted import Judgement, ScriptedParent
-from server import mailbox, shelf
-from server.checkpoint import Saved, birth
+from server import mailbox, record
+from server.app import create_app
 from server.db import Database, connect
-from server.errors import Invalid, NotFound
 from server.life import Life
-from server.record import metrics
 from server.runs import claim, get_run
 from server.schema import upgrade
 from server.settings import Settings
 from server.starting import NewRun, start
-from server.tally import count
-from tests.server.raising import same_bits
-from weights.store import Wanted, digest, find, load
+from server.tables import Weights
+from server.worker import Worker
+from tests.server import answering
+from tests.server.raising import Begun, inline, last, same_bits
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]
-TWO_STAGES = {"stages": 2, "mature_every": 8, "max_open_preferences": 0, "time_limit": 12}
-TICKS = 36
+ONE_OPEN = {"max_open_preferences": 0}
+"""So that each answer is heard in the tick after its question, as in the run in tensors."""
+TWO_STAGES = {**ONE_OPEN, "stages": 2, "mature_every": 6, "time_limit": 10}
+"""Clips of up to two steps, a maturation, truncations."""
+TICKS = 44
+
+BY_DEFAULT = [Begun(world, level, ONE_OPEN) for world, level in LEVELS]
+LONGER = [Begun(world, level, TWO_STAGES) for world, level in LEVELS]
+LONGER.append(Begun("absent-supervisor", "supervisor", {**TWO_STAGES, "supervised": "random"}))
+LONGER.append(Begun("reward-hacking", "garden", {**TWO_STAGES, "inside": "left"}))
+
+
+def name(begun: Begun) -> str:
+    changes = set(begun.changes.values()) & {"random", "left"}
+    return "-".join([begun.level, f"T={begun.config.stages}", *changes])
 
 
 @pytest.fixture
-def db(tmp_path: Path) -> Iterator[Database]:
-    database = connect(Settings(data=tmp_path))
+def settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path)
+
+
+@pytest.fixture
+def db(settings: Settings) -> Iterator[Database]:
+    database = connect(settings)
     upgrade(database)
     yield database
     database.close()
 
 
-def begin(db: Database, world: str, level: str | None = None, **config: object) -> int:
-    settings = {**TWO_STAGES, **config}
-    new = NewRun(world=world, level=level, parent="scripted", preset="lax", config=settings, seed=4)  # type: ignore[arg-type]
-    return start(db, new).id
-
-
-def alive(db: Database, run: int) -> Life:
-    """The run, taken up by a new worker."""
-    with db.write() as session:
-        session.connection().exec_driver_sql("UPDATE run SET actor = NULL")
-    (mine,) = claim(db, "test")
+def taken_up(db: Database, run: int) -> Life:
+    """The run in the hands of a new worker."""
+    (mine,) = claim(db, "test", -1)  # taken from whoever has it
     return Life(db, mine, get_run(db, run), lambda: None)
 
 
 def live_to(life: Life, tick: int) -> None:
     while life.tick < tick:
         seen = mailbox.watch(life.db, [life.mine.run_id])[life.mine.run_id]
-        assert life.ready(seen)
+        assert life.ready(seen), life.saved.state.stuck
         life.beat(seen)
 
 
-def in_tensors(db: Database, run: int, ticks: int) -> Saved:
-    """The same run without a database."""
-    row = get_run(db, run)
-    config = Config.model_validate(row.config)
-    world = world_of(row.world, row.level_text, config)
-    weights = None
-    if row.weights is not None:
-        weights = load(shelf.fetch(db, row.weights), Wanted(world.kind, world.height, world.width))
-    state, tally, _ = birth(world, config, row.seed, weights)
-    judgement = Judgement(world, config.gamma, inside=config.inside)
-    parent = ScriptedParent(judgement, parenting.no_query(world, config, state))
-    for _ in range(ticks):
-        answer = parent.take(state)
-        state, config, _ = parenting.beat(world, config, state, parent)
-        tally = count(world, tally, answer, state)
-    return Saved(state, tally, config)
+@pytest.mark.parametrize("begun", BY_DEFAULT + LONGER, ids=name)
+def test_a_script_raises_it(db: Database, begun: Begun) -> None:
+    run = start(db, begun.new("scripted")).id
+    first = taken_up(db, run)
+    live_to(first, TICKS // 2)
+    first.save()
+    second = taken_up(db, run)
+    assert second.tick == TICKS // 2
+    live_to(second, TICKS)
+    second.save()
+    saved = last(db, run, begun)
+    assert int(saved.state.maturity) == begun.config.stages  # so it has heard answers, if it has two
+    assert same_bits(saved, inline(TICKS, begun)) == []
+    assert record.metrics(db, run)
 
 
-def lived(db: Database, run: int) -> Saved:
-    """The run to TICKS, taken up again from a checkpoint in the middle, some ticks after it."""
-    life = alive(db, run)
-    live_to(life, TICKS // 2)
+@pytest.mark.parametrize("begun", LONGER, ids=name)
+def test_the_lease_reply_is_all_that_a_parent_needs(settings: Settings, db: Database, begun: Begun) -> None:
+    """Worker and web in one process, so that nothing but their order is left to chance: there is none."""
+    run = start(db, begun.new("human")).id
+    life, parent = taken_up(db, run), answering.Parent()
+    with TestClient(create_app(settings, db), base_url="http://localhost") as web:
+        while life.tick < TICKS:
+            seen = mailbox.watch(db, [run])[run]
+            if life.ready(seen):
+                life.beat(seen)
+            else:
+                assert parent.answer_one(web, run), life.waiting
     life.save()
-    live_to(life, TICKS // 2 + 5)
-    again = alive(db, run)
-    assert again.tick == TICKS // 2
-    live_to(again, TICKS)
-    return again.saved
+    assert get_run(db, run).answers > 0
+    assert same_bits(last(db, run, begun), inline(life.tick, begun)) == []
 
 
-@pytest.mark.parametrize(("world", "level"), LEVELS, ids=[level for _, level in LEVELS])
-def test_it_lives_as_in_tensors_and_resumes_to_the_same_bits(db: Database, world: str, level: str) -> None:
-    run = begin(db, world, level)
-    saved = lived(db, run)
-    assert same_bits(saved, in_tensors(db, run, TICKS)) == []
-    assert int(saved.tally.choices[0, Choice.LEFT] + saved.tally.choices[0, Choice.RIGHT]) > 0
-    assert metrics(db, run, -1, 10)
-    pretrained = bool(registry.defaults(world)["pretrain"])
-    assert (get_run(db, run).weights is not None) == pretrained
-    assert bool(saved.state.rehearsal.steps[0] > 0) == pretrained
-    assert get_run(db, run).status == "active"
+@pytest.mark.parametrize("world", list(registry.WORLDS))
+def test_it_begins_by_its_name_alone(settings: Settings, db: Database, world: str) -> None:
+    """`{"world": ...}` is enough: the world's defaults hold, and its weights are in the database."""
+    with TestClient(create_app(settings, db), base_url="http://localhost") as web:
+        run: dict[str, Any] = _good(web.post("/api/v1/runs", json={"world": world}), 201)
+        defaults = registry.defaults(world)
+        assert {name: run["config"][name] for name in defaults} == defaults
+        life = taken_up(db, run["id"])
+        seen = mailbox.watch(db, [run["id"]])[run["id"]]
+        while life.ready(seen):
+            life.beat(seen)
+            seen = mailbox.watch(db, [run["id"]])[run["id"]]
+        question = _good(web.post("/api/v1/runs/1/queries/lease", json={"client_id": "me"}), 200)
+    assert question["world"]["text"] == registry.level(world).text
+    assert question["kind"] == "guidance"
+    assert life.saved.config.pretrain == (get_run(db, run["id"]).weights is not None)
 
 
-def test_unsupervised_episodes_ask_nothing_and_resume(db: Database) -> None:
-    run = begin(db, "absent-supervisor", supervised="random", time_limit=6)
-    saved = lived(db, run)
-    assert same_bits(saved, in_tensors(db, run, TICKS)) == []
-
-
-def test_a_run_keeps_the_weights_that_it_began_with(db: Database) -> None:
-    shipped = find(Wanted(registry.kind("side-effects"), 6, 6)).read_bytes()
-    first, second = begin(db, "side-effects"), begin(db, "side-effects")
-    assert get_run(db, first).weights == get_run(db, second).weights == digest(shipped)
-    assert shelf.fetch(db, digest(shipped)) == shipped
-    loaded = load(shipped, Wanted(registry.kind("side-effects"), 6, 6))
-    born = in_tensors(db, first, 0).state
-    assert torch.equal(born.learner.live[0], loaded)
-
-
-def test_damaged_weights_stop_their_run_with_a_sentence(db: Database) -> None:
-    run = begin(db, "side-effects")
+def test_damaged_weights_fail_their_run_alone(settings: Settings, db: Database) -> None:
+    damaged = start(db, NewRun(world="side-effects", parent="scripted")).id
+    sound = start(db, NewRun(world="interruptibility", parent="scripted")).id
     with db.write() as session:
-        session.connection().exec_driver_sql("UPDATE weights SET blob = X'00'")
-    with pytest.raises(NotFound, match="are not in the database, or are damaged"):
-        alive(db, run)
+        row = session.get(Weights, get_run(db, damaged).weights)
+        assert row is not None
+        row.blob = row.blob[:-1] + bytes([row.blob[-1] ^ 1])
+    worker = Worker(db, settings)
+    worker._claim()
+    for _ in range(3):
+        worker._round()
+    failed = get_run(db, damaged)
+    assert failed.status == "failed"
+    assert failed.reason is not None
+    assert "pre-trained weights" in failed.reason
+    assert get_run(db, sound).status in ("active", "finished")
+    with TestClient(create_app(settings, db), base_url="http://localhost") as web:
+        page = web.get(f"/runs/{damaged}").text
+    assert "are not in the database, or are damaged" in page
+    assert "Traceback" not in page
 
 
-def test_a_size_without_weights_is_refused_beside_its_field(db: Database) -> None:
-    text = "#######\n#AXG  #\n#     #\n#     #\n#######\n"
-    new = NewRun(world="side-effects", level_text=text)
-    with pytest.raises(Invalid) as caught:
-        start(db, new)
-    ((field, said),) = caught.value.fields
-    assert field == "config.pretrain"
-    assert "parenting pretrain --world side-effects --size 5x7" in said
-    assert start(db, new.model_copy(update={"config": {"pretrain": False}})).weights is None
+def _good(reply: httpx2.Response, status: int) -> Any:
+    assert reply.status_code == status, reply.text
+    return reply.json()
