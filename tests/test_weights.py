@@ -59,7 +59,16 @@ def test_weights_of_something_else_are_refused(tmp_path: Path, wanted: Wanted, s
         load((tmp_path / "some.safetensors").read_bytes(), wanted)
 
 
-@pytest.mark.parametrize("spoil", [lambda b: b[: len(b) // 2], lambda b: b"", lambda b: b"\xff" * 64])
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda b: b[: len(b) // 2],
+        lambda b: b"",
+        lambda b: b"\xff" * 64,
+        lambda b: (2).to_bytes(8, "little") + b"[]",  # a header, but no table
+        lambda b: b.replace(b'"weights"', b'"heights"'),
+    ],
+)
 def test_damaged_weights_are_refused(spoil: object) -> None:
     blob = find(BOX).read_bytes()
     assert callable(spoil)

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
+from subprocess import PIPE
 from typing import Any
 
 import pytest
@@ -12,10 +17,13 @@ from typer.testing import CliRunner, Result
 from agent.schooling import Pupil, School
 from commands.main import app
 from envs import registry
+from tests.tree import ROOT
 from weights.store import Wanted, digest, find, load
 
 SMALL = ("--world", "side-effects", "--size", "4x4")
 NAME = "side-effects-4x4-v1"
+EAGER = "from commands.main import app; from experiments import education; education.SAVE_SECONDS = 0; app()"
+"""The command, which keeps its work after every step."""
 SMALL_LEVEL = "#####\n#AXG#\n#   #\n#   #\n#####\n"
 
 
@@ -76,6 +84,51 @@ def test_interrupted_and_short_of_steps_it_goes_on_to_the_same_bits(
     assert "mean return" in result.stdout
     assert steps == made[1]["steps"] + 1  # nothing was taught twice
     assert digest((tmp_path / f"{NAME}.safetensors").read_bytes()) == made[1]["sha256"]
+
+
+def test_a_real_ctrl_c_loses_nothing(made: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+    """Wherever in a step the signal comes, the bits are those of work in one piece."""
+    part = tmp_path / f"{NAME}-seed0.part"
+    command = [sys.executable, "-c", EAGER, "pretrain", *SMALL, "--out", str(tmp_path), "--json"]
+    with subprocess.Popen(command, cwd=ROOT, stdout=PIPE, stderr=PIPE, text=True) as process:
+        while not part.exists():
+            assert process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        said, wrong = process.communicate()
+    assert (process.returncode, said) == (130, "")
+    assert "the same command goes on from here" in wrong
+    result = pretrain(*SMALL, "--out", str(tmp_path), "--json")
+    assert json.loads(result.stdout)["weights"][0]["sha256"] == made[1]["sha256"]
+    assert not part.exists()
+
+
+def test_again_makes_them_anew(made: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+    (tmp_path / f"{NAME}.safetensors").write_bytes(b"older")
+    result = pretrain(*SMALL, "--out", str(tmp_path), "--again", "--max-steps", "5")
+    assert result.exit_code == 1
+    assert (tmp_path / f"{NAME}.safetensors").read_bytes() == b"older"  # until the new ones are whole
+    result = pretrain(*SMALL, "--out", str(tmp_path), "--again", "--json")
+    assert json.loads(result.stdout)["weights"][0]["sha256"] == made[1]["sha256"]
+
+
+def test_damaged_work_is_named(tmp_path: Path) -> None:
+    part = tmp_path / f"{NAME}-seed0.part"
+    pretrain(*SMALL, "--out", str(tmp_path), "--max-steps", "1")
+    for spoiled in (b"", b"no work of ours", part.read_bytes()[:5000]):
+        part.write_bytes(spoiled)
+        result = pretrain(*SMALL, "--out", str(tmp_path))
+        assert result.exit_code == 1
+        assert result.stderr == f"{part} cannot be read as interrupted work. Delete it to begin anew.\n"
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("in the way")
+    result = pretrain(*SMALL, "--out", str(file))
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"{file} cannot be written: ")
+    assert result.stdout == ""
 
 
 @pytest.mark.parametrize(

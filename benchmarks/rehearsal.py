@@ -1,0 +1,121 @@
+"""What a step of pre-training costs during parenting (Sec. 3.1.4). On one thread.
+
+    python -m benchmarks.rehearsal            every shipped size, about two minutes
+    python -m benchmarks.rehearsal --quick    6 x 6 alone, few repeats, about 15 seconds
+
+A batch of trials begins with the shipped weights of its world and owes a step in every tick, as conservative
+parenting does once it trains. Timed is `agent.parenting.rehearse`, the whole of it. *Walking* is its first
+part, timed by itself by turns with the whole: 16 mazes drawn, the policy's chances in all their states, and
+the episodes walked through. The rest is the gradient at the states that they came by, and Adam. Every step
+is another tick's, so its mazes are others. Numbers are medians of the process's own time on the processor:
+on one thread that is the time on the clock, less what other programs take.
+"""
+
+from __future__ import annotations
+
+import argparse
+from statistics import mean, median
+from time import process_time
+from typing import NamedTuple
+
+import torch
+
+from agent import parenting
+from agent.birth import network_of
+from agent.config import Config
+from agent.maze_walks import Walks, draw_mazes, pool, walk
+from agent.process import settle
+from agent.state import AgentState
+from envs import registry
+from envs.gridworld import Gridworld
+from envs.rng import keys
+from weights import store
+from weights.store import Wanted
+
+WORLDS = ("side-effects", "interruptibility", "reward-hacking")
+"""One for each shipped size; absent-supervisor's is interruptibility's."""
+CONFIG = Config(pretrain=True)
+SIZES, STEPS = (1, 10, 50, 100), 15
+QUICK_STEPS = 5
+HEAD = "  size  trials  ms/step  ms/trial-step  walking  visited states"
+
+
+class Line(NamedTuple):
+    """What was measured for one world and size of batch; times are in seconds."""
+
+    size: str
+    trials: int
+    step: float
+    walking: float
+    states: float
+
+    def __str__(self) -> str:
+        """A row of the table."""
+        each = 1e3 * self.step / self.trials
+        share = self.walking / self.step
+        return (
+            f"{self.size:>6} {self.trials:>7} {1e3 * self.step:>8.1f} {each:>14.2f} {share:>8.0%}"
+            f" {self.states:>15.0f}"
+        )
+
+
+def born(world: Gridworld, trials: int) -> AgentState:
+    """Trials that begin with the shipped weights."""
+    wanted = Wanted(registry.kind(world.name), world.height, world.width)
+    weights = store.load(store.find(wanted).read_bytes(), wanted)
+    return parenting.init(world, CONFIG, keys(0, trials), weights)
+
+
+def owing(state: AgentState) -> AgentState:
+    """The next tick, in which every trial owes a step."""
+    owed = torch.ones_like(state.rehearsal.owed)
+    return state.replace(keys=state.keys.next(), rehearsal=state.rehearsal.replace(owed=owed))
+
+
+def episodes(world: Gridworld, state: AgentState) -> Walks:
+    """The walking alone."""
+    brain = network_of(world)
+    batch = draw_mazes(pool(world.height, world.width, world.legend), state.keys)
+    with torch.no_grad():
+        logits = brain.heads(brain.unpack(state.learner.live), batch.seen, batch.near).logits
+    return walk(batch, logits.double().softmax(2), state.keys)
+
+
+def visited(walks: Walks) -> float:
+    """How many distinct states a trial came by, on average."""
+    each = zip(walks.state, walks.alive, strict=True)
+    return mean(len(set(state[alive].tolist())) for state, alive in each)
+
+
+def measure(world: Gridworld, trials: int, steps: int) -> Line:
+    """One line of the table; the first step of both warms up and is not counted."""
+    state = born(world, trials)
+    whole, walking, states = [], [], []
+    for _ in range(steps + 1):
+        state = owing(state)
+        began = process_time()
+        walks = episodes(world, state)
+        between = process_time()
+        state = parenting.rehearse(world, CONFIG, state)
+        whole.append(process_time() - between)
+        walking.append(between - began)
+        states.append(visited(walks))
+    size = f"{world.height}x{world.width}"
+    return Line(size, trials, median(whole[1:]), median(walking[1:]), median(states[1:]))
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description="Milliseconds a step of pre-training and trial.")
+    parser.add_argument("--quick", action="store_true", help="6 x 6 alone, and few repeats")
+    quick = parser.parse_args().quick
+    settle()
+    print(f"torch {torch.__version__}, one thread, from the shipped weights\n{HEAD}")
+    for name in WORLDS[:1] if quick else WORLDS:
+        world = registry.make(name)
+        for trials in SIZES:
+            print(measure(world, trials, QUICK_STEPS if quick else STEPS), flush=True)
+
+
+if __name__ == "__main__":
+    main()
