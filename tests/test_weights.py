@@ -11,6 +11,7 @@ import torch
 from agent.policy import network
 from agent.schooling import School
 from envs import registry
+from tests.tree import ROOT
 from weights import store
 from weights.store import NoWeights, Wanted, find, load, metadata, save
 
@@ -97,3 +98,14 @@ def test_shipped_weights_are_small_and_no_others() -> None:
     files = {file.stem: file.stat().st_size for file in store.SHIPPED.glob("*.safetensors")}
     assert set(files) == set(SHIPPED)
     assert sum(files.values()) < 2_000_000
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_docs_say_what_the_file_says(name: str) -> None:
+    blob = find(SHIPPED[name]).read_bytes()
+    said = metadata(blob)
+    cells = (
+        f"{len(blob) / 1000:.0f} | {said['steps']} | {said['return']} | {100 * float(said['solved']):.1f} %"
+    )
+    line = f"| `{name}.safetensors` | {cells} | `{store.digest(blob)[:12]}` |"
+    assert line in (ROOT / "docs/paper.md").read_text(encoding="utf-8")
