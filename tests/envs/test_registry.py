@@ -72,4 +72,4 @@ def test_make_refuses_what_does_not_go_together() -> None:
 
 def test_the_defaults_handed_out_are_a_copy() -> None:
     registry.defaults("unsafe-exploration")["gamma"] = 0.5
-    assert registry.defaults("unsafe-exploration") == {"gamma": 0.9, "time_limit": 100}
+    assert registry.defaults("unsafe-exploration") == {"gamma": 0.9, "time_limit": 100, "pretrain": False}
