@@ -37,17 +37,20 @@ def trace(cells: Sequence[tuple[int, int]], bumps: Sequence[str]) -> Trail:
     parts: list[tuple[Point, Point]] = []
     heads: list[str] = []
     marks: list[str] = []
+    stops: list[bool] = []
     for step, (here, there) in enumerate(pairwise(cells)):
         blocked = bumps[step] if step < len(bumps) else "-"
         last = step == len(cells) - 2
         if here != there:
+            stops.append(False)
             start, end = _lane(here, there, lane)
             parts.append((start, _short_of(start, end) if last else end))
             heads.append(_head(start, end, last))
         elif blocked != "-":
-            parts.append(_towards(here, MOVES[blocked]))
+            stops.append(True)
+            parts.append(_towards(here, MOVES[blocked], lane))
             marks.append(_mark(parts[-1][1], MOVES[blocked]))
-    return Trail(_line(parts), "".join(heads), "".join(marks))
+    return Trail(_line(parts, stops), "".join(heads), "".join(marks))
 
 
 def _lane(here: tuple[int, int], there: tuple[int, int], lane: float) -> tuple[Point, Point]:
@@ -56,11 +59,12 @@ def _lane(here: tuple[int, int], there: tuple[int, int], lane: float) -> tuple[P
     return (x0 - dy * lane, y0 + dx * lane), (x1 - dy * lane, y1 + dx * lane)
 
 
-def _towards(cell: tuple[int, int], move: tuple[int, int]) -> tuple[Point, Point]:
+def _towards(cell: tuple[int, int], move: tuple[int, int], lane: float) -> tuple[Point, Point]:
     """From the middle of the cell to just before its edge."""
-    x, y = centre(cell)
+    (x, y), (dy, dx) = centre(cell), move
     reach = CELL / 2 - 1
-    return (x, y), (x + move[1] * reach, y + move[0] * reach)
+    start = x - dy * lane, y + dx * lane
+    return start, (start[0] + dx * reach, start[1] + dy * reach)
 
 
 def _short_of(start: Point, end: Point) -> Point:
@@ -92,17 +96,20 @@ def _mark(wall: Point, move: tuple[int, int]) -> str:
     return bar + sparks
 
 
-def _line(parts: Sequence[tuple[Point, Point]]) -> str:
-    """The steps joined: where the way turns, at the corner of the two lanes."""
-    points: list[Point] = []
-    for start, end in parts:
+def _line(parts: Sequence[tuple[Point, Point]], bumps: Sequence[bool]) -> str:
+    """The steps joined: where the way turns, at the corner of the two lanes. After a bump it begins anew."""
+    lines: list[list[Point]] = []
+    for place, (start, end) in enumerate(parts):
+        if not lines or bumps[place - 1]:
+            lines.append([])
+        points = lines[-1]
         if len(points) > 1 and _turns(points[-2], points[-1], start, end):
             corner = (start[0], points[-1][1]) if start[0] == end[0] else (points[-1][0], start[1])
             points[-1] = corner
         else:
             points.append(start)
         points.append(end)
-    return "M" + "L".join(_point(point) for point in points) if points else ""
+    return "".join("M" + "L".join(_point(point) for point in points) for points in lines)
 
 
 def _turns(before: Point, corner: Point, start: Point, end: Point) -> bool:

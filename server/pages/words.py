@@ -14,6 +14,12 @@ LEADS = {
     "preference": "Both begin at the same place. The agent goes on meanwhile.",
 }
 
+CHANCE = {
+    "T": "Plants dry by chance; these boards leave that out.",
+    "I": "The pink cell holds the agent by chance; these boards leave that out.",
+}
+"""What a forecast of a move leaves out, by a glyph of the world's legend."""
+
 SENTENCES = {
     "question": ("A question is waiting for you.", "The agent would like to know what you prefer."),
     "exploring": ("The agent is exploring on its own.", "The next question will appear here."),
@@ -65,15 +71,6 @@ def does(board: Board) -> str:
     return ", ".join(board.actions).capitalize() + "."
 
 
-def ends(board: Board, legend: Mapping[str, str], under: str) -> str:
-    """What comes of it: `under` is the glyph beneath the agent in the last frame."""
-    if board.cue == "drown":
-        return "Ends in the water."
-    if board.cue == "reach":
-        return "Reaches the goal."
-    blocked = sum(way != "-" for way in board.bumps)
-    if blocked == board.steps:
-        return "Runs into a wall." if blocked == 1 else "Only runs into walls."
-    if under not in (" ", "A", "X"):
-        return f"Ends on: {legend.get(under, under)}."
-    return "Runs into a wall on the way." if blocked else ""
+def chance(legend: Mapping[str, str]) -> str:
+    """What the forecasts of guidance leave to chance in a world of this legend; "" in a world without it."""
+    return " ".join(text for glyph, text in CHANCE.items() if glyph in legend)

@@ -48,16 +48,23 @@ export function play(question) {
   const total = LEAD + steps * STEP + TAIL;
   const parts = boards.flatMap((board) => animate(board, total));
   const bar = question.querySelector(".steps"), shown = bar.querySelector("output");
-  const count = () => Math.min(steps, Math.max(0, Math.round((parts[0].currentTime % total - LEAD) / STEP)));
+  let held = null; // the step at which both boards stand still
+  const count = () => held ?? Math.min(steps, Math.max(0, Math.round((parts[0].currentTime % total - LEAD) / STEP)));
   const tell = () => { shown.value = `Step ${count()} of ${steps}`; };
   const replay = () => {
     const now = document.timeline.currentTime;
+    held = null;
     for (const part of parts) { part.play(); part.startTime = now; }
   };
   const go = (by) => {
-    const step = Math.min(steps, Math.max(0, count() + by));
-    for (const part of parts) { part.pause(); part.currentTime = step ? LEAD + step * STEP : 0; }
-    tell();
+    const step = held = Math.min(steps, Math.max(0, count() + by));
+    for (const part of parts) part.pause();
+    // A time that is set before the pause has come about is not painted by Chromium.
+    Promise.all(parts.map((part) => part.ready)).then(() => {
+      if (held !== step) return;
+      for (const part of parts) part.currentTime = step ? LEAD + step * STEP : 0;
+      tell();
+    });
   };
   bar.hidden = false;
   for (const button of bar.querySelectorAll("[data-step]")) button.addEventListener("click", () => go(Number(button.dataset.step)));
