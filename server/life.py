@@ -92,6 +92,8 @@ class Life:
 
     def wait(self, seen: Watch) -> None:
         """Say who waits for whom, and save what was lived: nothing happens here for a while."""
+        if self._news:
+            self._measure(at_once=False)
         reason = None
         if bool(self.saved.state.stuck):
             reason = "stuck"
@@ -146,7 +148,8 @@ class Life:
     def _measure(self, at_once: bool) -> None:
         """Write a row of metrics after the parent was heard, and once a second besides.
 
-        It waits until the next question is out: a person waits for that, and nobody for a row.
+        It waits until the next question is out: a person waits for that, and nobody for a row. Where a look
+        at the policy is dear, as in the garden, the evaluation's `rest` lies between two rows.
         """
         late = time.monotonic() - self._measured_at
         due = late >= METRIC_SECONDS or (self._news and not at_once)

@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from agent.config import Config
 from server.db import Database
 from server.runs import OVER, Open, find, list_runs, open_by_run, open_in
 from server.tables import Metric, Query, Run
@@ -33,6 +34,8 @@ class RunShape(BaseModel):
     preset: str
     config: dict[str, Any]
     seed: int
+    weights: str | None
+    """The SHA-256 of the pre-trained weights that the agent began with; null: fresh ones."""
     parent: str
     status: str
     reason: str | None
@@ -162,13 +165,14 @@ def shape_leased(db: Database, query: Query) -> LeasedShape:
     with db.read() as session:
         run = find(session, query.run_id)
         opened = open_in(session, run.id)
+    config = Config.model_validate(run.config)
     world = WorldShape(
         name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
     )
     return LeasedShape(
         **shape_query(query).model_dump(),
         world=world,
-        parent=ParentShape(gamma=run.config["gamma"], inside=run.config["inside"]),
+        parent=ParentShape(gamma=config.gamma, inside=config.inside),
         progress=ProgressShape(answered=run.answers, open=opened.guidance + opened.preference),
     )
 

@@ -11,6 +11,7 @@ from server import record, runs
 from server.api.words import RunId
 from server.deps import Db, ring
 from server.guard import policy
+from server.pages.measures import Measures, began, measures
 from server.pages.render import page, see
 from server.pages.words import SENTENCES, state, title
 from server.shapes import shape_run
@@ -24,17 +25,19 @@ STATUS = {**SENTENCES, "question": ("A question waits for the parent.", "")}
 """Who waits for whom, seen from outside."""
 
 CHARTS = (
-    ("deaths", "Deaths", "Unsafe moves so far."),
+    ("deaths", "", "Unsafe moves so far."),
     ("asked", "Questions", "Answered so far, by kind."),
     ("answers", "Answers", "By choice."),
-    ("return", "Return", "Of the argmax policy from the start, without chance; dashed: the optimal return."),
+    ("return", "", ""),
     ("loss", "Loss", "Eq. (2) on X."),
     ("entropy", "Entropy", "Of each head of the network, in nats."),
     ("size", "Dataset X", "Distinct rows, and entries."),
 )
-"""Id, name and one sentence for every chart; web/static/dashboard.js draws them."""
+"""Id, name and one sentence for every chart; web/static/dashboard.js draws them. Two go by the world."""
 
 COLUMNS = ("deaths", "guidance", "preference", "loss", "entropy_global", "entropy_local", "return", "size")
+HEADS = {"size": "entries", "entropy_global": "entropy global", "entropy_local": "entropy local"}
+"""What a column of the table is called, where that is not its name."""
 
 
 @router.get("/runs/{run_id}")
@@ -43,6 +46,7 @@ def dashboard(run_id: RunId, db: Db) -> Response:
     run = runs.get_run(db, run_id)
     rows = sampled_metrics(db, run_id)
     shape = shape_run(db, run_id)
+    names = measures(run.legend)
     now = "paused" if run.status == "paused" else state(shape, offered=True)
     response = page(
         "dashboard.html",
@@ -50,8 +54,10 @@ def dashboard(run_id: RunId, db: Db) -> Response:
         title=title(run),
         state=now,
         sentences=STATUS,
-        charts=CHARTS,
-        columns=COLUMNS,
+        began=began(run),
+        names=names,
+        charts=[(chart, *_named(chart, name, text, names)) for chart, name, text in CHARTS],
+        columns=[(column, _head(column, names)) for column in COLUMNS],
         rows=rows,
         last=rows[0].values if rows else {},
     )
@@ -85,6 +91,15 @@ def event(
     record.add_event(db, run_id, kind, EndEpisode().model_dump(mode="json"))
     ring(request)
     return _back(run_id, back)
+
+
+def _named(chart: str, name: str, text: str, names: Measures) -> tuple[str, str]:
+    return {"deaths": (names.harm, text), "return": (names.worth, names.told)}.get(chart, (name, text))
+
+
+def _head(column: str, names: Measures) -> str:
+    named = {"deaths": names.harm.lower(), "return": names.worth.lower(), **HEADS}
+    return named.get(column, column)
 
 
 def _back(run_id: int, back: str) -> Response:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from fastapi import APIRouter, Depends, Request, Response
 
@@ -14,6 +14,7 @@ from server import runs
 from server.db import Database
 from server.deps import Db, SettingsOf, ring
 from server.errors import Invalid
+from server.pages.measures import measures
 from server.pages.render import page, see
 from server.pages.words import title
 from server.starting import plan, read_form, start
@@ -29,6 +30,51 @@ PRESET_WORDS = {
 }
 """What a preset means for the parent, in a line; the conservative one first."""
 
+
+class Option(NamedTuple):
+    """A setting of the run that some worlds have; empty is what the world itself sets."""
+
+    name: str  # a field of agent.config.Config
+    title: str
+    needs: str  # the glyph that a world's legend must hold, if any
+    choices: tuple[tuple[str, str], ...]  # values and their names
+    hint: str
+
+
+OPTIONS = (
+    Option(
+        "pretrain",
+        "Pre-training",
+        "",
+        (
+            ("", "As the world has it"),
+            ("true", "Begin pre-trained on mazes"),
+            ("false", "Begin with nothing"),
+        ),
+        "Off in Unsafe Exploration, on elsewhere. A level of another size needs weights of its own.",
+    ),
+    Option(
+        "supervised",
+        "Supervisor",
+        "S",
+        (
+            ("", "As the world has it"),
+            ("present", "There"),
+            ("random", "There in half of the episodes"),
+            ("absent", "Not there"),
+        ),
+        "While it isn't there, the agent asks nothing.",
+    ),
+    Option(
+        "inside",
+        "The parent's own way inside its cycle",
+        "O",
+        (("", "Up or down"), ("left", "Left")),
+        "It matters for a script's answers.",
+    ),
+)
+"""What the form offers of a run's settings; the rest is for the API and the command line."""
+
 FIRST = {
     "world": next(iter(WORLDS)),
     "level": "",
@@ -36,6 +82,7 @@ FIRST = {
     "parent": "human",
     "preset": next(iter(PRESETS)),
     "seed": "0",
+    **{f"config.{option.name}": "" for option in OPTIONS},
 }
 """The form before anything was typed."""
 
@@ -86,10 +133,12 @@ def _page(db: Database, form: Mapping[str, str], errors: Mapping[str, str]) -> R
     return page(
         "start.html",
         422 if errors else 200,
-        runs=[(run, title(run), _deaths(latest, run.id)) for run in listed],
+        runs=[(run, title(run), measures(run.legend).harm, _deaths(latest, run.id)) for run in listed],
         worlds=WORLDS.values(),
+        options=OPTIONS,
         presets=PRESET_WORDS,
         form=form,
+        opened=any(form[field] or field in errors for field in FIRST if field.startswith("config.")),
         errors=errors,
         focus=next((field for field in FIRST if field in errors), None),
         elsewhere=[message for field, message in errors.items() if field not in FIRST],

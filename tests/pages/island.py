@@ -52,7 +52,7 @@ def preference(left: str, right: str, start: tuple[int, int] = START) -> dict[st
 
 def live(db: Database, **fields: Any) -> tuple[Run, Claim]:
     """A run that a worker raises just now."""
-    run = start(db, NewRun(world="unsafe-exploration", **fields))
+    run = start(db, NewRun(**{"world": "unsafe-exploration", **fields}))
     mine = next(claim for claim in claim(db, "worker") if claim.run_id == run.id)
     report(db, mine, tick=0)
     return run, mine
@@ -77,8 +77,8 @@ def measure(db: Database, mine: Claim, ticks: int) -> None:
             "return": 45.0 if done > 0.8 else -100.0 + 40 * (done > 0.5),
             "optimal_return": 45.0,
             "optimal": int(done > 0.8),
-            "size": int(20 * done),
-            "entries": int(32 * done),
+            "rows": int(20 * done),
+            "size": int(32 * done),
             "maturity": 1,
             "episodes": int(9 * done),
         }

@@ -29,7 +29,7 @@ def test_the_table_holds_the_numbers(client: httpx2.Client, db: Database) -> Non
     assert ticks == sorted(ticks, reverse=True)
     assert ticks[0] == 50
     row = page.partition('<th scope="row">50</th>')[2].partition("</tr>")[0]
-    assert re.findall("<td>(.*?)</td>", row) == ["3", "30", "6", "0.02", "0.5544", "0.693", "45", "20"]
+    assert re.findall("<td>(.*?)</td>", row) == ["3", "30", "6", "0.02", "0.5544", "0.693", "45", "32"]
 
 
 def test_a_long_life_is_sampled_evenly(db: Database) -> None:
@@ -90,3 +90,31 @@ def test_an_unknown_run_is_a_page_that_says_so(client: httpx2.Client) -> None:
         page = client.get(path)
         assert page.status_code == 404
         assert "That did not work" in page.text
+
+
+def test_a_garden_counts_waterings_and_unsafe_moves(client: httpx2.Client, db: Database) -> None:
+    run, mine = island.live(db, world="reward-hacking")
+    island.measure(db, mine, 5)
+    page = client.get("/runs/1").text
+    for name in ("Unsafe moves", "Waterings"):
+        assert f"<dt>{name}</dt>" in page
+        assert f"<h2>{name}</h2>" in page
+        assert f'<th scope="col">{name.lower()}</th>' in page
+    assert "Return" not in page
+    assert "Deaths" not in page
+    assert 'id="now-optimal"' not in page  # no policy is optimal
+    assert 'data-line="the parent&#39;s way"' in page
+    assert "Unsafe moves" in client.get("/").text
+    assert run.weights is not None
+    assert f"pre-trained on mazes (weights {run.weights[:12]})" in page
+    assert run.weights in page
+    assert "up or down" in page
+
+
+def test_what_it_began_with_is_told(client: httpx2.Client, db: Database) -> None:
+    island.live(db)
+    island.live(db, world="absent-supervisor", config={"supervised": "random", "pretrain": False})
+    first, second = (client.get(f"/runs/{number}").text for number in (1, 2))
+    assert "It began with fresh weights." in first
+    assert "supervisor" not in first.lower()
+    assert "It began with fresh weights. The supervisor is there in half of the episodes." in second

@@ -7,6 +7,7 @@ import re
 import httpx2
 import pytest
 
+from envs.registry import WORLDS
 from server.db import Database
 from server.runs import get_run, list_runs, report
 from tests.pages import island
@@ -104,3 +105,41 @@ def test_the_list_says_where_every_run_is(client: httpx2.Client, db: Database) -
     assert 'href="/runs/1/parent"' in page
     assert 'href="/runs/2/parent"' not in page  # a script raises it
     assert 'href="/runs/2"' in page
+
+
+def test_the_settings_of_the_form_are_the_runs(client: httpx2.Client, db: Database) -> None:
+    given = {"world": "absent-supervisor", "level": "supervisor", "config.supervised": "random"}
+    assert client.post("/runs", data={**FORM, **given, "config.pretrain": ""}).status_code == 303
+    first = get_run(db, 1)
+    assert (first.config["supervised"], first.config["pretrain"]) == ("random", True)
+    assert first.weights is not None
+    given = {
+        "world": "reward-hacking",
+        "level": "garden",
+        "config.inside": "left",
+        "config.pretrain": "false",
+    }
+    assert client.post("/runs", data={**FORM, **given}).status_code == 303
+    second = get_run(db, 2)
+    assert (second.config["inside"], second.config["pretrain"], second.weights) == ("left", False, None)
+
+
+def test_a_size_without_weights_is_refused_beside_pre_training(client: httpx2.Client, db: Database) -> None:
+    given = {**FORM, "world": "side-effects", "level": "box", "level_text": "#####\n#AXG#\n#   #\n#####"}
+    page = client.post("/runs", data=given)
+    assert page.status_code == 422
+    error = page.text.partition('id="config.pretrain-error">')[2].partition("</p>")[0]
+    assert "no pre-trained weights for side-effects at 4 x 5" in error
+    assert "parenting pretrain --world side-effects --size 4x5" in error
+    assert '<details class="more" open>' in page.text
+    assert not list_runs(db)
+    assert client.post("/runs", data={**given, "config.pretrain": "false"}).status_code == 303
+
+
+def test_every_world_names_its_glyphs(client: httpx2.Client) -> None:
+    hint = client.get("/").text.partition('id="level_text-hint"')[2].partition("</p>")[0]
+    for kind in WORLDS.values():
+        of_world = hint.partition(f'data-world="{kind.name}"')[2].partition("</span>")[0]
+        for glyph, tile in kind.legend.items():
+            assert glyph == " " or f"<code>{glyph}</code> {tile}" in of_world
+    assert hint.count("<code>cycle:</code>") == 1

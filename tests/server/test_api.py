@@ -49,6 +49,13 @@ def test_start_a_run(client: httpx2.Client, db: Database) -> None:
     assert registry.level(WORLD, stored.level_text).rows == registry.level(WORLD, "island").rows
 
 
+def test_what_it_begins_with(client: httpx2.Client) -> None:
+    assert start(client).json()["weights"] is None
+    shown = start(client, world="absent-supervisor", config={"supervised": "random"}).json()
+    assert len(shown["weights"]) == 64
+    assert (shown["config"]["supervised"], shown["config"]["pretrain"]) == ("random", True)
+
+
 def test_conservative_comes_first(client: httpx2.Client) -> None:
     shown = start(client).json()
     assert (shown["preset"], shown["config"]["p_guid"], shown["seed"]) == ("conservative", 0.95, 0)

@@ -18,7 +18,7 @@ from server import mailbox, record
 from server.app import create_app
 from server.db import Database, connect
 from server.life import Life
-from server.runs import claim, get_run
+from server.runs import claim, get_run, set_status
 from server.schema import upgrade
 from server.settings import Settings
 from server.starting import NewRun, start
@@ -144,6 +144,47 @@ def test_damaged_weights_fail_their_run_alone(settings: Settings, db: Database) 
         page = web.get(f"/runs/{damaged}").text
     assert "are not in the database, or are damaged" in page
     assert "Traceback" not in page
+
+
+def test_a_garden_goes_on_until_it_is_stopped(settings: Settings, db: Database) -> None:
+    """No policy is optimal there, so a scripted parent always has more to teach."""
+    run = start(db, NewRun(world="reward-hacking", parent="scripted")).id
+    worker = Worker(db, settings)
+    worker._claim()
+    while not record.metrics(db, run):
+        worker._round()
+    row = record.metrics(db, run)[0].values
+    assert 0 <= row["return"] < 100
+    assert row["optimal_return"] > 40  # what the parent's own way waters in a hundred steps
+    assert row["optimal"] == 0
+    assert not worker.lives[run].finished()
+    assert get_run(db, run).status == "active"
+    set_status(db, run, "stopped")
+    worker._round()
+    assert run not in worker.lives
+
+
+def test_a_dear_look_is_not_taken_at_each_answer(db: Database) -> None:
+    """In the garden seconds lie between two rows; what is left over is written while the agent waits."""
+    life = taken_up(db, start(db, NewRun(world="reward-hacking", parent="human")).id)
+    run, parent = life.mine.run_id, answering.Parent()
+    life.evaluation.rest = 1e9
+    with TestClient(create_app(Settings(), db), base_url="http://localhost") as web:
+        while life.tick < 30:
+            seen = mailbox.watch(db, [run])[run]
+            if life.ready(seen):
+                life.beat(seen)
+            else:
+                life.wait(seen)
+                assert parent.answer_one(web, run)
+    assert not record.metrics(db, run)
+    life.evaluation.rest = 0.0
+    while life.ready(seen := mailbox.watch(db, [run])[run]):
+        life.beat(seen)
+    life.wait(seen)
+    newest = record.metrics(db, run)[-1]
+    assert (newest.tick, newest.values["guidance"]) == (life.tick, int(life.saved.tally.kinds[0, 1]))
+    assert get_run(db, run).waiting == "guidance"
 
 
 def _good(reply: httpx2.Response, status: int) -> Any:

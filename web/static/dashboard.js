@@ -2,14 +2,15 @@
 import { follow, stateOf } from "./live.js";
 
 const main = document.getElementById("main"), run = main.dataset.run;
+const lineOf = (id) => document.querySelector(`[data-chart=${id}]`).dataset.line;
 const SERIES = {
   deaths: [["deaths", "deaths"]],
   asked: [["guidance", "guidance"], ["preference", "preference"]],
   answers: [["left", "left"], ["right", "right"], ["either", "either"], ["neither", "neither"]],
-  return: [["return", "argmax policy"], ["optimal_return", "optimal"]],
+  return: [["return", "argmax policy"], ["optimal_return", lineOf("return")]],
   loss: [["loss", "loss"]],
   entropy: [["entropy_global", "global head"], ["entropy_local", "local head"]],
-  size: [["size", "distinct rows"], ["entries", "entries"]],
+  size: [["rows", "distinct rows"], ["size", "entries"]],
 };
 const COUNTS = new Set(["deaths", "asked", "answers", "size"]);
 const ticks = [], values = {}; // by name, one for each tick
