@@ -15,6 +15,7 @@ from pathlib import Path
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from envs import registry
+from tests.server.serving import until_up
 
 ROOT = Path(__file__).parents[1]
 FLAGS = [
@@ -38,7 +39,9 @@ def up(data: Path) -> Iterator[str]:
         found = re.search(r"http://\S+", process.stdout.readline())
         assert found
         try:
-            yield found[0].rstrip("/")
+            # the address is told while the processes still start, which takes seconds where others work, too
+            until_up(url := found[0].rstrip("/"), seconds=60)
+            yield url
         finally:
             process.send_signal(signal.SIGINT)
             process.wait(10)
