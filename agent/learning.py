@@ -11,7 +11,7 @@ from torch import Tensor
 
 from agent.config import Config
 from agent.dataset import Dataset
-from agent.policy import Affine, Heads, Network
+from agent.policy import Heads, Network
 from agent.state import AgentState
 from envs.rng import Keys, Stream
 
@@ -83,9 +83,7 @@ def differentiate(
     network: Network, config: Config, parameters: Float[Tensor, "N P"], rows: Rows
 ) -> tuple[Terms, Float[Tensor, "N P"]]:
     """The terms of the objective and its gradient, each trial's by itself."""
-    layers = [
-        Affine(*(part.detach().requires_grad_() for part in layer)) for layer in network.unpack(parameters)
-    ]
+    layers = network.learnable(parameters)
     with torch.enable_grad():
         terms = objective(network.heads(layers, rows.s0, rows.near), rows)
         value = (
@@ -93,8 +91,8 @@ def differentiate(
             - config.lambda_global * terms.entropy_global
             - config.lambda_local * terms.entropy_local
         )
-        parts = torch.autograd.grad(value.sum(), [part for layer in layers for part in layer])
-    return Terms(*(term.detach() for term in terms)), torch.cat([part.flatten(1) for part in parts], dim=1)
+        gradient = network.gradient(value, layers)
+    return Terms(*(term.detach() for term in terms)), gradient
 
 
 def objective(heads: Heads, rows: Rows) -> Terms:

@@ -141,6 +141,17 @@ class Network:
             for layer in self.layers
         ]
 
+    def learnable(self, parameters: Float[Tensor, "N P"]) -> list[Affine]:
+        """The same as leaves of a graph of their own: what `gradient` differentiates by."""
+        return [
+            Affine(*(part.detach().requires_grad_() for part in layer)) for layer in self.unpack(parameters)
+        ]
+
+    def gradient(self, value: Float[Tensor, "N"], layers: list[Affine]) -> Float[Tensor, "N P"]:
+        """The gradient of each trial's value by its own parameters, as flat rows."""
+        parts = torch.autograd.grad(value.sum(), [part for layer in layers for part in layer])
+        return torch.cat([part.flatten(1) for part in parts], dim=1)
+
     def heads(
         self, layers: list[Affine], seen: UInt8[Tensor, "N S H W"], near: UInt8[Tensor, "N S 4"]
     ) -> Heads:

@@ -16,7 +16,7 @@ from torch import Tensor
 from agent.config import Config
 from agent.learning import adam, entropy
 from agent.maze_walks import Batch, Pool, Walks, draw_mazes, pool, walk
-from agent.policy import Affine, Network
+from agent.policy import Network
 from agent.state import AgentState
 from envs.gridworld import Gridworld
 from envs.rng import Keys
@@ -116,13 +116,9 @@ def _total(place: Tensor, amount: Tensor, size: int) -> Tensor:
 def _differentiate(
     network: Network, parameters: Float[Tensor, "N P"], visits: Visits
 ) -> Float[Tensor, "N P"]:
-    layers = [
-        Affine(*(part.detach().requires_grad_() for part in layer)) for layer in network.unpack(parameters)
-    ]
+    layers = network.learnable(parameters)
     with torch.enable_grad():
         logits = network.heads(layers, visits.seen, visits.near).logits
         gain = (visits.worth * logits.log_softmax(2)).sum((1, 2))
         open_minded = (visits.share * entropy(logits)).sum(1)
-        loss = -gain - ENTROPY * open_minded
-        parts = torch.autograd.grad(loss.sum(), [part for layer in layers for part in layer])
-    return torch.cat([part.flatten(1) for part in parts], dim=1)
+        return network.gradient(-gain - ENTROPY * open_minded, layers)
