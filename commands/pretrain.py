@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from commands.said import plainly, settings
+from commands.said import Wrong, plainly, settings
 from envs import registry
-from envs.levels.kind import Kind, LevelError
+from envs.levels.kind import Kind
 from weights import store
 from weights.store import Wanted
 
@@ -23,10 +23,6 @@ if TYPE_CHECKING:
     from experiments.education import Educated, Progress
 
 BARS = "▁▂▃▄▅▆▇█"
-
-
-class Wrong(ValueError):
-    """An option is not as it should be; the sentence says which and what would do."""
 
 
 def pretrain(
@@ -55,24 +51,32 @@ def pretrain(
     """
     with plainly():
         folder = out or settings().weights
-    try:
         wanted = _wanted(world, level, size)
-    except (Wrong, registry.UnknownName, LevelError) as error:
-        typer.echo(str(error), err=True)
-        raise typer.Exit(2) from None
-    results = [_one(each, folder, seed, max_steps, again, quiet=as_json) for each in wanted]
+    known = (folder,) if out else (folder, store.SHIPPED)
+    results = [
+        _there(each, known, quiet=as_json)
+        if not again and _files(each, known)
+        else _one(each, folder, seed, max_steps, quiet=as_json)
+        for each in wanted
+    ]
     if as_json:
         typer.echo(json.dumps({"weights": results}))
 
 
-def _one(
-    wanted: Wanted, folder: Path, seed: int, max_steps: int, again: bool, *, quiet: bool
-) -> dict[str, Any]:
-    path = folder / f"{wanted.name}{store.SUFFIX}"
-    if path.is_file() and not again:
-        if not quiet:
-            typer.echo(f"{path} is there already; --again makes it anew.")
-        return {"path": str(path), "sha256": store.digest(path.read_bytes())}
+def _files(wanted: Wanted, folders: tuple[Path, ...]) -> list[Path]:
+    """The files of these weights that there are."""
+    return [path for folder in folders if (path := folder / f"{wanted.name}{store.SUFFIX}").is_file()]
+
+
+def _there(wanted: Wanted, folders: tuple[Path, ...], *, quiet: bool) -> dict[str, Any]:
+    """The file that a run would take; nothing is made."""
+    path = _files(wanted, folders)[0]
+    if not quiet:
+        typer.echo(f"{path} is there already; --again makes it anew.")
+    return {"path": str(path), "sha256": store.digest(path.read_bytes())}
+
+
+def _one(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool) -> dict[str, Any]:
     from agent.process import settle
     from experiments.education import Damaged, Unconverged, educate
 

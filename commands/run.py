@@ -14,23 +14,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from pydantic import ValidationError
 
-from agent.config import Config, UnknownPreset, compose
+from agent.config import Config, compose
 from commands.results import page
-from commands.said import plainly, settings
+from commands.said import Wrong, plainly, settings
 from envs import registry
-from envs.levels.kind import Level, LevelError
-from weights.store import NoWeights, Wanted, find
+from envs.levels.kind import Level
+from weights.store import Wanted, find
 
 if TYPE_CHECKING:
     from experiments.chunks import Plan
     from experiments.trials import Progress, Standing, Until
-
-
-MOST_STAGES = 16
-
-
-class Wrong(ValueError):
-    """An option is not as it should be; the sentence says which and what would do."""
 
 
 def run(
@@ -66,7 +59,7 @@ def run(
 
     Example: parenting run unsafe-exploration --preset conservative --trials 100
     """
-    with plainly(), _plainly():
+    with plainly():
         found = _level(world, level)
         config = _config(world, preset, changes or [])
         goal = _until(world, until)
@@ -156,8 +149,14 @@ def _mature(config: Config, until: Until, changes: list[str]) -> Config:
             "--set: mature_every alone ends no stage, since the last one never ends."
             " Say how many there are, such as --set stages=2, or use --until queries:N."
         )
-    stages = min(MOST_STAGES, max(1, -(-until.number // config.mature_every)))
-    return config.model_copy(update={"stages": stages})
+    stages = -(-until.number // config.mature_every)
+    try:
+        return Config.model_validate({**config.model_dump(), "stages": stages})
+    except ValidationError as error:
+        raise Wrong(
+            f"--until: {until.number} queries at mature_every={config.mature_every} are {stages} stages:"
+            f" {error.errors()[0]['msg']}. Say how many there are, such as --set stages=4."
+        ) from None
 
 
 def _weights(level: Level, config: Config) -> bytes | None:
@@ -167,16 +166,6 @@ def _weights(level: Level, config: Config) -> bytes | None:
     return find(
         Wanted(registry.kind(level.world), level.height, level.width), settings().weights
     ).read_bytes()
-
-
-@contextmanager
-def _plainly() -> Iterator[None]:
-    """Print what is wrong as a sentence, and exit with 2."""
-    try:
-        yield
-    except (Wrong, UnknownPreset, registry.UnknownName, LevelError, NoWeights) as error:
-        typer.echo(str(error), err=True)
-        raise typer.Exit(2) from None
 
 
 @contextmanager

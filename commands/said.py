@@ -9,17 +9,28 @@ from typing import Any
 import typer
 from pydantic import ValidationError
 
+from agent.config import UnknownPreset
+from envs.levels.kind import LevelError
+from envs.registry import UnknownName
 from server.errors import ServerError
 from server.settings import Settings
+from weights.store import NoWeights
+
+
+class Wrong(ValueError):
+    """An option is not as it should be; the sentence says which and what would do."""
 
 
 @contextmanager
 def plainly() -> Iterator[None]:
-    """Print what a `ServerError` says, and exit with 2."""
+    """Print what is wrong as a sentence, and exit with 2."""
     try:
         yield
     except ServerError as error:
         typer.echo(error.message, err=True)
+        raise typer.Exit(2) from None
+    except (Wrong, UnknownPreset, UnknownName, LevelError, NoWeights) as error:
+        typer.echo(str(error), err=True)
         raise typer.Exit(2) from None
 
 

@@ -60,6 +60,15 @@ def test_weights_that_are_there_stay(made: tuple[Path, dict[str, Any]]) -> None:
     assert digest((folder / f"{NAME}.safetensors").read_bytes()) == found["sha256"]
 
 
+def test_shipped_weights_are_there_already(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unless a folder is named: then they are made for it."""
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path))
+    result = pretrain("--world", "reward-hacking", "--level", "garden")
+    assert result.exit_code == 0
+    assert "reward-hacking-7x9-v1.safetensors is there already" in result.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_interrupted_and_short_of_steps_it_goes_on_to_the_same_bits(
     made: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

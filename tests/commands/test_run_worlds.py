@@ -89,6 +89,9 @@ def test_two_budgets_say_how_many_stages_there_are() -> None:
     budget = (*PLAIN, "--set", "mature_every=4", "--until", "queries:9", "--max-ticks", "1")
     assert results_of("side-effects", *budget)["config"]["stages"] == 3
     assert results_of("side-effects", *budget, "--set", "stages=1")["config"]["stages"] == 1
+    many = run("side-effects", *PLAIN, "--set", "mature_every=1", "--until", "queries:17")
+    assert many.exit_code == 2
+    assert "are 17 stages" in many.stderr
     refused = run("side-effects", *PLAIN, "--set", "mature_every=4", "--until", "ticks:1")
     assert (refused.exit_code, refused.stdout) == (2, "")
     assert "stages=2" in refused.stderr
