@@ -47,7 +47,7 @@ def up(
     """
     with plainly():
         chosen = settings(port=port)
-        ear = bind(chosen.host, chosen.port)
+        ear = bind(chosen.host, chosen.port, chosen.container)
         _migrate(chosen)
     with _signals() as told, _children(ear) as children:
         url = f"http://localhost:{ear.getsockname()[1]}/"

@@ -16,7 +16,9 @@ Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a fre
 
 def web(
     port: Port = None,
-    host: Annotated[str | None, typer.Option(help="Address to listen on; only 127.0.0.1 as yet.")] = None,
+    host: Annotated[
+        str | None, typer.Option(help="Address to listen on: 127.0.0.1, or in a container 0.0.0.0.")
+    ] = None,
     fd: Annotated[
         int | None, typer.Option(hidden=True, help="A listening socket, from `parenting up`.")
     ] = None,
@@ -29,7 +31,7 @@ def web(
     with plainly():
         chosen = settings(port=port, host=host)
         server = make_server(chosen)
-        ear = bind(chosen.host, chosen.port) if fd is None else socket.socket(fileno=fd)
+        ear = bind(chosen.host, chosen.port, chosen.container) if fd is None else socket.socket(fileno=fd)
         if fd is None:
             typer.echo(f"Parenting's pages: http://localhost:{ear.getsockname()[1]}/  (Ctrl-C stops them)")
         server.run(sockets=[ear])

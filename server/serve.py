@@ -13,6 +13,7 @@ from server.errors import SetupError
 from server.log import set_up_log
 from server.settings import Settings
 
+LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
 GRACE = 1
 """Seconds that open requests may still take after the signal to stop (whole ones: uvicorn's rule)."""
 
@@ -28,14 +29,17 @@ class Server(uvicorn.Server):
         super().handle_exit(sig, frame)
 
 
-def bind(host: str, port: int) -> socket.socket:
-    """A listening socket on this machine only.
+def bind(host: str, port: int, container: bool = False) -> socket.socket:
+    """A listening socket on this machine only, or with `container` on all of its own network.
 
     Raises:
-        SetupError: another address than loopback, or a port that is taken.
+        SetupError: an address that would let others in, or a port that is taken.
     """
-    if host != "127.0.0.1":
-        raise SetupError(f"host: {host} would let others in, and there is no login yet. Use 127.0.0.1.")
+    if host != LOOPBACK and not (container and host == EVERYWHERE):
+        raise SetupError(
+            f"host: {host} would let others in, and there is no login yet. Use {LOOPBACK}; or, in a "
+            f"container whose port is published on loopback only, {EVERYWHERE} and PARENTING_CONTAINER=true."
+        )
     ear = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     ear.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

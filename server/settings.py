@@ -30,8 +30,15 @@ class Settings(BaseSettings):
         None,
         description="Another database, as SQLAlchemy writes it; none is parenting.db in the data folder.",
     )
-    host: str = Field("127.0.0.1", description="Address to listen on; only 127.0.0.1 is allowed as yet.")
+    host: str = Field(
+        "127.0.0.1", description="Address to listen on: 127.0.0.1, or 0.0.0.0 in a container (`container`)."
+    )
     port: int = Field(8765, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
+    container: bool = Field(
+        False,
+        description="The server runs in a container whose port is published on loopback only, so it may "
+        "listen on 0.0.0.0.",
+    )
     lease_seconds: float = Field(
         60.0, gt=0, description="How long a question is held for the parent who was shown it."
     )

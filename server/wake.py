@@ -8,8 +8,8 @@ answer.
 from __future__ import annotations
 
 import hashlib
-import itertools
 import os
+import secrets
 import select
 import socket
 import tempfile
@@ -17,8 +17,6 @@ from pathlib import Path
 
 LONGEST = 100
 """Bytes in the path of a unix socket (the system's limit is 104 to 108)."""
-
-_count = itertools.count()
 
 
 class Bell:
@@ -60,8 +58,8 @@ class Bell:
         """The socket on which this bell is heard, bound at the first call; for an event loop to watch."""
         if self._ear is None:
             self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            self._path = self.folder / f"{os.getpid()}-{next(_count)}"
-            self._path.unlink(missing_ok=True)
+            # A name of its own, and no process id: containers that share the folder have equal ones.
+            self._path = self.folder / secrets.token_hex(8)
             self._ear = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
             self._ear.setblocking(False)
             self._ear.bind(str(self._path))

@@ -1,13 +1,38 @@
 """Bells: heard at once, never in the way."""
 
+import subprocess
+import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from server.wake import Bell
+from tests.tree import ROOT
+
+LISTEN = """
+import os, pathlib
+os.getpid = lambda: 1
+from server.wake import Bell
+bell = Bell(pathlib.Path({!r}), "worker")
+bell.listen()
+print("listening", flush=True)
+print(bell.wait(5))
+"""
+
+
+@contextmanager
+def listening(data: Path) -> Iterator[subprocess.Popen[str]]:
+    """Process 1 of a container, once it listens to the bell of a worker."""
+    command = [sys.executable, "-c", LISTEN.format(str(data))]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "listening\n"
+        yield child
 
 
 def test_ring_wakes_at_once(tmp_path: Path) -> None:
@@ -47,6 +72,13 @@ def test_everyone_who_listens_hears_and_bells_are_apart(tmp_path: Path) -> None:
     assert not other.wait(0)
     for bell in (first, second, other):
         bell.close()
+
+
+def test_processes_of_two_containers_hear_both(tmp_path: Path) -> None:
+    """Each is process 1 in its container, and they share the folder."""
+    with listening(tmp_path) as first, listening(tmp_path) as second:
+        Bell(tmp_path, "worker").ring()
+        assert [child.communicate()[0] for child in (first, second)] == ["True\n", "True\n"]
 
 
 def test_nobody_listens(tmp_path: Path) -> None:

@@ -1,0 +1,58 @@
+"""Where the server listens: on this machine only, and in a container on that container's own network."""
+
+import socket
+
+import pytest
+
+from server.errors import SetupError
+from server.serve import bind
+
+ELSEWHERE = ["0.0.0.0", "192.168.1.2", "::", "localhost", ""]
+
+
+class Ear(socket.socket):
+    """Notes where it would listen, and opens nothing: a test lets nobody in."""
+
+    asked: tuple[str, int]
+
+    def bind(self, address: tuple[str, int]) -> None:  # type: ignore[override]
+        self.asked = address
+
+    def listen(self, _backlog: int = 0) -> None:
+        pass
+
+
+@pytest.fixture
+def deaf(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.serve.socket.socket", Ear)
+
+
+def test_this_machine_alone_can_reach_it() -> None:
+    with bind("127.0.0.1", 0) as ear:
+        assert ear.getsockname()[0] == "127.0.0.1"
+        with socket.create_connection(ear.getsockname(), timeout=5):
+            pass
+
+
+@pytest.mark.parametrize("host", ELSEWHERE)
+@pytest.mark.usefixtures("deaf")
+def test_other_addresses_are_refused_with_the_remedy(host: str) -> None:
+    with pytest.raises(
+        SetupError, match=r"there is no login yet\. Use 127\.0\.0\.1; .*PARENTING_CONTAINER=true"
+    ):
+        bind(host, 0)
+
+
+@pytest.mark.usefixtures("deaf")
+def test_in_a_container_it_may_listen_on_its_whole_network() -> None:
+    for host in ("127.0.0.1", "0.0.0.0"):
+        with bind(host, 8765, container=True) as ear:
+            assert isinstance(ear, Ear)
+            assert ear.asked == (host, 8765)
+
+
+@pytest.mark.parametrize("host", ELSEWHERE[1:])
+@pytest.mark.usefixtures("deaf")
+def test_a_container_changes_nothing_for_any_other_address(host: str) -> None:
+    with pytest.raises(SetupError, match="would let others in"):
+        bind(host, 0, container=True)
