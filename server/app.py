@@ -19,14 +19,23 @@ import server.api
 import server.pages
 from server.db import Database, connect
 from server.deps import Db
-from server.errors import Busy, Invalid, MethodNotAllowed, NotFound, ServerError, TooLarge
+from server.errors import (
+    Busy,
+    Invalid,
+    MethodNotAllowed,
+    NotFound,
+    NotReady,
+    ServerError,
+    SetupError,
+    TooLarge,
+)
 from server.guard import Guard
 from server.schema import require
 from server.settings import Settings
-from server.shapes import shape_runs
 from server.starting import messages
 from server.streams import Streams
 from server.wake import Bell
+from server.workers import alive
 
 STATIC = Path(__file__).parents[1] / "web" / "static"
 LARGEST_BODY = 64 * 1024
@@ -111,11 +120,14 @@ def _add_health(app: FastAPI) -> None:
 
     @app.get("/readyz", tags=["health"])
     def readyz(db: Db) -> dict[str, Any]:
-        """The database answers, its tables are up to date; and what the worker does."""
-        require(db)
-        living = {run.worker for run in shape_runs(db) if run.worker != "done"}
-        worker = "idle" if not living else "silent" if "silent" in living else "alive"
-        return {"status": "ok", "database": "ok", "migrations": "ok", "worker": worker}
+        """The database answers, its tables are up to date, and a worker gives signs of life; else 503."""
+        try:
+            require(db)
+        except SetupError as error:
+            raise NotReady(error.message) from None
+        if not alive(db):
+            raise NotReady("No worker gives a sign of life. Start one: parenting worker")
+        return {"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}
 
 
 def _add_static(app: FastAPI) -> None:

@@ -67,6 +67,12 @@ class TooMany(ServerError):
     status, code = 503, "too_many"
 
 
+class NotReady(ServerError):
+    """This server is not ready."""
+
+    status, code = 503, "not_ready"
+
+
 class TooLarge(ServerError):
     """The body of this request is too large."""
 

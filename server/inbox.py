@@ -34,6 +34,7 @@ class QueueParent:
         self.db, self.mine, self.world, self.asked = db, mine, world, asked
         self.stages = config.stages
         self.tick = 0
+        self.policy = (1, 0)
         self.heard: Answer | None = None
         self.answers = self.events_wait = True
 
@@ -49,6 +50,7 @@ class QueueParent:
 
     def take(self, state: AgentState) -> Answer:
         """The answer to be heard in the tick that comes, or none."""
+        self.policy = int(state.maturity[0]), int(state.learner.steps[0])
         taken = mailbox.take_answer(self.db, self.mine, self.tick) if self.answers else None
         nothing = queries.empty(1, self.stages, self.world.height, self.world.width)
         self.heard = queries.silence(nothing)
@@ -63,7 +65,7 @@ class QueueParent:
         kind = kind_name(query)
         if kind is not None:
             clips, maturity = encode(self.world, query), int(query.maturity[0])
-            number = mailbox.post_query(self.db, self.mine, self.tick, kind, maturity, clips)
+            number = mailbox.post_query(self.db, self.mine, self.tick, kind, maturity, clips, self.policy)
             self.posted(number, query)
             self.asked()
 

@@ -53,6 +53,7 @@ class Life:
         self.record_ends = mailbox.high_water(db, mine.run_id)
         self.optimal, self.waiting = run.optimal, run.waiting
         self._saved_tick, self._saved_at, self._measured_at = self.tick, time.monotonic(), 0.0
+        self._measured_tick, self._lived_at = self.tick, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
         runs.report(db, mine, versions=versions())
 
@@ -84,7 +85,11 @@ class Life:
 
     def ready(self, seen: Watch) -> bool:
         """Whether the next tick may pass: an agent never outruns its parent (docs/architecture.md)."""
-        if self.tick < self.record_ends or seen.events:
+        if self.tick < self.record_ends:
+            return True
+        if resting(seen):
+            return False
+        if seen.events:
             return True
         if seen.open_guidance or seen.open_preferences > self.saved.config.max_open_preferences:
             return False
@@ -106,6 +111,12 @@ class Life:
             runs.report(self.db, self.mine, tick=self.tick, waiting=reason)
         self.save_if_due()
 
+    def early(self, pace: float | None) -> float:
+        """Seconds until the next tick may pass at this pace; ticks that are lived again need not wait."""
+        if pace is None or self.tick < self.record_ends:
+            return 0.0
+        return max(0.0, self._lived_at + 1 / pace - time.monotonic())
+
     # A tick
 
     def beat(self, seen: Watch | None = None) -> bool:
@@ -116,6 +127,7 @@ class Life:
         replayed = self.tick < self.record_ends
         self.parent.expect(replayed or bool(seen and seen.answers), replayed or bool(seen and seen.events))
         state, config, query = parenting.beat(self.world, self.saved.config, self.saved.state, self.parent)
+        self._lived_at = time.monotonic()
         assert self.parent.heard is not None
         tally = count(self.world, self.saved.tally, self.parent.heard, state)
         self.saved = Saved(state, tally, config)
@@ -155,11 +167,13 @@ class Life:
         due = late >= METRIC_SECONDS or (self._news and not at_once)
         if not due or late < self.evaluation.rest:
             return
-        self._measured_at, self._news = time.monotonic(), False
-        row = {**measure(self.saved, self.evaluation), **self._learnt}
+        speed = (self.tick - self._measured_tick) / late if self._measured_at else None
+        self._measured_at, self._measured_tick, self._news = time.monotonic(), self.tick, False
+        row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed}
         self.optimal, self.waiting = bool(row["optimal"]), None
         record.write_metrics(self.db, self.mine, {self.tick: row})
-        runs.report(self.db, self.mine, tick=self.tick, waiting=None, optimal=self.optimal)
+        shown = {"maturity": row["maturity"], "speed": speed, "optimal": self.optimal}
+        runs.report(self.db, self.mine, tick=self.tick, waiting=None, **shown)
 
     def finished(self) -> bool:
         """A scripted parent has no more to teach once the argmax policy is optimal; a person may go on."""
@@ -176,3 +190,8 @@ class Life:
         """Write a checkpoint."""
         record.save_checkpoint(self.db, self.mine, self.tick, pack(self.saved))
         self._saved_tick, self._saved_at = self.tick, time.monotonic()
+
+
+def resting(seen: Watch) -> bool:
+    """Whether the goal of answered questions is reached, and every answer heard: the agent rests."""
+    return seen.goal is not None and seen.answered >= seen.goal and not seen.answers

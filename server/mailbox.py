@@ -37,6 +37,9 @@ class Watch:
     open_guidance: int
     open_preferences: int
     answers: int  # given and not yet heard
+    answered: int  # given since its birth
+    goal: int | None  # answered questions after which it rests
+    pace: float | None  # ticks a second at most
     events: int  # not yet applied
 
 
@@ -64,10 +67,19 @@ def high_water(db: Database, run_id: int) -> int:
         return max(_high(session, run_id))
 
 
-def post_query(db: Database, mine: Claim, tick: int, kind: str, maturity: int, clips: dict[str, Any]) -> int:
+def post_query(
+    db: Database,
+    mine: Claim,
+    tick: int,
+    kind: str,
+    maturity: int,
+    clips: dict[str, Any],
+    policy: tuple[int, int] | None = None,
+) -> int:
     """Ask: insert the query of this tick and return its id.
 
-    A known tick inserts nothing: its id and payload stay.
+    A known tick inserts nothing: its id and payload stay. `policy` says which one asks: its stage and its
+    gradient steps there.
 
     Raises:
         LostClaim: another worker raises this run now.
@@ -80,6 +92,7 @@ def post_query(db: Database, mine: Claim, tick: int, kind: str, maturity: int, c
         if known is not None:
             return known
         query = Query(run_id=run.id, tick=tick, kind=kind, maturity=maturity, clips=clips, posted=db.clock())
+        query.policy_stage, query.policy_steps = policy or (None, None)
         query.status = "open" if run.status in ("active", "paused") else "withdrawn"
         session.add(query)
         session.flush()
@@ -197,9 +210,23 @@ def _watch(session: Session, run_id: int) -> Watch | None:
         select(func.count()).where(Event.run_id == run_id, Event.applied_tick.is_(None)).scalar_subquery()
     )
     row = session.execute(
-        select(Run.status, Run.epoch, Run.actor, answered, events).where(Run.id == run_id)
+        select(Run.status, Run.epoch, Run.actor, answered, events, Run.answers, Run.goal, Run.pace).where(
+            Run.id == run_id
+        )
     ).one_or_none()
     if row is None:
         return None
     opened = open_in(session, run_id)
-    return Watch(run_id, row[0], row[1], row[2], opened.guidance, opened.preference, row[3], row[4])
+    return Watch(
+        run_id=run_id,
+        status=row[0],
+        epoch=row[1],
+        actor=row[2],
+        open_guidance=opened.guidance,
+        open_preferences=opened.preference,
+        answers=row[3],
+        events=row[4],
+        answered=row[5],
+        goal=row[6],
+        pace=row[7],
+    )

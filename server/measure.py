@@ -34,4 +34,5 @@ def measure(saved: Saved, evaluation: Evaluation) -> Row:
         "size": int(state.x.size[0]),
         "rows": int(state.x.rows[0]),
         "maturity": int(state.maturity[0]),
+        "stage_queries": int(state.answered[0]),
     }

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 from server.db import Database
 from server.errors import Conflict, NotFound
 from server.runs import hold
-from server.tables import Answer, Query
+from server.tables import Answer, Query, Run
 
 LEASE_SECONDS = 60.0
 
@@ -59,7 +59,7 @@ def lease(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECO
     """Hold the most urgent open query that nobody else holds for this client; None if there is none.
 
     Guidance goes first, then the oldest. A client that still holds one gets the same again, for `seconds`
-    more.
+    more. A run that has reached its goal offers nothing.
     """
     with db.read() as session:  # nothing to offer is the common case, and takes no lock
         if _offer(session, run_id, client_id, db.clock()) is None:
@@ -192,12 +192,20 @@ def guidance_first() -> ColumnElement[int]:
     return case((Query.kind == "guidance", 0), else_=1)
 
 
+def rests(session: Session, run_id: int, more: int = 0) -> bool:
+    """Whether a run's goal is reached once `more` questions are answered: it offers no others."""
+    run = session.get(Run, run_id)
+    return run is not None and run.goal is not None and run.answers + more >= run.goal
+
+
 def _urgent(run_id: int) -> Select[Query]:
     rows = select(Query).where(Query.run_id == run_id, Query.status == "open")
     return rows.order_by(guidance_first(), Query.tick).limit(1)
 
 
 def _offer(session: Session, run_id: int, client_id: str, now: datetime) -> Query | None:
+    if rests(session, run_id):
+        return None
     mine = session.scalars(
         _urgent(run_id).where(Query.leased_by == client_id, Query.leased_until > now)
     ).first()

@@ -12,7 +12,7 @@ from sqlalchemy import delete, select
 
 from server.db import Database
 from server.errors import Conflict
-from server.runs import OVER, Claim, find, held, hold
+from server.runs import Claim, find, held, living
 from server.tables import Checkpoint, Event, Metric
 
 KEPT = 2
@@ -33,12 +33,15 @@ def add_event(db: Database, run_id: int, kind: str, payload: dict[str, Any]) -> 
 
     Raises:
         NotFound: there is no such run.
-        Conflict: the run is over.
+        Conflict: the run is over, or it is told to mature in its last stage.
     """
     with db.write() as session:
-        run = hold(session, run_id)
-        if run.status in OVER:
-            raise Conflict(f"Run {run_id} is {run.status}; nothing can be done to its agent any more.")
+        run = living(session, run_id)
+        if kind == "mature" and run.maturity >= run.config["stages"]:
+            raise Conflict(
+                f"Run {run_id} is in its last stage, T = {run.maturity}; it never ends. "
+                "How many stages there are is said at the start (config.stages)."
+            )
         event = Event(run_id=run_id, kind=kind, payload=payload, created=db.clock())
         session.add(event)
         session.flush()

@@ -20,6 +20,8 @@ from server.tables import Query, Run
 
 CLAIM_SECONDS = 5.0
 OVER = ("stopped", "finished", "failed")
+SHOWN = frozenset({"tick", "waiting", "optimal", "versions", "maturity", "speed"})
+"""What a worker reports of an agent."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,32 @@ def set_status(db: Database, run_id: int, status: str, reason: str | None = None
         return run
 
 
+def set_goal(db: Database, run_id: int, goal: int | None) -> Run:
+    """Let a run rest once so many questions are answered; None lets it go on for ever.
+
+    Raises:
+        NotFound: there is no such run.
+        Conflict: it is over.
+    """
+    with db.write() as session:
+        run = living(session, run_id)
+        run.goal = goal
+        return run
+
+
+def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
+    """Let at most so many ticks pass in a second; None lets the agent live as fast as it can.
+
+    Raises:
+        NotFound: there is no such run.
+        Conflict: it is over.
+    """
+    with db.write() as session:
+        run = living(session, run_id)
+        run.pace = pace
+        return run
+
+
 def claim(db: Database, actor: str, seconds: float = CLAIM_SECONDS) -> Sequence[Claim]:
     """Take every living run that is free, or whose worker gave no sign of life for `seconds`."""
     late = db.clock() - timedelta(seconds=seconds)
@@ -126,14 +154,14 @@ def beat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
 
 
 def report(db: Database, mine: Claim, **fields: Any) -> Run:
-    """Show where an agent is: any of `tick`, `waiting`, `optimal`, `versions`. Also a sign of life.
+    """Show where an agent is: any of `SHOWN`. Also a sign of life.
 
     Raises:
         LostClaim: another worker raises this run now.
     """
-    unknown = set(fields) - {"tick", "waiting", "optimal", "versions"}
+    unknown = set(fields) - SHOWN
     if unknown:
-        raise TypeError(f"report takes tick, waiting, optimal and versions, not {sorted(unknown)}")
+        raise TypeError(f"report takes {sorted(SHOWN)}, not {sorted(unknown)}")
     with db.write() as session:
         run = held(session, mine)
         run.heartbeat = db.clock()
@@ -171,6 +199,19 @@ def hold(session: Session, run_id: int) -> Run:
     run = session.get(Run, run_id, with_for_update=True)
     if run is None:
         raise NotFound(f"There is no run {run_id}.")
+    return run
+
+
+def living(session: Session, run_id: int) -> Run:
+    """`hold`, for what can be done to a run that is not over.
+
+    Raises:
+        NotFound: there is no such run.
+        Conflict: it is over.
+    """
+    run = hold(session, run_id)
+    if run.status in OVER:
+        raise Conflict(f"Run {run_id} is {run.status}; nothing can be done to its agent any more.")
     return run
 
 

@@ -40,7 +40,17 @@ class RunShape(BaseModel):
     status: str
     reason: str | None
     tick: int
+    maturity: int
+    """The stage T that the agent is in (Sec. 2.4), as last reported."""
+    speed: float | None
+    """Ticks a second, as last measured."""
     waiting: str | None
+    goal: int | None
+    """Answered questions after which the run rests; null: never."""
+    resting: bool
+    """The goal is reached: no tick passes until it is raised."""
+    pace: float | None
+    """Ticks a second at most; null: as fast as it can."""
     optimal: bool
     answers: int
     open: OpenShape
@@ -183,9 +193,11 @@ def shape_metrics(rows: Sequence[Metric]) -> list[MetricShape]:
 
 
 def _shape(run: Run, opened: Open, now: datetime) -> RunShape:
-    own = {name: getattr(run, name) for name in RunShape.model_fields if name not in ("open", "worker")}
+    made = ("open", "worker", "resting")
+    own = {name: getattr(run, name) for name in RunShape.model_fields if name not in made}
     shown = OpenShape(guidance=opened.guidance, preference=opened.preference)
-    return RunShape(**own, open=shown, worker=_worker(run, now))
+    resting = run.status not in OVER and run.goal is not None and run.answers >= run.goal
+    return RunShape(**own, open=shown, worker=_worker(run, now), resting=resting)
 
 
 def _worker(run: Run, now: datetime) -> str:

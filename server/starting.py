@@ -33,7 +33,8 @@ from weights.store import NoWeights, Wanted, find
 LARGEST_INT = 2**53 - 1
 """The largest integer that every JSON reader keeps exactly."""
 LEVEL_CHARACTERS = 8192
-FORM_FIELDS = ("world", "level", "level_text", "parent", "preset", "name", "seed")
+FORM_FIELDS = ("world", "level", "level_text", "parent", "preset", "name", "seed", "goal", "pace")
+NUMBERS = ("seed", "goal", "pace")
 
 
 def _plain(text: str) -> str:
@@ -58,6 +59,8 @@ LevelText = Annotated[
     str, StringConstraints(min_length=1, max_length=LEVEL_CHARACTERS), AfterValidator(_plain)
 ]
 Seed = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=LARGEST_INT)]
+Goal = Annotated[int, BeforeValidator(_whole), Field(ge=1, le=1_000_000)]
+Pace = Annotated[float, Field(gt=0, le=1000)]
 Integer = Annotated[int, Field(ge=-LARGEST_INT, le=LARGEST_INT)]
 Setting = bool | Integer | float | Name | None
 
@@ -79,6 +82,8 @@ class NewRun(BaseModel):
     )
     seed: Seed = 0
     name: Name | None = None
+    goal: Goal | None = Field(None, description="Answered questions after which the run rests; null: never.")
+    pace: Pace | None = Field(None, description="Ticks a second at most; null: as fast as it can.")
 
 
 def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
@@ -108,7 +113,7 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
         raise Invalid(wrong)
     kind = registry.kind(new.world)
     return {
-        **new.model_dump(include={"world", "preset", "seed", "parent", "name"}),
+        **new.model_dump(include={"world", "preset", "seed", "parent", "name", "goal", "pace"}),
         "level": level.name,
         "level_text": level.text,
         "legend": dict(kind.legend),
@@ -126,7 +131,7 @@ def read_form(form: Mapping[str, str]) -> NewRun:
     """
     given = {name: text for name, text in form.items() if text.strip()}
     fields: dict[str, Any] = {name: given[name] for name in FORM_FIELDS if name in given}
-    fields["seed"] = _number(fields.get("seed", "0"))
+    fields |= {name: _number(fields[name]) for name in NUMBERS if name in fields}
     changes = {name: text for name, text in given.items() if name.startswith("config.")}
     fields["config"] = {name.removeprefix("config."): _number(text) for name, text in changes.items()}
     try:
@@ -168,12 +173,16 @@ def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
 
 
 def _config(new: NewRun, wrong: list[tuple[str, str]]) -> Config | None:
-    """The preset, over it what the world sets, over it what this run sets (docs/paper.md, "Settings")."""
+    """The preset, over it what the world sets, over it what this run sets (docs/paper.md, "Settings").
+
+    A script answers at once, so its agent waits for each of its answers.
+    """
     if new.preset not in PRESETS:
         wrong.append(("preset", f"There is no such preset; there is: {', '.join(PRESETS)}."))
         return None
     world = registry.defaults(new.world) if new.world in registry.WORLDS else {}
-    changes = {name: _whole(value) for name, value in new.config.items()}
+    waits = {"max_open_preferences": 0} if new.parent == "scripted" else {}
+    changes = waits | {name: _whole(value) for name, value in new.config.items()}
     try:
         # Strict: pydantic would otherwise take true for 1, and "1" too.
         return Config.model_validate({**PRESETS[new.preset], **world, **changes}, strict=True)

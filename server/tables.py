@@ -1,4 +1,4 @@
-"""The six tables: a run, its queries, their answers, the operator's events, metrics and checkpoints.
+"""The tables: a run, its queries, their answers, the operator's events, metrics, checkpoints, and others.
 
 The database holds the invariants: one query a run and tick, one standing answer a query, known words only.
 Times are UTC. JSON is readable by eye; the shape of a clip is described at `Query.clips`.
@@ -125,9 +125,14 @@ class Run(Table):
     tick: Mapped[int] = mapped_column(default=0)  # the last tick reported, for display
     waiting: Mapped[str | None]
     optimal: Mapped[bool] = mapped_column(default=False)
+    maturity: Mapped[int] = mapped_column(default=1, server_default=text("1"))  # the stage T, for display
+    speed: Mapped[float | None]  # ticks a second lately, for display
     answers: Mapped[int] = mapped_column(
         default=0
     )  # numbers the run's answers, in the answer's own transaction
+    # what the operator set, and may change while it lives; neither changes what the agent does
+    goal: Mapped[int | None]  # answered questions after which the run rests
+    pace: Mapped[float | None]  # ticks a second at most, for those who want to watch
     # which worker raises it
     actor: Mapped[str | None]
     epoch: Mapped[int] = mapped_column(
@@ -171,6 +176,8 @@ class Query(Table):
     {"ground": [rows], "observed": [rows], "agent": [row, column], "box": [row, column] or null}]}."""
     status: Mapped[str] = mapped_column(default="open")
     posted: Mapped[datetime]
+    policy_stage: Mapped[int | None]  # which policy asked: the stage T that it was in, and
+    policy_steps: Mapped[int | None]  # its gradient steps in that stage; null: asked before these were kept
     leased_until: Mapped[datetime | None]
     leased_by: Mapped[str | None]
 
@@ -235,6 +242,16 @@ class Metric(Table):
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
     tick: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     values: Mapped[dict[str, Any]]
+
+
+class Worker(Table):
+    """A worker process that gave a sign of life; it takes its row away when it ends in order."""
+
+    __tablename__ = "worker"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    started: Mapped[datetime]
+    heartbeat: Mapped[datetime]
 
 
 class Checkpoint(Table):

@@ -8,7 +8,7 @@ from datetime import timedelta
 from sqlalchemy import func, or_, select
 
 from server.db import Database
-from server.queue import LEASE_SECONDS, guidance_first
+from server.queue import LEASE_SECONDS, guidance_first, rests
 from server.runs import hold
 from server.tables import Metric, Query
 
@@ -26,7 +26,7 @@ def lease_ahead(
     rows = select(Query).where(Query.run_id == run_id, Query.status == "open", Query.id.not_in(shown), free)
     rows = rows.order_by(guidance_first(), Query.tick).limit(1)
     with db.read() as session:  # nothing to offer is the common case, and takes no lock
-        if session.scalars(rows).first() is None:
+        if rests(session, run_id, len(shown)) or session.scalars(rows).first() is None:
             return None
     with db.write() as session:
         hold(session, run_id)
@@ -41,7 +41,7 @@ def may_lease(db: Database, run_id: int, client_id: str) -> bool:
     free = or_(Query.leased_until.is_(None), Query.leased_until <= db.clock(), Query.leased_by == client_id)
     rows = select(Query.id).where(Query.run_id == run_id, Query.status == "open", free)
     with db.read() as session:
-        return session.scalars(rows.limit(1)).first() is not None
+        return not rests(session, run_id) and session.scalars(rows.limit(1)).first() is not None
 
 
 def latest_metrics(db: Database, run_ids: Sequence[int]) -> dict[int, Metric]:

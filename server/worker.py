@@ -10,12 +10,13 @@ import signal
 import socket
 import time
 import traceback
+from contextlib import suppress
 from types import FrameType
 
 import structlog
 
 from agent.process import settle
-from server import mailbox, runs
+from server import mailbox, runs, workers
 from server.db import Database, connect
 from server.errors import Busy, DiskFull, LostClaim
 from server.life import Life
@@ -44,7 +45,8 @@ class Worker:
         self.lives: dict[int, Life] = {}
         self.bell, self.web = Bell(settings.data, "worker"), Bell(settings.data, "web")
         self.stopping = False
-        self._claimed_at = 0.0
+        self._claimed_at, self._signed_at = 0.0, -workers.SIGN_SECONDS
+        self._soonest = POLL_SECONDS
 
     def stop(self, _signal: int = 0, _frame: FrameType | None = None) -> None:
         """Finish the tick in hand, save everything and end."""
@@ -55,11 +57,19 @@ class Worker:
         self.bell.listen()
         try:
             while not self.stopping:
+                self._sign()
                 self._claim()
+                self._soonest = POLL_SECONDS
                 if not self._round():
-                    self.bell.wait(POLL_SECONDS)
+                    self.bell.wait(self._soonest)
         finally:
             self._close()
+
+    def _sign(self) -> None:
+        """A sign of life of this process, with runs or without."""
+        if time.monotonic() - self._signed_at >= workers.SIGN_SECONDS:
+            workers.sign(self.db, self.name)
+            self._signed_at = time.monotonic()
 
     def _claim(self) -> None:
         """Signs of life for what we raise, and a look for runs that nobody raises."""
@@ -79,7 +89,7 @@ class Worker:
         lived = False
         for run_id, seen in mailbox.watch(self.db, list(self.claims)).items():
             if seen.status in runs.OVER:
-                self._drop(run_id)
+                self._end(run_id)
             elif seen.status == "active" and not self.stopping:
                 lived |= self._guarded(run_id, seen)
         return lived
@@ -108,8 +118,11 @@ class Worker:
         if not life.ready(seen):
             life.wait(seen)
             return False
+        if (early := life.early(seen.pace)) > 0:
+            self._soonest = min(self._soonest, early)
+            return False
         until = time.monotonic() + SLICE_SECONDS
-        lively = life.beat(seen)
+        lively = life.beat(seen) and seen.pace is None
         while lively and time.monotonic() < until and not life.finished():
             lively = life.beat()
         if life.finished():
@@ -124,6 +137,13 @@ class Worker:
         log.info("run taken up", run=run_id, tick=self.lives[run_id].tick)
         return self.lives[run_id]
 
+    def _end(self, run_id: int) -> None:
+        """Save what was lived of a run that somebody stopped, and let go of it."""
+        if run_id in self.lives:
+            with suppress(LostClaim):
+                self.lives[run_id].save()
+        self._drop(run_id)
+
     def _drop(self, run_id: int) -> None:
         self.lives.pop(run_id, None)
         self.claims.pop(run_id, None)
@@ -135,6 +155,7 @@ class Worker:
             except LostClaim:
                 self._drop(run_id)
         runs.let_go(self.db, list(self.claims.values()))
+        workers.sign_off(self.db, self.name)
         self.bell.close()
 
 

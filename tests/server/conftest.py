@@ -62,7 +62,8 @@ def db(settings: Settings, clock: Clock) -> Iterator[Database]:
 
 @pytest.fixture
 def run(db: Database) -> Run:
-    return start(db, NewRun(world="unsafe-exploration"))
+    """It has two stages, so that it can be told to mature."""
+    return start(db, NewRun(world="unsafe-exploration", config={"stages": 2}))
 
 
 @pytest.fixture

@@ -1,10 +1,10 @@
 """What the server tells of itself: Plotly's file, the description of the API, readiness."""
 
 import httpx2
+from sqlalchemy import text
 
 from server.db import Database
-from server.runs import claim, set_status
-from server.tables import Run
+from server.workers import SILENT_SECONDS, sign, sign_off
 from tests.server.conftest import Clock
 
 
@@ -25,15 +25,27 @@ def test_api_describes_itself(client: httpx2.Client) -> None:
     }
 
 
-def test_readiness_tells_of_the_worker(client: httpx2.Client, db: Database, run: Run, clock: Clock) -> None:
-    def worker() -> str:
-        found: str = client.get("/readyz").json()["worker"]
-        return found
+def test_readiness_needs_a_worker(client: httpx2.Client, db: Database, clock: Clock) -> None:
+    def said() -> str:
+        reply = client.get("/readyz")
+        assert (reply.status_code == 503) == ("error" in reply.json())
+        return reply.json()["error"]["message"] if reply.status_code == 503 else reply.json()["worker"]
 
-    assert worker() == "silent"
-    claim(db, "worker-1")
-    assert worker() == "alive"
-    clock.pass_seconds(6)
-    assert worker() == "silent"
-    set_status(db, run.id, "stopped")
-    assert worker() == "idle"
+    assert said() == "No worker gives a sign of life. Start one: parenting worker"
+    sign(db, "worker-1")
+    assert said() == "ok"
+    clock.pass_seconds(SILENT_SECONDS + 1)
+    assert said().startswith("No worker")
+    sign(db, "worker-1")
+    sign_off(db, "worker-1")
+    assert said().startswith("No worker")
+
+
+def test_readiness_needs_the_tables_of_this_version(client: httpx2.Client, db: Database) -> None:
+    sign(db, "worker-1")
+    with db.write() as session:
+        session.execute(text("UPDATE alembic_version SET version_num = '0001'"))
+    reply = client.get("/readyz")
+    assert reply.status_code == 503
+    assert "older version" in reply.json()["error"]["message"]
+    assert client.get("/healthz").status_code == 200
