@@ -154,3 +154,20 @@ def test_who_asked_is_kept(db: Database, settings: Settings) -> None:
     steps = [query.policy_steps or 0 for query in asked]
     assert steps == sorted(steps)
     assert steps[0] == 0 < steps[-1]
+
+
+def test_each_run_has_its_turn_in_every_round(
+    db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that would live for ever without a question takes no turn of the others, and waits for none."""
+    worlds = ("reward-hacking", "unsafe-exploration", "side-effects")
+    ids = [start(db, NewRun(world=world, preset="direct", parent="scripted")).id for world in worlds]
+    waits = start(db, NewRun(world="unsafe-exploration", parent="human")).id
+    monkeypatch.setattr("server.worker.SLICE_SECONDS", 0.0)  # a tick a turn, however fast the machine is
+    worker = Worker(db, settings)
+    worker._claim()
+    for _ in range(25):
+        worker._round()
+    assert [worker.lives[run].tick for run in ids] == [25, 25, 25]
+    assert worker.lives[waits].tick < 25
+    assert get_run(db, waits).waiting == "guidance"
