@@ -1,0 +1,86 @@
+"""The answers of a run as JSON lines: equal to what the agent heard, the same keys in every line."""
+
+import json
+
+import pytest
+import torch
+
+from agent.query import Answer, empty
+from server.codec import CHOICES
+from server.db import Database
+from server.errors import NotFound
+from server.export import MU, lines, rows
+from server.mailbox import post_query, record, take_answer
+from server.queue import answer, correct
+from server.runs import Claim
+from tests.server.conftest import CLIPS, Clock
+
+
+@pytest.fixture
+def run_id(db: Database, mine: Claim, clock: Clock) -> int:
+    """Four answers: one of each choice, heard; the last is corrected."""
+    for tick, choice in enumerate(CHOICES):
+        query = post_query(db, mine, 2 * tick, "preference", 2, CLIPS, policy=(2, 30 + tick))
+        clock.pass_seconds(0.5)
+        answer(db, query, choice, "tab", "human")
+        take_answer(db, mine, 2 * tick + 1)
+    correct(db, query, "left", "tab", "human")
+    return mine.run_id
+
+
+def test_a_row_tells_all_about_an_answer(db: Database, run_id: int) -> None:
+    first = next(rows(db, run_id))
+    assert first == {
+        "run": run_id,
+        "number": 1,
+        "query": 1,
+        "world": "unsafe-exploration",
+        "level": "island",
+        "kind": "preference",
+        "maturity": 2,
+        "tick": 0,
+        "applied_tick": 1,
+        "policy": {"stage": 2, "gradient_steps": 30},
+        **CLIPS,
+        "choice": "left",
+        "mu": [1.0, 0.0],
+        "parent": "human",
+        "asked": "2026-11-22T12:00:00.000000Z",
+        "received": "2026-11-22T12:00:00.500000Z",
+        "standing": True,
+        "supersedes": None,
+    }
+
+
+def test_it_is_what_the_agent_heard(db: Database, run_id: int) -> None:
+    heard = [
+        (taken.answer.applied_tick, taken.query.clips, taken.answer.choice) for taken in record(db, run_id)
+    ]
+    told = [row for row in rows(db, run_id) if row["applied_tick"] is not None]
+    assert [
+        (row["applied_tick"], {side: row[side] for side in ("left", "right")}, row["choice"]) for row in told
+    ] == heard
+
+
+def test_correction_names_what_it_corrects(db: Database, run_id: int) -> None:
+    told = [(row["number"], row["standing"], row["supersedes"], row["choice"]) for row in rows(db, run_id)]
+    assert told[3:] == [(4, False, None, "neither"), (5, True, 4, "left")]
+
+
+def test_mu_is_that_of_the_agent() -> None:
+    for choice, mu in MU.items():
+        heard = Answer(query=empty(1, 1, 1, 1), choice=torch.tensor([CHOICES[choice]]))
+        assert heard.mu.tolist() == [mu or [0, 0]]
+
+
+def test_a_line_a_row_with_the_same_keys(db: Database, run_id: int) -> None:
+    read = [json.loads(line) for line in lines(db, run_id)]
+    assert read == list(rows(db, run_id))
+    assert len({tuple(row) for row in read}) == 1
+    assert len({len(row["received"]) for row in read}) == 1
+    assert all(line.endswith("\n") and line.count("\n") == 1 for line in lines(db, run_id))
+
+
+def test_unknown_run_is_refused_before_the_first_row(db: Database) -> None:
+    with pytest.raises(NotFound):
+        lines(db, 9)
