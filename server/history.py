@@ -35,8 +35,17 @@ def after(db: Database, run_id: int, number: int = 0, limit: int = BATCH) -> Seq
         return [Answered(*row) for row in session.execute(rows.limit(limit))]
 
 
-def before(db: Database, run_id: int, number: int | None = None, limit: int = BATCH) -> Sequence[Answered]:
+def before(
+    db: Database,
+    run_id: int,
+    number: int | None = None,
+    limit: int = BATCH,
+    kind: str | None = None,
+    choice: str | None = None,
+) -> Sequence[Answered]:
     """The answers of a run before the one of this number, newest first, at most `limit`; None: the last ones.
+
+    With `kind` or `choice`, only those to questions of this kind, or those that say this.
 
     Raises:
         NotFound: there is no such run.
@@ -46,6 +55,10 @@ def before(db: Database, run_id: int, number: int | None = None, limit: int = BA
         rows = select(Answer, Query).join(Query, Answer.query_id == Query.id).where(Answer.run_id == run_id)
         if number is not None:
             rows = rows.where(Answer.number < number)
+        if kind is not None:
+            rows = rows.where(Query.kind == kind)
+        if choice is not None:
+            rows = rows.where(Answer.choice == choice)
         return [Answered(*row) for row in session.execute(rows.order_by(Answer.number.desc()).limit(limit))]
 
 

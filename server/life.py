@@ -51,7 +51,7 @@ class Life:
         self._weights = self._begun_with()
         self.saved = self._recall(born)
         self.record_ends = mailbox.high_water(db, mine.run_id)
-        self.optimal, self.waiting = run.optimal, run.waiting
+        self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at = self.tick, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
@@ -161,16 +161,17 @@ class Life:
         """Write a row of metrics after the parent was heard, and once a second besides.
 
         It waits until the next question is out: a person waits for that, and nobody for a row. Where a look
-        at the policy is dear, as in the garden, the evaluation's `rest` lies between two rows.
+        at the policy is dear, as in the garden, the evaluation's `rest` lies between two rows. The tick that
+        ends a stage has its row in any case: a stage is judged by what it ended with.
         """
-        late = time.monotonic() - self._measured_at
+        late, stage = time.monotonic() - self._measured_at, int(self.saved.state.maturity[0])
         due = late >= METRIC_SECONDS or (self._news and not at_once)
-        if not due or late < self.evaluation.rest:
+        if stage == self.stage and (not due or late < self.evaluation.rest):
             return
-        speed = (self.tick - self._measured_tick) / late if self._measured_at else None
+        speed = (self.tick - self._measured_tick) / late if self._measured_at and late else None
         self._measured_at, self._measured_tick, self._news = time.monotonic(), self.tick, False
         row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed}
-        self.optimal, self.waiting = bool(row["optimal"]), None
+        self.optimal, self.waiting, self.stage = bool(row["optimal"]), None, stage
         record.write_metrics(self.db, self.mine, {self.tick: row})
         shown = {"maturity": row["maturity"], "speed": speed, "optimal": self.optimal}
         runs.report(self.db, self.mine, tick=self.tick, waiting=None, **shown)

@@ -10,7 +10,7 @@ from sqlalchemy import func, or_, select
 from server.db import Database
 from server.queue import LEASE_SECONDS, guidance_first, rests
 from server.runs import hold
-from server.tables import Metric, Query
+from server.tables import Metric, Query, Run
 
 
 def lease_ahead(
@@ -44,6 +44,13 @@ def may_lease(db: Database, run_id: int, client_id: str) -> bool:
         return not rests(session, run_id) and session.scalars(rows.limit(1)).first() is not None
 
 
+def older_runs(db: Database, before: int | None = None, limit: int = 20) -> Sequence[Run]:
+    """The runs started before the one of this id, newest first, at most `limit`; None: the last ones."""
+    rows = select(Run) if before is None else select(Run).where(Run.id < before)
+    with db.read() as session:
+        return session.scalars(rows.order_by(Run.id.desc()).limit(limit)).all()
+
+
 def latest_metrics(db: Database, run_ids: Sequence[int]) -> dict[int, Metric]:
     """The last metrics of each of some runs; a run that has none yet is absent."""
     last = (
@@ -55,6 +62,15 @@ def latest_metrics(db: Database, run_ids: Sequence[int]) -> dict[int, Metric]:
     rows = select(Metric).join(newest, (Metric.run_id == newest.c.run_id) & (Metric.tick == newest.c.tick))
     with db.read() as session:
         return {metric.run_id: metric for metric in session.scalars(rows)}
+
+
+def first_metrics(db: Database, run_id: int) -> Sequence[Metric]:
+    """The first metrics of each stage T of a run (Sec. 2.4), in their order."""
+    first = select(func.min(Metric.tick)).where(Metric.run_id == run_id)
+    first = first.group_by(Metric.values["maturity"].as_integer())
+    rows = select(Metric).where(Metric.run_id == run_id, Metric.tick.in_(first)).order_by(Metric.tick)
+    with db.read() as session:
+        return session.scalars(rows).all()
 
 
 def sampled_metrics(db: Database, run_id: int, rows: int = 40) -> Sequence[Metric]:

@@ -60,3 +60,10 @@ def test_unknown_run(db: Database, verb: object) -> None:
     assert callable(verb)
     with pytest.raises(NotFound):
         verb(db, 9)
+
+
+def test_by_kind_and_choice(db: Database, mine: Claim, five: int) -> None:
+    answer(db, post_query(db, mine, 9, "preference", 1, CLIPS), "left", "me", "human")
+    assert numbers(history.before(db, five, kind="preference")) == [7]
+    assert numbers(history.before(db, five, choice="left")) == [7, 5, 1]
+    assert numbers(history.before(db, five, 7, kind="guidance", choice="left", limit=1)) == [5]

@@ -1,0 +1,54 @@
+"""What happened in each stage of maturation, from the metrics: cumulative counts become those of a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from server.tables import Metric
+
+Number = float | int | None
+Values = Mapping[str, Number]
+
+
+class Stage(NamedTuple):
+    """One row of the table; None where nothing is known yet. web/static/dashboard.js makes the same."""
+
+    number: int  # T, the length of its clips
+    when: str  # past, now or later
+    begin: int | None  # the tick at which it began
+    end: int | None  # the tick at which it ended, or the last one measured
+    guidance: Number
+    preference: Number
+    harm: Number
+    worth: Number  # what its policy came to at its end, or comes to now
+    line: Number  # what that is held against
+
+
+def stages(count: int, now: int, firsts: Sequence[Metric], last: Metric | None) -> list[Stage]:
+    """A row for each of `count` stages, `now` being the one that the agent is in.
+
+    `firsts` are the first metrics of each stage. The tick that ends a stage is measured, and says that it is
+    the next one's: so it holds what the stage before ended with.
+    """
+    begun = {int(row.values["maturity"]): row for row in firsts}
+    found = []
+    for number in range(1, count + 1):
+        when = "past" if number < now else "later" if number > now else "now"
+        first, end = begun.get(number), begun.get(number + 1, last)
+        if first is None or end is None:
+            found.append(Stage(number, when, *[None] * 7))
+        elif number == 1:  # nothing comes before it
+            found.append(Stage(number, when, 0, end.tick, *_within({}, end.values)))
+        else:
+            found.append(Stage(number, when, first.tick, end.tick, *_within(first.values, end.values)))
+    return found
+
+
+def _within(before: Values, after: Values) -> tuple[Number, Number, Number, Number, Number]:
+    """What was counted between two ticks, and what the policy comes to at the later one."""
+    guidance, preference, harm = (
+        None if (known := after.get(name)) is None else known - (before.get(name) or 0)
+        for name in ("guidance", "preference", "deaths")
+    )
+    return guidance, preference, harm, after.get("return"), after.get("optimal_return")

@@ -1,0 +1,62 @@
+"""The stages of a life as the metrics tell them."""
+
+from __future__ import annotations
+
+import pytest
+
+from server.db import Database
+from server.pages.stages import Stage, stages
+from server.record import metrics, write_metrics
+from server.runs import Claim, get_run
+from server.settings import Settings
+from server.starting import NewRun, start
+from server.views import first_metrics, latest_metrics
+from server.worker import Worker
+from tests.pages import island
+
+CONFIG = {"stages": 3, "mature_every": 4}
+
+
+@pytest.fixture
+def mine(db: Database) -> Claim:
+    return island.live(db)[1]
+
+
+def test_the_tick_that_ends_a_stage_is_measured(db: Database, settings: Settings) -> None:
+    new = NewRun(world="unsafe-exploration", parent="scripted", preset="lax", config=CONFIG, goal=10)
+    run = start(db, new).id
+    worker = Worker(db, settings)
+    worker._claim()
+    for _ in range(300):
+        worker._round()
+    assert get_run(db, run).maturity == 3
+    firsts = first_metrics(db, run)
+    assert [row.values["maturity"] for row in firsts] == [1, 2, 3]
+    assert [row.values["stage_queries"] for row in firsts[1:]] == [0, 0]
+    first, second, third = stages(3, 3, firsts, latest_metrics(db, [run])[run])
+    for stage, when in ((first, "past"), (second, "past")):
+        assert stage.when == when
+        assert (stage.guidance or 0) + (stage.preference or 0) == 4
+    assert first.begin == 0
+    assert (second.begin, third.begin) == (first.end, second.end)
+    assert third.when == "now"
+    assert (third.guidance or 0) + (third.preference or 0) == 2
+
+
+def test_counts_are_those_of_the_stage_alone(db: Database, mine: Claim) -> None:
+    def row(maturity: int, guidance: int, deaths: int, worth: float | None) -> dict[str, float | int | None]:
+        told = {"maturity": maturity, "guidance": guidance, "preference": 2 * guidance, "deaths": deaths}
+        return {**told, "return": worth, "optimal_return": 4.5}
+
+    rows = {3: row(1, 1, 0, 1.0), 9: row(1, 5, 1, 2.0), 12: row(2, 6, 1, 2.5), 20: row(2, 9, 4, None)}
+    write_metrics(db, mine, rows)
+    shown = stages(3, 2, first_metrics(db, mine.run_id), metrics(db, mine.run_id)[-1])
+    assert shown == [
+        Stage(1, "past", 0, 12, 6, 12, 1, 2.5, 4.5),
+        Stage(2, "now", 12, 20, 3, 6, 3, None, 4.5),
+        Stage(3, "later", None, None, None, None, None, None, None),
+    ]
+
+
+def test_nothing_is_known_before_the_first_metrics(db: Database, mine: Claim) -> None:
+    assert stages(1, 1, first_metrics(db, mine.run_id), None) == [Stage(1, "now", *[None] * 7)]
