@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
+import socket
+from typing import Annotated
+
+import typer
+
 from commands.lifeline import follow
 from commands.said import plainly, settings
+from server.db import connect
 from server.log import set_up_log
+from server.schema import require
+from server.settings import Settings
+from server.workers import SILENT_SECONDS, alive
 
 
-def worker() -> None:
+def worker(
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="Only say whether a worker of this machine lives: exit code 0, or else 1."
+        ),
+    ] = False,
+) -> None:
     """Raise the agents of the database's runs until Ctrl-C; goes on exactly where an earlier worker was.
 
     Example: parenting worker
     """
+    if check:
+        raise typer.Exit(_check())
     follow()
     with plainly():
         chosen = settings()
@@ -19,3 +37,27 @@ def worker() -> None:
         from server.worker import main  # loads torch, which takes a second: settings are checked first
 
         main(chosen)
+
+
+def _check() -> int:
+    """For health checks. Workers of other machines, which are named after those, do not count."""
+    with plainly():
+        names = [name for name in _alive(settings()) if name.rpartition(":")[0] == socket.gethostname()]
+    if not names:
+        typer.echo(
+            f"No worker of this machine has given a sign of life for {SILENT_SECONDS:g} s. "
+            "Start one: parenting worker",
+            err=True,
+        )
+        return 1
+    typer.echo(f"Alive: {', '.join(names)}")
+    return 0
+
+
+def _alive(chosen: Settings) -> list[str]:
+    db = connect(chosen)
+    try:
+        require(db)
+        return list(alive(db))
+    finally:
+        db.close()
