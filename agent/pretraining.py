@@ -71,7 +71,7 @@ def policy_gradient(
     walks = walk(batch, logits.double().softmax(2), keys)
     earned = returns_to_go(walks)
     visits = visited(batch, walks, earned, logits.dtype)
-    return _differentiate(network, parameters, visits), earned[:, 0].mean(1)
+    return differentiate(network, parameters, visits), earned[:, 0].mean(1)
 
 
 def returns_to_go(walks: Walks) -> Float64[Tensor, "N T E"]:
@@ -113,9 +113,8 @@ def _total(place: Tensor, amount: Tensor, size: int) -> Tensor:
     return zero.scatter_add_(1, place.flatten(1), amount.flatten(1))
 
 
-def _differentiate(
-    network: Network, parameters: Float[Tensor, "N P"], visits: Visits
-) -> Float[Tensor, "N P"]:
+def differentiate(network: Network, parameters: Float[Tensor, "N P"], visits: Visits) -> Float[Tensor, "N P"]:
+    """The gradient of REINFORCE's loss, less a little entropy, at the distinct states."""
     layers = network.learnable(parameters)
     with torch.enable_grad():
         logits = network.heads(layers, visits.seen, visits.near).logits

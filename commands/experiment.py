@@ -1,0 +1,108 @@
+"""`parenting experiment`: the paper's tables, figures and claims, with our numbers beside the paper's."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from commands.said import Wrong, plainly
+from experiments.catalogue import NAMES, UnknownExperiment
+
+if TYPE_CHECKING:
+    from experiments.experiment import Asked, Experiment
+    from experiments.labour import Told
+    from experiments.pieces import Task
+
+
+def experiment(
+    name: Annotated[str, typer.Argument(help=f"all, or one of: {', '.join(NAMES)}.")],
+    scale: Annotated[
+        Literal["quick", "paper"], typer.Option(help="The paper's number of trials, or a few.")
+    ] = "paper",
+    trials: Annotated[
+        int | None, typer.Option(min=1, help="Trials, in place of the scale's. More go on from fewer.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**53 - 1)] = 0,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes. [default: one a core]")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://127.0.0.1:8786.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for results; what is done already lies there.")] = Path(
+        "results"
+    ),
+) -> None:
+    """Run an experiment of the paper, or go on with it, and write its page, figures and data.
+
+    Every finished chunk of trials is stored, so a run that was stopped goes on where it was.
+
+    Example: parenting experiment table1 --scale quick
+    """
+    with plainly():
+        asked = _asked(NAMES if name == "all" else (name,), scale, trials, seed)
+        for one, what in asked:
+            _run(one, what, out, workers or os.cpu_count() or 1, cluster)
+
+
+def _asked(
+    names: Sequence[str], scale: Literal["quick", "paper"], trials: int | None, seed: int
+) -> list[tuple[Experiment, Asked]]:
+    from experiments.catalogue import experiment
+    from experiments.experiment import Asked
+
+    try:
+        found = [experiment(name) for name in names]
+    except UnknownExperiment as error:
+        raise Wrong(f"{error} Or: all.") from None
+    return [(one, Asked(trials or one.trials[scale], seed, scale)) for one in found]
+
+
+def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | None) -> None:
+    from experiments.labour import WorkersDied, work
+    from experiments.pieces import OtherPlan, Store
+    from experiments.publish import page, publish
+
+    began = time.monotonic()
+    plan = {"experiment": one.name, "seed": asked.seed, "device": asked.device, **one.config(asked)}
+    tasks = one.tasks(asked)
+    try:
+        store = Store(out / one.name / "pieces", plan)
+        with _bar(one, tasks) as told:
+            rows = work(tasks, store, workers, cluster, told)
+        results = publish(one, asked, rows, out, time.monotonic() - began, workers)
+    except (OtherPlan, WorkersDied) as error:
+        raise Wrong(str(error)) from None
+    except OSError as error:
+        raise Wrong(f"{one.name}: {error}. Look at --out and --cluster.") from None
+    except KeyboardInterrupt:
+        typer.echo("Stopped. The same command goes on from here.", err=True)
+        raise typer.Exit(130) from None
+    typer.echo(page(results, ()))
+
+
+@contextmanager
+def _bar(one: Experiment, tasks: Sequence[Task]) -> Iterator[Told]:
+    """A progress bar with the time left, on standard error where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda _task: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn(one.name),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        whole = bar.add_task(one.name, total=sum(task.share for task in tasks))
+        yield lambda task: bar.advance(whole, task.share)

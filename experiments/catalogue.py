@@ -1,0 +1,29 @@
+"""The experiments by name, each in a module of its own that is loaded when it is asked for."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from experiments.experiment import Experiment
+
+NAMES = ("table1",)
+"""In the order of the paper."""
+
+
+class UnknownExperiment(ValueError):
+    """There is no experiment of that name; the sentence lists those that there are."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"There is no experiment '{name}'; there is: {', '.join(NAMES)}.")
+
+
+def experiment(name: str) -> Experiment:
+    """One experiment.
+
+    Raises:
+        UnknownExperiment: there is none of that name.
+    """
+    if name not in NAMES:
+        raise UnknownExperiment(name)
+    found: Experiment = import_module(f"experiments.{name.replace('-', '_')}").EXPERIMENT
+    return found

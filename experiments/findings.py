@@ -1,0 +1,74 @@
+"""What an experiment found, beside what the paper says: numbers, intervals, and whether they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from math import sqrt
+from statistics import fmean, stdev
+from typing import Any
+
+Z = 1.959964
+"""Two-sided 95 % of a normal distribution."""
+LOST = "lost"
+"""What stands in place of a number that is not legible in our copy of the paper."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One number or claim of the paper, and ours."""
+
+    what: str
+    paper: str  # as the paper has it, or LOST
+    ours: str
+    difference: str = ""
+    interval: str = ""  # 95 %, of ours
+    agrees: bool | None = None  # None: there is nothing legible to compare with
+    note: str = ""
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data."""
+        return asdict(self)
+
+
+def spread(values: Sequence[float]) -> str:
+    """Mean +- standard deviation, over n - 1."""
+    if not values:
+        return "-"
+    return f"{fmean(values):.2f}" + (f" +- {stdev(values):.2f}" if len(values) > 1 else "")
+
+
+def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
+    """The 95 % confidence interval of a mean; None for fewer than two values."""
+    if len(values) < 2:
+        return None
+    half = Z * stdev(values) / sqrt(len(values))
+    return fmean(values) - half, fmean(values) + half
+
+
+def share_interval(hits: int, trials: int) -> tuple[float, float]:
+    """The 95 % confidence interval of a share, by Wilson's score: it holds for 0 of n, too.
+
+    Raises:
+        ValueError: there was no trial.
+    """
+    if trials < 1:
+        raise ValueError("A share of no trials is no number.")
+    share, z2 = hits / trials, Z * Z
+    middle = (share + z2 / (2 * trials)) / (1 + z2 / trials)
+    half = Z * sqrt(share * (1 - share) / trials + z2 / (4 * trials * trials)) / (1 + z2 / trials)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def count_finding(what: str, paper: int | None, hits: int, trials: int, note: str = "") -> Finding:
+    """A count of trials beside the paper's, which is always of 100; it agrees where the counts do."""
+    low, high = share_interval(hits, trials)
+    return Finding(
+        what=what,
+        paper=LOST if paper is None else f"{paper} of 100",
+        ours=f"{hits} of {trials}",
+        difference="" if paper is None else f"{100 * hits / trials - paper:+.1f} %",
+        interval=f"{100 * low:.1f} to {100 * high:.1f} %",
+        agrees=None if paper is None else hits / trials == paper / 100,
+        note=note,
+    )

@@ -1,0 +1,81 @@
+"""An experiment's work in pieces, each stored as soon as it is done: a kill costs the pieces in work alone.
+
+A piece is rows of plain data, one for each trial as a rule. What a piece holds depends on its task alone, not
+on who did it, when, or beside which others.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+Row = dict[str, Any]
+"""Name -> number, word, truth value or null."""
+PLAN = "plan.json"
+
+
+class Task(NamedTuple):
+    """One piece of work: a function by its name, and what it is called with. Plain data, for any machine."""
+
+    key: str  # names the piece and its file
+    call: str  # "module:function"; the function takes the arguments by name and returns rows
+    arguments: dict[str, Any]
+    share: float = 1.0  # of the whole work, against other tasks, for the time left
+
+
+class OtherPlan(ValueError):
+    """The folder holds pieces of something else; the sentence says what differs and what to do."""
+
+
+class Store:
+    """The pieces of one experiment in a folder."""
+
+    def __init__(self, folder: Path, plan: Mapping[str, Any]) -> None:
+        """Open a folder, or make it. `plan` is all that pieces depend on.
+
+        Raises:
+            OtherPlan: the folder's pieces belong to another plan.
+            OSError: the folder cannot be made or read.
+        """
+        self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+        wanted = json.loads(json.dumps(plan))
+        path = folder / PLAN
+        if not path.exists():
+            _write(path, wanted)
+        _same(folder, json.loads(path.read_text(encoding="utf-8")), wanted)
+
+    def find(self, task: Task) -> list[Row] | None:
+        """A finished piece; None if it is still to be done."""
+        path = self._path(task)
+        if not path.exists():
+            return None
+        rows: list[Row] = json.loads(path.read_text(encoding="utf-8"))
+        return rows
+
+    def keep(self, task: Task, rows: Sequence[Row]) -> None:
+        """Store a finished piece, whole or not at all."""
+        _write(self._path(task), list(rows))
+
+    def _path(self, task: Task) -> Path:
+        return self.folder / f"{task.key}.json"
+
+
+def _write(path: Path, data: object) -> None:
+    """To a name beside it first, so that a kill leaves no half of a file."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    beside.write_text(json.dumps(data, allow_nan=False), encoding="utf-8")
+    beside.replace(path)
+
+
+def _same(folder: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    differs = [name for name in {**found, **wanted} if found.get(name) != wanted.get(name)]
+    if differs:
+        said = ", ".join(f"{name} was {found.get(name)} and is {wanted.get(name)} now" for name in differs)
+        raise OtherPlan(
+            f"{folder} holds pieces of another plan: {said}. "
+            "Name another folder by --out, or remove this one."
+        )

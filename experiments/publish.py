@@ -1,0 +1,149 @@
+"""What an experiment leaves behind: results.json, a CSV of every trial, figures, and a page of Markdown."""
+
+from __future__ import annotations
+
+import csv
+import json
+import platform
+import subprocess
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from experiments.experiment import Asked, Experiment, Report
+from experiments.findings import Finding
+from experiments.pieces import Row
+
+RESULTS, TRIALS = "results.json", "trials.csv"
+HEADS = ("what", "paper", "ours", "difference", "95 % interval", "agrees")
+AGREES = {True: "yes", False: "**no**", None: "–"}
+LIBRARIES = ("parenting", "torch", "numpy", "joblib")
+
+
+def publish(
+    one: Experiment, asked: Asked, rows: Sequence[Row], out: Path, seconds: float, workers: int
+) -> dict[str, Any]:
+    """Write everything below `out`, and return what stands in results.json.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    folder = out / one.name
+    report = one.report(asked, rows)
+    results = _results(one, asked, report, seconds, workers)
+    _write(folder / RESULTS, json.dumps(results, indent=2) + "\n")
+    _write_rows(folder / TRIALS, rows)
+    drawn = _draw(report, folder)
+    _write(out / f"{one.name}.md", page(results, drawn))
+    return results
+
+
+def command(one: str, asked: Asked) -> str:
+    """What regenerates the page, from the folder of the checkout."""
+    words = ["parenting experiment", one, f"--scale {asked.scale}", f"--trials {asked.trials}"]
+    return " ".join([*words, f"--seed {asked.seed}", f"--device {asked.device}", "--out docs/results"])
+
+
+def _results(one: Experiment, asked: Asked, report: Report, seconds: float, workers: int) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "title": one.title,
+        "section": one.section,
+        "claim": one.claim,
+        "asked": asked._asdict(),
+        "config": dict(one.config(asked)),
+        "findings": [finding.plain() for finding in report.findings],
+        "words": list(report.words),
+        "command": command(one.name, asked),
+        "commit": _commit(),
+        "versions": _versions(),
+        "seconds": round(seconds, 1),
+        "workers": workers,
+    }
+
+
+def _commit() -> str | None:
+    """The commit of the checkout, with a mark if files were changed since; none outside of one."""
+    here = Path(__file__).parent
+    try:
+        said = subprocess.run(
+            ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"],
+            cwd=here,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return said.stdout.strip()
+
+
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+
+
+def _write_rows(path: Path, rows: Sequence[Row]) -> None:
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _draw(report: Report, folder: Path) -> list[str]:
+    """Each figure as SVG and PNG; none where matplotlib (the extra `figures`) is not installed."""
+    if not report.figures or find_spec("matplotlib") is None:
+        return []
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    matplotlib.rcParams["svg.hashsalt"] = "parenting"  # the same numbers give the same file
+    for name, draw in report.figures.items():
+        figure = Figure(figsize=(7, 4.2), layout="constrained")
+        draw(figure)
+        figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
+        figure.savefig(folder / f"{name}.png", dpi=150)
+    return list(report.figures)
+
+
+def page(results: dict[str, Any], figures: Sequence[str]) -> str:
+    """The page of docs/results: the paper's numbers, ours, and how to make them again."""
+    asked, name = results["asked"], results["name"]
+    lines = [f"# {results['title']}", "", f"Sec. {results['section']}. {results['claim']}", ""]
+    lines += _table([Finding(**found) for found in results["findings"]])
+    for figure in figures:
+        lines += ["", f"![{results['title']}: {figure}]({name}/{figure}.svg)"]
+    lines += ["", *(line for words in results["words"] for line in (words, ""))]
+    took = f"{results['seconds']:.0f} s on {results['workers']} process" + "es" * (results["workers"] > 1)
+    lines += [
+        "## Again",
+        "",
+        f"    {results['command']}",
+        "",
+        f"{asked['trials']} trials, seed {asked['seed']}, {took}, "
+        f"torch {results['versions'].get('torch', '?')}, commit {results['commit'] or 'unknown'}. "
+        f"Every trial: [{TRIALS}]({name}/{TRIALS}); the whole: [{RESULTS}]({name}/{RESULTS}).",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _table(findings: Sequence[Finding]) -> list[str]:
+    lines = [f"| {' | '.join(HEADS)} |", "|" + "---|" * len(HEADS)]
+    for one in findings:
+        what = f"{one.what} ({one.note})" if one.note else one.what
+        cells = (what, one.paper, one.ours, one.difference, one.interval, AGREES[one.agrees])
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines

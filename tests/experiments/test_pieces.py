@@ -1,0 +1,106 @@
+"""Pieces are stored whole, belong to one plan, and are never done twice; workers may die."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from experiments.labour import TRIES, WorkersDied, work
+from experiments.pieces import OtherPlan, Row, Store, Task
+
+PLAN = {"experiment": "sums", "seed": 0}
+
+
+def add(first: int, second: int) -> list[Row]:
+    """A piece of work."""
+    return [{"sum": first + second}]
+
+
+def die_once(mark: str) -> list[Row]:
+    """Killed at the first try, as for want of memory."""
+    if not Path(mark).exists():
+        Path(mark).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return [{"sum": 0}]
+
+
+def die() -> list[Row]:
+    """Killed each time."""
+    os.kill(os.getpid(), signal.SIGKILL)
+    return []
+
+
+def refuse(first: int, second: int) -> list[Row]:
+    """What is done already is not to be done again."""
+    raise AssertionError("done twice")
+
+
+def task(first: int, call: str = "add") -> Task:
+    return Task(f"piece-{first}", f"{__name__}:{call}", {"first": first, "second": 1})
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return Store(tmp_path / "pieces", PLAN)
+
+
+@pytest.fixture
+def importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Worker processes find this module by its name."""
+    root = Path(__file__).parents[2]
+    monkeypatch.setenv("PYTHONPATH", str(root))
+
+
+def test_rows_come_in_the_order_of_the_tasks(store: Store) -> None:
+    assert work([task(3), task(1), task(2)], store, 1) == [{"sum": 4}, {"sum": 2}, {"sum": 3}]
+
+
+def test_what_is_done_is_not_done_again(store: Store) -> None:
+    work([task(1), task(2)], store, 1)
+    told: list[str] = []
+    rows = work(
+        [task(1, "refuse"), task(2, "refuse"), task(5)], store, 1, told=lambda one: told.append(one.key)
+    )
+    assert rows == [{"sum": 2}, {"sum": 3}, {"sum": 6}]
+    assert told == ["piece-1", "piece-2", "piece-5"]
+
+
+def test_a_piece_that_was_not_renamed_is_no_piece(store: Store) -> None:
+    (store.folder / ".piece-1.json.99").write_text('[{"sum": 9')
+    assert store.find(task(1)) is None
+
+
+def test_another_plan_is_refused(store: Store) -> None:
+    Store(store.folder, PLAN)
+    with pytest.raises(OtherPlan, match=r"seed was 0 and is 1 now\. Name another folder by --out"):
+        Store(store.folder, {**PLAN, "seed": 1})
+
+
+def test_numbers_that_are_none_are_refused(store: Store) -> None:
+    with pytest.raises(ValueError, match="JSON"):
+        store.keep(task(1), [{"sum": float("nan")}])
+    assert store.find(task(1)) is None
+    assert json.loads((store.folder / "plan.json").read_text()) == PLAN
+
+
+@pytest.mark.usefixtures("importable")
+def test_processes_do_the_same(store: Store) -> None:
+    assert work([task(number) for number in range(4)], store, 2) == [{"sum": n + 1} for n in range(4)]
+
+
+@pytest.mark.usefixtures("importable")
+def test_a_worker_that_dies_costs_its_piece_only(store: Store, tmp_path: Path) -> None:
+    fatal = Task("fatal", f"{__name__}:die_once", {"mark": str(tmp_path / "mark")})
+    rows = work([task(1), fatal, task(2)], store, 2)
+    assert rows == [{"sum": 2}, {"sum": 0}, {"sum": 3}]
+
+
+@pytest.mark.usefixtures("importable")
+def test_workers_that_always_die_are_said(store: Store) -> None:
+    with pytest.raises(WorkersDied, match=rf"died {TRIES} times and no piece was done\..*smaller chunks"):
+        work([Task("fatal", f"{__name__}:die", {}), task(1)], store, 2)
+    assert store.find(task(1)) == [{"sum": 2}]

@@ -1,0 +1,59 @@
+"""Table 1 in small: real trials through the command's own way, resumed, and its page."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from commands.main import app
+from experiments.catalogue import NAMES, experiment
+from experiments.experiment import Asked, spans
+from experiments.publish import page
+
+run = CliRunner().invoke
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_says_what_it_is(name: str) -> None:
+    one = experiment(name)
+    assert one.name == name
+    assert one.trials["quick"] < one.trials["paper"]
+    keys = [task.key for task in one.tasks(Asked(120))]
+    assert len(keys) == len(set(keys))
+
+
+def test_spans_cover_every_trial_once() -> None:
+    assert [list(span) for span in spans(5, 2)] == [[0, 1], [2, 3], [4]]
+
+
+def test_the_order_of_the_four_algorithms(tmp_path: Path) -> None:
+    arguments = ["experiment", "table1", "--trials", "6", "--workers", "1", "--out", str(tmp_path)]
+    said = run(app, arguments)
+    assert said.exit_code == 0, said.output
+    results = json.loads((tmp_path / "table1/results.json").read_text())
+    found = {one["what"]: float(one["ours"].split()[0]) for one in results["findings"]}
+    names = ("Traditional RL", "Direct policy learning", "Lax parenting", "Conservative parenting")
+    deaths = [found[f"{name}: deaths"] for name in names]
+    assert deaths == sorted(deaths, reverse=True)
+    assert deaths[0] > 10 * deaths[1] > 10 * deaths[2]
+    rows = list(csv.DictReader((tmp_path / "table1/trials.csv").read_text().splitlines()))
+    assert len(rows) == 24
+    assert (tmp_path / "table1.md").read_text() == page(results, ())
+    before = [path.stat().st_mtime_ns for path in sorted((tmp_path / "table1/pieces").iterdir())]
+    assert run(app, arguments).exit_code == 0
+    assert [path.stat().st_mtime_ns for path in sorted((tmp_path / "table1/pieces").iterdir())] == before
+
+
+def test_wrong_names_and_other_plans_are_sentences(tmp_path: Path) -> None:
+    said = run(app, ["experiment", "bogus"])
+    assert said.exit_code == 2
+    assert "There is no experiment 'bogus'; there is: table1" in said.output
+    arguments = ["experiment", "table1", "--trials", "1", "--workers", "1", "--out", str(tmp_path)]
+    assert run(app, arguments).exit_code == 0
+    said = run(app, [*arguments, "--seed", "1"])
+    assert said.exit_code == 2
+    assert "seed was 0 and is 1 now" in said.output
