@@ -1,0 +1,115 @@
+"""docs/deployment.md: its commands work, its unit is one, and it names what there is."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from server.app import create_app
+from server.db import Database, connect, sqlite_module
+from server.runs import list_runs, set_status
+from server.schema import require, upgrade
+from server.settings import Settings
+from server.starting import NewRun, start
+from tests.services import read_compose
+from tests.tree import ROOT
+
+TEXT = (ROOT / "docs/deployment.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def db(tmp_path: Path) -> Iterator[Database]:
+    """A data folder with two runs in its database."""
+    database = connect(Settings(data=tmp_path, database_url=None))
+    upgrade(database)
+    for name in ("first", "second"):
+        start(database, NewRun(world="unsafe-exploration", name=name))
+    yield database
+    database.close()
+
+
+@contextmanager
+def writing(db: Database) -> Iterator[None]:
+    """Somebody else pauses and resumes a run meanwhile, as fast as he can."""
+    done, wrote = threading.Event(), threading.Event()
+
+    def write() -> None:
+        while not done.is_set():
+            for status in ("paused", "active"):
+                set_status(db, 1, status)
+            wrote.set()
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        assert wrote.wait(30)
+        yield
+    finally:
+        done.set()
+        writer.join()
+
+
+def back_up(folder: Path) -> subprocess.CompletedProcess[str]:
+    """The documented command, in the data folder, with the python that has Parenting."""
+    (command,) = re.findall(r"^ {4}(python -c .*VACUUM INTO.*)$", TEXT, re.MULTILINE)
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(["sh", "-c", command], cwd=folder, env=environment, capture_output=True, text=True)
+
+
+def test_backup_is_whole_while_others_write(db: Database, tmp_path: Path) -> None:
+    with writing(db):
+        done = back_up(tmp_path)
+    assert done.returncode == 0, done.stderr
+    copy = tmp_path / "backup.db"
+    with sqlite_module().connect(str(copy)) as found:
+        assert found.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+    found.close()
+    again = connect(Settings(data=tmp_path, database_url=f"sqlite:///{copy}"))
+    require(again)
+    assert [run.name for run in list_runs(again)] == ["second", "first"]
+    again.close()
+
+
+def test_backup_overwrites_nothing(db: Database, tmp_path: Path) -> None:
+    (tmp_path / "backup.db").write_text("an earlier one")
+    assert back_up(tmp_path).returncode != 0
+    assert (tmp_path / "backup.db").read_text() == "an earlier one"
+
+
+def test_backup_of_nothing_fails_and_makes_nothing(tmp_path: Path) -> None:
+    assert back_up(tmp_path).returncode != 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_unit_is_one(tmp_path: Path) -> None:
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("this system has no systemd")
+    (unit,) = re.findall(r"^```ini\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+    folder = Path(sys.executable).parent
+    file = tmp_path / "parenting.service"
+    file.write_text(unit.replace("/opt/parenting/bin", str(folder)))
+    assert f"ExecStart={folder}/parenting up --no-browser\n" in file.read_text()
+    done = subprocess.run(["systemd-analyze", "verify", str(file)], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_it_names_every_service_and_endpoint(db: Database, tmp_path: Path) -> None:
+    app = create_app(Settings(data=tmp_path, database_url=None), db)
+    endpoints = [path for path in app.openapi()["paths"] if not path.startswith("/api/")]
+    assert len(endpoints) > 1
+    names = [*read_compose()["services"], *endpoints]
+    assert [name for name in names if f"\n| `{name}` |" not in TEXT] == []
+
+
+def test_the_readme_leads_to_it() -> None:
+    assert (
+        "(docs/deployment.md)" in (ROOT / "README.md").read_text(encoding="utf-8").partition("## Read on")[2]
+    )
