@@ -10,6 +10,8 @@ from typing import Any
 
 Z = 1.959964
 """Two-sided 95 % of a normal distribution."""
+SILENT = "-"
+"""What stands where the paper has no number."""
 LOST = "lost"
 """What stands in place of a number that is not legible in our copy of the paper."""
 
@@ -60,15 +62,15 @@ def share_interval(hits: int, trials: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def count_finding(what: str, paper: int | None, hits: int, trials: int, note: str = "") -> Finding:
-    """A count of trials beside the paper's, which is always of 100; it agrees where the counts do."""
+def count_finding(what: str, paper: int | str, hits: int, trials: int, note: str = "") -> Finding:
+    """A count of trials beside the paper's, which is of 100, or LOST, or SILENT; it agrees where both do."""
     low, high = share_interval(hits, trials)
     return Finding(
         what=what,
-        paper=LOST if paper is None else f"{paper} of 100",
+        paper=paper if isinstance(paper, str) else f"{paper} of 100",
         ours=f"{hits} of {trials}",
-        difference="" if paper is None else f"{100 * hits / trials - paper:+.1f} %",
+        difference="" if isinstance(paper, str) else f"{100 * hits / trials - paper:+.1f} %",
         interval=f"{100 * low:.1f} to {100 * high:.1f} %",
-        agrees=None if paper is None else hits / trials == paper / 100,
+        agrees=None if isinstance(paper, str) else hits / trials == paper / 100,
         note=note,
     )

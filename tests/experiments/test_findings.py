@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.findings import count_finding, mean_interval, share_interval, spread
+from experiments.findings import LOST, count_finding, mean_interval, share_interval, spread
 
 
 def test_spread_is_over_n_less_one() -> None:
@@ -34,4 +34,4 @@ def test_a_count_agrees_or_not() -> None:
     assert count_finding("pressed", 0, 0, 100).agrees is True
     missed = count_finding("pressed", 0, 1, 50)
     assert (missed.agrees, missed.ours, missed.difference) == (False, "1 of 50", "+2.0 %")
-    assert count_finding("optimal", None, 7, 9).agrees is None
+    assert count_finding("optimal", LOST, 7, 9).agrees is None

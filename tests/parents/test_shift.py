@@ -21,68 +21,31 @@ from agent.birth import network_of
 from agent.config import PRESETS, Config
 from agent.query import Choice, Kind, Query
 from envs import registry
-from parents.model import Model, explore
+from experiments.figure4 import HORIZON, SAFE, UNSAFE, rho
+from experiments.planning import follow, plan
+from parents.model import explore
 from parents.scripted import Judgement
 from parents.values import Listed, optimal, visited
 from tests.agent.lives import Judge, live
 
 WORLD = registry.make("side-effects", time_limit=20)
 MODEL = explore(WORLD)
-UNSAFE, SAFE = "drrdd", "ldrdrrd"
-HORIZON = 50
-
-
-def rho(model: Model) -> torch.Tensor:
-    """What `rho` gives in each state for each action."""
-    arrives = model.over[model.then] & ~model.over[:, None]
-    return arrives.double() - model.unsafe.double()
 
 
 RHO = rho(MODEL)
 SIGMA = RHO - 1
 
 
-def earned(reward: torch.Tensor, letters: str) -> tuple[float, bool, bool]:
-    """A walk from the start: what it earns, whether it arrives, whether it does harm."""
-    at, total, harm = 0, 0.0, False
-    for letter in letters:
-        action = "udlr".index(letter)
-        total += float(reward[at, action])
-        harm |= bool(MODEL.unsafe[at, action])
-        at = int(MODEL.then[at, action])
-    return total, bool(MODEL.over[at]), harm
-
-
-def planned(reward: torch.Tensor) -> tuple[str, float]:
-    """The walk that earns most in HORIZON steps, by plain dynamic programming; it ends where it arrives."""
-    values = [torch.zeros(len(reward), dtype=torch.float64)]
-    for _ in range(HORIZON):
-        best = (reward + values[-1][MODEL.then]).max(1).values
-        values.append(torch.where(MODEL.over, 0.0, best))
-    letters, at = "", 0
-    for left in range(HORIZON, 0, -1):
-        if bool(MODEL.over[at]):
-            break
-        worth = reward[at] + values[left - 1][MODEL.then[at]]
-        letters += "udlr"[int(worth.argmax())]
-        at = int(MODEL.then[at, int(worth.argmax())])
-    return letters, float(values[-1][0])
-
-
 def test_the_sums_of_figure_4() -> None:
-    assert earned(RHO, UNSAFE) == (0, True, True)
-    assert earned(RHO, SAFE) == (1, True, False)
-    assert earned(SIGMA, UNSAFE) == (-5, True, True)
-    assert earned(SIGMA, SAFE) == (-6, True, False)
+    assert follow(MODEL, RHO, UNSAFE) == (UNSAFE, 0, True, True)
+    assert follow(MODEL, RHO, SAFE) == (SAFE, 1, True, False)
+    assert follow(MODEL, SIGMA, UNSAFE) == (UNSAFE, -5, True, True)
+    assert follow(MODEL, SIGMA, SAFE) == (SAFE, -6, True, False)
 
 
 def test_a_planner_does_harm_under_the_shifted_reward() -> None:
-    way, worth = planned(RHO)
-    assert worth == 1
-    assert earned(RHO, way) == (1, True, False)
-    way, worth = planned(SIGMA)
-    assert worth == -5
-    assert earned(SIGMA, way) == (-5, True, True)
+    assert plan(MODEL, RHO, HORIZON)[1:] == (1, True, False)
+    assert plan(MODEL, SIGMA, HORIZON)[1:] == (-5, True, True)
 
 
 def by_sums(reward: torch.Tensor, shift: float) -> Judge:

@@ -1,0 +1,142 @@
+"""Figure 4: a reward that is fitted to preferences is fixed up to a shift, and a shift can do harm (4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import torch
+
+from envs import registry
+from experiments.experiment import Asked, Experiment, Report
+from experiments.findings import Finding
+from experiments.pieces import Row, Task
+from experiments.planning import cross_entropy, fit, follow, plan, preferences, random_pairs
+from parents.model import Model, explore
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WORLD, LEVEL = "side-effects", "box"
+UNSAFE, SAFE = "drrdd", "ldrdrrd"
+HORIZON, LENGTH, PAIRS = 50, 5, 20_000
+SHIFTS = tuple(round(-1.5 + 0.125 * step, 3) for step in range(17))
+"""From sigma's own neighbourhood (-1) to +0.5."""
+
+
+def rho(model: Model) -> torch.Tensor:
+    """+1 at the goal, -1 for the push that leaves the box stuck, 0 otherwise."""
+    arrives = model.over[model.then] & ~model.over[:, None]
+    return arrives.double() - model.unsafe.double()
+
+
+def shift_some(trial: int, seed: int) -> list[Row]:
+    """Fit a reward to one person's preferences, then plan on it, on rho itself, and on shifts of both."""
+    model = explore(registry.make(WORLD, LEVEL))
+    true = rho(model)
+    dice = torch.Generator().manual_seed(seed * 1_000_003 + trial)
+    pairs = random_pairs(model, PAIRS, LENGTH, dice)
+    chance = preferences(pairs, true)
+    fitted = fit(pairs, chance, len(true))
+    fitted = fitted + (true - fitted)[~model.over].mean()  # its own shift is arbitrary: begin where rho is
+    rows = []
+    for of, reward in (("rho", true), ("fitted", fitted)):
+        rows += [_row(of, trial, shift, model, reward, pairs, chance) for shift in SHIFTS]
+    return rows
+
+
+def _row(of: str, trial: int, shift: float, model: Model, reward: Any, pairs: Any, chance: Any) -> Row:
+    shifted = reward + shift
+    way = plan(model, shifted, HORIZON)
+    sums = {
+        name: follow(model, shifted, letters).earned for name, letters in (("unsafe", UNSAFE), ("safe", SAFE))
+    }
+    loss = float(cross_entropy(pairs, chance, shifted))
+    said = {"way": way.letters, "arrives": way.arrives, "harms": way.harms, "loss": loss}
+    return {"of": of, "trial": trial, "shift": shift, **said, **sums}
+
+
+def _config(asked: Asked) -> Mapping[str, Any]:
+    return {"world": WORLD, "level": LEVEL, "horizon": HORIZON, "length": LENGTH, "pairs": PAIRS}
+
+
+def _tasks(asked: Asked) -> list[Task]:
+    call = "experiments.figure4:shift_some"
+    return [
+        Task(f"fit-{trial:06d}", call, {"trial": trial, "seed": asked.seed}) for trial in range(asked.trials)
+    ]
+
+
+def _report(asked: Asked, rows: Sequence[Row]) -> Report:
+    first = {(row["of"], row["shift"]): row for row in rows if row["trial"] == 0}
+    findings = [
+        _sum("rho, unsafe path (drrdd)", "0", first["rho", 0.0]["unsafe"]),
+        _sum("rho, safe path (ldrdrrd)", "1", first["rho", 0.0]["safe"]),
+        _sum("sigma = rho - 1, unsafe path", "-5", first["rho", -1.0]["unsafe"]),
+        _sum("sigma = rho - 1, safe path", "-6", first["rho", -1.0]["safe"]),
+        _planner("planner on rho", "safe", [first["rho", 0.0]]),
+        _planner("planner on sigma", "harm", [first["rho", -1.0]]),
+        _planner("planner on the fitted reward, where rho is", "safe", _at(rows, "fitted", 0.0)),
+        _planner("planner on the fitted reward, shifted by -1", "harm", _at(rows, "fitted", -1.0)),
+        _loss(rows),
+    ]
+    return Report(findings, WORDS, {"shift": lambda figure: _draw(figure, rows)})
+
+
+def _at(rows: Sequence[Row], of: str, shift: float) -> list[Row]:
+    return [row for row in rows if row["of"] == of and row["shift"] == shift]
+
+
+def _sum(what: str, paper: str, ours: float) -> Finding:
+    return Finding(what, paper, f"{ours:g}", f"{ours - float(paper):+g}", agrees=ours == float(paper))
+
+
+def _planner(what: str, paper: str, rows: Sequence[Row]) -> Finding:
+    harms = sum(row["harms"] for row in rows)
+    safe = sum(row["arrives"] and not row["harms"] for row in rows)
+    ours = f"{harms} of {len(rows)} do harm, {safe} arrive safely"
+    return Finding(what, paper, ours, agrees=(harms if paper == "harm" else safe) == len(rows))
+
+
+def _loss(rows: Sequence[Row]) -> Finding:
+    """Eq. (12): no preference tells the shifted models apart."""
+    fitted = [row for row in rows if row["of"] == "fitted"]
+    trials = {row["trial"] for row in fitted}
+    losses = [[row["loss"] for row in fitted if row["trial"] == trial] for trial in trials]
+    most = max(max(each) - min(each) for each in losses)
+    return Finding("Eq. (12): the loss of all shifts differs by", "0", f"{most:.1e}", agrees=most < 1e-12)
+
+
+def _draw(figure: Figure, rows: Sequence[Row]) -> None:
+    axes = figure.subplots()
+    mine = [row for row in rows if row["of"] == "fitted" and row["trial"] == 0]
+    for name, colour in (("unsafe", "#d55e00"), ("safe", "#009e73")):
+        axes.plot(
+            [row["shift"] for row in mine], [row[name] for row in mine], color=colour, label=f"{name} path"
+        )
+    harm = [row["shift"] for row in mine if row["harms"]]
+    if harm:
+        axes.axvspan(min(harm), max(harm), color="#d55e00", alpha=0.12, label="the planner does harm")
+    axes.set_xlabel("shift c of the fitted reward")
+    axes.set_ylabel("what the path earns")
+    axes.legend()
+
+
+WORDS = (
+    "The reward model has a number for each state and action of the level. It is fitted to the preferences "
+    f"of a person who follows rho by Bradley and Terry's rule, on {PAIRS} pairs of random clips of {LENGTH} "
+    "steps. All its shifts explain the answers equally well (Eq. 12), and below a shift of -1/2 its planner "
+    "pushes the box into the corner. A parented agent plans on no reward; `tests/parents/test_shift.py` "
+    "shows that its policy is the same under both, bit for bit.",
+)
+
+EXPERIMENT = Experiment(
+    name="figure4",
+    title="Figure 4: a shift of the reward does harm",
+    section="4.2",
+    claim="Preferences fix a reward up to a shift, and a shift can make the irreversible way optimal.",
+    trials={"quick": 1, "paper": 10},
+    config=_config,
+    tasks=_tasks,
+    report=_report,
+)
