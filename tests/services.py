@@ -90,4 +90,4 @@ class Stack:
         end = time.monotonic() + seconds
         while self.check(name, before) != 0:
             assert time.monotonic() < end, f"{name} did not become healthy"
-            time.sleep(0.5)
+            time.sleep(1)  # the worker's check alone takes a second of work

@@ -1,6 +1,8 @@
 """`parenting worker --check`: what a container's health check asks."""
 
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -13,6 +15,7 @@ from server.db import Database, connect
 from server.schema import upgrade
 from server.settings import Settings
 from server.workers import sign, sign_off
+from tests.tree import ROOT
 
 HERE = f"{socket.gethostname()}:7"
 
@@ -74,3 +77,10 @@ def test_tables_are_missing(empty: Database) -> None:
     said = check()
     assert said.exit_code == 2
     assert said.stderr.endswith("has no tables yet. Run: parenting migrate\n")
+
+
+def test_the_check_loads_no_torch() -> None:
+    """It is asked once a minute."""
+    code = "import sys, commands.worker; assert 'torch' not in sys.modules"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
