@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from importlib.util import find_spec
-from pathlib import Path
-from typing import Any
 
 import structlog
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, JSONResponse
-from fastapi.staticfiles import StaticFiles
+from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 import server.api
 import server.pages
+from server.api.described import Described
+from server.api.replies import tells
 from server.db import Database, connect
 from server.deps import Db
 from server.errors import (
@@ -33,13 +31,22 @@ from server.guard import Guard
 from server.schema import require
 from server.settings import Settings
 from server.starting import messages
+from server.static import OthersFiles, OurFiles
 from server.streams import Streams
 from server.wake import Bell
 from server.workers import alive
 
-STATIC = Path(__file__).parents[1] / "web" / "static"
 LARGEST_BODY = 64 * 1024
-WEEK = 7 * 24 * 3600
+ABOUT = """Start a run, lease its questions, answer them, watch how the agent learns, export what was said.
+
+Bodies are JSON and strict: an unknown field is refused. Every error has one shape. Lists come in pages:
+the `next` of one page is the cursor of the following. No GET changes anything."""
+TAGS = [
+    {"name": "runs", "description": "Start them, look at them, read what they did."},
+    {"name": "operator", "description": "What whoever runs the experiment may do to a living agent."},
+    {"name": "questions", "description": "What the agent asks its parent, and the parent's answers."},
+    {"name": "health", "description": "For whoever watches over the processes."},
+]
 
 log = structlog.get_logger()
 
@@ -52,10 +59,14 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     """
     db = connect(settings) if db is None else db
     require(db)
-    app = FastAPI(
+    app = Described(
         title="Parenting",
+        version="1",
+        description=ABOUT,
+        openapi_tags=TAGS,
         openapi_url="/api/v1/openapi.json",
-        docs_url=None,  # FastAPI's own pages load from another origin
+        generate_unique_id_function=lambda route: route.name,
+        docs_url=None,  # FastAPI's own pages load from another origin; ours is server.pages.docs
         redoc_url=None,
         lifespan=_lifespan,
     )
@@ -67,7 +78,8 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     _add_health(app)
     app.include_router(server.api.router)
     app.include_router(server.pages.router)
-    _add_static(app)
+    app.mount("/static/vendor", OthersFiles())
+    app.mount("/static", OurFiles(), name="static")
     return app
 
 
@@ -113,13 +125,17 @@ def _reply(request: Request, error: ServerError, headers: dict[str, str] | None 
 
 
 def _add_health(app: FastAPI) -> None:
-    @app.get("/healthz", tags=["health"])
+    fine = {"status": "ok"}
+    ready = {"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}
+    errors = (400, 413, 500)
+
+    @app.get("/healthz", summary="Ask for life", tags=["health"], responses=tells(*errors))
     def healthz() -> dict[str, str]:
         """This process answers."""
-        return {"status": "ok"}
+        return fine
 
-    @app.get("/readyz", tags=["health"])
-    def readyz(db: Db) -> dict[str, Any]:
+    @app.get("/readyz", summary="Ask for readiness", tags=["health"], responses=tells(*errors, 503))
+    def readyz(db: Db) -> dict[str, str]:
         """The database answers, its tables are up to date, and a worker gives signs of life; else 503."""
         try:
             require(db)
@@ -127,22 +143,4 @@ def _add_health(app: FastAPI) -> None:
             raise NotReady(error.message) from None
         if not alive(db):
             raise NotReady("No worker gives a sign of life. Start one: parenting worker")
-        return {"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}
-
-
-def _add_static(app: FastAPI) -> None:
-    plotly = find_spec("plotly")  # found, not imported: it takes a second
-    folders = [] if plotly is None else plotly.submodule_search_locations or []
-    script = next(
-        (path for folder in folders if (path := Path(folder, "package_data/plotly.min.js")).is_file()), None
-    )
-
-    @app.get("/static/vendor/plotly.min.js", include_in_schema=False)
-    def plotly_script() -> FileResponse:
-        if script is None:
-            raise NotFound("The charts' library is not installed. Run: pip install plotly")
-        return FileResponse(
-            script, media_type="text/javascript", headers={"Cache-Control": f"public, max-age={WEEK}"}
-        )
-
-    app.mount("/static", StaticFiles(directory=STATIC), name="static")
+        return ready

@@ -4,26 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 
-from agent.config import Config
+from agent.config import Config, Inside
 from server.db import Database
-from server.runs import OVER, Open, find, list_runs, open_by_run, open_in
-from server.tables import Metric, Query, Run
+from server.runs import OVER, Open, find, open_by_run, open_in
+from server.tables import Answer, Metric, Query, Run
 
 SILENT_AFTER = timedelta(seconds=5)
 
+# The words of server.tables, as types: a test holds them equal.
+RunStatus = Literal["active", "paused", "stopped", "finished", "failed"]
+QueryStatus = Literal["open", "answered", "applied", "withdrawn"]
+Waiting = Literal["guidance", "preferences", "stuck"]
+Kind = Literal["guidance", "preference"]
+Choice = Literal["left", "right", "either", "neither"]
+By = Literal["human", "scripted"]
 
-class OpenShape(BaseModel):
+
+class Shape(BaseModel):
+    """The root of all shapes: the sentence under a field describes it in the API's own description."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+
+class OpenShape(Shape):
     """How many questions wait for an answer, by kind."""
 
     guidance: int
     preference: int
 
 
-class RunShape(BaseModel):
+class RunShape(Shape):
     """A run as it is now."""
 
     id: int
@@ -33,18 +47,24 @@ class RunShape(BaseModel):
     level: str
     preset: str
     config: dict[str, Any]
+    """Every hyperparameter as the run was started with it; changes since then are operator's events."""
     seed: int
     weights: str | None
     """The SHA-256 of the pre-trained weights that the agent began with; null: fresh ones."""
-    parent: str
-    status: str
+    parent: By
+    status: RunStatus
     reason: str | None
+    """Why it is over, in a sentence."""
     tick: int
+    """The last tick, as last reported."""
     maturity: int
     """The stage T that the agent is in (Sec. 2.4), as last reported."""
     speed: float | None
     """Ticks a second, as last measured."""
-    waiting: str | None
+    waiting: Waiting | None
+    """Whom it waits for: its parent's guidance, fewer open preference questions, or the operator (*stuck*:
+    no action was acceptable, so the episode has to be ended); null while it lives.
+    """
     goal: int | None
     """Answered questions after which the run rests; null: never."""
     resting: bool
@@ -52,66 +72,86 @@ class RunShape(BaseModel):
     pace: float | None
     """Ticks a second at most; null: as fast as it can."""
     optimal: bool
+    """The policy without chance takes a shortest safe path to the goal (never in the garden)."""
     answers: int
+    """Answers so far, corrections counted."""
     open: OpenShape
-    worker: str
+    worker: Literal["alive", "silent", "done"]
     """alive, silent (none raises this run just now), or done (the run is over)."""
 
 
-class FrameShape(BaseModel):
+class FrameShape(Shape):
     """One moment of a clip: glyphs as they were true and as the agent saw them, and the pieces."""
 
     ground: list[str]
+    """What was true, without agent and box: a string of glyphs a row."""
     observed: list[str]
+    """What the agent saw."""
     agent: tuple[int, int]
+    """Row and column."""
     box: tuple[int, int] | None
 
 
-class ClipShape(BaseModel):
+class ClipShape(Shape):
     """A clip: `length` actions between `length + 1` frames."""
 
-    actions: list[str]
+    actions: list[Literal["up", "down", "left", "right"]]
     length: int
     frames: list[FrameShape]
 
 
-class QueryShape(BaseModel):
+class PolicyShape(Shape):
+    """Which policy asked; null for questions that were asked before this was kept."""
+
+    stage: int | None
+    gradient_steps: int | None
+    """Within its stage."""
+
+
+class QueryShape(Shape):
     """A question: two clips, of which the parent prefers left, right, either or neither."""
 
     id: int
     run: int
     tick: int
-    kind: str
+    """The tick at which the agent asked."""
+    kind: Kind
     maturity: int
-    status: str
+    """The stage T that the clips were recorded at; 1 for guidance."""
+    policy: PolicyShape
+    status: QueryStatus
     posted: datetime
     leased_until: datetime | None
+    """Until then it is offered to nobody else."""
     left: ClipShape
     right: ClipShape
 
 
-class WorldShape(BaseModel):
+class WorldShape(Shape):
     """All that is needed to draw a clip, and to answer it without knowing the world's code."""
 
     name: str
     level: str
     text: str
+    """The level's file, header included."""
     legend: dict[str, str]
+    """What each glyph is."""
     brief: dict[str, str]
+    """The goal and the danger, a sentence each."""
 
 
-class ProgressShape(BaseModel):
+class ProgressShape(Shape):
     """How far the parent is."""
 
     answered: int
     open: int
 
 
-class ParentShape(BaseModel):
+class ParentShape(Shape):
     """What the parent's own values depend on: Eq. (7)'s gamma, and the garden's way inside (Sec. 3.3)."""
 
     gamma: float
-    inside: str
+    inside: Inside
 
 
 class LeasedShape(QueryShape):
@@ -122,28 +162,39 @@ class LeasedShape(QueryShape):
     progress: ProgressShape
 
 
-class StoredShape(BaseModel):
+class StoredShape(Shape):
     """The reply to an answer; the same answer always gets the same reply."""
 
     query: int
     run: int
     number: int
-    choice: str
+    """Which answer of the run it is, from 1 on."""
+    choice: Choice
     received: datetime
 
 
-class MetricShape(BaseModel):
+class AnswerShape(Shape):
+    """The answer that stands for a question."""
+
+    number: int
+    choice: Choice
+    parent: By
+    received: datetime
+    applied_tick: int | None
+    """The tick at which the agent heard it; null: not yet."""
+
+
+class AskedShape(QueryShape):
+    """A question with its answer, if one stands."""
+
+    answer: AnswerShape | None
+
+
+class MetricShape(Shape):
     """What was measured at one tick; null where a number was not finite."""
 
     tick: int
     values: dict[str, float | int | None]
-
-
-class MetricsShape(BaseModel):
-    """Metrics in the order of their ticks; `more` says that there are further ones after the last."""
-
-    rows: list[MetricShape]
-    more: bool
 
 
 def shape_run(db: Database, run_id: int) -> RunShape:
@@ -156,9 +207,8 @@ def shape_run(db: Database, run_id: int) -> RunShape:
         return _shape(find(session, run_id), open_in(session, run_id), db.clock())
 
 
-def shape_runs(db: Database) -> list[RunShape]:
-    """The runs as they are now, newest first (at most 200)."""
-    runs = list_runs(db)
+def shape_runs(db: Database, runs: Sequence[Run]) -> list[RunShape]:
+    """Runs as they are now."""
     with db.read() as session:
         opened = open_by_run(session, [run.id for run in runs])
     return [_shape(run, opened[run.id], db.clock()) for run in runs]
@@ -167,7 +217,16 @@ def shape_runs(db: Database) -> list[RunShape]:
 def shape_query(query: Query) -> QueryShape:
     """A question as it is stored."""
     names = ("id", "tick", "kind", "maturity", "status", "posted", "leased_until")
-    return QueryShape(run=query.run_id, **{name: getattr(query, name) for name in names}, **query.clips)
+    policy = PolicyShape(stage=query.policy_stage, gradient_steps=query.policy_steps)
+    own = {name: getattr(query, name) for name in names}
+    return QueryShape(run=query.run_id, policy=policy, **own, **query.clips)
+
+
+def shape_asked(query: Query, answer: Answer | None) -> AskedShape:
+    """A question as it is stored, and the answer that stands for it."""
+    names = ("number", "choice", "parent", "received", "applied_tick")
+    said = None if answer is None else AnswerShape(**{name: getattr(answer, name) for name in names})
+    return AskedShape(**shape_query(query).model_dump(), answer=said)
 
 
 def shape_leased(db: Database, query: Query) -> LeasedShape:
@@ -200,7 +259,7 @@ def _shape(run: Run, opened: Open, now: datetime) -> RunShape:
     return RunShape(**own, open=shown, worker=_worker(run, now), resting=resting)
 
 
-def _worker(run: Run, now: datetime) -> str:
+def _worker(run: Run, now: datetime) -> Literal["alive", "silent", "done"]:
     if run.status in OVER:
         return "done"
     late = run.heartbeat is None or now - run.heartbeat > SILENT_AFTER

@@ -58,8 +58,8 @@ Name = Annotated[
 LevelText = Annotated[
     str, StringConstraints(min_length=1, max_length=LEVEL_CHARACTERS), AfterValidator(_plain)
 ]
-Seed = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=LARGEST_INT)]
-Goal = Annotated[int, BeforeValidator(_whole), Field(ge=1, le=1_000_000)]
+Seed = Annotated[int, Field(ge=0, le=LARGEST_INT), BeforeValidator(_whole)]
+Goal = Annotated[int, Field(ge=1, le=1_000_000), BeforeValidator(_whole)]
 Pace = Annotated[float, Field(gt=0, le=1000)]
 Integer = Annotated[int, Field(ge=-LARGEST_INT, le=LARGEST_INT)]
 Setting = bool | Integer | float | Name | None

@@ -1,11 +1,11 @@
-"""The API under /api/v1: thin routes over the verbs of `server.runs`, `queue` and `record`."""
+"""The API under /api/v1: thin routes over the verbs of `server.runs`, `queue`, `record` and `listing`."""
 
 from __future__ import annotations
 
 from fastapi import APIRouter
 
-from server.api import queries, runs, streams
+from server.api import operator, queries, runs, streams
 
 router = APIRouter(prefix="/api/v1")
-for part in (runs, queries, streams):
+for part in (runs, operator, queries, streams):
     router.include_router(part.router)

@@ -1,30 +1,46 @@
-"""Routes on questions: lease the most urgent, look at one, answer it."""
+"""Routes on questions: list them, look at one, lease the most urgent, answer it, let go of it."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import Annotated
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
 
-from server.api.words import AnswerBody, LeaseBody, QueryId, RunId, errors
+from server import listing
+from server.api.lists import AskedPart, AskedRows
+from server.api.replies import acts, looks
+from server.api.words import AnswerBody, LeaseBody, QueryId, RunId
 from server.deps import Db, SettingsOf, ring
-from server.queue import answer, get_query, lease
+from server.queue import answer, lease, release
 from server.runs import get_run
-from server.shapes import LeasedShape, QueryShape, StoredShape, shape_leased, shape_query
+from server.shapes import AskedShape, LeasedShape, StoredShape, shape_asked, shape_leased
 
 router = APIRouter(tags=["questions"])
 
 
+@router.get("/runs/{run_id}/queries", summary="List a run's questions", responses=looks(404))
+def list_questions(run_id: RunId, db: Db, part: Annotated[AskedPart, Query()]) -> AskedRows:
+    """What the run asked, oldest first, with the answers that stand.
+
+    The `next` of a page goes back as `after`.
+    """
+    page = listing.asked_after(db, run_id, part.after, part.limit, part.status)
+    return AskedRows(rows=[shape_asked(row.query, row.answer) for row in page.rows], next=page.next)
+
+
 @router.post(
     "/runs/{run_id}/queries/lease",
+    summary="Lease the next question",
     response_model=LeasedShape,
-    responses={204: {"description": "No question waits."}, **errors(403, 404)},
+    responses={204: {"description": "No question waits."}, **acts(404)},
 )
-def lease_next(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf) -> Response:
-    """The most urgent open question, guidance first, held for this client; 204 if there is none.
+def lease_question(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf) -> Response:
+    """The most urgent open question, guidance first, then the oldest, held for this client for 60 s.
 
-    Leasing again renews.
+    It comes with all that a parent needs to answer it. Leasing again renews. 204 if nothing waits, or if the
+    run has reached its goal.
     """
     get_run(db, run_id)
     query = lease(db, run_id, body.client_id, settings.lease_seconds)
@@ -33,15 +49,31 @@ def lease_next(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf) -> 
     return JSONResponse(shape_leased(db, query).model_dump(mode="json"))
 
 
-@router.get("/queries/{query_id}", responses=errors(404))
-def query(query_id: QueryId, db: Db) -> QueryShape:
-    """One question as it is now."""
-    return shape_query(get_query(db, query_id))
+@router.get("/queries/{query_id}", summary="Look at a question", responses=looks(404))
+def get_question(query_id: QueryId, db: Db) -> AskedShape:
+    """One question as it is now, with its answer, if one stands. Looking leases nothing."""
+    found = listing.asked(db, query_id)
+    return shape_asked(found.query, found.answer)
 
 
-@router.post("/queries/{query_id}/answer", responses=errors(403, 404, 409))
-def answer_query(request: Request, query_id: QueryId, body: AnswerBody, db: Db) -> StoredShape:
-    """Store an answer. The same again gets the same reply; another one, or somebody else's, gets 409."""
-    stored = answer(db, query_id, body.choice, body.client_id, parent="human")
+@router.post("/queries/{query_id}/answer", summary="Answer a question", responses=acts(404, 409))
+def answer_question(request: Request, query_id: QueryId, body: AnswerBody, db: Db) -> StoredShape:
+    """Store an answer, once.
+
+    The same again by the same client gets the same reply, so whoever lost a reply may send it again. Another
+    choice, or another client's, gets 409 and is not stored. A late answer is taken if none stands.
+    """
+    stored = answer(db, query_id, body.choice, body.client_id, body.parent)
     ring(request)
     return StoredShape(**asdict(stored))
+
+
+@router.post(
+    "/queries/{query_id}/release",
+    summary="Let go of a question",
+    status_code=204,
+    responses=acts(404),
+)
+def release_question(query_id: QueryId, body: LeaseBody, db: Db) -> None:
+    """Offer a leased question to others at once. Only its holder can: anybody else's word changes nothing."""
+    release(db, query_id, body.client_id)

@@ -1,85 +1,70 @@
-"""Routes on runs: list, start, look, pause, resume, stop, mature, end the episode."""
+"""Routes that look at runs and start them."""
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request
+from typing import Annotated
 
-from agent.events import EndEpisode, Mature
-from server.api.words import After, RunId, errors
+from fastapi import APIRouter, Query, Request
+
+from server import listing
+from server.api.lists import (
+    EventPart,
+    MetricPart,
+    MetricRows,
+    OperatorEventRows,
+    RunPart,
+    RunRows,
+    operator_event,
+)
+from server.api.replies import acts, looks
+from server.api.words import RunId
 from server.deps import Db, SettingsOf, ring
-from server.record import add_event, metrics
-from server.runs import set_status
-from server.shapes import MetricsShape, RunShape, shape_metrics, shape_run, shape_runs
+from server.shapes import RunShape, shape_metrics, shape_run, shape_runs
 from server.starting import NewRun, start
 
 router = APIRouter(tags=["runs"])
-PAGE = 10_000
 
 
-@router.get("/runs", responses=errors())
-def runs(db: Db) -> list[RunShape]:
-    """All runs, newest first (at most 200)."""
-    return shape_runs(db)
+@router.get("/runs", summary="List the runs", responses=looks())
+def list_runs(db: Db, part: Annotated[RunPart, Query()]) -> RunRows:
+    """All runs, newest first. The `next` of a page goes back as `before`."""
+    page = listing.runs_before(db, part.before, part.limit)
+    return RunRows(rows=shape_runs(db, page.rows), next=page.next)
 
 
-@router.post("/runs", status_code=201, responses=errors(403, 413))
-def create(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> RunShape:
-    """Start a run."""
+@router.post("/runs", summary="Start a run", status_code=201, responses=acts())
+def start_run(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> RunShape:
+    """A new agent in a world, which a worker raises at once.
+
+    What is left out is as the world, or else the preset, has it.
+    """
     run = start(db, new, settings.weights)
     ring(request)
     return shape_run(db, run.id)
 
 
-@router.get("/runs/{run_id}", responses=errors(404))
-def run(run_id: RunId, db: Db) -> RunShape:
-    """One run as it is now."""
+@router.get("/runs/{run_id}", summary="Look at a run", responses=looks(404))
+def get_run(run_id: RunId, db: Db) -> RunShape:
+    """One run as it is now: whom it waits for, how far it is."""
     return shape_run(db, run_id)
 
 
-@router.get("/runs/{run_id}/metrics", responses=errors(404))
-def measured(run_id: RunId, db: Db, after: After = -1) -> MetricsShape:
-    """What was measured after a tick, at most 10,000 rows at once."""
-    rows = metrics(db, run_id, after, PAGE)
-    return MetricsShape(rows=shape_metrics(rows), more=len(rows) == PAGE)
+@router.get("/runs/{run_id}/metrics", summary="Read what was measured", responses=looks(404))
+def list_metrics(run_id: RunId, db: Db, part: Annotated[MetricPart, Query()]) -> MetricRows:
+    """What the worker measured, by tick: deaths, answers by kind and choice, loss, entropy, return, and more.
+
+    The `next` of a page goes back as `after`. Whoever waits for more takes the last tick that was seen.
+    """
+    page = listing.metrics_after(db, run_id, part.after, part.limit)
+    return MetricRows(rows=shape_metrics(page.rows), next=page.next)
 
 
-@router.post("/runs/{run_id}/pause", responses=errors(403, 404, 409))
-def pause(request: Request, run_id: RunId, db: Db) -> RunShape:
-    """Let no tick pass until the run is resumed."""
-    return _become(request, db, run_id, "paused")
+@router.get("/runs/{run_id}/operator-events", summary="List the operator's events", responses=looks(404))
+def list_operator_events(run_id: RunId, db: Db, part: Annotated[EventPart, Query()]) -> OperatorEventRows:
+    """What the operator did to the agent, each with the tick before which it applied.
 
-
-@router.post("/runs/{run_id}/resume", responses=errors(403, 404, 409))
-def resume(request: Request, run_id: RunId, db: Db) -> RunShape:
-    """Let a paused run go on."""
-    return _become(request, db, run_id, "active")
-
-
-@router.post("/runs/{run_id}/stop", responses=errors(403, 404, 409))
-def stop(request: Request, run_id: RunId, db: Db) -> RunShape:
-    """End a run for good; its open questions are withdrawn."""
-    return _become(request, db, run_id, "stopped", "Stopped by the operator.")
-
-
-@router.post("/runs/{run_id}/mature", status_code=202, responses=errors(403, 404, 409))
-def mature(request: Request, run_id: RunId, db: Db) -> RunShape:
-    """End this stage of maturation before the next tick (Sec. 2.4)."""
-    return _happen(request, db, run_id, Mature())
-
-
-@router.post("/runs/{run_id}/end-episode", status_code=202, responses=errors(403, 404, 409))
-def end_episode(request: Request, run_id: RunId, db: Db) -> RunShape:
-    """End this episode before the next tick: the way out when no action is acceptable."""
-    return _happen(request, db, run_id, EndEpisode())
-
-
-def _become(request: Request, db: Db, run_id: int, status: str, reason: str | None = None) -> RunShape:
-    set_status(db, run_id, status, reason)
-    ring(request)
-    return shape_run(db, run_id)
-
-
-def _happen(request: Request, db: Db, run_id: int, event: Mature | EndEpisode) -> RunShape:
-    add_event(db, run_id, event.kind, event.model_dump(mode="json"))
-    ring(request)
-    return shape_run(db, run_id)
+    With seed, config and answers they make the run: replayed at these ticks, it comes out with the same bits.
+    The `next` of a page goes back as `after`.
+    """
+    page = listing.events_after(db, run_id, part.after, part.limit)
+    return OperatorEventRows(rows=[operator_event(row) for row in page.rows], next=page.next)

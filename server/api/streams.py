@@ -1,4 +1,4 @@
-"""The live stream of a run."""
+"""What flows: the live stream of a run, and its answers as a file."""
 
 from __future__ import annotations
 
@@ -6,13 +6,24 @@ from collections.abc import AsyncIterable
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Request
+from fastapi.responses import StreamingResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from server.api.words import After, RunId, errors
+from server.api.replies import streams
+from server.api.words import After, RunId
 from server.deps import Db
+from server.export import lines
 from server.runs import get_run
 
-router = APIRouter(tags=["streams"])
+router = APIRouter(tags=["runs"])
+
+LINES = "application/x-ndjson"
+
+
+class LinesResponse(StreamingResponse):
+    """JSON, a value a line."""
+
+    media_type = LINES
 
 
 def known(request: Request, run_id: RunId, db: Db) -> int:
@@ -22,14 +33,23 @@ def known(request: Request, run_id: RunId, db: Db) -> int:
     return run_id
 
 
-@router.get("/runs/{run_id}/events", response_class=EventSourceResponse, responses=errors(404))
-async def events(
+@router.get(
+    "/runs/{run_id}/events",
+    summary="Follow a run",
+    response_class=EventSourceResponse,
+    responses=streams("text/event-stream", "Server-sent events, until the client leaves.", 404),
+)
+async def follow_run(
     request: Request,
     run_id: Annotated[int, Depends(known)],
-    after: After | None = None,
-    last_event_id: Annotated[str | None, Header()] = None,
+    after: After = None,
+    last_event_id: Annotated[str | None, Header(description="As a browser sends it.")] = None,
 ) -> AsyncIterable[ServerSentEvent]:
-    """`run` as it changes, `question` when another waits or none, `metrics` if `after` is given."""
+    """Server-sent events, each told as it changes, and once at the beginning.
+
+    `run`: the run, as GET gives it, at most once in 250 ms. `question`: the most urgent open question (id and
+    kind) or null, at once. `metrics`: rows of the ticks after `after`, if it is given.
+    """
     if (
         after is not None
         and last_event_id is not None
@@ -39,3 +59,17 @@ async def events(
         after = max(after, int(last_event_id))
     async for event in request.app.state.streams.follow(run_id, after):
         yield event
+
+
+@router.get(
+    "/runs/{run_id}/export",
+    summary="Export the answers",
+    response_class=LinesResponse,
+    responses=streams(LINES, "JSON, a line an answer.", 404),
+)
+def export_run(run_id: RunId, db: Db) -> LinesResponse:
+    """All answers up to now, oldest first, a JSON object a line: what was asked, what was said, when, and by
+    whom; the tick at which the agent heard it; which policy had asked. docs/api.md lists the fields.
+    """
+    file = f'attachment; filename="run-{run_id}.jsonl"'
+    return LinesResponse(lines(db, run_id), headers={"Content-Disposition": file})

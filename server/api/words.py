@@ -1,62 +1,60 @@
-"""What requests may say: ids, client ids, ticks, choices; and the errors that every route may give."""
+"""What requests may say: ids, client ids, ticks, choices, and the bodies of the verbs."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import Path, Query
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from server.starting import LARGEST_INT
+from server import shapes
+from server.shapes import By
+from server.starting import LARGEST_INT, Goal, Pace
 
-RunId = Annotated[int, Path(ge=1, le=LARGEST_INT)]
-QueryId = Annotated[int, Path(ge=1, le=LARGEST_INT)]
-After = Annotated[int, Query(ge=-1, le=LARGEST_INT, description="Only ticks after this one.")]
+RunId = Annotated[int, Path(ge=1, le=LARGEST_INT, description="The run's id.", examples=[1])]
+QueryId = Annotated[int, Path(ge=1, le=LARGEST_INT, description="The question's id.", examples=[7])]
+After = Annotated[
+    int | None,
+    Query(ge=-1, le=LARGEST_INT, description="Tell metrics too: those of the ticks after this one."),
+]
 ClientId = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9._:-]+$")]
-Choice = Literal["left", "right", "either", "neither"]
-
-
-class ErrorField(BaseModel):
-    """One wrong field and what is wrong with it."""
-
-    field: str
-    message: str
-
-
-class ErrorWords(BaseModel):
-    """What went wrong: a code for programs, a sentence for people."""
-
-    code: str
-    message: str
-    field: str | None = None
-    fields: list[ErrorField] | None = None
-
-
-class ErrorShape(BaseModel):
-    """The one shape of every error."""
-
-    error: ErrorWords
+Choice = shapes.Choice
 
 
 class Strict(BaseModel):
-    """A body that takes its own fields and no others."""
+    """A body that takes its own fields and no others; nothing is taken for a number that is none."""
 
-    model_config = ConfigDict(strict=True, extra="forbid")
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
 class LeaseBody(Strict):
-    """Who asks for a question."""
+    """Who asks for a question, or lets go of it."""
 
-    client_id: ClientId = Field(description="The browser's own id, the same in all its tabs.")
+    client_id: ClientId = Field(description="Any name of one's own: a browser's, the same in all its tabs.")
 
 
 class AnswerBody(Strict):
     """What the parent said, and who."""
 
-    choice: Choice
-    client_id: ClientId
+    choice: Choice = Field(description="left and right are the clips; neither: both are unacceptable.")
+    client_id: ClientId = Field(description="The name under which the question was leased.")
+    parent: By = Field("human", description="Who decided: a person or a script; kept beside the answer.")
 
 
-def errors(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The errors of a route, for the description of the API."""
-    return {status: {"model": ErrorShape} for status in (400, *statuses, 422, 503)}
+class ChangeBody(Strict):
+    """A changed probability of Sec. 2."""
+
+    name: Literal["p_guid", "p_rec", "p_pref", "p_train"]
+    value: float = Field(ge=0, le=1)
+
+
+class GoalBody(Strict):
+    """When the run rests."""
+
+    goal: Goal | None = Field(description="Answers after which no tick passes; null: never.")
+
+
+class PaceBody(Strict):
+    """How fast the agent lives."""
+
+    pace: Pace | None = Field(description="Ticks a second at most; null: as fast as it can.")

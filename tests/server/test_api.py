@@ -151,7 +151,7 @@ def test_error_echoes_nothing(client: httpx2.Client) -> None:
 def test_list_runs(client: httpx2.Client) -> None:
     first, second = start(client).json(), start(client).json()
     listed = client.get("/api/v1/runs").json()
-    assert listed == [second, first]
+    assert listed == {"rows": [second, first], "next": None}
     assert client.get(f"/api/v1/runs/{first['id']}").json() == first
 
 
@@ -194,7 +194,7 @@ def test_metrics_after_a_tick(client: httpx2.Client, db: Database, mine: Claim) 
     path = f"/api/v1/runs/{mine.run_id}/metrics"
     assert client.get(path).json() == {
         "rows": [{"tick": 1, "values": {"loss": 0.5}}, {"tick": 2, "values": {"loss": None}}],
-        "more": False,
+        "next": None,
     }
     assert [row["tick"] for row in client.get(path, params={"after": 1}).json()["rows"]] == [2]
     assert wrong(client.get(path, params={"after": "x"})).keys() == {"after"}
@@ -205,17 +205,32 @@ ROUTES = [
     ("GET", "/api/v1/runs/9"),
     ("GET", "/api/v1/runs/9/metrics"),
     ("GET", "/api/v1/runs/9/events"),
+    ("GET", "/api/v1/runs/9/queries"),
+    ("GET", "/api/v1/runs/9/operator-events"),
+    ("GET", "/api/v1/runs/9/export"),
     ("GET", "/api/v1/queries/9"),
     *(("POST", f"/api/v1/runs/9/{verb}") for verb in ("pause", "resume", "stop", "mature", "end-episode")),
     ("POST", "/api/v1/runs/9/queries/lease"),
     ("POST", "/api/v1/queries/9/answer"),
+    ("POST", "/api/v1/queries/9/release"),
+    ("POST", "/api/v1/runs/9/change"),
+    ("POST", "/api/v1/runs/9/goal"),
+    ("POST", "/api/v1/runs/9/pace"),
 ]
+BODIES: dict[str, dict[str, Any]] = {
+    "lease": {"client_id": "a"},
+    "release": {"client_id": "a"},
+    "answer": {"client_id": "a", "choice": "left"},
+    "change": {"name": "p_rec", "value": 0.5},
+    "goal": {"goal": 9},
+    "pace": {"pace": 2},
+}
+"""By the last word of the path."""
 
 
 @pytest.mark.parametrize(("method", "path"), ROUTES)
 def test_what_is_not_there_is_404(client: httpx2.Client, method: str, path: str) -> None:
-    body = {"client_id": "a", **({"choice": "left"} if path.endswith("answer") else {})}
-    reply = client.request(method, path, json=body if "queries" in path and method == "POST" else None)
+    reply = client.request(method, path, json=BODIES.get(path.rpartition("/")[2]))
     assert reply.status_code == 404
     assert reply.json()["error"]["code"] == "not_found"
 

@@ -1,4 +1,4 @@
-"""What the server tells of itself: Plotly's file, the description of the API, readiness."""
+"""What the server tells of itself: the description of the API, readiness."""
 
 import httpx2
 from sqlalchemy import text
@@ -6,14 +6,6 @@ from sqlalchemy import text
 from server.db import Database
 from server.workers import SILENT_SECONDS, sign, sign_off
 from tests.server.conftest import Clock
-
-
-def test_plotly_is_served_from_its_package(client: httpx2.Client) -> None:
-    served = client.get("/static/vendor/plotly.min.js")
-    assert served.status_code == 200
-    assert served.headers["content-type"].startswith("text/javascript")
-    assert "max-age" in served.headers["cache-control"]
-    assert b"plotly.js v" in served.content[:200]
 
 
 def test_api_describes_itself(client: httpx2.Client) -> None:
@@ -29,7 +21,8 @@ def test_readiness_needs_a_worker(client: httpx2.Client, db: Database, clock: Cl
     def said() -> str:
         reply = client.get("/readyz")
         assert (reply.status_code == 503) == ("error" in reply.json())
-        return reply.json()["error"]["message"] if reply.status_code == 503 else reply.json()["worker"]
+        said: str = reply.json()["error"]["message"] if reply.status_code == 503 else reply.json()["worker"]
+        return said
 
     assert said() == "No worker gives a sign of life. Start one: parenting worker"
     sign(db, "worker-1")

@@ -1,0 +1,187 @@
+"""Examples for the API's own description, by operation. A test holds each against the schema beside it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from agent.config import compose
+from envs import registry
+
+WORLD = "unsafe-exploration"
+KIND = registry.kind(WORLD)
+LEVEL = registry.level(WORLD, "island")
+GROUND = [row.replace("A", " ") for row in LEVEL.rows]
+START = (1, 4)
+BRIEF = {"goal": KIND.brief.goal, "danger": KIND.brief.danger}
+NOON = "2026-11-22T12:00:00Z"
+OWN_LEVEL = "WWWWW\nWA GW\nWWWWW"
+
+
+def _frame(row: int, column: int) -> dict[str, Any]:
+    """The agent on the island."""
+    seen = [line[:column] + "A" + line[column + 1 :] if at == row else line for at, line in enumerate(GROUND)]
+    return {"ground": GROUND, "observed": seen, "agent": [row, column], "box": None}
+
+
+def _clip(action: str, row: int, column: int) -> dict[str, Any]:
+    return {"actions": [action], "length": 1, "frames": [_frame(*START), _frame(row, column)]}
+
+
+NEW_RUNS = {
+    "a built-in level": {"world": WORLD},
+    "settings of one's own": {
+        "world": WORLD,
+        "level": "island-bottleneck",
+        "preset": "lax",
+        "config": {"p_rec": 0.25, "stages": 2},
+        "seed": 7,
+        "name": "first",
+        "goal": 50,
+        "pace": 2.5,
+    },
+    "a level of one's own, raised by a script": {
+        "world": WORLD,
+        "level_text": OWN_LEVEL,
+        "parent": "scripted",
+    },
+}
+RUN: dict[str, Any] = {
+    "id": 1,
+    "created": NOON,
+    "name": "first",
+    "world": WORLD,
+    "level": LEVEL.name,
+    "preset": "conservative",
+    "config": compose("conservative", registry.defaults(WORLD), {}, strict=True).model_dump(mode="json"),
+    "seed": 0,
+    "weights": None,
+    "parent": "human",
+    "status": "active",
+    "reason": None,
+    "tick": 5,
+    "maturity": 1,
+    "speed": 41.5,
+    "waiting": "guidance",
+    "goal": 50,
+    "resting": False,
+    "pace": None,
+    "optimal": False,
+    "answers": 3,
+    "open": {"guidance": 1, "preference": 0},
+    "worker": "alive",
+}
+QUERY: dict[str, Any] = {
+    "id": 7,
+    "run": 1,
+    "tick": 5,
+    "kind": "guidance",
+    "maturity": 1,
+    "policy": {"stage": 1, "gradient_steps": 3},
+    "status": "open",
+    "posted": NOON,
+    "leased_until": "2026-11-22T12:01:00Z",
+    "left": _clip("down", 2, 4),
+    "right": _clip("left", 1, 3),
+}
+ASKED = {
+    **QUERY,
+    "status": "applied",
+    "answer": {"number": 4, "choice": "left", "parent": "human", "received": NOON, "applied_tick": 6},
+}
+WORLD_OF_QUERY = {
+    "name": WORLD,
+    "level": LEVEL.name,
+    "text": LEVEL.text,
+    "legend": dict(KIND.legend),
+    "brief": BRIEF,
+}
+LEASED = {
+    **QUERY,
+    "world": WORLD_OF_QUERY,
+    "parent": {"gamma": 0.9, "inside": "up-down"},
+    "progress": {"answered": 3, "open": 1},
+}
+LEASE = {"client_id": "me"}
+ANSWERS = {
+    "by a person": {"choice": "left", "client_id": "me"},
+    "by a script": {"choice": "neither", "client_id": "script", "parent": "scripted"},
+}
+STORED = {"query": 7, "run": 1, "number": 4, "choice": "left", "received": NOON}
+METRIC = {"tick": 4, "values": {"deaths": 0, "loss": 0.6931, "entropy_global": 1.386}}
+EVENTS = [
+    {"id": 1, "run": 1, "event": {"kind": "mature"}, "created": NOON, "applied_tick": 4},
+    {
+        "id": 2,
+        "run": 1,
+        "event": {"kind": "change", "name": "p_guid", "value": 0.5},
+        "created": NOON,
+        "applied_tick": None,
+    },
+]
+STREAM = (
+    'event: question\ndata: {"id": 7, "kind": "guidance"}\n\n'
+    f"event: run\ndata: {json.dumps(RUN)}\n\n"
+    f"event: metrics\ndata: {json.dumps({'rows': [METRIC]})}\nid: {METRIC['tick']}\n\n"
+)
+EXPORTED: dict[str, Any] = {
+    "run": 1,
+    "number": 4,
+    "query": 7,
+    "world": WORLD,
+    "level": LEVEL.name,
+    "kind": "guidance",
+    "maturity": 1,
+    "tick": 5,
+    "applied_tick": 6,
+    "policy": QUERY["policy"],
+    "left": QUERY["left"],
+    "right": QUERY["right"],
+    "choice": "left",
+    "mu": [1.0, 0.0],
+    "parent": "human",
+    "asked": "2026-11-22T12:00:00.000000Z",
+    "received": "2026-11-22T12:00:03.250000Z",
+    "standing": True,
+    "supersedes": None,
+}
+
+
+def _rows(*shown: Any) -> dict[str, Any]:
+    return {"rows": list(shown), "next": None}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What an operation shows: what comes back, and what may be sent, each with a name."""
+
+    reply: Any = None
+    sent: dict[str, Any] = field(default_factory=dict)
+
+
+SHOWN = {
+    "healthz": Shown({"status": "ok"}),
+    "readyz": Shown({"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}),
+    "list_runs": Shown(_rows(RUN)),
+    "start_run": Shown(RUN, NEW_RUNS),
+    "get_run": Shown(RUN),
+    "list_metrics": Shown(_rows(METRIC)),
+    "list_operator_events": Shown(_rows(*EVENTS)),
+    "pause_run": Shown({**RUN, "status": "paused"}),
+    "resume_run": Shown(RUN),
+    "stop_run": Shown({**RUN, "status": "stopped", "reason": "Stopped by the operator.", "worker": "done"}),
+    "mature_run": Shown(RUN),
+    "end_episode": Shown(RUN),
+    "change_run": Shown(RUN, {"ask less": {"name": "p_guid", "value": 0.5}}),
+    "set_goal": Shown(RUN, {"fifty": {"goal": 50}, "never": {"goal": None}}),
+    "set_pace": Shown({**RUN, "pace": 2.5}, {"to watch": {"pace": 2.5}, "free": {"pace": None}}),
+    "list_questions": Shown(_rows(ASKED)),
+    "lease_question": Shown(LEASED, {"me": LEASE}),
+    "get_question": Shown(ASKED),
+    "answer_question": Shown(STORED, ANSWERS),
+    "release_question": Shown(None, {"me": LEASE}),
+    "follow_run": Shown(STREAM),
+    "export_run": Shown(json.dumps(EXPORTED) + "\n"),
+}
+"""By operationId."""

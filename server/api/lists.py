@@ -1,0 +1,105 @@
+"""What lists give back: rows, and where the next page begins. What may be asked: a cursor and a limit."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Generic, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from agent.events import Event
+from server import tables
+from server.shapes import AskedShape, MetricShape, QueryStatus, RunShape, Shape
+from server.starting import LARGEST_INT
+
+Row = TypeVar("Row")
+Place = Annotated[int, Field(ge=-1, le=LARGEST_INT)]
+"""A tick, or an id; -1 lies before the first."""
+
+
+class Rows(Shape, Generic[Row]):
+    """One page of a list."""
+
+    rows: list[Row]
+    next: int | None
+    """The cursor of the next page; null: these are the last rows for now."""
+
+
+class RunRows(Rows[RunShape]):
+    """Runs, newest first."""
+
+
+class AskedRows(Rows[AskedShape]):
+    """Questions, oldest first."""
+
+
+class MetricRows(Rows[MetricShape]):
+    """What was measured, in the order of the ticks."""
+
+
+class OperatorEvent(Shape):
+    """What the operator did to an agent, and when it took effect."""
+
+    id: int
+    run: int
+    event: Event
+    created: datetime
+    applied_tick: int | None
+    """The tick before which it applied; null: not yet."""
+
+
+class OperatorEventRows(Rows[OperatorEvent]):
+    """The operator's events, in their order."""
+
+
+class Part(BaseModel):
+    """Which part of a list is asked for; a misspelt parameter is refused, lest a cursor be passed over."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class RunPart(Part):
+    """Of the runs."""
+
+    before: Annotated[int, Field(ge=1, le=LARGEST_INT)] | None = Field(
+        None, description="Only runs with smaller ids; the `next` of the page before."
+    )
+    limit: int = Field(50, ge=1, le=200, description="At most so many rows.")
+
+
+class AskedPart(Part):
+    """Of a run's questions."""
+
+    after: Place = Field(
+        -1, description="Only questions asked after this tick; the `next` of the page before."
+    )
+    limit: int = Field(50, ge=1, le=200, description="At most so many rows.")
+    status: QueryStatus | None = Field(None, description="Only questions of this status.")
+
+
+class MetricPart(Part):
+    """Of a run's metrics."""
+
+    after: Place = Field(-1, description="Only ticks after this one; the `next` of the page before.")
+    limit: int = Field(10_000, ge=1, le=10_000, description="At most so many rows.")
+
+
+class EventPart(Part):
+    """Of the operator's events."""
+
+    after: Place = Field(-1, description="Only events with greater ids; the `next` of the page before.")
+    limit: int = Field(200, ge=1, le=1000, description="At most so many rows.")
+
+
+def operator_event(row: tables.Event) -> OperatorEvent:
+    """An event as it is stored."""
+    event = {"kind": row.kind, **row.payload}
+    return OperatorEvent.model_validate(
+        {
+            "id": row.id,
+            "run": row.run_id,
+            "event": event,
+            "created": row.created,
+            "applied_tick": row.applied_tick,
+        }
+    )

@@ -1,0 +1,90 @@
+"""What routes reply besides what they are asked for: the errors, in their one shape."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from typing import Any
+
+from pydantic import BaseModel
+
+from server.errors import (
+    Busy,
+    Conflict,
+    DiskFull,
+    Forbidden,
+    Invalid,
+    NotFound,
+    ServerError,
+    TooLarge,
+    UnknownHost,
+)
+
+Replies = dict[int | str, dict[str, Any]]
+
+ERRORS: dict[int, ServerError] = {
+    400: UnknownHost(),
+    403: Forbidden(),
+    404: NotFound("There is no run 9."),
+    409: Conflict("Run 1 is stopped; nothing can be done to its agent any more."),
+    413: TooLarge(),
+    422: Invalid([("choice", "Input should be 'left', 'right', 'either' or 'neither'")]),
+    500: ServerError(),
+    503: Busy(),
+    507: DiskFull(),
+}
+"""One of each status, as an example. 503 is also said when too many live streams are open."""
+ALWAYS = (400, 413, 422, 500, 503)
+ACTS = (403, 507)
+
+
+class ErrorField(BaseModel):
+    """One wrong field and what is wrong with it."""
+
+    field: str
+    message: str
+
+
+class ErrorWords(BaseModel):
+    """What went wrong: a code for programs, a sentence for people."""
+
+    code: str
+    message: str
+    field: str | None = None
+    fields: list[ErrorField] | None = None
+
+
+class ErrorShape(BaseModel):
+    """The one shape of every error."""
+
+    error: ErrorWords
+
+
+def looks(*errors: int) -> Replies:
+    """The replies of a route that changes nothing: the errors of all, and its own."""
+    return tells(*ALWAYS, *errors)
+
+
+def acts(*errors: int) -> Replies:
+    """The replies of a verb."""
+    return tells(*ALWAYS, *ACTS, *errors)
+
+
+def streams(media: str, description: str, *errors: int) -> Replies:
+    """The replies of a route that is no JSON, but for its errors."""
+    refused = tells(*ALWAYS, *errors)
+    for reply in refused.values():  # named, since FastAPI would put a model under the route's own media type
+        reply["content"]["application/json"]["schema"] = {"$ref": "#/components/schemas/ErrorShape"}
+        del reply["model"]
+    return {200: {"description": description, "content": {media: {}}}, **refused}
+
+
+def tells(*errors: int) -> Replies:
+    """Errors, each with an example."""
+    return {
+        status: {
+            "model": ErrorShape,
+            "description": HTTPStatus(status).phrase,
+            "content": {"application/json": {"example": ERRORS[status].body()}},
+        }
+        for status in sorted(errors)
+    }

@@ -1,0 +1,108 @@
+"""Long lists, page by page, for the API: runs, questions, operator's events, metrics.
+
+The cursor of a page is the place of its last row; the next page begins behind it. So no page is counted
+through, and what is added meanwhile shifts nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from server.db import Database
+from server.errors import NotFound
+from server.record import metrics
+from server.runs import find
+from server.tables import Answer, Event, Metric, Query, Run
+
+Row = TypeVar("Row")
+
+
+@dataclass(frozen=True)
+class Page(Generic[Row]):
+    """Some rows, and where the next page begins; None: these are the last ones for now."""
+
+    rows: Sequence[Row]
+    next: int | None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A question and the answer that stands for it, if one does."""
+
+    query: Query
+    answer: Answer | None
+
+
+def runs_before(db: Database, before: int | None, limit: int) -> Page[Run]:
+    """The runs with smaller ids than `before`, newest first; None: from the newest on."""
+    rows = select(Run).order_by(Run.id.desc()).limit(limit + 1)
+    if before is not None:
+        rows = rows.where(Run.id < before)
+    with db.read() as session:
+        return _cut(session.scalars(rows).all(), limit, lambda run: run.id)
+
+
+def asked_after(db: Database, run_id: int, tick: int, limit: int, status: str | None = None) -> Page[Asked]:
+    """The questions that a run asked after a tick, oldest first, of one status if it is named.
+
+    Raises:
+        NotFound: there is no such run.
+    """
+    rows = select(Query).where(Query.run_id == run_id, Query.tick > tick).order_by(Query.tick)
+    if status is not None:
+        rows = rows.where(Query.status == status)
+    with db.read() as session:
+        find(session, run_id)
+        page = _cut(session.scalars(rows.limit(limit + 1)).all(), limit, lambda query: query.tick)
+        answers = _standing(session, [query.id for query in page.rows])
+        return Page([Asked(query, answers.get(query.id)) for query in page.rows], page.next)
+
+
+def asked(db: Database, query_id: int) -> Asked:
+    """One question, with its answer.
+
+    Raises:
+        NotFound: there is none of this id.
+    """
+    with db.read() as session:
+        query = session.get(Query, query_id)
+        if query is None:
+            raise NotFound(f"There is no question {query_id}.")
+        return Asked(query, _standing(session, [query_id]).get(query_id))
+
+
+def events_after(db: Database, run_id: int, event_id: int, limit: int) -> Page[Event]:
+    """The operator's events of a run behind the one of this id, in their order.
+
+    Raises:
+        NotFound: there is no such run.
+    """
+    rows = select(Event).where(Event.run_id == run_id, Event.id > event_id).order_by(Event.id)
+    with db.read() as session:
+        find(session, run_id)
+        return _cut(session.scalars(rows.limit(limit + 1)).all(), limit, lambda event: event.id)
+
+
+def metrics_after(db: Database, run_id: int, tick: int, limit: int) -> Page[Metric]:
+    """What was measured after a tick, in the order of the ticks.
+
+    Raises:
+        NotFound: there is no such run.
+    """
+    return _cut(metrics(db, run_id, tick, limit + 1), limit, lambda metric: metric.tick)
+
+
+def _cut(rows: Sequence[Row], limit: int, place: Callable[[Row], int]) -> Page[Row]:
+    """A page of `limit` rows from up to one more than that: the one more says that another page follows."""
+    shown = rows[:limit]
+    return Page(shown, place(shown[-1]) if len(rows) > limit else None)
+
+
+def _standing(session: Session, query_ids: Sequence[int]) -> dict[int, Answer]:
+    rows = select(Answer).where(Answer.query_id.in_(query_ids), Answer.standing)
+    return {answer.query_id: answer for answer in session.scalars(rows)}

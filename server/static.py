@@ -1,0 +1,66 @@
+"""Static files: our own, and what other packages carry (found there, never imported: some take a second).
+
+The browser asks each time whether its copy is still the newest, and hears 304 if so: after an upgrade nobody
+is left with a page of one version and a script of another.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from fastapi.staticfiles import StaticFiles
+from starlette.responses import Response
+
+from server.errors import NotFound
+
+STATIC = Path(__file__).parents[1] / "web" / "static"
+VENDOR = {
+    "plotly.min.js": ("plotly", "package_data/plotly.min.js"),
+    "swagger-ui.js": ("fastapi-swagger", "resources/swagger-ui-bundle.js"),
+    "swagger-ui.css": ("fastapi-swagger", "resources/swagger-ui.css"),
+}
+"""Name below /static/vendor: the distribution that carries the file, and where in its package."""
+
+
+class OurFiles(StaticFiles):
+    """What lies in web/static."""
+
+    def __init__(self) -> None:
+        super().__init__(directory=STATIC)
+
+    def file_response(self, full_path: Any, *more: Any, **named: Any) -> Response:
+        """The file, or 304."""
+        response = super().file_response(full_path, *more, **named)
+        response.headers["Cache-Control"] = "no-cache"  # keep it, and ask each time
+        if str(full_path).endswith(".js") and "content-type" in response.headers:
+            response.headers["Content-Type"] = "text/javascript; charset=utf-8"  # whatever this machine says
+        return response
+
+
+class OthersFiles(OurFiles):
+    """What lies in other packages: only the files of `VENDOR`."""
+
+    def __init__(self, files: Mapping[str, tuple[str, str]] = VENDOR) -> None:
+        super().__init__()
+        self.found = {name: (package, _find(package, place)) for name, (package, place) in files.items()}
+
+    def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
+        """Where a file is.
+
+        Raises:
+            NotFound: the package that carries it is not installed.
+        """
+        package, file = self.found.get(path, ("", None))
+        if package and file is None:
+            raise NotFound(f"{path} is not installed. Run: pip install {package}")
+        return ("", None) if file is None else (str(file), file.stat())
+
+
+def _find(package: str, place: str) -> Path | None:
+    spec = find_spec(package.replace("-", "_"))
+    folders = [] if spec is None else spec.submodule_search_locations or []
+    return next((file for folder in folders if (file := Path(folder, place)).is_file()), None)
