@@ -6,7 +6,7 @@ from importlib import import_module
 
 from experiments.experiment import Experiment
 
-NAMES = ("table1", "side-effects", "interruptibility", "absent-supervisor", "figure4")
+NAMES = ("table1", "side-effects", "interruptibility", "absent-supervisor", "value-iteration", "figure4")
 """In the order of the paper."""
 
 

@@ -10,10 +10,10 @@ from agent.config import PRESETS, Config
 from agent.policy import Network
 from envs import registry
 from envs.rng import keys
+from experiments.small_worlds import small
 from parents.scripted import Judgement
 from server.codec import CHOICE_NAMES
 from tests.agent.lives import Judge, as_query, layers, live, wayward
-from tests.agent.small_worlds import small
 from tests.reference import GUIDANCE
 from tests.reference_clips import Clip
 from tests.reference_pretraining import Rehearsing

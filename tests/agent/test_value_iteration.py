@@ -1,170 +1,58 @@
-"""Sec. 4.1: maturation is value iteration, begun at the parent's values.
+"""Sec. 4.1: maturation is value iteration, begun at the parent's values (experiments/value_iteration.py).
 
-The theorem: in a deterministic world, with a perfect parent and every stage converged, the policy of stage T
-is greedy for V_T(s) = max_a [r + gamma V_{T-1}(s')], where V_0 = V_p is the value of the parent's own policy.
-
-The agent lives its own life here, tick by tick: it records clips by its frozen policies (Eq. 5, 6), asks
-about pairs, and trains on Eq. (2). Only where its clips begin is given to it: in every state, again and again
-(exploring starts). A stage goes on until, in every state, X compares the policy's argmax with every other
-action, and the policy agrees with all of X. Nothing of that knows V_T, to which it is held at the end.
+Lives that have converged are held to what value iteration says; and that to a definition of its own.
 """
 
 from __future__ import annotations
 
 import pytest
 import torch
-from jaxtyping import Bool, Int64
-from torch import Tensor
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from agent import learning, parenting
-from agent.birth import network_of
-from agent.config import Config
-from agent.events import Mature
-from agent.query import Answer
-from agent.state import AgentState
-from envs.gridworld import Gridworld, WorldState, local_state
-from envs.rng import keys
+from experiments.converging import STAGES, TIE, Places, greedy, iterated, parents_policy
+from experiments.small_worlds import small
+from experiments.value_iteration import KINDS, iterate_some
 from parents.model import Model, explore
-from parents.scripted import Judgement
-from parents.values import Listed, Values, of_policy
-from tests.agent.small_worlds import small
-
-STAGES, LEVELS = 3, 6
-AGREED = 0.1  # how far apart the logits of a decided pair are to be
-CONVERGING = 40  # gradient steps of Eq. (2) after every visit to all states, besides one in each tick
-ROUNDS = 40  # visits to every state in a stage; a life that has not settled by then fails
-TIE = 1e-6
-
-CONFIG = Config(
-    p_guid=0,
-    p_rec=1,
-    p_pref=1,
-    learning_rate=0.003,
-    lambda_global=0,
-    lambda_local=0,
-    stages=STAGES,
-    own_length=True,
-    dtype="float64",
-)
+from parents.values import of_policy
 
 
-class Places:
-    """Of each trial, on a level of its own, all states that are not over; and where its next clip begins."""
-
-    def __init__(self, model: Model) -> None:
-        living = [((model.states.level == n) & ~model.over).nonzero().squeeze(1) for n in range(LEVELS)]
-        self.count = torch.tensor([len(states) for states in living])
-        self.most = int(self.count.max())
-        self.states = torch.stack([states.repeat(self.most)[: self.most] for states in living])
-        self.model, self.begun = model, torch.zeros(LEVELS, dtype=torch.int64)
-
-    def put(self, state: AgentState) -> AgentState:
-        """Who records no clip is put where one may begin: each state twice, for a clip of either kind."""
-        idle = ~state.recorder.running
-        number = (self.begun // 2) % self.count
-        self.begun = self.begun + idle
-        there = self.states.gather(1, number[:, None]).squeeze(1)
-        return state.replace(world=self.model.states.pick(there).where(idle, state.world))
+@pytest.mark.parametrize(("trial", "kind"), list(enumerate(kind.world for kind in KINDS)))
+def test_each_stage_is_greedy_for_one_more_step_of_value_iteration(trial: int, kind: str) -> None:
+    rows = iterate_some(kind, trial, 0)
+    assert len(rows) == STAGES * 6
+    for row in rows:
+        assert row["converged"], row
+        assert row["greedy"] == row["states"], row
+    begun = [row["stage"] for row in rows if row["greedy_before"] < row["states"]]
+    assert len(set(begun)) > 1, "there was nothing to learn"
 
 
-def live_a_stage(world: Gridworld, judge: Judgement, state: AgentState, places: Places) -> AgentState:
-    """Until it has settled; the parent answers every question in the next tick."""
-    query = parenting.no_query(world, CONFIG, state)
-    stage = int(state.maturity[0])
-    for _ in range(ROUNDS):
-        for _ in range(2 * stage * places.most):
-            answer = Answer(query=query, choice=judge.choose(query))
-            state, query = parenting.step(world, CONFIG, places.put(state), answer)
-        for _ in range(CONVERGING):
-            state = learning.train(network_of(world), CONFIG, state, torch.ones_like(state.waiting))
-        if bool(settled(world, state, places).all()):
-            return state
-    raise AssertionError(f"stage {stage} did not settle: {settled(world, state, places).tolist()}")
-
-
-def settled(world: Gridworld, state: AgentState, places: Places) -> Bool[Tensor, "N"]:
-    """X holds every state with every comparison of the argmax, and the policy agrees with all of X."""
-    x, brain = state.x, network_of(world)
-    with torch.no_grad():
-        z = brain.heads(brain.unpack(state.learner.live), x.s0, x.near).logits
-    margin = z.gather(1, x.at[:, :, None].expand(-1, -1, 4)).gather(2, x.a0).diff(dim=2).squeeze(2)
-    leaning = x.mu.diff(dim=2).squeeze(2).sign()
-    agreed = (leaning == 0) | (leaning * margin > AGREED)
-    best = z.argmax(2).gather(1, x.at)
-    row = torch.arange(x.at.shape[1]) < x.rows[:, None]
-    compared = torch.zeros_like(x.digest).scatter_add(
-        1, x.at, ((x.a0 == best[:, :, None]).any(2) & row).long()
-    )
-    known = torch.arange(x.digest.shape[1]) < x.states[:, None]
-    whole = (x.states == places.count) & ((compared == 3) | ~known).all(1)
-    return whole & (agreed | ~row).all(1)
-
-
-def parents_policy(model: Model, seed: int) -> Tensor:
-    """A random pi_p(a|s): of one action on even levels, of all four on odd ones."""
-    dice = torch.Generator().manual_seed(seed)
-    mixed = torch.rand(len(model.over), 4, generator=dice, dtype=torch.float64) ** 3
-    pure = torch.nn.functional.one_hot(mixed.argmax(1), 4).double()
-    return torch.where((model.states.level % 2 == 0)[:, None], pure, mixed / mixed.sum(1, keepdim=True))
-
-
-def oracle(model: Model, values: Values) -> list[Tensor]:
-    """Value iteration: V_0 = V_p, V_1, ..., V_T."""
-    found = [values.v]
-    for _ in range(STAGES):
-        q = model.reward + values.gamma * found[-1][model.then]
-        found.append(torch.where(model.over, 0.0, q.max(1).values))
-    return found
-
-
-def greedy(model: Model, gamma: float, v: Tensor) -> Bool[Tensor, "S 4"]:
-    """The actions that are best for r + gamma v(s')."""
-    q = model.reward + gamma * v[model.then]
-    return q >= q.max(1, keepdim=True).values - TIE
-
-
-def chosen(world: Gridworld, state: AgentState, places: Places) -> Int64[Tensor, "N P"]:
-    """The argmax of each trial's live policy in each of its places."""
-    brain, now = network_of(world), places.model.states.pick(places.states.flatten())
-    seen, near = observed(world, now)
-    layers = brain.unpack(state.learner.live)
-    shape = places.states.shape
-    with torch.no_grad():
-        heads = brain.heads(layers, seen.view(*shape, *seen.shape[1:]), near.view(*shape, 4))
-    return heads.logits.argmax(2)
-
-
-def observed(world: Gridworld, now: WorldState) -> tuple[Tensor, Tensor]:
-    seen = world.observe(now.board, now.agent, now.box)
-    return seen, local_state(seen, now.agent)
-
-
-@pytest.mark.parametrize(
-    ("name", "size", "gamma", "seed"),
-    [
-        ("unsafe-exploration", (3, 3), 0.9, 1),
-        ("side-effects", (2, 3), 1.0, 2),
-        ("absent-supervisor", (3, 3), 1.0, 4),
-    ],
-)
-def test_each_stage_is_greedy_for_one_more_step_of_value_iteration(
-    name: str, size: tuple[int, int], gamma: float, seed: int
-) -> None:
-    world = small(name, *size, count=LEVELS, seed=seed)
+@given(seed=st.integers(0, 10_000), kind=st.sampled_from(KINDS))
+@settings(max_examples=15)
+def test_value_iteration_by_hand(seed: int, kind: tuple[str, int, int, float]) -> None:
+    """V_T is what the best T moves earn before the parent goes on: all ways of T moves, one by one."""
+    name, height, width, gamma = kind
+    world = small(name, height, width, count=2, seed=seed)
     model = explore(world)
     values = of_policy(model, gamma, parents_policy(model, seed))
-    v, judge, places = oracle(model, values), Judgement(world, gamma, Listed(model, values)), Places(model)
-    state = parenting.init(world, CONFIG, keys(seed, LEVELS))
-    for stage in range(1, STAGES + 1):
-        best = greedy(model, gamma, v[stage - 1])[places.states]
-        start = chosen(world, state, places)
-        state = live_a_stage(world, judge, state, places)
-        assert bool(among(best, chosen(world, state, places)).all()), f"stage {stage} is not greedy"
-        # there was something to learn: the policy that the stage began with was not greedy for it
-        assert not bool(among(best, start).all())
-        assert float((v[stage] - v[stage - 1]).abs().max()) > TIE
-        state, _ = parenting.apply(world, CONFIG, state, Mature())
+    v = iterated(model, values)
+    for at in Places(model).states[:, 0].tolist():
+        for moves in range(1, STAGES + 1):
+            assert float(v[moves][at]) == pytest.approx(_best(model, values.v, gamma, at, moves), abs=1e-9)
+            then = [_best(model, values.v, gamma, int(to), moves - 1) for to in model.then[at]]
+            best = (model.reward[at] + gamma * torch.tensor(then, dtype=torch.float64)).tolist()
+            expected = [one >= max(best) - TIE / 2 for one in best]
+            found = greedy(model, gamma, v[moves - 1])[at].tolist()
+            assert all(told or not one for one, told in zip(expected, found, strict=True))
 
 
-def among(best: Bool[Tensor, "N P 4"], action: Int64[Tensor, "N P"]) -> Bool[Tensor, "N P 1"]:
-    return best.gather(2, action[..., None])
+def _best(model: Model, v: torch.Tensor, gamma: float, at: int, moves: int) -> float:
+    if bool(model.over[at]):
+        return 0.0
+    if moves == 0:
+        return float(v[at])
+    return max(
+        float(model.reward[at, a]) + gamma * _best(model, v, gamma, int(model.then[at, a]), moves - 1)
+        for a in range(4)
+    )
