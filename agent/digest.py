@@ -23,13 +23,13 @@ def fingerprint(content: Tensor) -> Int64[Tensor, "..."]:
 
 def together(*words: Tensor) -> Int64[Tensor, "..."]:
     """One word for several in their order."""
-    mixed: tuple[Tensor, ...] = torch.broadcast_tensors(*map(scramble, words))  # type: ignore[no-untyped-call]
-    return fingerprint(torch.stack(mixed, dim=-1))
+    alike: tuple[Tensor, ...] = torch.broadcast_tensors(*words)  # type: ignore[no-untyped-call]
+    return fingerprint(scramble(torch.stack(alike, dim=-1)))
 
 
 def unordered(one: Tensor, other: Tensor) -> Int64[Tensor, "..."]:
     """One word for two, whichever stands first."""
-    return scramble(one) + scramble(other)
+    return scramble(torch.stack((one, other))).sum(0)
 
 
 def scramble(word: Tensor) -> Int64[Tensor, "..."]:

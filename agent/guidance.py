@@ -38,6 +38,8 @@ class Heard(Struct):
 def hear(config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Heard]:
     """Answers enter X (Eq. 1, 2); guidance approves an action, or refuses both."""
     query, choice = answer.query, answer.choice
+    if not bool((choice != Choice.NONE).any()):
+        return state, _nothing_heard(state)
     guided = (query.kind == Kind.GUIDANCE) & (choice != Choice.NONE)
     reviewed = (query.kind == Kind.PREFERENCE) & (choice != Choice.NONE)
     state = state.replace(
@@ -45,6 +47,10 @@ def hear(config: Config, state: AgentState, answer: Answer) -> tuple[AgentState,
         answered=state.answered + (guided | (reviewed & (query.maturity == state.maturity))),
     )
     return _resolve(state, query, choice, guided & state.waiting)
+
+
+def _nothing_heard(state: AgentState) -> Heard:
+    return Heard(approved=torch.full_like(state.answered, NO_ACTION), redraw=torch.zeros_like(state.waiting))
 
 
 def _store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset:
@@ -61,6 +67,8 @@ def _store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset
 
 
 def _resolve(state: AgentState, query: Query, choice: Tensor, guided: Tensor) -> tuple[AgentState, Heard]:
+    if not bool(guided.any()):
+        return state, _nothing_heard(state)
     left, right = query.action[:, 0, 0], query.action[:, 1, 0]
     coin = state.keys.uniform(Stream.EITHER) < 0.5
     leftward = (choice == Choice.LEFT) | ((choice == Choice.EITHER) & coin)
@@ -79,11 +87,12 @@ def ask(
     """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi; redraw after
     *neither*.
     """
-    codes = len(world.legend)
-    where = familiarity.place(view.near, codes)
+    undecided = view.watched & ~state.waiting & (heard.approved == NO_ACTION)
+    if not bool((undecided | heard.redraw).any()):
+        return state, query
+    where = familiarity.place(view.near, len(world.legend))
     f = state.familiarity.gather(1, where[:, None]).squeeze(1)
-    pausing = state.keys.uniform(Stream.ASK) < familiarity.ask_chance(f, config.p_guid)
-    pausing &= view.watched & ~state.waiting & (heard.approved == NO_ACTION)
+    pausing = undecided & (state.keys.uniform(Stream.ASK) < familiarity.ask_chance(f, config.p_guid))
     asking = pausing | heard.redraw
     if not bool(asking.any()):
         return state, query

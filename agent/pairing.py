@@ -62,9 +62,9 @@ def store(
 def digest(
     ground: Tensor, agent: Tensor, box: Tensor, action: Tensor, length: Tensor, level: Tensor
 ) -> Tensor:
-    """A clip's fingerprint: true frames, agent, box, actions, length, level. Leading axes [n]."""
-    parts = (ground, agent, box, action)
-    return together(*(fingerprint(part.flatten(1)) for part in parts), length.long(), level)
+    """A clip's fingerprint: true frames, agent, box, actions, length, level. Any leading axes."""
+    parts = (ground.flatten(-3), agent.flatten(-2), box.flatten(-2), action)
+    return together(*map(fingerprint, parts), length.long(), level)
 
 
 def forget(recorder: Recorder, mask: Bool[Tensor, "N"]) -> Recorder:
@@ -199,17 +199,8 @@ def _remember(config: Config, asked: Asked, query: Query) -> Asked:
         return asked
     asked, query = _more(asked), query.pick(trial)
     place = asked.count[trial]
-    one, other = (
-        digest(
-            query.ground[:, i],
-            query.agent[:, i],
-            query.box[:, i],
-            query.action[:, i],
-            query.length[:, i],
-            query.level,
-        )
-        for i in (0, 1)
-    )
+    clips = digest(query.ground, query.agent, query.box, query.action, query.length, query.level[:, None])
+    one, other = clips.unbind(1)
     asked.pair[trial, place] = same_pair(config, one, other, query.maturity)
     seen, first = fingerprint(query.observation[:, 0, 0].flatten(1)), query.action[:, :, 0]
     asked.compared[trial, place] = comparison(seen, first[:, 0], first[:, 1], query.maturity)

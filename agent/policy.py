@@ -118,6 +118,11 @@ class Network:
         """The layers that are convolutions, in order."""
         return [layer for layer in self.layers if layer.sides]
 
+    @cached_property
+    def sizes(self) -> list[int]:
+        """How many weights and how many biases the layers have, by turns."""
+        return [size for layer in self.layers for size in (layer.rows * layer.columns, layer.columns)]
+
     def start(self, keys: Keys, dtype: torch.dtype) -> Float[Tensor, "N P"]:
         """Glorot uniform weights and zero biases, drawn from the trials' keys (ours, as TensorFlow 1.12)"""
         parameters = torch.zeros(keys.seed.shape[0], self.size, dtype=dtype, device=keys.seed.device)
@@ -133,12 +138,10 @@ class Network:
 
     def unpack(self, parameters: Float[Tensor, "N P"]) -> list[Affine]:
         """The layers' weights and biases, as views of the flat rows."""
+        parts = parameters.split_with_sizes(self.sizes, dim=1)
         return [
-            Affine(
-                parameters[:, layer.start : layer.bias].view(-1, layer.rows, layer.columns),
-                parameters[:, layer.bias : layer.end].unsqueeze(1),
-            )
-            for layer in self.layers
+            Affine(weight.view(-1, layer.rows, layer.columns), bias.unsqueeze(1))
+            for layer, weight, bias in zip(self.layers, parts[::2], parts[1::2], strict=True)
         ]
 
     def learnable(self, parameters: Float[Tensor, "N P"]) -> list[Affine]:
@@ -204,7 +207,7 @@ class _Patches(torch.autograd.Function):
         total = gradient.new_zeros(context.shape)  # type: ignore[attr-defined]
         for shift, part in enumerate(gradient.chunk(9, dim=-1)):
             i, j = divmod(shift, 3)
-            total[:, :, i : i + tall, j : j + wide] += part
+            total.narrow(2, i, tall).narrow(3, j, wide).add_(part)
         return total
 
 

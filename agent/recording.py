@@ -27,6 +27,9 @@ def act(
     steered.
     """
     moving = ~state.waiting
+    if not bool(moving.any()):
+        broken = state.recorder.replace(running=moving)
+        return state.replace(recorder=broken), moving
     recorder, begun = _begin(config, world, state, view, heard)
     action = _action(network, config, state.replace(recorder=recorder), view, heard, begun)
     before = state.world
@@ -43,18 +46,22 @@ def _begin(
     begin.
     """
     recorder, keys = state.recorder, state.keys
-    running = recorder.running & ~state.waiting & view.watched
-    idle = view.watched & ~state.waiting & ~running & (heard.approved == NO_ACTION)
+    free = view.watched & ~state.waiting
+    running = recorder.running & free
+    idle = free & ~running & (heard.approved == NO_ACTION)
     fits = world.time_limit - state.world.t >= state.maturity
     wanted = idle & fits & (keys.uniform(Stream.RECORD) < config.p_rec)
-    best = view.logits.argmax(1)
-    permitted = _permitted(config, state, view, best)
-    noise = gumbel(keys.uniform(Stream.EXPLORE, 4)).masked_fill(~permitted, -torch.inf)
+    if not bool(wanted.any()):
+        return recorder.replace(running=running), torch.full_like(recorder.turn, NO_ACTION)
+    first = best = view.logits.argmax(1)
     exploring = recorder.turn == EXPLORE
-    begins = wanted & (~exploring | permitted.any(1))
-    first = torch.where(exploring, draw(view.logits, noise), best)
-    recorder = recorder.replace(running=running | begins, step=recorder.step.masked_fill(begins, 0))
-    return recorder, torch.where(begins, first, NO_ACTION)
+    if bool((wanted & exploring).any()):
+        permitted = _permitted(config, state, view, best)
+        noise = gumbel(keys.uniform(Stream.EXPLORE, 4)).masked_fill(~permitted, -torch.inf)
+        first = torch.where(exploring, draw(view.logits, noise), best)
+        wanted = wanted & (~exploring | permitted.any(1))
+    recorder = recorder.replace(running=running | wanted, step=recorder.step.masked_fill(wanted, 0))
+    return recorder, torch.where(wanted, first, NO_ACTION)
 
 
 def _permitted(
@@ -76,9 +83,10 @@ def _permitted(
 def _action(
     network: Network, config: Config, state: AgentState, view: View, heard: Heard, begun: Int64[Tensor, "N"]
 ) -> Int64[Tensor, "N"]:
-    drawn = draw(view.logits, gumbel(state.keys.uniform(Stream.ACT, 4)))
-    action = torch.where(heard.approved != NO_ACTION, heard.approved, drawn)
-    action = torch.where(begun != NO_ACTION, begun, action)
+    action = torch.maximum(heard.approved, begun)  # never both
+    if bool((action == NO_ACTION).any()):
+        drawn = draw(view.logits, gumbel(state.keys.uniform(Stream.ACT, 4)))
+        action = torch.where(action == NO_ACTION, drawn, action)
     if config.stages == 1:
         return action
     # Eq. (5), (6): move t of a clip is the argmax of pi_{T-t}, so that the last is always pi_1's

@@ -7,6 +7,7 @@ or on their number. The hash is the finaliser of SplitMix64 (Steele, Lea & Flood
 from __future__ import annotations
 
 from enum import IntEnum
+from functools import cache, cached_property
 from math import prod
 
 import torch
@@ -42,6 +43,10 @@ class Stream(IntEnum):
     WEIGHTS = 64
 
 
+TOGETHER = 4
+"""So many draws of each of the agent's streams up to TRAIN are made at once."""
+
+
 class Keys(Struct):
     """One stream of randomness a trial, at one tick."""
 
@@ -50,14 +55,25 @@ class Keys(Struct):
 
     def uniform(self, stream: int, *shape: int) -> Float64[Tensor, "N *shape"]:
         """Independent draws, uniform on [0, 1) with 53 bits, for this stream at this tick."""
-        place = torch.arange(prod(shape), dtype=torch.int64, device=self.seed.device)
+        size = prod(shape)
+        if 0 < stream <= Stream.TRAIN and size <= TOGETHER:
+            return self._together[:, stream - 1, :size].view(-1, *shape)
+        place = torch.arange(size, device=self.seed.device)
         return self.at(stream, place).view(-1, *shape)
 
     def at(self, stream: int, place: Int64[Tensor, "K"]) -> Float64[Tensor, "N K"]:
         """The draws at given places of a stream. A draw is the same however many are asked for beside it."""
-        word = _mix(_mix(_mix(self.seed) + self.tick) + stream)
-        bits = _mix(word.unsqueeze(1) + place * _GOLDEN)
-        return _shift(bits, 11).to(torch.float64) * 2.0**-53
+        return _unit(_mix(_mix(self._word + stream).unsqueeze(1) + place * _GOLDEN))
+
+    @cached_property
+    def _word(self) -> Int64[Tensor, "N"]:
+        return _mix(_mix(self.seed) + self.tick)
+
+    @cached_property
+    def _together(self) -> Float64[Tensor, "N streams TOGETHER"]:
+        """What a tick draws, nearly: one by one, the draws would be a third of its operations."""
+        stream, place = _first_places(self.seed.device)
+        return _unit(_mix(_mix(self._word[:, None] + stream)[:, :, None] + place))
 
     def next(self) -> Keys:
         """The keys of the tick that follows."""
@@ -74,6 +90,17 @@ def keys(seed: int, trials: int, device: str | torch.device = "cpu") -> Keys:
 def gumbel(u: Tensor) -> Tensor:
     """Standard Gumbel noise from uniform draws: argmax of (logits + noise) is a draw from their softmax."""
     return -(-(u.clamp_min(2.0**-53)).log()).log()
+
+
+@cache
+def _first_places(device: torch.device) -> tuple[Tensor, Tensor]:
+    stream = torch.arange(1, Stream.TRAIN + 1, device=device)
+    return stream, torch.arange(TOGETHER, device=device) * _GOLDEN
+
+
+def _unit(bits: Tensor) -> Tensor:
+    """53 bits as numbers on [0, 1)."""
+    return _shift(bits, 11).to(torch.float64) * 2.0**-53
 
 
 def _signed(word: int) -> int:

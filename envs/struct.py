@@ -65,7 +65,12 @@ class Struct:
         )
 
     def where(self, mask: Tensor, other: Self) -> Self:
-        """This record's trials where `mask` holds, the other's elsewhere. Both must have the same shapes."""
+        """This record's trials where `mask` holds, the other's elsewhere. Both must have the same shapes.
+
+        Where it holds in all of them, this record itself: nothing is copied.
+        """
+        if bool(mask.all()):
+            return self
         theirs = other.tensors()
 
         def choose(name: str, tensor: Tensor, axis: int | None) -> Tensor:

@@ -73,6 +73,15 @@ def test_a_draw_is_the_same_however_many_are_asked_for() -> None:
     assert not torch.equal(every, births.uniform(Stream.DRYING, 4, 6).flatten(1))
 
 
+@pytest.mark.parametrize("stream", [stream for stream in Stream if stream < Stream.WEIGHTS])
+def test_a_draw_is_the_same_by_itself_and_together_with_others(stream: Stream) -> None:
+    births = keys(5, 3).next()
+    places = torch.arange(6)
+    for size in (1, 4, 6):
+        assert torch.equal(births.uniform(stream, size), births.at(stream, places)[:, :size])
+    assert torch.equal(births.uniform(stream), births.at(stream, places)[:, 0])
+
+
 @pytest.mark.parametrize("trials", [2, 7, 100])
 def test_a_trials_keys_do_not_depend_on_their_number(trials: int) -> None:
     few, many = keys(9, 2), keys(9, trials)
