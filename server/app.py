@@ -39,8 +39,8 @@ from server.workers import alive
 LARGEST_BODY = 64 * 1024
 ABOUT = """Start a run, lease its questions, answer them, watch how the agent learns, export what was said.
 
-Bodies are JSON and strict: an unknown field is refused. Every error has one shape. Lists come in pages:
-the `next` of one page is the cursor of the following. No GET changes anything."""
+Bodies are JSON and strict: an unknown field is refused. Every error has one shape. Lists come in pages, and
+what a page says under *next* is the cursor of the following one. No GET changes anything."""
 TAGS = [
     {"name": "runs", "description": "Start them, look at them, read what they did."},
     {"name": "operator", "description": "What whoever runs the experiment may do to a living agent."},

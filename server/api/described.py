@@ -28,6 +28,9 @@ class Described(FastAPI):
 
 def _show(operation: dict[str, Any]) -> None:
     shown = SHOWN[operation["operationId"]]
+    for parameter in operation.get("parameters", []):
+        if "examples" in parameter["schema"]:  # here too, for pages that fill it in
+            parameter["example"] = parameter["schema"]["examples"][0]
     for media in operation.get("requestBody", {}).get("content", {}).values():
         media["examples"] = {name: {"value": value} for name, value in shown.sent.items()}
     for reply in (reply for status, reply in operation["responses"].items() if status in DONE):

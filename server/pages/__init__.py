@@ -3,6 +3,7 @@
 from fastapi import APIRouter
 
 from server.pages.dashboard import router as dashboard
+from server.pages.docs import router as docs
 from server.pages.parent import router as parent
 from server.pages.render import error_page
 from server.pages.start import router as start
@@ -13,3 +14,4 @@ router = APIRouter(include_in_schema=False)
 router.include_router(start)
 router.include_router(parent)
 router.include_router(dashboard)
+router.include_router(docs)
