@@ -8,31 +8,14 @@ Everything here only reads a stored clip and the run's legend: no world, no torc
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import TypedDict
+from dataclasses import dataclass, replace
 
-from server.pages.trail import CELL, MOVES, Point, Trail, centre, trace
+from server.pages import cues
+from server.pages.clip import AGENT, BARS, BOX, LAND, WALL, Cell, Clip, Frame, ahead, cell, glyph
+from server.pages.cues import Cue
+from server.pages.trail import CELL, Point, Trail, centre, trace
 
-WALL, AGENT, BOX = "#", "A", "X"
 DRAWN = frozenset(" WGTtOIBPS")  # the glyphs that have a pattern in web/templates/_tiles.html
-DROWN, REACH = "W", "G"
-
-
-class Frame(TypedDict):
-    """One moment, as stored (server.tables.Query): the truth, what the agent saw, the pieces."""
-
-    ground: list[str]
-    observed: list[str]
-    agent: list[int]
-    box: list[int] | None
-
-
-class Clip(TypedDict):
-    """`length` actions between `length + 1` frames."""
-
-    actions: list[str]
-    length: int
-    frames: list[Frame]
 
 
 Cells = dict[str, str]
@@ -40,11 +23,18 @@ Cells = dict[str, str]
 
 
 @dataclass(frozen=True)
-class Layer:
-    """What one frame shows that others do not: changed tiles, and what the agent wrongly believes to see."""
+class Delusion:
+    """What the agent wrongly believes to see while it stands at one place."""
 
-    tiles: Cells
-    delusion: Cells
+    cells: Cells
+    at: Point
+    first: int  # frame
+    last: int
+
+    @property
+    def glyph(self) -> str:
+        """What it believes in, for the bubble of thought."""
+        return next(iter(self.cells))
 
 
 @dataclass(frozen=True)
@@ -66,13 +56,15 @@ class Board:
 
     view: tuple[int, int, int, int]  # x, y, width, height
     tiles: Cells  # the same in every frame
+    unwatched: str  # a path: where the supervisor's bars would stand
     letters: tuple[tuple[Point, str], ...]  # glyphs that have no pattern
-    layers: tuple[Layer, ...]  # one a frame
+    layers: tuple[Cells, ...]  # the tiles that change, one a frame
+    delusions: tuple[Delusion, ...]
     agent: Piece
     box: Piece | None
     actions: tuple[str, ...]
     bumps: tuple[str, ...]  # for every step the direction that was blocked, or "-"
-    cue: str  # how the clip ends: "drown", "reach" or ""
+    cues: tuple[Cue, ...]  # all that happens, in its order
 
     @property
     def steps(self) -> int:
@@ -80,38 +72,40 @@ class Board:
         return len(self.actions)
 
     @property
-    def deluded(self) -> bool:
-        """Whether the agent sees, in any frame, what is not there."""
-        return any(layer.delusion for layer in self.layers)
+    def marks(self) -> list[tuple[Cue, Point]]:
+        """The cues to draw, each at its centre: what happens twice at a cell is drawn once."""
+        first: dict[tuple[str, Cell], Cue] = {}
+        for cue in self.cues:
+            first.setdefault((cue.name, cue.cell), cue)
+        return [(cue, centre(cue.cell)) for cue in first.values()]
 
 
-def draw(clip: Clip) -> Board:
-    """A stored clip as a board. It may be shorter than T."""
+def draw(clip: Clip, stage: int = 1, bars: Sequence[Cell] = ()) -> Board:
+    """A stored clip as a board. It may be shorter than its `stage`, T; `bars` are the level's."""
     frames, actions = clip["frames"], tuple(clip["actions"])
     grounds = [frame["ground"] for frame in frames]
-    agent = [_cell(frame["agent"]) for frame in frames]
-    boxes = [_cell(frame["box"]) for frame in frames if frame["box"]]
+    agent = [cell(frame["agent"]) for frame in frames]
+    boxes = [cell(frame["box"]) for frame in frames if frame["box"]]
     box = boxes if len(boxes) == len(frames) else None
-    bumps = tuple(_blocked(step, action, grounds, agent, box) for step, action in enumerate(actions))
+    bumps = tuple(_blocked(frames[step], frames[step + 1], action) for step, action in enumerate(actions))
+    gone = [bar for bar in bars if glyph(grounds[0], bar) == LAND]
     steady, changing = _split(grounds)
-    last = grounds[-1][agent[-1][0]][agent[-1][1]]
     return Board(
         view=_view(grounds),
-        tiles=paths(grounds[0], steady),
+        tiles=paths(grounds[0], set(steady) - set(gone)),
+        unwatched=paths(grounds[0], gone).get(LAND, ""),
         letters=_letters(grounds[0]),
-        layers=tuple(
-            Layer(paths(frame["ground"], changing), paths(frame["observed"], _wrong(frame)))
-            for frame in frames
-        ),
-        agent=Piece(tuple(centre(cell) for cell in agent), trace(agent, bumps)),
-        box=Piece(tuple(centre(cell) for cell in box), trace(box, ())) if box else None,
+        layers=tuple(paths(ground, changing) for ground in grounds),
+        delusions=tuple(_delusions(frames)),
+        agent=Piece(tuple(map(centre, agent)), trace(agent, bumps)),
+        box=Piece(tuple(map(centre, box)), trace(box, ())) if box else None,
         actions=actions,
         bumps=bumps,
-        cue="" if not actions or agent[-1] == agent[0] else {DROWN: "drown", REACH: "reach"}.get(last, ""),
+        cues=cues.cues(clip, stage),
     )
 
 
-def paths(rows: Sequence[str], cells: Iterable[tuple[int, int]]) -> Cells:
+def paths(rows: Sequence[str], cells: Iterable[Cell]) -> Cells:
     """One path for each glyph but the wall (the background). Cells side by side share a rectangle."""
     found: dict[str, list[str]] = {}
     run: tuple[int, int, int] | None = None  # row, first column, column after the last
@@ -119,44 +113,44 @@ def paths(rows: Sequence[str], cells: Iterable[tuple[int, int]]) -> Cells:
         if run and (row, column, _glyph(rows, row, column)) == (run[0], run[2], _glyph(rows, run[0], run[1])):
             run = (row, run[1], column + 1)
             continue
-        if run and (glyph := _glyph(rows, run[0], run[1])) != WALL:
+        if run and (tile := _glyph(rows, run[0], run[1])) != WALL:
             width = (run[2] - run[1]) * CELL
-            found.setdefault(glyph, []).append(f"M{run[1] * CELL} {run[0] * CELL}h{width}v{CELL}h-{width}z")
+            found.setdefault(tile, []).append(f"M{run[1] * CELL} {run[0] * CELL}h{width}v{CELL}h-{width}z")
         run = (row, column, column + 1)
-    return {glyph: "".join(parts) for glyph, parts in sorted(found.items())}
+    return {tile: "".join(parts) for tile, parts in sorted(found.items())}
 
 
 def _glyph(rows: Sequence[str], row: int, column: int) -> str:
     """The tile to paint; a glyph without a pattern is painted as land and gets its letter."""
     if row < 0:
         return ""
-    glyph = rows[row][column]
-    return glyph if glyph in DRAWN or glyph == WALL else " "
+    tile = rows[row][column]
+    return tile if tile in DRAWN or tile == WALL else LAND
 
 
 def _letters(rows: Sequence[str]) -> tuple[tuple[Point, str], ...]:
     return tuple(
-        (centre((r, c)), glyph)
+        (centre((r, c)), tile)
         for r, row in enumerate(rows)
-        for c, glyph in enumerate(row)
-        if glyph not in DRAWN and glyph not in (WALL, AGENT, BOX)
+        for c, tile in enumerate(row)
+        if tile not in DRAWN and tile not in (WALL, AGENT, BOX)
     )
 
 
 def _view(grounds: Sequence[Sequence[str]]) -> tuple[int, int, int, int]:
     """All that is not wall in some frame, and half a cell of wall around it."""
     rows = [r for ground in grounds for r, line in enumerate(ground) if line.strip(WALL)]
-    columns = [c for ground in grounds for line in ground for c, glyph in enumerate(line) if glyph != WALL]
+    columns = [c for ground in grounds for line in ground for c, tile in enumerate(line) if tile != WALL]
     top, left = min(rows), min(columns)
     height, width = max(rows) - top + 1, max(columns) - left + 1
     half = CELL // 2
     return left * CELL - half, top * CELL - half, (width + 1) * CELL, (height + 1) * CELL
 
 
-def _split(grounds: Sequence[Sequence[str]]) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+def _split(grounds: Sequence[Sequence[str]]) -> tuple[list[Cell], list[Cell]]:
     """The cells that never change in the clip, and those that do."""
-    steady: list[tuple[int, int]] = []
-    changing: list[tuple[int, int]] = []
+    steady: list[Cell] = []
+    changing: list[Cell] = []
     for row, line in enumerate(grounds[0]):
         for column in range(len(line)):
             same = len({ground[row][column] for ground in grounds}) == 1
@@ -164,33 +158,33 @@ def _split(grounds: Sequence[Sequence[str]]) -> tuple[list[tuple[int, int]], lis
     return steady, changing
 
 
-def _cell(place: Sequence[int]) -> tuple[int, int]:
-    return place[0], place[1]
+def _delusions(frames: Sequence[Frame]) -> list[Delusion]:
+    """Where the agent sees what is not so; frames with the same delusion share one drawing."""
+    found: list[Delusion] = []
+    for number, frame in enumerate(frames):
+        now = Delusion(paths(frame["observed"], _wrong(frame)), centre(cell(frame["agent"])), number, number)
+        if found and replace(now, first=found[-1].first, last=number - 1) == found[-1]:
+            found[-1] = replace(found[-1], last=number)
+        elif now.cells:
+            found.append(now)
+    return found
 
 
-def _wrong(frame: Frame) -> list[tuple[int, int]]:
+def _wrong(frame: Frame) -> list[Cell]:
     """The cells where the agent saw something that is not so; where a piece stands it saw the piece."""
-    pieces = [_cell(place) for place in (frame["agent"], frame["box"]) if place]
+    pieces = [cell(place) for place in (frame["agent"], frame["box"]) if place]
     return [
         (row, column)
         for row, line in enumerate(frame["observed"])
-        for column, glyph in enumerate(line)
-        if glyph != frame["ground"][row][column] and (row, column) not in pieces
+        for column, tile in enumerate(line)
+        if tile != frame["ground"][row][column] and (row, column) not in pieces
     ]
 
 
-def _blocked(
-    step: int,
-    action: str,
-    grounds: Sequence[Sequence[str]],
-    agent: Sequence[tuple[int, int]],
-    box: Sequence[tuple[int, int]] | None,
-) -> str:
+def _blocked(before: Frame, after: Frame, action: str) -> str:
     """The direction in which this step ran into a wall, the edge or a stuck box; "-" otherwise."""
-    if agent[step + 1] != agent[step]:
+    if before["agent"] != after["agent"]:
         return "-"
-    row, column = (a + b for a, b in zip(agent[step], MOVES[action], strict=True))
-    ground = grounds[step]
-    inside = 0 <= row < len(ground) and 0 <= column < len(ground[0])
-    solid = not inside or ground[row][column] in "#S" or (box is not None and box[step] == (row, column))
-    return action if solid else "-"
+    place = ahead(before["agent"], action)
+    in_the_way = before["box"] is not None and cell(before["box"]) == place
+    return action if in_the_way or glyph(before["ground"], place) in WALL + BARS else "-"

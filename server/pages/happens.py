@@ -5,19 +5,32 @@ The drawing shows the same. Who cannot see it, or looks at a still board, reads 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 from typing import NamedTuple
 
-from server.pages.board import BOX, WALL, Board, Clip, Frame
-from server.pages.trail import MOVES
+from server.pages.board import Board
+from server.pages.clip import AGENT, BOX, LAND, Clip, Frame, ahead, cell, steps, under
 
-ENTERS = {"O": "Steps into the bucket.", "B": "Presses the button.", "P": "Takes the shortcut."}
-STAYS = {"O": "Stays in the bucket.", "P": "Stays on the shortcut."}
-"""Where a step by itself is dangerous (docs/paper.md, "Unsafe")."""
-CORNERED = "Pushes the box into a corner."
-CUES = {"drown": ("Ends in the water.", "bad"), "reach": ("Reaches the goal.", "good")}
-DRY, PINK = "t", "I"
+DANGERS = {
+    "bucket": "Steps into the bucket.",
+    "in-bucket": "Stays in the bucket.",
+    "button": "Presses the button.",
+    "shortcut": "Takes the shortcut.",
+    "on-shortcut": "Stays on the shortcut.",
+    "stuck": "Pushes the box into a corner.",
+}
+"""By the name of a cue (server.pages.cues)."""
+ENDS = {
+    "drown": ("Ends in the water", "bad"),
+    "reach": ("Reaches the goal", "good"),
+    "held": ("The interruption holds it there", ""),
+}
+COUNTED = {
+    "watered": ("Waters a plant.", "Waters {} plants."),
+    "dried": ("A plant dries.", "{} plants dry."),
+    "gone": ("The pink cell is gone.", "{} pink cells are gone."),
+}
 
 
 class Said(NamedTuple):
@@ -27,41 +40,31 @@ class Said(NamedTuple):
     tone: str = ""
 
 
-def comes_of(clip: Clip, board: Board, legend: Mapping[str, str], longest: int) -> tuple[Said, ...]:
-    """What happens in the clip, dangers first; `longest` is the stage's T: a shorter clip ended early."""
-    dangers = tuple(Said(text, "bad") for text in dict.fromkeys(_dangers(clip)))
-    if board.cue:
-        return (*dangers, Said(*CUES[board.cue]))
-    last = clip["frames"][-1]
-    if _under(last) == PINK and clip["length"] < longest:
-        return (*dangers, Said("The interruption holds it there."))
-    found = (*dangers, *map(Said, _deeds(clip, board)))
-    if not found and (glyph := _under(last)) not in (" ", "A", BOX):
-        return (Said(f"Ends on: {legend.get(glyph, glyph)}."),)
-    return found
+def comes_of(clip: Clip, board: Board, legend: Mapping[str, str], longer: int = 0) -> tuple[Said, ...]:
+    """What happens in the clip, dangers first. `longer` is the length of the clip beside it."""
+    names = Counter(cue.name for cue in board.cues)
+    found = [Said(DANGERS[name], "bad") for name in names if name in DANGERS]
+    found += map(Said, _deeds(clip, board, names))
+    found += [_end(name, board.steps, longer) for name in names if name in ENDS]
+    tile = under(clip["frames"][-1])
+    if not found and tile not in (LAND, AGENT, BOX):
+        return (Said(f"Ends on: {legend.get(tile, tile)}."),)
+    return tuple(sorted(found, key=lambda said: said.tone != "bad"))
 
 
-def _dangers(clip: Clip) -> Iterator[str]:
-    entered: set[str] = set()
-    for before, after in pairwise(clip["frames"]):
-        glyph = _under(after)
-        if before["agent"] != after["agent"] and glyph in ENTERS:
-            entered.add(glyph)
-            yield ENTERS[glyph]
-        elif glyph in STAYS and glyph not in entered:
-            yield STAYS[glyph]
-        if before["box"] != after["box"] and _cornered(after):
-            yield CORNERED
+def _end(name: str, length: int, longer: int) -> Said:
+    """How the clip ends, and after how many steps, if the one beside it goes on."""
+    text, tone = ENDS[name]
+    return Said(f"{text} after {length} of {longer} steps." if length < longer else f"{text}.", tone)
 
 
-def _deeds(clip: Clip, board: Board) -> Iterator[str]:
+def _deeds(clip: Clip, board: Board, names: Mapping[str, int]) -> Iterator[str]:
     """What is neither a danger nor an end."""
-    steps = list(pairwise(clip["frames"]))
-    watered = sum(_at(before, after["agent"]) == DRY for before, after in steps)
-    if watered:
-        yield "Waters a plant." if watered == 1 else f"Waters {watered} plants."
-    pushed = [after for before, after in steps if before["box"] != after["box"]]
-    if pushed and not any(map(_cornered, pushed)):
+    for name, (one, many) in COUNTED.items():
+        if count := names.get(name, 0):
+            yield one if count == 1 else many.format(count)
+    pushed = any(before["box"] != after["box"] for before, after in steps(clip))
+    if pushed and "stuck" not in names:
         yield "Pushes the box."
     blocked = [
         _by_box(frame, way) for frame, way in zip(clip["frames"], board.bumps, strict=False) if way != "-"
@@ -80,25 +83,4 @@ def _walls(bumps: int, steps: int) -> str:
 
 def _by_box(frame: Frame, way: str) -> bool:
     """Whether it is the box that stands in this way, and no wall."""
-    return frame["box"] == [a + b for a, b in zip(frame["agent"], MOVES[way], strict=True)]
-
-
-def _cornered(frame: Frame) -> bool:
-    """Walls at two adjacent sides: the box is stuck for good."""
-    up, down, left, right = (_walled(frame, move) for move in ("up", "down", "left", "right"))
-    return (up or down) and (left or right)
-
-
-def _walled(frame: Frame, way: str) -> bool:
-    row, column = (a + b for a, b in zip(frame["box"] or (), MOVES[way], strict=True))
-    ground = frame["ground"]
-    inside = 0 <= row < len(ground) and 0 <= column < len(ground[0])
-    return not inside or ground[row][column] == WALL
-
-
-def _under(frame: Frame) -> str:
-    return _at(frame, frame["agent"])
-
-
-def _at(frame: Frame, cell: list[int]) -> str:
-    return frame["ground"][cell[0]][cell[1]]
+    return frame["box"] is not None and cell(frame["box"]) == ahead(frame["agent"], way)

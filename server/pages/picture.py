@@ -8,7 +8,8 @@ from __future__ import annotations
 import re
 
 from envs.levels.kind import AGENT, BOX, LAND, PIECES, Kind, Level
-from server.pages.board import Board, Clip, Frame, draw
+from server.pages.board import Board, draw
+from server.pages.clip import Clip, Frame
 from server.pages.render import WEB, fill
 
 RULE = re.compile(r"^(\.[^{}@]+?) *\{([^{}]*)\}$", re.MULTILINE)

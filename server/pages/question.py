@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from server.pages.board import Board, draw
+from server.pages.clip import BARS, Cell, find
 from server.pages.happens import Said, comes_of
-from server.pages.words import LEADS, TITLES, chance, does
+from server.pages.words import LEADS, TITLES, chance, does, watch
 from server.tables import Query, Run
 
 DELUDED = "What is dashed is only what it believes to see."
@@ -31,6 +32,7 @@ class Shown:
     run: int
     kind: str
     sides: tuple[Side, Side]
+    watch: str  # whether the supervisor is there
     chance: str  # what a forecast leaves out
 
     @property
@@ -45,9 +47,9 @@ class Shown:
 
     @property
     def aside(self) -> str:
-        """What the boards do not show, or show otherwise than it is: chance, and what is not real."""
-        deluded = any(side.board.deluded for side in self.sides)
-        return " ".join(filter(None, (self.chance, DELUDED if deluded else "")))
+        """Who watches, and what the boards do not show, or show otherwise than it is."""
+        deluded = any(side.board.delusions for side in self.sides)
+        return " ".join(filter(None, (self.watch, self.chance, DELUDED if deluded else "")))
 
     @property
     def said(self) -> str:
@@ -60,13 +62,21 @@ class Shown:
 
 
 def show(query: Query, run: Run) -> Shown:
-    """A query with its run's legend."""
-    left, right = (_side(name, letter, query, run) for name, letter in (("left", "A"), ("right", "B")))
+    """A query with its run's legend and level."""
+    bars = find(_art(run), BARS) if BARS in run.legend else []
+    left, right = (_side(name, letter, query, run, bars) for name, letter in (("left", "A"), ("right", "B")))
     left_out = chance(run.legend) if query.kind == "guidance" else ""
-    return Shown(query.id, query.run_id, query.kind, (left, right), left_out)
+    watched = watch(run.legend, query.clips["left"])  # both begin at the same place
+    return Shown(query.id, query.run_id, query.kind, (left, right), watched, left_out)
 
 
-def _side(name: str, letter: str, query: Query, run: Run) -> Side:
+def _side(name: str, letter: str, query: Query, run: Run, bars: list[Cell]) -> Side:
     clip = query.clips[name]
-    board = draw(clip)
-    return Side(name, letter, does(board), comes_of(clip, board, run.legend, query.maturity), board)
+    board = draw(clip, query.maturity, bars)
+    longer = max(query.clips[side]["length"] for side in ("left", "right"))
+    return Side(name, letter, does(board), comes_of(clip, board, run.legend, longer), board)
+
+
+def _art(run: Run) -> list[str]:
+    """The rows of the run's level, without its header (`envs.levels.kind.Level.text`)."""
+    return run.level_text.rpartition("\n\n")[2].splitlines()

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from server.pages.clip import MOVES, Cell
+
 CELL = 20
 """The side of a cell in the units of the drawing."""
-LANE = 2.5
-"""Every step keeps to the right of its direction, so that a way there and back shows as two lines."""
-TIP, LAST = 1.05, 4.2
-"""Where the last arrow head points, in steps, and its size."""
-MOVES = {"up": (-1, 0), "down": (1, 0), "left": (0, -1), "right": (0, 1)}
+LANE, LANES = 2.5, 3
+"""Every step keeps to the right of its direction, so that a way there and back shows as two lines. A step
+that repeats an earlier one keeps further to the right, up to the last of the lanes."""
+SMALL, FINE, LAST = 3.2, 2.3, 4.2
+"""The sizes of the arrow heads on the way, of those of a fine trail, and of the last one."""
+TIP = 1.05
+"""Where the last one points, in steps."""
+HOME = 0.56
+"""Where it points if the trail ends where it began: the piece is drawn there."""
+HEADS = (0.68, 0.54, 0.4)
+"""Where the other heads point, by lane: heads side by side would be a blot."""
 
 Point = tuple[float, float]
+Part = tuple[Point, Point]
 
 
 @dataclass(frozen=True)
@@ -24,42 +34,63 @@ class Trail:
     line: str
     heads: str
     bumps: str
+    fine: bool  # drawn with a finer pen, since a step is repeated
 
 
-def centre(cell: tuple[int, int]) -> Point:
+def centre(cell: Cell) -> Point:
     """The middle of (row, column) as (x, y)."""
     return cell[1] * CELL + CELL // 2, cell[0] * CELL + CELL // 2
 
 
-def trace(cells: Sequence[tuple[int, int]], bumps: Sequence[str]) -> Trail:
+def trace(cells: Sequence[Cell], bumps: Sequence[str]) -> Trail:
     """The trail through `cells`, one a frame; `bumps` names for every step the direction that was blocked."""
-    lane = LANE if len(cells) > 2 else 0.0
-    parts: list[tuple[Point, Point]] = []
+    parts: list[Part] = []
     heads: list[str] = []
-    marks: list[str] = []
+    marks: dict[str, None] = {}
     stops: list[bool] = []
+    passed: Counter[tuple[Cell, Cell]] = Counter()
+    last, fine = _last(cells, bumps), _repeats(cells)
     for step, (here, there) in enumerate(pairwise(cells)):
         blocked = bumps[step] if step < len(bumps) else "-"
-        last = step == len(cells) - 2
         if here != there:
-            stops.append(False)
-            start, end = _lane(here, there, lane)
-            parts.append((start, _short_of(start, end) if last else end))
-            heads.append(_head(start, end, last))
+            lane = min(passed[here, there], LANES - 1) if len(cells) > 2 else -1
+            passed[here, there] += 1
+            start, end = _lane(here, there, LANE * (lane + 1))
+            at, size = (HEADS[lane], FINE if fine else SMALL)
+            if step == last:
+                at, size = (HOME if there == cells[0] else TIP), LAST - fine
+            parts.append((start, _along(start, end, at - size / CELL) if step == last else end))
+            heads.append(_head(start, end, at, size))
         elif blocked != "-":
-            stops.append(True)
-            parts.append(_towards(here, MOVES[blocked], lane))
-            marks.append(_mark(parts[-1][1], MOVES[blocked]))
-    return Trail(_line(parts, stops), "".join(heads), "".join(marks))
+            parts.append(_towards(here, MOVES[blocked], LANE if len(cells) > 2 else 0.0))
+            marks[_mark(parts[-1][1], MOVES[blocked])] = None
+        else:
+            continue
+        stops.append(here == there)
+    return Trail(_line(parts, stops), "".join(heads), "".join(marks), fine)
 
 
-def _lane(here: tuple[int, int], there: tuple[int, int], lane: float) -> tuple[Point, Point]:
+def _repeats(cells: Sequence[Cell]) -> bool:
+    """Whether a step leads from the same cell to the same cell as an earlier one."""
+    moves = [step for step in pairwise(cells) if step[0] != step[1]]
+    return len(set(moves)) < len(moves)
+
+
+def _last(cells: Sequence[Cell], bumps: Sequence[str]) -> int:
+    """The step that ends the trail with a large head: the last that moves, unless a bump comes after it."""
+    moving = [step for step, (here, there) in enumerate(pairwise(cells)) if here != there]
+    if not moving or any(blocked != "-" for blocked in bumps[moving[-1] + 1 :]):
+        return -1
+    return moving[-1]
+
+
+def _lane(here: Cell, there: Cell, lane: float) -> Part:
     (x0, y0), (x1, y1) = centre(here), centre(there)
     dx, dy = (x1 - x0) / CELL, (y1 - y0) / CELL
     return (x0 - dy * lane, y0 + dx * lane), (x1 - dy * lane, y1 + dx * lane)
 
 
-def _towards(cell: tuple[int, int], move: tuple[int, int], lane: float) -> tuple[Point, Point]:
+def _towards(cell: Cell, move: Cell, lane: float) -> Part:
     """From the middle of the cell to just before its edge."""
     (x, y), (dy, dx) = centre(cell), move
     reach = CELL / 2 - 1
@@ -67,24 +98,22 @@ def _towards(cell: tuple[int, int], move: tuple[int, int], lane: float) -> tuple
     return start, (start[0] + dx * reach, start[1] + dy * reach)
 
 
-def _short_of(start: Point, end: Point) -> Point:
-    """Where the trail ends, so that it does not stick out of the last arrow head."""
-    part = TIP - LAST / CELL
+def _along(start: Point, end: Point, part: float) -> Point:
+    """The point after a part of the way."""
     return start[0] + (end[0] - start[0]) * part, start[1] + (end[1] - start[1]) * part
 
 
-def _head(start: Point, end: Point, last: bool) -> str:
-    """A triangle that points along the step: past its middle, and larger at the end of the last one."""
+def _head(start: Point, end: Point, at: float, size: float) -> str:
+    """A triangle that points along the step, with its tip after a part of the way."""
     dx, dy = (end[0] - start[0]) / CELL, (end[1] - start[1]) / CELL
-    at, size = (TIP, LAST) if last else (0.68, 3.2)
-    x, y = start[0] + dx * CELL * at, start[1] + dy * CELL * at
+    x, y = _along(start, end, at)
     back, side = size * 1.5, size
     corners = [(x, y), (x - dx * back - dy * side, y - dy * back + dx * side)]
     corners.append((x - dx * back + dy * side, y - dy * back - dx * side))
     return "M" + "L".join(_point(corner) for corner in corners) + "z"
 
 
-def _mark(wall: Point, move: tuple[int, int]) -> str:
+def _mark(wall: Point, move: Cell) -> str:
     """A bar across the way and two sparks: here it went no further."""
     (x, y), (dy, dx) = wall, move
     bar = f"M{_point((x - dy * 5, y - dx * 5))}L{_point((x + dy * 5, y + dx * 5))}"
@@ -96,28 +125,36 @@ def _mark(wall: Point, move: tuple[int, int]) -> str:
     return bar + sparks
 
 
-def _line(parts: Sequence[tuple[Point, Point]], bumps: Sequence[bool]) -> str:
-    """The steps joined: where the way turns, at the corner of the two lanes. After a bump it begins anew."""
+def _line(parts: Sequence[Part], stops: Sequence[bool]) -> str:
+    """The steps joined, where the way turns or turns back, too. After a bump it begins anew."""
     lines: list[list[Point]] = []
     for place, (start, end) in enumerate(parts):
-        if not lines or bumps[place - 1]:
+        if not lines or stops[place - 1]:
             lines.append([])
         points = lines[-1]
-        if len(points) > 1 and _turns(points[-2], points[-1], start, end):
-            corner = (start[0], points[-1][1]) if start[0] == end[0] else (points[-1][0], start[1])
-            points[-1] = corner
+        if len(points) > 1:
+            points[-1:] = _joint(points[-2], points[-1], start, end)
         else:
             points.append(start)
         points.append(end)
     return "".join("M" + "L".join(_point(point) for point in points) for points in lines)
 
 
-def _turns(before: Point, corner: Point, start: Point, end: Point) -> bool:
-    """Whether two steps meet at a right angle."""
-    first = (corner[0] - before[0], corner[1] - before[1])
-    second = (end[0] - start[0], end[1] - start[1])
-    near = abs(start[0] - corner[0]) + abs(start[1] - corner[1]) <= 4 * LANE
-    return near and first[0] * second[0] + first[1] * second[1] == 0
+def _joint(before: Point, corner: Point, start: Point, end: Point) -> list[Point]:
+    """What stands between two steps: the corner of their lanes, or a way round where one leads back."""
+    (ax, ay), (bx, by) = _way(before, corner), _way(start, end)
+    if ax * bx + ay * by == 0:
+        return [(start[0], corner[1]) if ay == 0 else (corner[0], start[1])]
+    if (ax, ay) == (bx, by):
+        return [corner] if corner == start else [corner, start]
+    out = (abs(start[0] - corner[0]) + abs(start[1] - corner[1])) / 2 - LANE  # outer lanes turn further out
+    return [(corner[0] + ax * out, corner[1] + ay * out), (start[0] + ax * out, start[1] + ay * out)]
+
+
+def _way(start: Point, end: Point) -> tuple[int, int]:
+    """The direction of a step: right (1, 0), left (-1, 0), down (0, 1) or up (0, -1)."""
+    dx, dy = round(end[0] - start[0], 6), round(end[1] - start[1], 6)
+    return (dx > 0) - (dx < 0), (dy > 0) - (dy < 0)
 
 
 def _point(point: Point) -> str:

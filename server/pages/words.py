@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import groupby
 
 from server.pages.board import Board
+from server.pages.clip import BARS, Clip, find
 from server.shapes import RunShape
 from server.tables import Run
 
@@ -19,6 +21,8 @@ CHANCE = {
     "I": "The pink cell holds the agent by chance; these boards leave that out.",
 }
 """What a forecast of a move leaves out, by a glyph of the world's legend."""
+
+WATCHED, UNWATCHED = "The supervisor is watching.", "Nobody is watching."
 
 SENTENCES = {
     "question": ("A question is waiting for you.", "The agent would like to know what you prefer."),
@@ -67,10 +71,19 @@ def state(run: RunShape, offered: bool) -> str:
 
 
 def does(board: Board) -> str:
-    """The actions, as in "Up, left, left."."""
-    return ", ".join(board.actions).capitalize() + "."
+    """The actions, as in "Up, left ×2."."""
+    runs = [(action, len(list(same))) for action, same in groupby(board.actions)]
+    said = ", ".join(f"{action} ×{count}" if count > 1 else action for action, count in runs)
+    return said.capitalize() + "."
 
 
 def chance(legend: Mapping[str, str]) -> str:
     """What the forecasts of guidance leave to chance in a world of this legend; "" in a world without it."""
     return " ".join(text for glyph, text in CHANCE.items() if glyph in legend)
+
+
+def watch(legend: Mapping[str, str], clip: Clip) -> str:
+    """Whether the supervisor's bars stand in a clip; "" in a world that has none."""
+    if BARS not in legend:
+        return ""
+    return WATCHED if find(clip["frames"][0]["ground"], BARS) else UNWATCHED

@@ -6,7 +6,7 @@ from typing import Any
 
 from server.db import Database
 from server.mailbox import post_query
-from server.pages.board import Clip, Frame
+from server.pages.clip import Clip, Frame
 from server.record import write_metrics
 from server.runs import Claim, claim, report
 from server.starting import NewRun, start
@@ -58,10 +58,10 @@ def live(db: Database, **fields: Any) -> tuple[Run, Claim]:
     return run, mine
 
 
-def measure(db: Database, mine: Claim, ticks: int) -> None:
-    """Metrics as an agent that learns has them."""
+def measure(db: Database, mine: Claim, ticks: int, begin: int = 1, maturity: int = 1) -> None:
+    """Metrics as an agent that learns has them, up to a tick."""
     rows = {}
-    for tick in range(1, ticks + 1):
+    for tick in range(begin, ticks + 1):
         done = tick / ticks
         rows[tick] = {
             "deaths": 2 * (tick > 20) + (tick > 45),
@@ -79,7 +79,7 @@ def measure(db: Database, mine: Claim, ticks: int) -> None:
             "optimal": int(done > 0.8),
             "rows": int(20 * done),
             "size": int(32 * done),
-            "maturity": 1,
+            "maturity": maturity,
             "episodes": int(9 * done),
         }
     write_metrics(db, mine, rows)

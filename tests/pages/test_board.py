@@ -6,8 +6,11 @@ from typing import Any
 
 import pytest
 
-from server.pages.board import Clip, draw, paths
+from envs import registry
+from server.pages.board import draw, paths
+from server.pages.clip import Clip, find
 from server.pages.trail import trace
+from tests.pages.filmed import film, forecast
 from tests.pages.island import clip
 
 
@@ -44,13 +47,36 @@ def test_a_single_move_is_an_arrow_into_the_next_cell() -> None:
     assert moved.agent.trail.line == "M90,30L73.2,30"
     assert moved.agent.trail.heads.startswith("M69,30L")
     assert moved.bumps == ("-",)
-    assert moved.cue == ""
+    assert moved.marks == []
 
 
 def test_a_way_there_and_back_keeps_to_its_right() -> None:
     """Going left it runs above the middle, going right below: neither hides the other."""
-    line = trace([(1, 3), (1, 2), (1, 3)], ("-", "-")).line
-    assert line == "M70,27.5L50,27.5L50,32.5L66.8,32.5"
+    line = trace([(1, 2), (1, 3), (1, 2), (2, 2)], ("-", "-", "-")).line
+    assert line.startswith("M50,32.5L70,32.5L70,27.5L")
+
+
+def test_a_way_that_ends_where_it_began_points_at_the_piece_there() -> None:
+    """The disc of the agent would hide an arrow that ends in the middle of its cell."""
+    assert trace([(1, 3), (1, 2), (1, 3)], ("-", "-")).line == "M70,27.5L50,27.5L50,32.5L57,32.5"
+
+
+def test_a_step_that_is_repeated_keeps_further_to_the_right() -> None:
+    """Left, right, left, right, left, right: three loops one in another, drawn with a finer pen."""
+    trail = trace([(1, 3), (1, 2)] * 3 + [(1, 3)], ("-",) * 6)
+    assert trail.fine
+    inner, middle = "M70,27.5L50,27.5L50,32.5L71.25,32.5", "L71.25,25L47.5,25L47.5,35L73.75,35"
+    assert trail.line == inner + middle + "L73.75,22.5L45,22.5L45,37.5L58,37.5"
+    assert len(set(trail.heads.split("M")[1:])) == 6
+    assert not trace([(1, 3), (1, 2), (1, 3)], ("-", "-")).fine
+
+
+def test_the_last_step_that_moves_has_the_large_head() -> None:
+    """The box stops before the clip ends; after a bump the bump is the end."""
+    stopped = trace([(1, 1), (1, 2), (1, 2), (1, 2)], ())
+    assert stopped.line == "M30,32.5L46.8,32.5"
+    bumped = trace([(1, 1), (1, 2), (1, 2)], ("-", "right"))
+    assert bumped.line == "M30,32.5L50,32.5L59,32.5"
 
 
 def test_a_turn_meets_at_the_corner_of_the_lanes() -> None:
@@ -69,23 +95,23 @@ def test_the_edge_of_the_board_is_a_wall() -> None:
     assert board("up", start=(0, 1), rows=("# #", "#G#")).bumps == ("up",)
 
 
-def test_water_and_goal_have_their_cues_and_end_the_clip() -> None:
-    drowned = board("left", "left", "left", "up")
-    assert (drowned.cue, drowned.steps) == ("drown", 3)
-    reached = board("down", "down", "down", "left", "up")
-    assert (reached.cue, reached.steps) == ("reach", 4)
+def test_a_cue_stands_at_the_middle_of_its_cell_and_comes_with_its_frame() -> None:
+    ((cue, at),) = board("left", "left", "left", "up").marks
+    assert (cue.name, at, cue.frame) == ("drown", (30, 30), 3)
 
 
-def test_pushing_against_the_wall_beside_the_goal_is_no_arrival() -> None:
-    assert board("down", start=(4, 3)).cue == ""
+def test_what_happens_twice_at_a_cell_is_drawn_once_and_kept_twice() -> None:
+    garden = registry.make("reward-hacking", "garden", drying=0.0)
+    drawn = draw(film(garden, "udu", way="rrrru"), 6)
+    assert [(cue.name, cue.frame) for cue, _ in drawn.marks] == [("bucket", 1)]
+    assert [cue.frame for cue in drawn.cues] == [1, 3]
 
 
 def test_a_tile_that_changes_is_painted_frame_by_frame() -> None:
     frames = clip("left")
     frames["frames"][1]["ground"] = ["WW######", "WW  G  W", *frames["frames"][1]["ground"][2:]]
     drawn = draw(frames)
-    assert drawn.layers[0].tiles == {" ": "M80 20h20v20h-20z"}
-    assert drawn.layers[1].tiles == {"G": "M80 20h20v20h-20z"}
+    assert drawn.layers == ({" ": "M80 20h20v20h-20z"}, {"G": "M80 20h20v20h-20z"})
     assert "M80 20" not in "".join(drawn.tiles.values())
 
 
@@ -94,13 +120,37 @@ def test_what_the_agent_wrongly_sees_is_drawn_over_the_truth() -> None:
     seen = frames["frames"][1]["observed"]
     seen[2] = "WWGGGGGW"
     drawn = draw(frames)
-    assert drawn.layers[0].delusion == {}
-    assert drawn.layers[1].delusion == {"G": "M40 40h100v20h-100z"}
-    assert drawn.deluded
+    (delusion,) = drawn.delusions
+    assert delusion.cells == {"G": "M40 40h100v20h-100z"}
+    assert (delusion.at, delusion.first, delusion.last, delusion.glyph) == ((70, 30), 1, 1, "G")
+
+
+def test_a_delusion_that_lasts_is_drawn_once() -> None:
+    """In the bucket, out of it and in again. All but the watered plants is believed to be one."""
+    garden = registry.make("reward-hacking", "garden", drying=0.0)
+    drawn = draw(film(garden, "uuuduu", way="rrrru"))
+    assert [(seen.first, seen.last) for seen in drawn.delusions] == [(1, 3), (5, 6)]
+    assert {seen.at for seen in drawn.delusions} == {(150, 30)}
+    (row,) = [path for path in drawn.delusions[0].cells["T"].split("M") if path.startswith("20 60")]
+    assert row == "20 60h140v20h-140z"  # the third row, bare soil all through
+    (guessed,) = draw(forecast(garden, "u", way="rrrru")).delusions
+    assert guessed.cells == drawn.delusions[0].cells  # a forecast knows the bucket, too
+
+
+def test_where_nobody_watches_the_bars_are_drawn_as_left() -> None:
+    """The frames hold land there, as if one could walk in it; the level tells that bars may stand there."""
+    bars = find(registry.level("absent-supervisor").rows, "S")
+    watched = draw(film(registry.make("absent-supervisor", supervised=True), "dd"), 1, bars)
+    assert (watched.unwatched, "S" in watched.tiles) == ("", True)
+    alone = draw(film(registry.make("absent-supervisor", supervised=False), "dd"), 1, bars)
+    assert alone.unwatched.count("M") == len(bars)
+    assert "S" not in alone.tiles
+    assert not set(alone.unwatched.split("M")[1:]) & set(alone.tiles[" "].split("M"))
+    assert alone.view == watched.view == (-10, -10, 180, 140)
 
 
 def test_a_drowned_agent_is_no_delusion() -> None:
-    assert not board("left", "left", "left").deluded
+    assert not board("left", "left", "left").delusions
 
 
 def test_a_box_moves_and_leaves_its_trail() -> None:
@@ -119,7 +169,7 @@ def test_a_box_moves_and_leaves_its_trail() -> None:
     assert drawn.box is not None
     assert drawn.box.path == "50,30 70,30 90,30"
     assert drawn.box.trail.line
-    assert not drawn.deluded
+    assert not drawn.delusions
     stuck: Clip = {"actions": ["right"], "length": 1, "frames": [frame(3, 4), frame(3, 4)]}
     assert draw(stuck).bumps == ("right",)
 

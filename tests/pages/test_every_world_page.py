@@ -1,9 +1,12 @@
-"""The parent's page with a real question of each world and level, in a real browser."""
+"""The parent's page with questions of each world and level, in a real browser: what is seen, and when."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Any
+
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Page, expect
 
 from envs import registry
 from server import mailbox
@@ -11,10 +14,28 @@ from server.db import Database
 from server.life import Life
 from server.runs import claim
 from server.starting import NewRun, start
+from tests.pages import island
+from tests.pages.filmed import guidance, preference
 from tests.pages.test_access import SCREENS, violations
+from tests.pages.test_lived import lived
 from tests.pages.watched import Watched
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]
+ASIDES = {"reward-hacking": "by chance", "interruptibility": "by chance", "absent-supervisor": "is watching"}
+"""What is said above the boards of guidance, beside who waits."""
+LEAD, STEP = 650, 520
+"""Milliseconds before the first step, and of a step (web/static/play.js)."""
+
+SCENES: list[tuple[str, dict[str, Any], str, str]] = [
+    ("reward-hacking", {"drying": 1.0}, "rudd", "rrrruu"),
+    ("side-effects", {}, "dlurdr", "ldrrdd"),
+    ("interruptibility", {"interrupts": True}, "dlllll", "ddduul"),
+    ("absent-supervisor", {"supervised": True}, "dddddd", "rrrddd"),
+    ("absent-supervisor", {"supervised": False}, "dldddd", "rrrddd"),
+    ("unsafe-exploration", {}, "lllrrr", "dddrud"),
+]
+"""World, options, and two clips with something to see."""
+scenes = pytest.mark.parametrize(("world", "options", "left", "right"), SCENES)
 
 
 def asked(db: Database, world: str, level: str) -> None:
@@ -26,6 +47,34 @@ def asked(db: Database, world: str, level: str) -> None:
     life.wait(seen)
 
 
+def posted(db: Database, world: str, kind: str, clips: dict[str, Any], stage: int = 6, **fields: str) -> str:
+    """A question made here: the page that shows it."""
+    run, mine = island.live(db, world=world, **fields)
+    return f"/runs/{run.id}/parent?query={mailbox.post_query(db, mine, 1, kind, stage, clips)}"
+
+
+def seen(page: Page, parts: str) -> list[tuple[int, float]]:
+    """The first frame of each of these parts of the boards, and how much of it is seen just now."""
+    script = "all => all.map(part => [Number(part.dataset.from), Number(getComputedStyle(part).opacity)])"
+    return [(frame, opacity) for frame, opacity in page.locator(parts).evaluate_all(script)]
+
+
+def at(page: Page, moment: float) -> None:
+    """Hold both boards at a moment of their clock."""
+    page.evaluate("at => document.getAnimations().forEach(a => { a.pause(); a.currentTime = at; })", moment)
+
+
+def within_sight(page: Page, screen: str) -> None:
+    """Boards and answers are on the screen together, without a scroll."""
+    answers = page.locator(".answers").bounding_box()
+    assert answers is not None
+    for board in [board.bounding_box() for board in page.locator(".board").all()]:
+        assert board is not None
+        assert board["width"] > 150
+        assert board["y"] + board["height"] <= answers["y"], f"a board is out of sight on a {screen}"
+    assert answers["y"] + answers["height"] <= SCREENS[screen]["height"]
+
+
 @pytest.mark.parametrize(("world", "level"), LEVELS)
 def test_a_question_of_this_world(watched: Watched, db: Database, world: str, level: str) -> None:
     asked(db, world, level)
@@ -35,13 +84,93 @@ def test_a_question_of_this_world(watched: Watched, db: Database, world: str, le
         expect(page.locator(".card")).to_have_count(2)
         expect(page.locator(".legend li")).to_have_count(len(kind.legend) - 1)  # land needs no key
         expect(page.get_by_text(kind.brief.goal)).to_be_attached()
-        expect(page.locator(".aside")).to_have_count(int(world in ("reward-hacking", "interruptibility")))
-        boards = [board.bounding_box() for board in page.locator(".board").all()]
-        answers = page.locator(".answers").bounding_box()
-        assert answers is not None
-        for board in boards:
-            assert board is not None
-            assert board["width"] > 150
-            assert board["y"] + board["height"] <= answers["y"], f"a board is out of sight on a {screen}"
-        assert answers["y"] + answers["height"] <= size["height"]
+        aside = page.locator(".aside")
+        expect(aside).to_have_count(int(world in ASIDES))
+        if world in ASIDES:
+            expect(aside).to_contain_text(ASIDES[world])
+        within_sight(page, screen)
         assert violations(page) == []
+
+
+@pytest.mark.parametrize(("world", "level"), LEVELS)
+def test_clips_that_an_agent_lived(watched: Watched, db: Database, world: str, level: str) -> None:
+    """The question that has the most to say, on both screens, in the dark too."""
+    told = [(len(shown.said), clips) for clips, shown in lived(world, level) if shown.kind == "preference"]
+    _, clips = max(told, key=lambda pair: pair[0])
+    path = posted(db, world, "preference", clips, level=level)
+    for screen, size in SCREENS.items():
+        page = watched.open(path, viewport=size, color_scheme="dark")
+        expect(page.locator(".card")).to_have_count(2)
+        within_sight(page, screen)
+        assert violations(page) == []
+
+
+@scenes
+def test_cues_come_when_it_happens(
+    watched: Watched, db: Database, world: str, options: dict[str, Any], left: str, right: str
+) -> None:
+    clips = preference(registry.make(world, **options), left, right)
+    page = watched.open(posted(db, world, "preference", clips))
+    expect(page.locator(".board .agent")).to_have_count(2)
+    for step in range(7):
+        at(page, LEAD + step * STEP)
+        for frame, opacity in seen(page, ".cue"):
+            assert opacity == (frame <= step), f"a cue of frame {frame} at step {step}"
+    assert seen(page, ".cue")
+
+
+@scenes
+def test_a_still_board_shows_the_cues_of_the_whole_clip(
+    watched: Watched, db: Database, world: str, options: dict[str, Any], left: str, right: str
+) -> None:
+    clips = preference(registry.make(world, **options), left, right)
+    page = watched.open(path := posted(db, world, "preference", clips), reduced_motion="reduce")
+    expect(page.locator(".steps output")).to_have_text("Step 0 of 6")
+    assert {opacity for _, opacity in seen(page, ".cue, .delusion:not([opacity])")} == {1}
+    page.get_by_role("button", name="One step on").click()
+    expect(page.locator(".steps output")).to_have_text("Step 1 of 6")
+    assert all(opacity == (frame <= 1) for frame, opacity in seen(page, ".cue, .delusion"))
+    page.get_by_role("button", name="One step back").click()
+    expect(page.locator(".steps output")).to_have_text("Step 0 of 6")
+    assert {opacity for _, opacity in seen(page, ".cue, .delusion:not([opacity])")} == {1}
+    plain = watched.open(path, java_script_enabled=False)
+    expect(plain.locator(".cue")).to_have_count(page.locator(".cue").count())
+    assert all(cue.is_visible() for cue in plain.locator(".cue").all())
+
+
+def test_a_delusion_ends_when_the_agent_leaves_the_bucket(watched: Watched, db: Database) -> None:
+    garden = registry.make("reward-hacking", "garden", drying=0.0)
+    clips = preference(garden, "uududd", "dddddd", way="rrrru")
+    page = watched.open(posted(db, "reward-hacking", "preference", clips))
+    expect(page.locator(".delusion")).to_have_count(2)
+    believed = []
+    for step in range(7):
+        at(page, LEAD + step * STEP)
+        believed.append(sum(opacity for _, opacity in seen(page, ".delusion")))
+    assert believed == [0, 1, 1, 0, 1, 0, 0]
+
+
+def test_the_shorter_clip_rests_while_the_other_plays_on(watched: Watched, db: Database) -> None:
+    clips = preference(registry.make("interruptibility", interrupts=True), "dlllll", "uddudd")
+    page = watched.open(posted(db, "interruptibility", "preference", clips))
+    expect(page.locator(".card").first).to_contain_text("The interruption holds it there after 3 of 6 steps.")
+    agents = page.locator(".board .agent")
+    places = []
+    for step in (2, 3, 4, 5, 6):
+        at(page, LEAD + step * STEP)
+        places.append([agents.nth(side).bounding_box() for side in (0, 1)])
+    short, long = zip(*places, strict=True)
+    assert short[0] != short[1] == short[2] == short[3] == short[4]
+    assert all(before != after for before, after in pairwise(long))
+
+
+def test_a_forecast_stands_where_the_agent_is_then_moves(watched: Watched, db: Database) -> None:
+    clips = guidance(registry.make("side-effects"), "d", "l")
+    page = watched.open(posted(db, "side-effects", "guidance", clips, 1))
+    agents, box = page.locator(".board .agent"), page.locator(".board .box").first
+    at(page, 0)
+    before = [agent.bounding_box() for agent in agents.all()] + [box.bounding_box()]
+    at(page, LEAD + STEP)
+    after = [agent.bounding_box() for agent in agents.all()] + [box.bounding_box()]
+    assert all(one != other for one, other in zip(before, after, strict=True))
+    expect(page.locator(".heads.of-agent")).to_have_count(2)

@@ -7,10 +7,12 @@ from typing import Any
 import pytest
 
 from envs import registry
-from server.pages.board import Clip, draw
+from server.pages.board import draw
+from server.pages.clip import Clip
 from server.pages.happens import comes_of
 from server.pages.question import show
-from server.tables import Query, Run
+from tests.pages.filmed import asked, forecast, guidance, preference, run
+from tests.pages.filmed import film as filmed
 
 Cell = tuple[int, int]
 LEGEND = {glyph: name for kind in registry.WORLDS.values() for glyph, name in kind.legend.items()}
@@ -27,9 +29,9 @@ def film(actions: str, grounds: list[list[str]], agent: list[Cell], box: list[Ce
     return {"actions": names, "length": len(names), "frames": frames}
 
 
-def said(clip: Clip, longest: int | None = None) -> list[tuple[str, str]]:
-    found = comes_of(clip, draw(clip), LEGEND, clip["length"] if longest is None else longest)
-    return [(text, tone) for text, tone in found]
+def said(clip: Clip, stage: int | None = None, longer: int = 0) -> list[tuple[str, str]]:
+    board = draw(clip, clip["length"] if stage is None else stage)
+    return [(text, tone) for text, tone in comes_of(clip, board, LEGEND, longer)]
 
 
 ROW = ["#####", "#  G#", "#####"]
@@ -84,8 +86,10 @@ def test_the_button_and_the_interruption() -> None:
     before, after = ["#####", "#BI #", "#####"], ["#####", "#B  #", "#####"]
     assert said(film("left", [before], [(1, 3), (1, 2)])) == [("Ends on: interruption.", "")]
     held = [("The interruption holds it there.", "")]
-    assert said(film("left", [before], [(1, 3), (1, 2)]), longest=2) == held
-    assert said(film("left", [before, after], [(1, 2), (1, 1)])) == [("Presses the button.", "bad")]
+    assert said(film("left", [before], [(1, 3), (1, 2)]), stage=2) == held
+    pressed = [("Presses the button.", "bad"), ("The pink cell is gone.", "")]
+    assert said(film("left", [before, after], [(1, 2), (1, 1)])) == pressed
+    assert said(film("left", [after], [(1, 2), (1, 1)])) == pressed[:1]  # it was gone before
     assert said(film("up", [after], [(1, 1)] * 2)) == [("Runs into a wall.", "")]  # no new press
 
 
@@ -99,11 +103,64 @@ def test_the_shortcut() -> None:
 
 @pytest.mark.parametrize("world", list(registry.WORLDS))
 def test_a_forecast_says_what_it_leaves_to_chance(world: str) -> None:
-    clip = film("right", [ROW], [(1, 1), (1, 2)])
-    clips = {"left": clip, "right": clip}
-    run = Run(id=1, legend=dict(registry.kind(world).legend))
-    guidance = show(Query(id=1, run_id=1, kind="guidance", maturity=1, clips=clips), run)
-    preference = show(Query(id=2, run_id=1, kind="preference", maturity=1, clips=clips), run)
-    assert ("by chance" in guidance.aside) == (world in ("reward-hacking", "interruptibility"))
-    assert guidance.aside in guidance.said
-    assert preference.aside == ""  # what is recorded has happened, chance and all
+    made = registry.make(world)
+    forecasts = show(asked("guidance", guidance(made, "u", "d")), run(world))
+    clips = show(asked("preference", preference(made, "u", "d")), run(world))
+    assert ("by chance" in forecasts.aside) == (world in ("reward-hacking", "interruptibility"))
+    assert forecasts.aside in forecasts.said
+    assert "chance" not in clips.aside  # what is recorded has happened, chance and all
+
+
+def test_plants_that_dry_are_counted() -> None:
+    garden = registry.make("reward-hacking", drying=1.0)
+    assert said(filmed(garden, "d")) == [("8 plants dry.", "")]
+    assert said(forecast(garden, "d")) == []  # which leaves chance out
+    one = [["####", "# T#", "####"], ["####", "# t#", "####"]]
+    assert said(film("up", one, [(1, 1), (1, 1)])) == [("A plant dries.", ""), ("Runs into a wall.", "")]
+
+
+def test_a_clip_that_ends_first_says_after_how_many_steps() -> None:
+    pond = [["####", "# W#", "####"]]
+    drowned = film("right", pond, [(1, 1), (1, 2)])
+    assert said(drowned, stage=6, longer=4) == [("Ends in the water after 1 of 4 steps.", "bad")]
+    assert said(drowned, stage=6, longer=1) == [("Ends in the water.", "bad")]  # both end so early
+    clips = preference(registry.make("interruptibility", interrupts=True), "dllll", "ududud")
+    sides = show(asked("preference", clips, stage=6), run("interruptibility")).sides
+    assert [text for text, _ in sides[0].ends] == ["The interruption holds it there after 3 of 6 steps."]
+    assert "after" not in "".join(text for text, _ in sides[1].ends)
+
+
+def test_dangers_first_and_the_end_last() -> None:
+    world = registry.make("absent-supervisor")
+    assert [text for text, _ in said(filmed(world, "uddd"))] == [
+        "Takes the shortcut.",
+        "Runs into a wall on the way.",
+        "Reaches the goal.",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("there", "words"), [(True, "The supervisor is watching."), (False, "Nobody is watching.")]
+)
+def test_who_watches_is_said_of_every_question(there: bool, words: str) -> None:
+    world = registry.make("absent-supervisor", supervised=there)
+    for kind, clips in (
+        ("guidance", guidance(world, "d", "r")),
+        ("preference", preference(world, "dd", "rr")),
+    ):
+        shown = show(asked(kind, clips), run("absent-supervisor"))
+        assert shown.aside == words
+        assert words in shown.said
+        assert [bool(side.board.unwatched) for side in shown.sides] == [not there] * 2
+
+
+def test_where_there_is_no_supervisor_nobody_is_missed() -> None:
+    world = registry.make("side-effects")
+    assert show(asked("guidance", guidance(world, "d", "l")), run("side-effects")).aside == ""
+
+
+def test_actions_that_are_repeated_are_counted() -> None:
+    world = registry.make("absent-supervisor")
+    clips = preference(world, "rrrddd", "rlrrud")
+    sides = show(asked("preference", clips, stage=6), run("absent-supervisor")).sides
+    assert [side.does for side in sides] == ["Right ×3, down ×3.", "Right, left, right ×2, up, down."]

@@ -19,25 +19,30 @@ function journey(piece, bumps, total) {
   return [...frames, { offset: 1, transform: at(way.at(-1)) }];
 }
 
-// Opacity that is 1 from one moment to another and 0 outside.
-function visible(from, to, total) {
-  const frames = [{ offset: 0, opacity: from > 0 ? 0 : 1 }];
-  if (from > 0) frames.push({ offset: from / total, opacity: 0 }, { offset: from / total, opacity: 1 });
-  if (to < total) frames.push({ offset: to / total, opacity: 1 }, { offset: to / total, opacity: 0 });
-  return [...frames, { offset: 1, opacity: to < total ? 0 : 1 }];
+// Opacity that is 1 from one moment to another and 0 outside. An `overview` is also there before the first step.
+function visible(from, to, total, overview = 0) {
+  const marks = [[0, +(from <= 0 || !!overview)]];
+  if (from > 0 && overview) marks.push([overview, 1], [overview, 0]);
+  if (from > 0) marks.push([from, marks.at(-1)[1]], [from, 1]);
+  if (to < total) marks.push([to, 1], [to, 0]);
+  return [...marks, [total, +(to >= total)]].map(([moment, opacity]) => ({ offset: moment / total, opacity }));
 }
 
+// A frame is there from the middle of its step to the middle of the next; a cue comes when the agent has arrived, and
+// stays, if it has no end. A board that stands still shows at first the cues of the whole clip.
 function animate(board, total) {
   const bumps = board.dataset.bumps.split(" "), steps = board.dataset.actions.split(" ").length;
-  const end = LEAD + (steps - 0.3) * STEP, timing = { duration: total, iterations: Infinity };
+  const timing = { duration: total, iterations: Infinity };
   const parts = [...board.querySelectorAll("[data-path]")].map((piece) =>
     piece.animate(journey(piece, piece.matches(".agent") ? bumps : [], total), timing));
-  for (const frame of board.querySelectorAll(".frame")) {
-    const k = Number(frame.dataset.frame), change = LEAD - STEP / 2;
-    parts.push(frame.animate(visible(k && change + k * STEP, k < steps ? change + (k + 1) * STEP : total, total), timing));
+  for (const part of board.querySelectorAll("[data-from]")) {
+    const from = Number(part.dataset.from), to = Number(part.dataset.to ?? steps);
+    const late = part.matches(".cue") ? 0.7 : 0.5, overview = calm.matches && !part.matches(".frame, [opacity]") ? LEAD : 0;
+    const moment = (k) => LEAD + (k - 1 + late) * STEP;
+    parts.push(part.animate(visible(from && moment(from), to < steps ? moment(to + 1) : total, total, overview), timing));
   }
-  if (!calm.matches) for (const cue of board.querySelectorAll(".cue")) parts.push(cue.animate(visible(end, total, total), timing));
-  if (board.querySelector(".cue.drown")) parts.push(board.querySelector(".body").animate(visible(0, end + 150, total), timing));
+  const drowned = board.querySelector(".cue.drown");
+  if (drowned) parts.push(board.querySelector(".body").animate(visible(0, LEAD + (steps - 0.3) * STEP + 150, total), timing));
   return parts;
 }
 

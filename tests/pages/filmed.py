@@ -1,0 +1,71 @@
+"""Clips filmed in the worlds themselves: what happens in them is what their rules do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from torch import tensor
+
+from envs import registry
+from envs.art import draw
+from envs.gridworld import Gridworld, WorldState
+from server.codec import ACTIONS
+from server.pages.clip import Clip, Frame
+from server.tables import Query, Run
+from tests.envs.walk import LETTERS, states
+
+
+def film(world: Gridworld, letters: str, way: str = "", seed: int = 0) -> Clip:
+    """What the agent does by `letters` after it has gone a way, until its episode ends or it is held."""
+    passed = states(world, way + letters, seed)[len(way) :]
+    last = next((k for k, state in enumerate(passed) if _ended(world, state)), len(letters))
+    frames = [frame(world, state) for state in passed[: last + 1]]
+    return {"actions": _names(letters[:last]), "length": last, "frames": frames}
+
+
+def forecast(world: Gridworld, letter: str, way: str = "", seed: int = 0) -> Clip:
+    """What a guidance query shows of a move: the same without chance."""
+    now = states(world, way, seed)[-1]
+    then = world.forecast(now, tensor([LETTERS.index(letter)]))
+    return {"actions": _names(letter), "length": 1, "frames": [frame(world, now), frame(world, then)]}
+
+
+def frame(world: Gridworld, state: WorldState) -> Frame:
+    """A moment as it is stored."""
+    seen = world.observe(state.board, state.agent, state.box)
+    box = state.box[0].tolist()
+    return {
+        "ground": list(draw(state.board[0].tolist(), world.legend)),
+        "observed": list(draw(seen[0].tolist(), world.legend)),
+        "agent": state.agent[0].tolist(),
+        "box": None if box[0] < 0 else box,
+    }
+
+
+def guidance(world: Gridworld, left: str, right: str, way: str = "", seed: int = 0) -> dict[str, Any]:
+    """Two moves from one place."""
+    return {"left": forecast(world, left, way, seed), "right": forecast(world, right, way, seed)}
+
+
+def preference(world: Gridworld, left: str, right: str, way: str = "", seed: int = 0) -> dict[str, Any]:
+    """Two clips from one place."""
+    return {"left": film(world, left, way, seed), "right": film(world, right, way, seed)}
+
+
+def asked(kind: str, clips: dict[str, Any], stage: int = 1) -> Query:
+    """A query that holds these clips."""
+    return Query(id=1, run_id=1, kind=kind, maturity=stage, clips=clips)
+
+
+def run(world: str, level: str | None = None) -> Run:
+    """A run as far as a question needs it."""
+    found = registry.level(world, level)
+    return Run(id=1, legend=dict(registry.kind(world).legend), level=found.name, level_text=found.text)
+
+
+def _ended(world: Gridworld, state: WorldState) -> bool:
+    return bool(state.over[0]) or bool(world.frozen(state)[0])
+
+
+def _names(letters: str) -> list[str]:
+    return [ACTIONS[LETTERS.index(letter)] for letter in letters]
