@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 
 def experiment(
-    name: Annotated[str, typer.Argument(help=f"all, or one of: {', '.join(NAMES)}.")],
+    name: Annotated[
+        str,
+        typer.Argument(help=f"{', '.join(NAMES)}; all of them; or report: one HTML page of what is done."),
+    ],
     scale: Annotated[
         Literal["quick", "paper"], typer.Option(help="The paper's number of trials, or a few.")
     ] = "paper",
@@ -41,13 +44,26 @@ def experiment(
     """Run an experiment of the paper, or go on with it, and write its page, figures and data.
 
     Every finished chunk of trials is stored, so a run that was stopped goes on where it was.
+    `parenting experiment report` builds one HTML page of all results below --out.
 
     Example: parenting experiment table1 --scale quick
     """
     with plainly():
+        if name == "report":
+            _report(out)
+            return
         asked = _asked(NAMES if name == "all" else (name,), scale, trials, seed)
         for one, what in asked:
             _run(one, what, out, workers or os.cpu_count() or 1, cluster)
+
+
+def _report(out: Path) -> None:
+    from experiments.report import NoResults, report
+
+    try:
+        typer.echo(f"Written: {report(out)}")
+    except (NoResults, OSError) as error:
+        raise Wrong(str(error)) from None
 
 
 def _asked(
@@ -59,7 +75,7 @@ def _asked(
     try:
         found = [experiment(name) for name in names]
     except UnknownExperiment as error:
-        raise Wrong(f"{error} Or: all.") from None
+        raise Wrong(f"{error} Or: all, report.") from None
     return [(one, Asked(trials or one.trials[scale], seed, scale)) for one in found]
 
 
