@@ -2,7 +2,8 @@
 
 Every write begins with BEGIN IMMEDIATE: a deferred transaction that reads and then writes fails at once under
 another writer, whatever the busy timeout. SQLite runs in WAL with `synchronous=FULL`: after a commit nothing
-is lost, power included.
+is lost, power included. A write that is not `durable` leaves its commit to the next one that is: the log is
+one file, so what was committed before is on the disk with it.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ class Database:
     def __init__(self, engine: Engine, clock: Callable[[], datetime] = utc_now) -> None:
         self.engine = engine
         self.clock = clock
-        self._writing = engine.execution_options(begin="IMMEDIATE")
+        self._writing = engine.execution_options(begin="IMMEDIATE", synchronous="full")
+        self._hurried = engine.execution_options(begin="IMMEDIATE", synchronous="normal")
         # One writer of this process at a time: fairer than many threads that sleep on SQLite's lock.
         self._turn = threading.Lock()
         self._listening = threading.Lock()
@@ -65,8 +67,11 @@ class Database:
             yield session
 
     @contextmanager
-    def write(self) -> Iterator[Session]:
+    def write(self, durable: bool = True) -> Iterator[Session]:
         """A transaction that holds the write lock from its beginning and commits at its end.
+
+        What is not `durable` may be lost with the power, but only together with all that came after it. So
+        it is for what nobody was promised, or what a worker does again: leases, ticks, metrics, checkpoints.
 
         Raises:
             Busy: no turn to write within five seconds.
@@ -75,7 +80,8 @@ class Database:
         if not self._turn.acquire(timeout=BUSY_SECONDS):
             raise Busy
         try:
-            with _said_plainly(), Session(self._writing, expire_on_commit=False) as session, session.begin():
+            engine = self._writing if durable else self._hurried
+            with _said_plainly(), Session(engine, expire_on_commit=False) as session, session.begin():
                 session.connection()  # BEGIN IMMEDIATE now, not at the first statement
                 yield session
         finally:
@@ -190,8 +196,12 @@ def _set_up(connection: Any, _record: Any) -> None:
 
 
 def _begin(connection: Connection) -> None:
-    mode = connection.get_execution_options().get("begin", "DEFERRED")
-    connection.exec_driver_sql(f"BEGIN {mode}")
+    options = connection.get_execution_options()
+    before = connection.info.setdefault("synchronous", PRAGMAS["synchronous"])
+    if (synchronous := options.get("synchronous", before)) != before:
+        connection.exec_driver_sql(f"PRAGMA synchronous={synchronous}")
+        connection.info["synchronous"] = synchronous
+    connection.exec_driver_sql(f"BEGIN {options.get('begin', 'DEFERRED')}")
 
 
 @contextmanager

@@ -17,12 +17,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import func, select, update
+from sqlalchemy import BindParameter, ColumnElement, ScalarSelect, bindparam, func, select, update
 from sqlalchemy.orm import Session
 
 from server.db import Database
 from server.queue import guidance_first
-from server.runs import Claim, held, open_in, withdraw_in
+from server.runs import Claim, held, held_status, withdraw_in
 from server.tables import Answer, Event, Query, Run
 
 
@@ -51,12 +51,52 @@ class Taken:
     query: Query
 
 
+# Statements that every tick needs are built once.
+_RUN: BindParameter[int] = bindparam("run_id")
+_HIGH = select(
+    select(func.max(Query.tick)).where(Query.run_id == _RUN).scalar_subquery(),
+    select(func.max(Answer.applied_tick)).where(Answer.run_id == _RUN).scalar_subquery(),
+    select(func.max(Event.applied_tick)).where(Event.run_id == _RUN).scalar_subquery(),
+)
+_PENDING = (
+    select(Answer, Query)
+    .join(Query, Answer.query_id == Query.id)
+    .where(Query.run_id == _RUN, Query.status == "answered", Answer.standing)
+    .order_by(guidance_first(), Query.tick)
+    .limit(1)
+)
+_KNOWN = select(Query.id).where(Query.run_id == _RUN, Query.tick == bindparam("tick"))
+
+
+def _number(*conditions: ColumnElement[bool]) -> ScalarSelect[int]:
+    return select(func.count()).where(*conditions).correlate(Run).scalar_subquery()
+
+
+_WATCH = select(
+    Run.id.label("run_id"),
+    Run.status,
+    Run.epoch,
+    Run.actor,
+    _number(Query.run_id == Run.id, Query.status == "open", Query.kind == "guidance").label("open_guidance"),
+    _number(Query.run_id == Run.id, Query.status == "open", Query.kind == "preference").label(
+        "open_preferences"
+    ),
+    _number(Query.run_id == Run.id, Query.status == "answered").label("answers"),
+    Run.answers.label("answered"),
+    Run.goal,
+    Run.pace,
+    _number(Event.run_id == Run.id, Event.applied_tick.is_(None)).label("events"),
+).where(Run.id.in_(bindparam("run_ids", expanding=True)))
+
+
 def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
     """The state of some runs, by id. While nobody commits anything, asking again costs next to nothing."""
 
     def look() -> dict[int, Watch]:
         with db.read() as session:
-            return {run_id: seen for run_id in run_ids if (seen := _watch(session, run_id)) is not None}
+            rows = session.execute(_WATCH, {"run_ids": run_ids}).all()
+        seen = {row.run_id: Watch(**row._mapping) for row in rows}
+        return {run_id: seen[run_id] for run_id in run_ids if run_id in seen}
 
     return db.remembered(("watch", *run_ids), look)
 
@@ -85,15 +125,13 @@ def post_query(
         LostClaim: another worker raises this run now.
     """
     with db.write() as session:
-        run = held(session, mine)
-        known = session.scalars(
-            select(Query.id).where(Query.run_id == run.id, Query.tick == tick)
-        ).one_or_none()
+        status = held_status(session, mine)
+        known = session.execute(_KNOWN, {"run_id": mine.run_id, "tick": tick}).scalar()
         if known is not None:
-            return known
-        query = Query(run_id=run.id, tick=tick, kind=kind, maturity=maturity, clips=clips, posted=db.clock())
+            return int(known)
+        query = Query(run_id=mine.run_id, tick=tick, kind=kind, maturity=maturity, clips=clips)
         query.policy_stage, query.policy_steps = policy or (None, None)
-        query.status = "open" if run.status in ("active", "paused") else "withdrawn"
+        query.posted, query.status = db.clock(), "open" if status in ("active", "paused") else "withdrawn"
         session.add(query)
         session.flush()
         return query.id
@@ -114,12 +152,10 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
     Raises:
         LostClaim: another worker raises this run now.
     """
-    with db.read() as session:
-        known = _recorded_answer(session, mine.run_id, tick)
-        if known is not None or _closed(session, mine.run_id, tick) or _pending(session, mine.run_id) is None:
-            return known
-    with db.write() as session:
-        held(session, mine)
+    with db.write(durable=False) as session:
+        if _closed(session, mine.run_id, tick):
+            return _recorded_answer(session, mine.run_id, tick)
+        held_status(session, mine)
         found = _pending(session, mine.run_id)
         if found is not None:
             found.answer.applied_tick, found.query.status = tick, "applied"
@@ -177,10 +213,7 @@ def record(db: Database, run_id: int) -> Sequence[Taken]:
 
 
 def _high(session: Session, run_id: int) -> tuple[int, int, int]:
-    query = select(func.max(Query.tick)).where(Query.run_id == run_id).scalar_subquery()
-    answer = select(func.max(Answer.applied_tick)).where(Answer.run_id == run_id).scalar_subquery()
-    event = select(func.max(Event.applied_tick)).where(Event.run_id == run_id).scalar_subquery()
-    ticks = session.execute(select(query, answer, event)).one()
+    ticks = session.execute(_HIGH, {"run_id": run_id}).one()
     return tuple(-1 if tick is None else tick for tick in ticks)  # type: ignore[return-value]
 
 
@@ -196,37 +229,5 @@ def _recorded_answer(session: Session, run_id: int, tick: int) -> Taken | None:
 
 
 def _pending(session: Session, run_id: int) -> Taken | None:
-    rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
-    rows = rows.where(Query.run_id == run_id, Query.status == "answered", Answer.standing)
-    row = session.execute(rows.order_by(guidance_first(), Query.tick).limit(1)).first()
+    row = session.execute(_PENDING, {"run_id": run_id}).first()
     return None if row is None else Taken(*row)
-
-
-def _watch(session: Session, run_id: int) -> Watch | None:
-    answered = (
-        select(func.count()).where(Query.run_id == run_id, Query.status == "answered").scalar_subquery()
-    )
-    events = (
-        select(func.count()).where(Event.run_id == run_id, Event.applied_tick.is_(None)).scalar_subquery()
-    )
-    row = session.execute(
-        select(Run.status, Run.epoch, Run.actor, answered, events, Run.answers, Run.goal, Run.pace).where(
-            Run.id == run_id
-        )
-    ).one_or_none()
-    if row is None:
-        return None
-    opened = open_in(session, run_id)
-    return Watch(
-        run_id=run_id,
-        status=row[0],
-        epoch=row[1],
-        actor=row[2],
-        open_guidance=opened.guidance,
-        open_preferences=opened.preference,
-        answers=row[3],
-        events=row[4],
-        answered=row[5],
-        goal=row[6],
-        pace=row[7],
-    )

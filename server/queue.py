@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from typing import Any
 
-from sqlalchemy import ColumnElement, Select, case, or_, select
+from sqlalchemy import ColumnElement, Select, and_, bindparam, case, or_, select, update
 from sqlalchemy.orm import Session
 
 from server.db import Database
 from server.errors import Conflict, NotFound
-from server.runs import hold
+from server.runs import lock
 from server.tables import Answer, Query, Run
 
 LEASE_SECONDS = 60.0
@@ -62,14 +63,14 @@ def lease(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECO
     more. A run that has reached its goal offers nothing.
     """
     with db.read() as session:  # nothing to offer is the common case, and takes no lock
-        if _offer(session, run_id, client_id, db.clock()) is None:
+        if session.execute(_OFFERED, _asks(db, run_id, client_id)).first() is None:
             return None
-    with db.write() as session:
-        hold(session, run_id)
-        now = db.clock()
-        query = _offer(session, run_id, client_id, now)
+    with db.write(durable=False) as session:
+        lock(session, run_id)
+        asks = _asks(db, run_id, client_id)
+        query = session.scalars(_OFFER, asks).first()
         if query is not None:
-            query.leased_by, query.leased_until = client_id, now + timedelta(seconds=seconds)
+            query.leased_by, query.leased_until = client_id, asks["now"] + timedelta(seconds=seconds)
         return query
 
 
@@ -91,17 +92,15 @@ def answer(db: Database, query_id: int, choice: str, client_id: str, parent: str
         Conflict: it was answered otherwise, or by someone else, or withdrawn; the message says which.
     """
     with db.write() as session:
-        query = _held(session, query_id)
+        run_id = _hold(session, query_id)
         before = _standing(session, query_id)
         if before is not None:
             return _again(before, choice, client_id)
-        if query.status != "open":
+        if session.execute(_ANSWERED, {"query_id": query_id}).scalar() is None:
             raise Conflict(
                 f"Question {query_id} was withdrawn: the run or its episode was ended before an answer came."
             )
-        row = _add(session, db, query, choice, client_id, parent)
-        query.status = "answered"
-        return _stored(row)
+        return _stored(_add(session, db, query_id, run_id, choice, client_id, parent))
 
 
 def correct(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Answer:
@@ -120,24 +119,25 @@ def correct(db: Database, query_id: int, choice: str, client_id: str, parent: st
             raise Conflict(f"Question {query_id} has no answer to correct.")
         before.standing = False
         session.flush()
-        return _add(session, db, query, choice, client_id, parent, supersedes=before.id)
+        return _add(session, db, query_id, query.run_id, choice, client_id, parent, supersedes=before.id)
 
 
 def _add(
     session: Session,
     db: Database,
-    query: Query,
+    query_id: int,
+    run_id: int,
     choice: str,
     client_id: str,
     parent: str,
     supersedes: int | None = None,
 ) -> Answer:
-    run = hold(session, query.run_id)
-    run.answers += 1  # numbered in this transaction: no reader can see number n + 1 before n
+    # numbered in this transaction: no reader can see number n + 1 before n
+    number = session.execute(_NUMBERED, {"run_id": run_id}).scalar_one()
     row = Answer(
-        query_id=query.id,
-        run_id=run.id,
-        number=run.answers,
+        query_id=query_id,
+        run_id=run_id,
+        number=number,
         choice=choice,
         parent=parent,
         client_id=client_id,
@@ -168,12 +168,19 @@ def _stored(row: Answer) -> Stored:
     )
 
 
+def _hold(session: Session, query_id: int) -> int:
+    """The run of a query, locked, so that nobody else writes to its queries."""
+    run_id: int | None = session.execute(_RUN_OF, {"query_id": query_id}).scalar()
+    if run_id is None:
+        raise NotFound(f"There is no question {query_id}.")
+    lock(session, run_id)
+    return run_id
+
+
 def _held(session: Session, query_id: int) -> Query:
     """A query, locked after its run: everyone locks in this order, or two could wait for each other."""
-    query = _query(session, query_id)
-    hold(session, query.run_id)
-    session.refresh(query, with_for_update=True)
-    return query
+    _hold(session, query_id)
+    return session.get_one(Query, query_id, with_for_update=True)
 
 
 def _query(session: Session, query_id: int) -> Query:
@@ -184,7 +191,7 @@ def _query(session: Session, query_id: int) -> Query:
 
 
 def _standing(session: Session, query_id: int) -> Answer | None:
-    return session.scalars(select(Answer).where(Answer.query_id == query_id, Answer.standing)).one_or_none()
+    return session.scalars(_STANDING, {"query_id": query_id}).one_or_none()
 
 
 def guidance_first() -> ColumnElement[int]:
@@ -203,13 +210,35 @@ def _urgent(run_id: int) -> Select[Query]:
     return rows.order_by(guidance_first(), Query.tick).limit(1)
 
 
-def _offer(session: Session, run_id: int, client_id: str, now: datetime) -> Query | None:
-    if rests(session, run_id):
-        return None
-    mine = session.scalars(
-        _urgent(run_id).where(Query.leased_by == client_id, Query.leased_until > now)
-    ).first()
-    if mine is not None:
-        return mine
-    free = or_(Query.leased_until.is_(None), Query.leased_until <= now)
-    return session.scalars(_urgent(run_id).where(free)).first()
+def _asks(db: Database, run_id: int, client_id: str) -> dict[str, Any]:
+    return {"run_id": run_id, "client_id": client_id, "now": db.clock()}
+
+
+# Statements that every answer needs are built once.
+_RUN_OF = select(Query.run_id).where(Query.id == bindparam("query_id"))
+_STANDING = select(Answer).where(Answer.query_id == bindparam("query_id"), Answer.standing)
+_ANSWERED = (
+    update(Query)
+    .where(Query.id == bindparam("query_id"), Query.status == "open")
+    .values(status="answered")
+    .returning(Query.id)
+    .execution_options(synchronize_session=False)
+)
+_NUMBERED = (
+    update(Run)
+    .where(Run.id == bindparam("run_id"))
+    .values(answers=Run.answers + 1)
+    .returning(Run.answers)
+    .execution_options(synchronize_session=False)
+)
+_KEPT = and_(Query.leased_by == bindparam("client_id"), Query.leased_until > bindparam("now"))
+_FREE = or_(Query.leased_until.is_(None), Query.leased_until <= bindparam("now"))
+_OFFER = (
+    select(Query)
+    .join(Run, Run.id == Query.run_id)
+    .where(Query.run_id == bindparam("run_id"), Query.status == "open", or_(_KEPT, _FREE))
+    .where(or_(Run.goal.is_(None), Run.answers < Run.goal))
+    .order_by(case((_KEPT, 0), else_=1), guidance_first(), Query.tick)
+    .limit(1)
+)
+_OFFERED = _OFFER.with_only_columns(Query.id)

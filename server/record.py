@@ -62,7 +62,7 @@ def write_metrics(db: Database, mine: Claim, rows: Mapping[int, Mapping[str, flo
     Raises:
         LostClaim: another worker raises this run now.
     """
-    with db.write() as session:
+    with db.write(durable=False) as session:
         run = held(session, mine)
         session.execute(delete(Metric).where(Metric.run_id == run.id, Metric.tick.in_(list(rows))))
         session.add_all(
@@ -91,7 +91,7 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
         LostClaim: another worker raises this run now.
     """
     digest = hashlib.sha256(blob).hexdigest()
-    with db.write() as session:
+    with db.write(durable=False) as session:
         run = held(session, mine)
         session.execute(delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.tick == tick))
         session.add(Checkpoint(run_id=run.id, tick=tick, blob=blob, sha256=digest, created=db.clock()))

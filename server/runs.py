@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import func, or_, select, update
+from sqlalchemy import bindparam, func, or_, select, update
 from sqlalchemy.orm import Session
 
 from server.db import Database
@@ -31,6 +31,13 @@ class Claim:
     run_id: int
     actor: str
     epoch: int
+
+
+_LOCKED = select(Run.id).where(Run.id == bindparam("run_id")).with_for_update()
+_MINE = select(Run.status).where(
+    Run.id == bindparam("run_id"), Run.actor == bindparam("actor"), Run.epoch == bindparam("epoch")
+)
+_MINE = _MINE.with_for_update()
 
 
 @dataclass(frozen=True)
@@ -144,7 +151,7 @@ def let_go(db: Database, claims: Sequence[Claim]) -> None:
 
 def beat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
     """A sign of life for all runs of a worker; gives back the claims that still hold."""
-    with db.write() as session:
+    with db.write(durable=False) as session:
         kept = []
         for mine in claims:
             rows = update(Run).where(Run.id == mine.run_id, Run.actor == mine.actor, Run.epoch == mine.epoch)
@@ -162,7 +169,7 @@ def report(db: Database, mine: Claim, **fields: Any) -> Run:
     unknown = set(fields) - SHOWN
     if unknown:
         raise TypeError(f"report takes {sorted(SHOWN)}, not {sorted(unknown)}")
-    with db.write() as session:
+    with db.write(durable=False) as session:
         run = held(session, mine)
         run.heartbeat = db.clock()
         for name, value in fields.items():
@@ -202,6 +209,12 @@ def hold(session: Session, run_id: int) -> Run:
     return run
 
 
+def lock(session: Session, run_id: int) -> None:
+    """`hold`, for those who need nothing of the run."""
+    if session.execute(_LOCKED, {"run_id": run_id}).scalar() is None:
+        raise NotFound(f"There is no run {run_id}.")
+
+
 def living(session: Session, run_id: int) -> Run:
     """`hold`, for what can be done to a run that is not over.
 
@@ -223,6 +236,12 @@ def held(session: Session, mine: Claim) -> Run:
             f"Run {run.id} is raised by {run.actor or 'nobody'} now (epoch {run.epoch}, not {mine.epoch})."
         )
     return run
+
+
+def held_status(session: Session, mine: Claim) -> str:
+    """`held`, for those who need no more of the run than its status: what a tick writes."""
+    status: str | None = session.execute(_MINE, vars(mine)).scalar()
+    return held(session, mine).status if status is None else status
 
 
 def open_in(session: Session, run_id: int) -> Open:

@@ -5,20 +5,26 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from sqlalchemy import event, select, text
+from sqlalchemy import Connection, event, select, text
 from sqlalchemy.exc import IntegrityError, OperationalError
 
 import server.db
 from server.db import Database, connect, sqlite_module
 from server.errors import Busy, DiskFull, SetupError
-from server.queue import answer
+from server.mailbox import post_query, take_answer
+from server.queue import answer, lease
+from server.record import add_event, save_checkpoint
+from server.runs import Claim, report
 from server.settings import Settings
 from server.tables import Answer, Query, Run
 from tests.tree import ROOT
+
+NORMAL, FULL = 1, 2
 
 
 def pragma(db: Database, name: str) -> object:
@@ -34,6 +40,34 @@ def test_every_connection_is_set_up(db: Database, name: str, value: object) -> N
     assert pragma(db, name) == value
     with db.write() as session:
         assert session.execute(text(f"PRAGMA {name}")).scalar() == value
+
+
+@pytest.mark.parametrize(
+    ("verb", "level"),
+    [
+        (lambda db, mine, query: answer(db, query, "left", "a", "human"), FULL),
+        (lambda db, mine, query: post_query(db, mine, 9, "guidance", 1, {}), FULL),
+        (lambda db, mine, query: add_event(db, mine.run_id, "end_episode", {}), FULL),
+        (lambda db, mine, query: lease(db, mine.run_id, "a"), NORMAL),
+        (lambda db, mine, query: take_answer(db, mine, 9), NORMAL),
+        (lambda db, mine, query: report(db, mine, tick=9), NORMAL),
+        (lambda db, mine, query: save_checkpoint(db, mine, 9, b"state"), NORMAL),
+    ],
+)
+def test_what_somebody_was_told_is_on_the_disk_at_once(
+    db: Database, mine: Claim, guidance: int, verb: Callable[..., object], level: int
+) -> None:
+    """The rest is there with the next commit that is: one log holds them all in their order."""
+    found: list[object] = []
+
+    def look(connection: Connection) -> None:
+        found.append(connection.exec_driver_sql("PRAGMA synchronous").scalar())
+
+    event.listen(db.engine, "commit", look)
+    verb(db, mine, guidance)
+    assert found == [level]
+    with db.write() as session:
+        assert session.execute(text("PRAGMA synchronous")).scalar() == FULL, "the next write is durable again"
 
 
 def test_foreign_keys_are_held(db: Database) -> None:
