@@ -10,7 +10,7 @@ from sqlalchemy import func, or_, select
 from server.db import Database
 from server.queue import LEASE_SECONDS, guidance_first, rests
 from server.runs import hold
-from server.tables import Metric, Query, Run
+from server.tables import Metric, Query
 
 
 def lease_ahead(
@@ -42,13 +42,6 @@ def may_lease(db: Database, run_id: int, client_id: str) -> bool:
     rows = select(Query.id).where(Query.run_id == run_id, Query.status == "open", free)
     with db.read() as session:
         return not rests(session, run_id) and session.scalars(rows.limit(1)).first() is not None
-
-
-def older_runs(db: Database, before: int | None = None, limit: int = 20) -> Sequence[Run]:
-    """The runs started before the one of this id, newest first, at most `limit`; None: the last ones."""
-    rows = select(Run) if before is None else select(Run).where(Run.id < before)
-    with db.read() as session:
-        return session.scalars(rows.order_by(Run.id.desc()).limit(limit)).all()
 
 
 def latest_metrics(db: Database, run_ids: Sequence[int]) -> dict[int, Metric]:

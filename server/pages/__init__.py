@@ -2,8 +2,10 @@
 
 from fastapi import APIRouter
 
+from server.pages.controls import router as controls
 from server.pages.dashboard import router as dashboard
 from server.pages.docs import router as docs
+from server.pages.history import router as history
 from server.pages.parent import router as parent
 from server.pages.render import error_page
 from server.pages.start import router as start
@@ -14,4 +16,6 @@ router = APIRouter(include_in_schema=False)
 router.include_router(start)
 router.include_router(parent)
 router.include_router(dashboard)
+router.include_router(controls)
+router.include_router(history)
 router.include_router(docs)

@@ -1,28 +1,36 @@
-"""The dashboard of a run: who waits for whom, and how it learns, in charts (JavaScript) and in a table."""
+"""The dashboard of a run: who waits for whom, what each stage came to, and how it learns, in charts
+(JavaScript) and in a table. server/pages/controls.py has the operator's verbs.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
 
-from fastapi import APIRouter, Form, Request, Response
+from fastapi import APIRouter, Response
 
-from agent.events import EndEpisode
 from server import record, runs
 from server.api.words import RunId
-from server.deps import Db, ring
+from server.db import Database
+from server.deps import Db
 from server.guard import policy
+from server.pages.events import CHANCES, chances, done
 from server.pages.measures import Measures, began, measures
-from server.pages.render import page, see
-from server.pages.words import SENTENCES, state, title
+from server.pages.render import page, shown
+from server.pages.stages import stages
+from server.pages.words import MORE, SENTENCES, state, title
 from server.shapes import shape_run
-from server.views import sampled_metrics
+from server.tables import Run
+from server.views import first_metrics, sampled_metrics
 
 router = APIRouter(include_in_schema=False)
 
-Back = Annotated[Literal["parent", "dashboard"], Form()]
-
 STATUS = {**SENTENCES, "question": ("A question waits for the parent.", "")}
-"""Who waits for whom, seen from outside."""
+"""Who waits for whom, seen from outside. How many questions the goal is of, the template says."""
+
+PACES = (1, 2, 5, 10)
+"""Ticks a second that are offered by a button each."""
+EVENTS = 100
+"""Of the operator's events, the last ones that are shown."""
 
 CHARTS = (
     ("deaths", "", "Unsafe moves so far."),
@@ -35,6 +43,9 @@ CHARTS = (
 )
 """Id, name and one sentence for every chart; web/static/dashboard.js draws them. Two go by the world."""
 
+BY_STAGE = 4
+"""Where the chart of the stages stands, in a run that has several."""
+
 COLUMNS = ("deaths", "guidance", "preference", "loss", "entropy_global", "entropy_local", "return", "size")
 HEADS = {"size": "entries", "entropy_global": "entropy global", "entropy_local": "entropy local"}
 """What a column of the table is called, where that is not its name."""
@@ -42,55 +53,75 @@ HEADS = {"size": "entries", "entropy_global": "entropy global", "entropy_local":
 
 @router.get("/runs/{run_id}")
 def dashboard(run_id: RunId, db: Db) -> Response:
-    """The page. Its styles may be inline, since Plotly writes them so; its scripts may not."""
+    """The page."""
+    return dashboard_page(db, run_id, {}, {})
+
+
+def dashboard_page(
+    db: Database, run_id: int, typed: Mapping[str, str], errors: Mapping[str, str]
+) -> Response:
+    """The page; where a form was wrong, with what was typed and an error beside each wrong field (422).
+
+    Its styles may be inline, since Plotly writes them so; its scripts may not.
+
+    Raises:
+        NotFound: there is no such run.
+    """
     run = runs.get_run(db, run_id)
-    rows = sampled_metrics(db, run_id)
-    shape = shape_run(db, run_id)
-    names = measures(run.legend)
-    now = "paused" if run.status == "paused" else state(shape, offered=True)
+    now = "paused" if run.status == "paused" else state(shape_run(db, run_id), offered=True)
     response = page(
         "dashboard.html",
+        422 if errors else 200,
         run=run,
         title=title(run),
         state=now,
         sentences=STATUS,
         began=began(run),
-        names=names,
-        charts=[(chart, *_named(chart, name, text, names)) for chart, name, text in CHARTS],
-        columns=[(column, _head(column, names)) for column in COLUMNS],
-        rows=rows,
-        last=rows[0].values if rows else {},
+        more=MORE,
+        **_numbers(db, run),
+        **_operator(db, run, typed),
+        errors=errors,
+        focus=next(iter(errors), None),
     )
     response.headers["Content-Security-Policy"] = policy(inline_styles=True)
     return response
 
 
-@router.post("/runs/{run_id}/status")
-def set_status(
-    request: Request,
-    run_id: RunId,
-    db: Db,
-    status: Annotated[Literal["active", "paused", "stopped"], Form()],
-    back: Back = "dashboard",
-) -> Response:
-    """Pause, resume or stop, then back to where the button was."""
-    runs.set_status(db, run_id, status, "Stopped by the operator." if status == "stopped" else None)
-    ring(request)
-    return _back(run_id, back)
+def _numbers(db: Database, run: Run) -> dict[str, object]:
+    """What was measured: now, by stage, and sampled over the whole life."""
+    names = measures(run.legend)
+    rows = sampled_metrics(db, run.id)
+    last = rows[0] if rows else None
+    count = run.config["stages"]
+    charts = [(chart, *_named(chart, name, text, names)) for chart, name, text in CHARTS]
+    if count > 1:
+        text = f"{names.worth} at the end of each stage; dashed: {names.line}."
+        charts.insert(BY_STAGE, ("stages", "By stage", text))
+    return {
+        "names": names,
+        "charts": charts,
+        "columns": [(column, _head(column, names)) for column in COLUMNS],
+        "rows": rows,
+        "last": last.values if last else {},
+        "stages": stages(count, run.maturity, first_metrics(db, run.id), last),
+    }
 
 
-@router.post("/runs/{run_id}/event")
-def event(
-    request: Request,
-    run_id: RunId,
-    db: Db,
-    kind: Annotated[Literal["end_episode"], Form()],
-    back: Back = "dashboard",
-) -> Response:
-    """End an episode in which no action was acceptable, then back to where the button was."""
-    record.add_event(db, run_id, kind, EndEpisode().model_dump(mode="json"))
-    ring(request)
-    return _back(run_id, back)
+def _operator(db: Database, run: Run, typed: Mapping[str, str]) -> dict[str, object]:
+    """What the operator did, and the fields to do more."""
+    events = record.list_events(db, run.id)
+    known = {
+        **{name: shown(value) for name, value in chances(run, events).items()},
+        "goal": shown(run.goal),
+        "pace": shown(run.pace),
+    }
+    return {
+        "chances": CHANCES,
+        "fields": {**known, **{name: text for name, text in typed.items() if name in known}},
+        "paces": PACES,
+        "events": done(events)[:EVENTS],
+        "earlier": max(0, len(events) - EVENTS),
+    }
 
 
 def _named(chart: str, name: str, text: str, names: Measures) -> tuple[str, str]:
@@ -100,7 +131,3 @@ def _named(chart: str, name: str, text: str, names: Measures) -> tuple[str, str]
 def _head(column: str, names: Measures) -> str:
     named = {"deaths": names.harm.lower(), "return": names.worth.lower(), **HEADS}
     return named.get(column, column)
-
-
-def _back(run_id: int, back: str) -> Response:
-    return see(f"/runs/{run_id}" + ("/parent" if back == "parent" else ""))

@@ -26,7 +26,7 @@ from server.deps import Db, SettingsOf, ring
 from server.errors import NotFound
 from server.pages.question import Shown, show
 from server.pages.render import page, see
-from server.pages.words import SENTENCES, state, title
+from server.pages.words import MORE, SENTENCES, state, title
 from server.shapes import shape_run
 from server.starting import LARGEST_INT
 from server.streams import Streams
@@ -67,6 +67,7 @@ def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = Non
         shown=shown,
         state=now,
         sentences=SENTENCES,
+        more=MORE,
         refresh=shown is None and now in ("exploring", "idle", "elsewhere"),
     )
     response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")

@@ -32,13 +32,21 @@ def fill(template: str, **context: object) -> str:
     return _templates.get_template(template).render(**context)
 
 
+def shown(number: float | None) -> str:
+    """A number as a field of a form shows it: whole, or "" for none. It reads back as the same number."""
+    return "" if number is None else str(number).removesuffix(".0")
+
+
 def see(path: str) -> RedirectResponse:
     """After a POST: look there (303), so that a reload repeats nothing."""
     return RedirectResponse(path, status_code=303)
 
 
 def error_page(request: Request, error: ServerError) -> HTMLResponse:
-    """An error as a page: what happened, in a sentence, and the way back."""
-    run = re.match(r"/runs/\d+(?=/parent)", request.url.path)
-    back = f"{run[0]}/parent" if run and error.status == 409 else "/"
+    """An error as a page: what happened, in a sentence, and the way back.
+
+    What a run refused leads back to it; else there may be no such run.
+    """
+    run = re.match(r"/runs/\d+(/parent)?", request.url.path)
+    back = run[0] if run and error.status == 409 else "/"
     return page("error.html", error.status, message=error.message, back=back)

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 
 from agent.config import PRESETS
 from envs.registry import WORLDS
-from server import runs
 from server.db import Database
 from server.deps import Db, SettingsOf, ring
 from server.errors import Invalid
+from server.listing import runs_before
 from server.pages.measures import measures
 from server.pages.render import page, see
-from server.pages.words import title
-from server.starting import plan, read_form, start
-from server.tables import Metric
+from server.pages.words import WORDS, state, title
+from server.shapes import RunShape, shape_runs
+from server.starting import LARGEST_INT, plan, read_form, start
+from server.tables import Metric, Run
 from server.views import latest_metrics
 
 router = APIRouter(include_in_schema=False)
@@ -32,18 +33,39 @@ PRESET_WORDS = {
 
 
 class Option(NamedTuple):
-    """A setting of the run that some worlds have; empty is what the world itself sets."""
+    """A setting of the run; empty is what the world itself sets."""
 
-    name: str  # a field of agent.config.Config
+    field: str  # of the form; behind "config." one of agent.config.Config
     title: str
     needs: str  # the glyph that a world's legend must hold, if any
-    choices: tuple[tuple[str, str], ...]  # values and their names
+    choices: tuple[tuple[str, str], ...]  # values and their names; without any, a number is typed
     hint: str
 
 
 OPTIONS = (
     Option(
-        "pretrain",
+        "pace",
+        "Pace",
+        "",
+        (),
+        "Ticks a second at most, for those who want to watch. Empty: as fast as it can.",
+    ),
+    Option(
+        "config.stages",
+        "Stages",
+        "",
+        (),
+        "Clips get longer by a step from stage to stage (Sec. 2.4). Empty: one stage, clips of one step.",
+    ),
+    Option(
+        "config.mature_every",
+        "A stage ends after",
+        "",
+        (),
+        "Answers in it. Empty: when the operator says so.",
+    ),
+    Option(
+        "config.pretrain",
         "Pre-training",
         "",
         (
@@ -54,7 +76,7 @@ OPTIONS = (
         "Off in Unsafe Exploration, on elsewhere. A level of another size needs weights of its own.",
     ),
     Option(
-        "supervised",
+        "config.supervised",
         "Supervisor",
         "S",
         (
@@ -66,7 +88,7 @@ OPTIONS = (
         "While it isn't there, the agent asks nothing.",
     ),
     Option(
-        "inside",
+        "config.inside",
         "The parent's own way inside its cycle",
         "O",
         (("", "Up or down"), ("left", "Left")),
@@ -75,6 +97,11 @@ OPTIONS = (
 )
 """What the form offers of a run's settings; the rest is for the API and the command line."""
 
+PAGE = 20
+"""Runs on a page."""
+
+Before = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
+
 FIRST = {
     "world": next(iter(WORLDS)),
     "level": "",
@@ -82,9 +109,20 @@ FIRST = {
     "parent": "human",
     "preset": next(iter(PRESETS)),
     "seed": "0",
-    **{f"config.{option.name}": "" for option in OPTIONS},
+    "goal": "",
+    **{option.field: "" for option in OPTIONS},
 }
 """The form before anything was typed."""
+
+
+class Line(NamedTuple):
+    """A run in the list."""
+
+    run: Run
+    title: str
+    state: str
+    harm: str  # what `deaths` are called
+    deaths: float | int | None
 
 
 async def form_of(request: Request) -> dict[str, str]:
@@ -96,9 +134,9 @@ FormOf = Annotated[dict[str, str], Depends(form_of)]
 
 
 @router.get("/")
-def index(db: Db) -> Response:
-    """The list of runs and an empty form."""
-    return _page(db, FIRST, {})
+def index(db: Db, before: Before = None) -> Response:
+    """The list of runs and an empty form. `before` is a run's id: those that were started before it."""
+    return _page(db, FIRST, {}, before)
 
 
 @router.post("/runs")
@@ -127,22 +165,41 @@ def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
     return errors
 
 
-def _page(db: Database, form: Mapping[str, str], errors: Mapping[str, str]) -> Response:
-    listed = runs.list_runs(db)
-    latest = latest_metrics(db, [run.id for run in listed])
+def _page(
+    db: Database, form: Mapping[str, str], errors: Mapping[str, str], before: int | None = None
+) -> Response:
+    listed = runs_before(db, before, PAGE)
     return page(
         "start.html",
         422 if errors else 200,
-        runs=[(run, title(run), measures(run.legend).harm, _deaths(latest, run.id)) for run in listed],
+        runs=_lines(db, listed.rows),
+        words=WORDS,
+        older=listed.next,
+        before=before,
         worlds=WORLDS.values(),
         options=OPTIONS,
         presets=PRESET_WORDS,
         form=form,
-        opened=any(form[field] or field in errors for field in FIRST if field.startswith("config.")),
+        opened=any(form[option.field] or option.field in errors for option in OPTIONS),
         errors=errors,
         focus=next((field for field in FIRST if field in errors), None),
         elsewhere=[message for field, message in errors.items() if field not in FIRST],
     )
+
+
+def _lines(db: Database, listed: Sequence[Run]) -> list[Line]:
+    """What the list says of some runs."""
+    latest = latest_metrics(db, [run.id for run in listed])
+    return [
+        Line(run, title(run), _state(shape), measures(run.legend).harm, _deaths(latest, run.id))
+        for run, shape in zip(listed, shape_runs(db, listed), strict=True)
+    ]
+
+
+def _state(shape: RunShape) -> str:
+    """Who waits for whom. A script answers at once, so its questions wait for nobody."""
+    now = "paused" if shape.status == "paused" else state(shape, offered=True)
+    return "exploring" if now == "question" and shape.parent == "scripted" else now
 
 
 def _deaths(latest: Mapping[int, Metric], run_id: int) -> float | int | None:

@@ -40,6 +40,7 @@ SENTENCES = {
         "No worker is running.",
         "Nothing moves until one is started (parenting worker).",
     ),
+    "resting": ("That was the last question of this goal.", "The agent rests until you go on."),
     "over": ("This run is over.", "The agent asks no more questions."),
     "offline": (
         "No connection to the server.",
@@ -47,6 +48,20 @@ SENTENCES = {
     ),
 }
 """Who waits for whom when no question is shown: a heading and a sentence for every state of the page."""
+
+
+MORE = 50
+"""Answers that a goal grows by where it is reached, by a button."""
+
+WORDS = {
+    "question": "a question waits",
+    "exploring": "exploring",
+    "stuck": "no action acceptable",
+    "paused": "paused",
+    "idle": "no worker",
+    "resting": "goal reached",
+}
+"""The same in a word or two, for the list of runs; a run that is over has its status for it."""
 
 
 def title(run: Run) -> str:
@@ -61,6 +76,8 @@ def state(run: RunShape, offered: bool) -> str:
     """
     if run.worker == "done":
         return "over"
+    if run.resting:
+        return "resting"
     if run.open.guidance or run.open.preference:
         return "question" if offered else "elsewhere"
     if run.status == "paused":

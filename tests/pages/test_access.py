@@ -10,26 +10,51 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
-from server import runs
+from server import queue, record, runs
 from server.db import Database
 from tests.pages import island
 from tests.pages.watched import Watched
 
 SCREENS = {"desktop": {"width": 1280, "height": 800}, "phone": {"width": 390, "height": 844}}
-PATHS = ("/", "/runs/1", "/runs/1/parent?query=1", "/runs/1/parent?query=2", "/runs/2/parent", "/runs/9")
-LARGEST_PAGE = 15_000
+PATHS = (
+    "/",
+    "/runs/1",
+    "/runs/1/history",
+    "/runs/1/parent?query=1",
+    "/runs/1/parent?query=2",
+    "/runs/2",
+    "/runs/2/parent",
+    "/runs/3",
+    "/runs/3/parent",
+    "/runs/4",
+    "/runs/9",
+)
+LARGEST_PAGE = 16_000
 """Bytes of the parent's page with all that it loads, compressed."""
 
 
 @pytest.fixture
 def lives(db: Database) -> None:
-    """A run with two questions and a run that waits for its operator."""
+    """A run with two questions and one that was answered, one that waits for its operator, one that rests at
+    its goal in its second stage, and one that failed.
+    """
     _, mine = island.live(db)
     island.measure(db, mine, 40)
     island.ask(db, mine, 41, "guidance", island.guidance("left", "up", start=(1, 2)))
     island.ask(db, mine, 42, "preference", island.preference("down left left left", "right down down"))
+    told = island.ask(db, mine, 43, "preference", island.preference("left left", "down"))
+    queue.answer(db, told, "left", "me", "human")
     _, other = island.live(db, level="island-bottleneck")
     runs.report(db, other, waiting="stuck", optimal=True)
+    _, third = island.live(db, goal=1, pace=2.5, config={"stages": 2})
+    island.measure(db, third, 40)
+    runs.report(db, third, maturity=2)
+    record.add_event(db, 3, "end_episode", {})
+    queue.answer(
+        db, island.ask(db, third, 41, "guidance", island.guidance("up", "left")), "left", "me", "human"
+    )
+    _, fourth = island.live(db)
+    runs.finish(db, fourth, "failed", "The agent could not go on.")
 
 
 def violations(page: Page) -> list[str]:
@@ -123,7 +148,7 @@ def test_both_boards_play_on_one_clock(watched: Watched, lives: None) -> None:
 
 def test_the_parents_page_is_small(client: httpx2.Client, lives: None) -> None:
     paths = ["/runs/1/parent?query=2", "/static/site.css", "/static/parent.css", "/static/icon.svg"]
-    paths += [f"/static/{name}.js" for name in ("parent", "live", "outbox", "play")]
+    paths += [f"/static/{name}.js" for name in ("parent", "live", "left", "outbox", "play")]
     sizes = {path: len(gzip.compress(client.get(path).content)) for path in paths}
     assert sum(sizes.values()) <= LARGEST_PAGE, sizes
 
@@ -147,5 +172,6 @@ def test_the_charts_are_drawn_and_go_on(watched: Watched, db: Database, lives: N
 def test_the_dashboard_without_javascript_is_a_table(watched: Watched, lives: None) -> None:
     page = watched.open("/runs/1", java_script_enabled=False)
     expect(page.locator("#charts")).to_be_hidden()
+    expect(page.get_by_role("region", name="Numbers by stage").get_by_role("table")).to_be_visible()
     page.get_by_text("The numbers as a table").click()
-    expect(page.get_by_role("table")).to_be_visible()
+    expect(page.get_by_role("region", name="Numbers by tick").get_by_role("table")).to_be_visible()

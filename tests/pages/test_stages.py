@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from server.db import Database
@@ -14,7 +16,7 @@ from server.views import first_metrics, latest_metrics
 from server.worker import Worker
 from tests.pages import island
 
-CONFIG = {"stages": 3, "mature_every": 4}
+CONFIG: dict[str, Any] = {"stages": 3, "mature_every": 4}
 
 
 @pytest.fixture

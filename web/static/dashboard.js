@@ -1,19 +1,21 @@
-// The dashboard: seven small charts by Plotly, fed by the run's metrics as they come.
+// The dashboard: numbers, the table of stages and small charts by Plotly, fed by the run's metrics as they come.
 import { follow, stateOf } from "./live.js";
 
 const main = document.getElementById("main"), run = main.dataset.run;
-const lineOf = (id) => document.querySelector(`[data-chart=${id}]`).dataset.line;
+const lineOf = (id) => document.querySelector(`[data-chart=${id}]`)?.dataset.line;
 const SERIES = {
   deaths: [["deaths", "deaths"]],
   asked: [["guidance", "guidance"], ["preference", "preference"]],
   answers: [["left", "left"], ["right", "right"], ["either", "either"], ["neither", "neither"]],
   return: [["return", "argmax policy"], ["optimal_return", lineOf("return")]],
+  stages: [["return", "argmax policy"], ["optimal_return", lineOf("stages")]],
   loss: [["loss", "loss"]],
   entropy: [["entropy_global", "global head"], ["entropy_local", "local head"]],
   size: [["rows", "distinct rows"], ["size", "entries"]],
 };
 const COUNTS = new Set(["deaths", "asked", "answers", "size"]);
-const ticks = [], values = {}; // by name, one for each tick
+const ticks = [], values = { maturity: [] }; // by name, one for each tick
+const firsts = [];                           // where in them each stage begins
 let last = -1, queued = false;
 
 for (const name of Object.values(SERIES).flat().map(([key]) => key)) values[name] = [];
@@ -22,20 +24,57 @@ const colour = (name) => getComputedStyle(document.documentElement).getPropertyV
 
 const largest = (id) => Math.max(...SERIES[id].map(([key]) => values[key].at(-1)));
 
+// ---- stages (server/pages/stages.py makes the same)
+
+// What each stage came to: between its first row and that of the next stage, which holds what it ended with.
+function stages() {
+  return firsts.map((from, number) => {
+    const end = firsts[number + 1] ?? ticks.length - 1;
+    const within = (name) => values[name][end] - (number ? values[name][from] : 0);
+    return {
+      T: values.maturity[from], worth: values.return[end],
+      cells: [values.return[end], values.optimal_return[end], ...["deaths", "guidance", "preference"].map(within), `${number ? ticks[from] : 0} to ${ticks[end]}`],
+    };
+  });
+}
+
+const shown = (value, digits = 4) => typeof value === "number" && !Number.isInteger(value) ? Number(value.toPrecision(digits)) : value ?? "–";
+
+function fill() {
+  for (const { T, cells } of stages()) {
+    const row = document.querySelector(`tr[data-stage="${T}"]`);
+    row?.querySelectorAll("td").forEach((cell, at) => { cell.textContent = shown(cells[at]); });
+  }
+}
+
+// ---- charts
+
+// A line where each stage but the first begins.
+function borders() {
+  const at = firsts.slice(1).map((first) => [ticks[first], values.maturity[first]]);
+  const line = { color: colour("quiet"), width: 1, dash: "dot" };
+  return {
+    shapes: at.map(([x]) => ({ type: "line", x0: x, x1: x, yref: "paper", y0: 0, y1: 1, line })),
+    annotations: at.map(([x, T]) => ({ x, y: 1, yref: "paper", text: `T = ${T}`, showarrow: false, xanchor: "left", yanchor: "top", xshift: 3, font: { size: 11, color: colour("quiet") } })),
+  };
+}
+
 function layout(id) {
   const axis = { color: colour("quiet"), gridcolor: colour("line"), zeroline: false, fixedrange: false, automargin: true };
-  const many = SERIES[id].length > 1;
+  const many = SERIES[id].length > 1, by = id === "stages";
   return {
     margin: { l: 8, r: 8, t: many ? 26 : 8, b: 8 }, height: 240, autosize: true, hovermode: "x unified", showlegend: many, uirevision: id,
     paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { family: "system-ui, DejaVu Sans, sans-serif", size: 12, color: colour("quiet") },
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { color: colour("ink") } },
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
-    xaxis: { ...axis, title: { text: "tick", standoff: 4 }, showgrid: false },
-    yaxis: { ...axis, dtick: COUNTS.has(id) && largest(id) < 6 ? 1 : null, rangemode: COUNTS.has(id) ? "tozero" : "normal", type: logs.has(id) ? "log" : "linear" },
+    xaxis: { ...axis, title: { text: by ? "T" : "tick", standoff: 4 }, showgrid: false, ...(by && { dtick: 1, range: [0.5, firsts.length + 0.5] }) },
+    yaxis: { ...axis, dtick: COUNTS.has(id) && largest(id) < 6 ? 1 : null, rangemode: COUNTS.has(id) || by ? "tozero" : "normal", type: logs.has(id) ? "log" : "linear" },
+    ...(!by && borders()),
   };
 }
 
 function traces(id) {
+  if (id === "stages") return bars();
   const colours = [colour("blue"), colour("agent"), colour("leaf"), colour("unreal")];
   return SERIES[id].map(([key, name], at) => ({
     type: "scatter", mode: "lines", connectgaps: true, x: ticks, y: values[key], name,
@@ -43,11 +82,22 @@ function traces(id) {
   }));
 }
 
+// A bar for each stage, and the line that it is held against.
+function bars() {
+  const all = stages(), x = all.map(({ T }) => T);
+  const [[, policy], [, line]] = SERIES.stages;
+  return [
+    { type: "bar", x, y: all.map(({ worth }) => worth), name: policy, width: 0.5, marker: { color: colour("blue") } },
+    { type: "scatter", mode: "lines", x: [0.5, ...x, x.length + 0.5], y: Array(x.length + 2).fill(values.optimal_return.at(-1)), name: line, line: { color: colour("quiet"), width: 2, dash: "dash" } },
+  ];
+}
+
 const logs = new Set();
 const figures = [...document.querySelectorAll("[data-chart]")];
 
 function draw() {
   queued = false;
+  fill();
   for (const figure of figures) {
     const id = figure.dataset.chart, plot = figure.querySelector(".plot");
     window.Plotly.react(plot, traces(id), layout(id), { displayModeBar: false, responsive: true });
@@ -61,9 +111,11 @@ function redraw() {
   requestAnimationFrame(draw);
 }
 
+// ---- what comes in
+
 const put = (name, value) => {
   const element = document.getElementById(`now-${name}`);
-  if (element) element.textContent = typeof value === "number" ? Number(value.toPrecision(4)) : value ?? "–";
+  if (element) element.textContent = shown(value, 3);
 };
 
 function add(rows) {
@@ -72,9 +124,10 @@ function add(rows) {
     ticks.push(row.tick);
     last = row.tick;
     for (const name in values) values[name].push(row.values[name] ?? null);
+    if (!firsts.length || values.maturity.at(-1) > values.maturity[firsts.at(-1)]) firsts.push(ticks.length - 1);
   }
   const newest = rows.at(-1)?.values;
-  if (newest) for (const name of ["deaths", "return", "optimal_return"]) put(name, newest[name]);
+  if (newest) for (const name of ["deaths", "return", "optimal_return", "stage_queries"]) put(name, newest[name]);
   redraw();
 }
 
@@ -83,14 +136,32 @@ const status = (which) => {
   for (const part of document.querySelectorAll(".status [data-state]")) part.hidden = part.dataset.state !== which;
 };
 
+// What the operator did has its tick once it applied: the list is fetched anew.
+async function applied(tick) {
+  const list = document.getElementById("events");
+  if (!list?.querySelector("[data-pending]") || Number(list.dataset.tick) === tick) return;
+  list.dataset.tick = tick;
+  const page = await fetch(location.pathname).then((reply) => reply.text()).catch(() => "");
+  const fresh = new DOMParser().parseFromString(page, "text/html").getElementById("events");
+  if (fresh) list.replaceChildren(...fresh.childNodes);
+}
+
 const tell = {
   after: () => last,
   metrics: add,
   run(now) {
     status(now.status === "paused" ? "paused" : stateOf(now));
+    main.dataset.status = now.status;
     put("tick", now.tick);
     put("answered", now.answers);
+    put("goal", now.goal);
+    put("maturity", now.maturity);
+    if (now.reason) put("reason", now.reason);
+    put("speed", now.speed);
     put("optimal", now.optimal ? "optimal" : "learning");
+    for (const row of document.querySelectorAll("tr[data-stage]")) row.className = ["past", "now", "later"][1 + Math.sign(row.dataset.stage - now.maturity)];
+    for (const button of document.querySelectorAll("[data-more]")) button.value = now.goal + Number(button.dataset.more);
+    applied(now.tick);
   },
   lost: () => status("offline"),
 };

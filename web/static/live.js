@@ -4,6 +4,7 @@ const POLL = 500, HIDDEN = 3000;
 // The state of the page (server/pages/words.py, SENTENCES).
 export function stateOf(run) {
   if (run.worker === "done") return "over";
+  if (run.resting) return "resting";
   if (run.open.guidance || run.open.preference) return "question";
   if (run.status === "paused") return "paused";
   if (run.worker === "silent") return "idle";

@@ -1,5 +1,6 @@
 // The parent's page: shows one question after another, takes keys and clicks, and says who waits for whom.
 // The markup of a question comes from the server (server/pages/board.py says why); this file swaps it in.
+import { left, took } from "./left.js";
 import { follow, stateOf } from "./live.js";
 import { flush, give, kept } from "./outbox.js";
 import { play } from "./play.js";
@@ -19,7 +20,7 @@ let ahead = null;      // markup of the question after it
 let prefetches = 0;    // the last request for it counts
 let asking = false, again = false; // a request for a question is under way; another was wanted meanwhile
 let state = main.dataset.state;
-let answered = Number($("count").textContent), unsaved = 0, quiet = 0;
+let answered = Number($("count").textContent), goal = Number($("goal").firstElementChild.textContent), unsaved = 0, quiet = 0;
 
 // ---- questions
 
@@ -111,6 +112,8 @@ function announce(which) {
 const tell = {
   run(now) {
     state = stateOf(now);
+    goal = now.goal;
+    if (now.reason) $("reason").textContent = now.reason;
     $("optimal").hidden = !now.optimal || state === "over";
     count(now.answers);
     if (current && state === "over") current = null;
@@ -134,6 +137,10 @@ const tell = {
 function count(number) {
   answered = Math.max(answered, number);
   $("count").textContent = answered;
+  $("goal").hidden = !goal;
+  $("goal").firstElementChild.textContent = goal ?? "";
+  $("left").textContent = left(goal - answered);
+  for (const button of waiting.querySelectorAll("[data-more]")) button.value = goal + Number(button.dataset.more);
 }
 
 function answer(choice) {
@@ -145,6 +152,7 @@ function answer(choice) {
   $("saved").textContent = "Saving";
   $("alert").textContent = "";
   performance.mark("answer", { detail: String(query) });
+  took();
   const sent = give({ query, choice, client_id: client }, report);
   if (ahead) return show(ahead);
   Promise.race([sent, new Promise((done) => { setTimeout(done, HASTE); })]).then(() => { if (!current) next(PATIENCE); });

@@ -1,0 +1,114 @@
+"""What an operator may do to a run, each verb a plain form: pause, resume, stop, mature, end the episode, set
+chances, goal and pace. A wrong field brings the dashboard back with an error beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Form, Request, Response
+from pydantic import TypeAdapter, ValidationError
+
+from agent.events import Change, EndEpisode, Mature, Probability
+from server import record, runs
+from server.api.words import RunId
+from server.deps import Db, ring
+from server.pages.dashboard import dashboard_page
+from server.pages.events import CHANCES, chances
+from server.pages.render import see
+from server.pages.start import FormOf
+from server.starting import Goal, Pace
+
+router = APIRouter(include_in_schema=False)
+
+Back = Annotated[Literal["parent", "dashboard", "operator"], Form()]
+WAYS = {"parent": "/parent", "dashboard": "", "operator": "#operator"}
+"""Where a form leads back to, below the run's address."""
+
+WORDS = {
+    **dict.fromkeys(CHANCES, "A chance is a number from 0 to 1, such as 0.5."),
+    "goal": "A goal is a whole number of questions from 1 to 1000000; leave it empty to have none.",
+    "pace": "A pace is a number of ticks a second, above 0 and up to 1000; leave it empty to have none.",
+}
+"""What is said beside a wrong field."""
+
+
+@router.post("/runs/{run_id}/status")
+def set_status(
+    request: Request,
+    run_id: RunId,
+    db: Db,
+    status: Annotated[Literal["active", "paused", "stopped"], Form()],
+    back: Back = "dashboard",
+) -> Response:
+    """Pause, resume or stop, then back to where the button was."""
+    runs.set_status(db, run_id, status, "Stopped by the operator." if status == "stopped" else None)
+    return _back(request, run_id, back)
+
+
+@router.post("/runs/{run_id}/event")
+def event(
+    request: Request,
+    run_id: RunId,
+    db: Db,
+    kind: Annotated[Literal["mature", "end_episode"], Form()],
+    back: Back = "dashboard",
+) -> Response:
+    """End the stage, or an episode in which no action was acceptable."""
+    happens = Mature() if kind == "mature" else EndEpisode()
+    record.add_event(db, run_id, kind, happens.model_dump(mode="json"))
+    return _back(request, run_id, back)
+
+
+@router.post("/runs/{run_id}/chances")
+def set_chances(request: Request, run_id: RunId, db: Db, form: FormOf) -> Response:
+    """Set those of the four chances that differ from what they are: an event for each."""
+    run = runs.get_run(db, run_id)
+    given, wrong = _numbers(form, CHANCES, Probability)
+    if wrong:
+        return dashboard_page(db, run_id, form, wrong)
+    known = chances(run, record.list_events(db, run_id))
+    for name in [name for name in CHANCES if given[name] != known[name]]:
+        change = Change.model_validate({"name": name, "value": given[name]})
+        record.add_event(db, run_id, change.kind, change.model_dump(mode="json"))
+    return _back(request, run_id, "operator")
+
+
+@router.post("/runs/{run_id}/goal")
+def set_goal(request: Request, run_id: RunId, db: Db, form: FormOf, back: Back = "operator") -> Response:
+    """Let the agent rest after so many answers, or never."""
+    given, wrong = _numbers(form, ["goal"], Goal | None)
+    if wrong:
+        return dashboard_page(db, run_id, form, wrong)
+    runs.set_goal(db, run_id, given["goal"])
+    return _back(request, run_id, back)
+
+
+@router.post("/runs/{run_id}/pace")
+def set_pace(request: Request, run_id: RunId, db: Db, form: FormOf) -> Response:
+    """Let so many ticks pass in a second at most, or as many as can."""
+    given, wrong = _numbers(form, ["pace"], Pace | None)
+    if wrong:
+        return dashboard_page(db, run_id, form, wrong)
+    runs.set_pace(db, run_id, given["pace"])
+    return _back(request, run_id, "operator")
+
+
+def _numbers(
+    form: Mapping[str, str], names: Iterable[str], kind: Any
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Numbers from a form's text, None from an empty one; and what is wrong with those that are none."""
+    given, wrong, reader = {}, {}, TypeAdapter(kind)
+    for name in names:
+        try:
+            given[name] = reader.validate_python(form.get(name, "").strip() or None)
+        except ValidationError:
+            wrong[name] = WORDS[name]
+    return given, wrong
+
+
+def _back(request: Request, run_id: int, back: str) -> Response:
+    """Wake the worker, and go back to where the button was."""
+    ring(request)
+    return see(f"/runs/{run_id}{WAYS[back]}")

@@ -1,0 +1,44 @@
+"""What the operator did to a run, in words, and what its chances come to after it (agent.events)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from server.tables import Event, Run
+
+CHANCES = {
+    "p_guid": "ask before a new move",
+    "p_rec": "record a clip",
+    "p_pref": "ask about two clips",
+    "p_train": "train on X",
+}
+"""What an operator may change, in the order of Sec. 2, and what each is a chance for, in a few words."""
+
+
+class Done(NamedTuple):
+    """One thing that the operator did."""
+
+    what: str
+    when: str
+
+
+def done(events: Sequence[Event]) -> list[Done]:
+    """Everything that the operator did, the last first."""
+    return [Done(_what(event), _when(event)) for event in reversed(events)]
+
+
+def chances(run: Run, events: Sequence[Event]) -> dict[str, float]:
+    """The chances by name as they hold once every event has applied."""
+    changed = {event.payload["name"]: event.payload["value"] for event in events if event.kind == "change"}
+    return {name: changed.get(name, run.config[name]) for name in CHANCES}
+
+
+def _what(event: Event) -> str:
+    if event.kind == "change":
+        return f"Set {event.payload['name']} to {event.payload['value']:g}"
+    return {"mature": "Ended the stage", "end_episode": "Ended the episode"}[event.kind]
+
+
+def _when(event: Event) -> str:
+    return "before the next tick" if event.applied_tick is None else f"at tick {event.applied_tick}"

@@ -1,0 +1,101 @@
+"""What was answered in a run: every answer with its clips, the last first, page by page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Literal, NamedTuple
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+
+from server import history, runs
+from server.api.words import RunId
+from server.deps import Db
+from server.history import Answered
+from server.pages.parent import COOKIE
+from server.pages.question import Shown, show
+from server.pages.render import page
+from server.pages.words import title
+from server.shapes import Choice
+from server.starting import LARGEST_INT
+from server.tables import CHOICES, KINDS, Run
+
+router = APIRouter(include_in_schema=False)
+
+PAGE = 20
+"""Answers on a page."""
+
+SAID = {
+    "left": "Left is better",
+    "right": "Right is better",
+    "either": "Equally good",
+    "neither": "Both too dangerous",
+}
+"""What a choice says."""
+
+Before = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
+OfKind = Annotated[Literal["guidance", "preference", ""], Query()]
+OfChoice = Annotated[Choice | Literal[""], Query()]
+
+
+class Entry(NamedTuple):
+    """One answer, ready for web/templates/history.html."""
+
+    number: int
+    said: str
+    chosen: tuple[str, ...]  # the sides that it favours
+    standing: bool
+    who: str
+    received: str  # in UTC, to the second
+    asked: int  # the tick of the question
+    heard: int | None  # the tick at which the agent heard it
+    stage: int
+    shown: Shown
+
+
+@router.get("/runs/{run_id}/history")
+def history_page(
+    request: Request, run_id: RunId, db: Db, before: Before = None, kind: OfKind = "", choice: OfChoice = ""
+) -> Response:
+    """The page. `before` is the number of an answer; kind and choice leave out the others."""
+    run = runs.get_run(db, run_id)
+    rows = history.before(db, run_id, before, PAGE + 1, kind or None, choice or None)
+    kept = {name: value for name, value in (("kind", kind), ("choice", choice)) if value}
+    return page(
+        "history.html",
+        run=run,
+        title=title(run),
+        entries=_entries(rows[:PAGE], run, request.cookies.get(COOKIE, "")),
+        older=urlencode({**kept, "before": rows[PAGE - 1].answer.number}) if len(rows) > PAGE else None,
+        newest=urlencode(kept) if before is not None else None,
+        kinds=KINDS,
+        choices={name: SAID[name] for name in CHOICES},
+        kind=kind,
+        choice=choice,
+    )
+
+
+def _entries(rows: Sequence[Answered], run: Run, mine: str) -> list[Entry]:
+    return [_entry(row, run, mine) for row in rows]
+
+
+def _entry(row: Answered, run: Run, mine: str) -> Entry:
+    answer, query = row.answer, row.query
+    return Entry(
+        answer.number,
+        SAID[answer.choice],
+        ("left", "right") if answer.choice == "either" else (answer.choice,),
+        answer.standing,
+        _who(answer.parent, answer.client_id, mine),
+        f"{answer.received:%Y-%m-%d %H:%M:%S}",
+        query.tick,
+        answer.applied_tick,
+        query.maturity if query.policy_stage is None else query.policy_stage,
+        show(query, run),
+    )
+
+
+def _who(parent: str, client_id: str, mine: str) -> str:
+    if parent == "scripted":
+        return "a script"
+    return "you, in this browser" if client_id == mine else f"a person ({client_id[:8]})"

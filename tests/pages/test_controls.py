@@ -1,0 +1,211 @@
+"""What an operator may do to a run: each verb a form that leads back, with errors beside their fields."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import httpx2
+import pytest
+
+from server import mailbox, runs
+from server.db import Database
+from server.record import list_events
+from server.runs import Claim, get_run, set_status
+from tests.pages import island
+
+CHANCES = {"p_guid": "0.95", "p_rec": "0.8", "p_pref": "0.8", "p_train": "1"}
+"""Those of the conservative preset."""
+
+
+@pytest.fixture
+def mine(db: Database) -> Claim:
+    return island.live(db, config={"stages": 2})[1]
+
+
+def changes(db: Database) -> list[tuple[str, float]]:
+    """What was changed, in its order."""
+    return [(row.payload["name"], row.payload["value"]) for row in list_events(db, 1) if row.kind == "change"]
+
+
+def field(page: str, name: str) -> str:
+    """What a field of the page holds."""
+    found = re.search(rf'<input id="{name}"[^>]* value="([^"]*)"', page)
+    assert found
+    return found[1]
+
+
+def beside(page: str, name: str) -> str:
+    """The error that stands beside a field."""
+    assert f'aria-invalid="true" aria-describedby="{name}-error {name}-hint"' in page
+    return page.partition(f'<p class="error" id="{name}-error">')[2].partition("</p>")[0]
+
+
+@pytest.mark.parametrize(
+    ("path", "data", "back"),
+    [
+        ("status", {"status": "paused"}, ""),
+        ("status", {"status": "active", "back": "parent"}, "/parent"),
+        ("event", {"kind": "mature", "back": "operator"}, "#operator"),
+        ("event", {"kind": "end_episode", "back": "parent"}, "/parent"),
+        ("chances", CHANCES, "#operator"),
+        ("goal", {"goal": "50"}, "#operator"),
+        ("goal", {"goal": "50", "back": "parent"}, "/parent"),
+        ("pace", {"pace": "2"}, "#operator"),
+    ],
+)
+def test_a_form_leads_back_to_where_it_stood(
+    client: httpx2.Client, mine: Claim, path: str, data: dict[str, str], back: str
+) -> None:
+    reply = client.post(f"/runs/1/{path}", data=data)
+    assert (reply.status_code, reply.headers["location"]) == (303, f"/runs/1{back}")
+
+
+def test_only_what_differs_becomes_an_event(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    page = client.get("/runs/1").text
+    assert {name: field(page, name) for name in CHANCES} == CHANCES
+    client.post("/runs/1/chances", data=CHANCES)
+    assert changes(db) == []
+    client.post("/runs/1/chances", data={**CHANCES, "p_guid": "0.25", "p_train": " .5 "})
+    assert changes(db) == [("p_guid", 0.25), ("p_train", 0.5)]
+    page = client.get("/runs/1").text  # what waits to be applied counts
+    assert {name: field(page, name) for name in CHANCES} == {**CHANCES, "p_guid": "0.25", "p_train": "0.5"}
+    mailbox.take_events(db, mine, 7)
+    client.post("/runs/1/chances", data={**CHANCES, "p_train": "0.5"})
+    assert changes(db)[2:] == [("p_guid", 0.95)]
+
+
+@pytest.mark.parametrize("value", ["", "1.1", "-0.1", "nan", "often", "1e400"])
+def test_a_chance_that_is_none_stands_beside_its_field(
+    client: httpx2.Client, db: Database, mine: Claim, value: str
+) -> None:
+    page = client.post("/runs/1/chances", data={**CHANCES, "p_rec": "0.1", "p_pref": value})
+    assert page.status_code == 422
+    assert beside(page.text, "p_pref") == "A chance is a number from 0 to 1, such as 0.5."
+    assert field(page.text, "p_pref") == value
+    assert field(page.text, "p_rec") == "0.1"  # what was typed stays
+    assert page.text.count(" autofocus") == 1
+    assert "'unsafe-inline'" in page.headers["content-security-policy"]
+    assert list_events(db, 1) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "stored", "bad"),
+    [
+        ("goal", "50", 50, ["0", "-1", "2.5", "many", "1000001"]),
+        ("pace", "2.5", 2.5, ["0", "-1", "nan", "inf", "slow", "1001"]),
+    ],
+)
+def test_goal_and_pace(
+    client: httpx2.Client, db: Database, mine: Claim, name: str, good: str, stored: float, bad: list[str]
+) -> None:
+    client.post(f"/runs/1/{name}", data={name: good})
+    assert getattr(get_run(db, 1), name) == stored
+    assert field(client.get("/runs/1").text, name) == good
+    for value in bad:
+        page = client.post(f"/runs/1/{name}", data={name: value})
+        assert page.status_code == 422, value
+        assert beside(page.text, name).startswith(f"A {name} is ")
+        assert field(page.text, name) == value
+    assert getattr(get_run(db, 1), name) == stored
+    client.post(f"/runs/1/{name}", data={name: "  "})
+    assert getattr(get_run(db, 1), name) is None
+
+
+def test_a_preset_of_the_pace_shows_that_it_holds(client: httpx2.Client, mine: Claim) -> None:
+    def held() -> list[str]:
+        return re.findall(r'name="pace" value="([^"]*)"[^>]* aria-current', client.get("/runs/1").text)
+
+    assert held() == [""]
+    client.post("/runs/1/pace", data={"pace": "5"})
+    assert held() == ["5"]
+    client.post("/runs/1/pace", data={"pace": "0.2"})
+    assert held() == []
+    assert "at most 0.2" in client.get("/runs/1").text
+
+
+def test_the_last_stage_cannot_be_ended(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    assert "Mature now" in client.get("/runs/1").text
+    runs.report(db, mine, maturity=2)
+    assert "Mature now" not in client.get("/runs/1").text
+    reply = client.post("/runs/1/event", data={"kind": "mature"})
+    assert reply.status_code == 409
+    assert "is in its last stage" in reply.text
+    assert 'href="/runs/1"' in reply.text  # the way back
+
+
+def test_what_was_done_is_listed_with_its_tick(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    assert "What the operator did" not in client.get("/runs/1").text
+    client.post("/runs/1/event", data={"kind": "mature"})
+    client.post("/runs/1/event", data={"kind": "end_episode"})
+    mailbox.take_events(db, mine, 7)
+    client.post("/runs/1/chances", data={**CHANCES, "p_guid": "1"})
+    listed = client.get("/runs/1").text.partition("What the operator did")[2].partition("</ol>")[0]
+    assert [re.sub("<.*?>", "", line) for line in re.findall(r"<li.*?</li>", listed)] == [
+        "Set p_guid to 1 before the next tick",
+        "Ended the episode at tick 7",
+        "Ended the stage at tick 7",
+    ]
+
+
+def test_stopping_is_asked_for_twice(client: httpx2.Client, mine: Claim) -> None:
+    """The button stands in what has to be opened first, without JavaScript, too."""
+    page = client.get("/runs/1").text
+    folded = page.partition("Stop for good…")[2].partition("</details>")[0]
+    assert 'value="stopped"' in folded
+    assert page.count('value="stopped"') == 1
+
+
+@pytest.mark.parametrize(
+    ("path", "data"),
+    [
+        ("event", {"kind": "end_episode"}),
+        ("chances", {**CHANCES, "p_guid": "0"}),
+        ("goal", {"goal": "5"}),
+        ("pace", {"pace": "5"}),
+        ("status", {"status": "active"}),
+    ],
+)
+def test_a_run_that_is_over_takes_nothing(
+    client: httpx2.Client, db: Database, mine: Claim, path: str, data: dict[str, Any]
+) -> None:
+    client.post("/runs/1/event", data={"kind": "mature"})
+    set_status(db, 1, "stopped", "Stopped by the operator.")
+    page = client.get("/runs/1").text
+    assert 'method="post"' not in page
+    assert "Ended the stage" in page
+    reply = client.post(f"/runs/1/{path}", data=data)
+    assert reply.status_code == 409
+    assert len(list_events(db, 1)) == 1
+
+
+@pytest.mark.parametrize("path", ["status", "event", "chances", "goal", "pace"])
+def test_other_sites_can_do_nothing(client: httpx2.Client, mine: Claim, path: str) -> None:
+    data = {"status": "stopped", "kind": "end_episode", "goal": "1", "pace": "1", **CHANCES}
+    for headers in ({"sec-fetch-site": "cross-site"}, {"origin": "http://elsewhere.example"}):
+        assert client.post(f"/runs/1/{path}", data=data, headers=headers).status_code == 403
+    assert client.get(f"/runs/1/{path}").status_code == 405
+
+
+def test_a_run_that_failed_says_why(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    runs.finish(db, mine, "failed", "The agent could not go on: it was lost.", "Traceback: secret")
+    for path in ("/runs/1", "/runs/1/parent", "/"):
+        page = client.get(path).text
+        assert "The agent could not go on: it was lost." in page
+        assert "secret" not in page
+
+
+def test_at_its_goal_it_says_so_and_offers_more(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    runs.set_goal(db, 1, 1)
+    query = island.ask(db, mine, 1, "guidance", island.guidance("left", "down"))
+    data = {"query_id": query, "choice": "left", "client_id": "me"}
+    client.post("/runs/1/parent/answer", data=data)
+    page = re.sub("<.*?>", "", client.get("/runs/1").text)
+    assert "The goal of 1 questions is reached. The agent rests." in page
+    for path in ("/runs/1", "/runs/1/parent"):
+        assert 'data-state="resting"' in client.get(path).text.partition("<main")[2].partition(">")[0]
+        assert 'name="goal" value="51"' in client.get(path).text
+    assert "That was the last question of this goal." in client.get("/runs/1/parent").text
+    client.post("/runs/1/goal", data={"goal": "51", "back": "parent"})
+    assert 'data-state="exploring"' in client.get("/runs/1/parent").text.partition("<main")[2]
+    assert "of <span>51</span>" in client.get("/runs/1/parent").text

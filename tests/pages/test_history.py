@@ -1,0 +1,114 @@
+"""The page of what was answered."""
+
+from __future__ import annotations
+
+import re
+
+import httpx2
+import pytest
+
+from server import mailbox, queue
+from server.db import Database
+from server.pages.history import PAGE
+from server.runs import Claim
+from tests.pages import island
+
+ME = "client-of-mine"
+
+
+@pytest.fixture
+def mine(db: Database) -> Claim:
+    return island.live(db)[1]
+
+
+def answered(db: Database, mine: Claim, tick: int, choice: str, kind: str = "guidance", by: str = ME) -> int:
+    """A question of this tick with its answer."""
+    clips = {"guidance": island.guidance, "preference": island.preference}[kind]("left", "down")
+    query = island.ask(db, mine, tick, kind, clips)
+    queue.answer(db, query, choice, by, "scripted" if by == "scripted" else "human")
+    return query
+
+
+def numbers(page: str) -> list[int]:
+    return [int(number) for number in re.findall(r'id="answer-(\d+)"', page)]
+
+
+def entry(page: str, number: int) -> str:
+    """One answer as it reads."""
+    text = page.partition(f'id="answer-{number}"')[2].partition("</li>")[0]
+    return " ".join(re.sub("<[^>]*>", " ", text.partition(">")[2]).split())
+
+
+def test_nothing_yet(client: httpx2.Client, mine: Claim) -> None:
+    assert "Nothing has been answered yet." in client.get("/runs/1/history").text
+    assert client.get("/runs/2/history").status_code == 404
+
+
+def test_an_answer_with_all_that_is_known_of_it(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    answered(db, mine, 3, "left")
+    mailbox.take_answer(db, mine, 4)
+    answered(db, mine, 5, "neither", "preference", by="somebody-else")
+    answered(db, mine, 6, "either", by="scripted")
+    client.cookies.set("parenting_client", ME)
+    page = client.get("/runs/1/history").text
+    assert numbers(page) == [3, 2, 1]
+    first = entry(page, 1)
+    for part in ("Left is better", "guidance, stage T = 1", "at tick 3", "at tick 4", "you, in this browser"):
+        assert part in first
+    assert "Left better Left." in first
+    assert "Right better" not in first
+    second = entry(page, 2)
+    assert "Both too dangerous" in second
+    assert second.count("refused") == 2
+    for part in ("preference", "Heard not yet", "a person (somebody)", "UTC"):
+        assert part in second
+    third = entry(page, 3)
+    assert "By a script" in third
+    assert third.count("equal") == 2
+    assert page.count('<svg class="board"') == 6
+    assert 'href="/api/v1/runs/1/export"' in page
+
+
+def test_page_by_page(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    for tick in range(1, 2 * PAGE + 4):
+        answered(db, mine, tick, "left")
+    path, seen = "/runs/1/history", []
+    while path:
+        page = client.get(path).text
+        seen.append(numbers(page))
+        older = re.search(r'href="([^"]*)">Older answers', page)
+        path = older[1].replace("&amp;", "&") if older else ""
+    assert [len(part) for part in seen] == [PAGE, PAGE, 3]
+    assert [number for part in seen for number in part] == list(range(2 * PAGE + 3, 0, -1))
+    assert ">Newest</a>" in page
+    assert "Newest" not in client.get("/runs/1/history").text
+
+
+def test_some_of_them(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    for tick in range(1, PAGE + 5):
+        answered(db, mine, tick, "left")
+    answered(db, mine, 90, "right")
+    answered(db, mine, 91, "left", "preference")
+    right, clips = PAGE + 5, PAGE + 6
+    assert numbers(client.get("/runs/1/history?choice=right&kind=").text) == [right]
+    assert numbers(client.get("/runs/1/history?kind=preference").text) == [clips]
+    page = client.get("/runs/1/history?kind=guidance&choice=left").text
+    assert numbers(page) == list(range(PAGE + 4, 4, -1))
+    assert "<option selected>guidance" in page
+    assert 'href="/runs/1/history?kind=guidance&amp;choice=left&amp;before=5"' in page
+    assert "No answer is like that." in client.get("/runs/1/history?choice=either").text
+    for wrong in ("choice=best", "kind=none", "before=0", "before=x"):
+        assert client.get(f"/runs/1/history?{wrong}").status_code == 422
+
+
+def test_a_corrected_answer_says_so(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    query = answered(db, mine, 1, "left")
+    queue.correct(db, query, "right", ME, "human")
+    page = client.get("/runs/1/history").text
+    assert "corrected later" in entry(page, 1)
+    assert "corrected later" not in entry(page, 2)
+
+
+def test_dashboard_and_parents_page_lead_there(client: httpx2.Client, mine: Claim) -> None:
+    for path in ("/runs/1", "/runs/1/parent"):
+        assert 'href="/runs/1/history"' in client.get(path).text

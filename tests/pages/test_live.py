@@ -1,0 +1,135 @@
+"""What the scripts add: numbers that move, clips that play, the time that is left."""
+
+from __future__ import annotations
+
+import re
+
+from playwright.sync_api import Page, expect
+
+from server import mailbox, queue, runs
+from server.db import Database
+from server.settings import Settings
+from server.wake import Bell
+from tests.pages import island
+from tests.pages.watched import Watched
+
+
+def table(page: Page) -> list[str]:
+    """The stages, a line each."""
+    return [" ".join(row.inner_text().split()) for row in page.locator("tr[data-stage]").all()]
+
+
+def test_the_table_of_stages_grows_as_it_is_drawn(watched: Watched, db: Database) -> None:
+    """The script makes of the metrics what the server makes of them."""
+    _, mine = island.live(db, config={"stages": 3, "mature_every": 20})
+    page = watched.open("/runs/1")
+    expect(page.locator("tr[data-stage]")).to_have_count(3)
+    assert table(page) == ["1 now – – – – – –", "2 – – – – – –", "3 – – – – – –"]
+    island.measure(db, mine, 30)
+    island.measure(db, mine, 50, begin=31, maturity=2)
+    runs.report(db, mine, maturity=2)
+    expect(page.locator("tr.now")).to_contain_text("2")
+    expect(page.locator("tr.now")).to_contain_text("31 to 50")
+    drawn = table(page)
+    still = watched.open("/runs/1", java_script_enabled=False)
+    assert table(still) == drawn
+    assert drawn[0].endswith("0 to 31")
+    assert drawn[2].startswith("3 – –")
+    expect(page.locator("#now-maturity")).to_have_text("2")
+    plots = "[...document.querySelectorAll('.plot')].map(plot => plot.layout.shapes?.map(line => line.x0))"
+    assert page.evaluate(plots) == [[31]] * 4 + [None] + [[31]] * 3
+    bars = "document.querySelector('[data-chart=stages] .plot').data[0].y"
+    assert len(page.evaluate(bars)) == 2
+
+
+def test_an_event_gets_its_tick_on_the_page(watched: Watched, db: Database) -> None:
+    _, mine = island.live(db, config={"stages": 2})
+    page = watched.open("/runs/1")
+    page.get_by_label("p_guid").fill("0.5")
+    page.get_by_role("button", name="Change").click()
+    expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 before the next tick")
+    mailbox.take_events(db, mine, 8)
+    runs.report(db, mine, tick=8)
+    expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 at tick 8")
+
+
+def test_the_buttons_go_by_what_holds(watched: Watched, db: Database) -> None:
+    _, mine = island.live(db)
+    page = watched.open("/runs/1")
+    for name in ("Pause", "End the episode", "Be the parent"):
+        expect(page.get_by_role("button", name=name).or_(page.get_by_role("link", name=name))).to_be_visible()
+    for name in ("Resume", "50 more"):
+        expect(page.get_by_role("button", name=name)).to_be_hidden()
+    runs.set_status(db, 1, "paused")
+    expect(page.get_by_role("button", name="Resume")).to_be_visible()
+    expect(page.get_by_role("button", name="Pause")).to_be_hidden()
+    runs.set_status(db, 1, "active")
+    runs.report(db, mine, waiting="stuck")
+    expect(page.get_by_role("button", name="End the episode")).to_have_count(2)
+    runs.set_status(db, 1, "stopped", "Stopped by the operator.")
+    expect(page.get_by_text("Stopped by the operator.")).to_be_visible()
+    expect(page.get_by_role("button", name=re.compile("Pause|Set|Change|episode"))).to_have_count(0)
+
+
+def test_the_clips_of_an_answer_play_while_it_is_pointed_at(watched: Watched, db: Database) -> None:
+    _, mine = island.live(db)
+    for tick in (1, 2):
+        query = island.ask(db, mine, tick, "preference", island.preference("left left", "down down"))
+        queue.answer(db, query, "left", "me", "human")
+    page = watched.open("/runs/1/history")
+    entries = page.locator(".entry")
+
+    def playing(at: int) -> int:
+        moving = (
+            "entry => entry.getAnimations({ subtree: true }).filter(a => a.playState === 'running').length"
+        )
+        return int(entries.nth(at).evaluate(moving))
+
+    assert playing(0) == playing(1) == 0
+    entries.nth(0).hover()
+    assert playing(0) > 0
+    entries.nth(1).hover()
+    assert playing(0) == 0
+    assert playing(1) > 0
+    page.mouse.move(0, 0)
+    assert playing(1) == 0
+    play = entries.nth(0).get_by_role("button", name="Play")
+    play.focus()
+    assert playing(0) > 0
+    step = entries.nth(0).get_by_role("button", name="One step on")
+    step.click()
+    expect(entries.nth(0).locator("output")).to_have_text(re.compile("Step . of 2"))
+    still = watched.open("/runs/1/history", java_script_enabled=False)
+    expect(still.locator("svg.board .trail.of-agent")).to_have_count(4)
+    expect(still.get_by_role("button", name="Play")).to_have_count(0)
+
+
+def test_the_time_that_is_left_of_a_goal(watched: Watched, db: Database, settings: Settings) -> None:
+    _, mine = island.live(db, goal=6)
+    for tick in range(1, 8):
+        island.ask(db, mine, tick, "preference", island.preference("left left", "down down"))
+    Bell(settings.data, "web").ring()
+    page = watched.open("/runs/1/parent")
+    expect(page.locator("#goal")).to_have_text("of 6")
+    for count in range(1, 6):
+        expect(page.locator("#question")).to_have_attribute("data-query", str(count))
+        expect(page.locator("#left")).to_have_text("" if count < 5 else ", under a minute")
+        page.keyboard.press("ArrowLeft")
+        expect(page.locator("#count")).to_have_text(str(count))
+    expect(page.locator("#question")).to_have_attribute("data-query", "6")
+    page.keyboard.press("ArrowLeft")
+    expect(page.get_by_role("heading", name="That was the last question of this goal.")).to_be_visible()
+    expect(page.locator("#left")).to_have_text("")
+    page.get_by_role("button", name="50 more").click()
+    expect(page.locator("#goal")).to_have_text("of 56")
+    page.get_by_role("button", name="50 more").wait_for(state="hidden")
+
+
+def test_it_is_told_from_the_median_of_the_last_answers(watched: Watched, db: Database) -> None:
+    island.live(db, goal=50)
+    page = watched.open("/")
+    page.evaluate("localStorage.setItem('parenting.times', '[100, 3000, 3000, 3500, 90000]')")
+    page.goto(f"{watched.address}/runs/1/parent")
+    expect(page.locator(".count")).to_contain_text("0 of 50 answered, about 3 min")
+    words = page.evaluate("import('/static/left.js').then(({ left }) => [5, 50, 5000, 0].map(left))")
+    assert words == [", under a minute", ", about 3 min", ", about 4 h", ""]

@@ -1,0 +1,26 @@
+// How long the rest of a goal will take: by the median time between this browser's last answers.
+const KEY = "parenting.times", LAST = 20, FEW = 3;
+let times = read(), before = 0;
+
+function read() {
+  try { return JSON.parse(localStorage.getItem(KEY)) ?? []; } catch { return []; }
+}
+
+addEventListener("pagehide", () => {
+  try { localStorage.setItem(KEY, JSON.stringify(times)); } catch { /* no storage: the next visit begins anew */ }
+});
+
+// An answer was given just now.
+export function took() {
+  const now = performance.now();
+  if (before) times = [...times, now - before].slice(-LAST);
+  before = now;
+}
+
+// The time that so many more answers will take, in words; "" while too few were given to tell.
+export function left(answers) {
+  if (times.length < FEW || answers <= 0) return "";
+  const seconds = times.toSorted((a, b) => a - b)[times.length >> 1] * answers / 1000;
+  if (seconds < 60) return ", under a minute";
+  return seconds < 5400 ? `, about ${Math.round(seconds / 60)} min` : `, about ${Math.round(seconds / 3600)} h`;
+}
