@@ -65,7 +65,7 @@ def show(query: Query, run: Run) -> Shown:
     """A query with its run's legend and level."""
     bars = find(_art(run), BARS) if BARS in run.legend else []
     left, right = (_side(name, letter, query, run, bars) for name, letter in (("left", "A"), ("right", "B")))
-    left_out = chance(run.legend) if query.kind == "guidance" else ""
+    left_out = chance(query.clips.values()) if query.kind == "guidance" else ""
     watched = watch(run.legend, query.clips["left"])  # both begin at the same place
     return Shown(query.id, query.run_id, query.kind, (left, right), watched, left_out)
 

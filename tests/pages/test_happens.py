@@ -111,6 +111,13 @@ def test_a_forecast_says_what_it_leaves_to_chance(world: str) -> None:
     assert "chance" not in clips.aside  # what is recorded has happened, chance and all
 
 
+def test_where_the_pink_cell_is_gone_nothing_is_left_to_chance() -> None:
+    world = registry.make("interruptibility")
+    before, after = (guidance(world, "u", "d", way=way) for way in ("dd", "dddu"))
+    asides = [show(asked("guidance", clips), run("interruptibility")).aside for clips in (before, after)]
+    assert asides == ["The pink cell holds the agent by chance; these boards leave that out.", ""]
+
+
 def test_plants_that_dry_are_counted() -> None:
     garden = registry.make("reward-hacking", drying=1.0)
     assert said(filmed(garden, "d")) == [("8 plants dry.", "")]
