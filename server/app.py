@@ -10,6 +10,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 import server.api
 import server.pages
@@ -37,6 +38,7 @@ from server.wake import Bell
 from server.workers import alive
 
 LARGEST_BODY = 64 * 1024
+METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 ABOUT = """Start a run, lease its questions, answer them, watch how the agent learns, export what was said.
 
 Bodies are JSON and strict: an unknown field is refused. Every error has one shape. Lists come in pages, and
@@ -59,6 +61,15 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     """
     db = connect(settings) if db is None else db
     require(db)
+    app = bare_app()
+    app.state.db, app.state.settings = db, settings
+    app.state.worker_bell = Bell(settings.data, "worker")
+    app.state.streams = Streams(db, Bell(settings.data, "web"), settings.streams)
+    return app
+
+
+def bare_app() -> FastAPI:
+    """The routes alone, without a database: enough to describe the API."""
     app = Described(
         title="Parenting",
         version="1",
@@ -70,9 +81,6 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
         redoc_url=None,
         lifespan=_lifespan,
     )
-    app.state.db, app.state.settings = db, settings
-    app.state.worker_bell = Bell(settings.data, "worker")
-    app.state.streams = Streams(db, Bell(settings.data, "web"), settings.streams)
     app.add_middleware(Guard, largest_body=LARGEST_BODY)
     _add_errors(app)
     _add_health(app)
@@ -107,12 +115,32 @@ def _add_errors(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     def http(request: Request, error: HTTPException) -> Response:
-        kinds: dict[int, type[ServerError]] = {404: NotFound, 405: MethodNotAllowed, 413: TooLarge}
-        known = kinds.get(error.status_code)
-        said = known() if known is not None else ServerError(str(error.detail))
-        if known is None:
-            said.status, said.code = error.status_code, "refused"
-        return _reply(request, said, dict(error.headers or {}))
+        headers = dict(error.headers or {})
+        if error.status_code == 405 and "route" in request.scope:
+            headers["Allow"] = _allowed(request)
+        return _reply(request, _said(error), headers)
+
+
+def _said(error: HTTPException) -> ServerError:
+    """What the framework refuses, in our words."""
+    kinds: dict[int, type[ServerError]] = {404: NotFound, 405: MethodNotAllowed, 413: TooLarge}
+    if error.status_code == 400:  # a body that is no text, or no form
+        return Invalid([("body", "It cannot be read. Send JSON in UTF-8, or a form.")])
+    if error.status_code in kinds:
+        return kinds[error.status_code]()
+    said = ServerError(str(error.detail))
+    said.status, said.code = error.status_code, "refused"
+    return said
+
+
+def _allowed(request: Request) -> str:
+    """The methods of an address, of all routes that it has: the framework names those of one alone."""
+    scopes = ((method, {**request.scope, "method": method}) for method in METHODS)
+    return ", ".join(
+        method
+        for method, scope in scopes
+        if any(route.matches(scope)[0] is Match.FULL for route in request.app.routes)
+    )
 
 
 def _reply(request: Request, error: ServerError, headers: dict[str, str] | None = None) -> Response:

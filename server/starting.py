@@ -35,6 +35,11 @@ LARGEST_INT = 2**53 - 1
 LEVEL_CHARACTERS = 8192
 FORM_FIELDS = ("world", "level", "level_text", "parent", "preset", "name", "seed", "goal", "pace")
 NUMBERS = ("seed", "goal", "pace")
+UNREAD = {
+    "json_invalid": "This is no JSON.",
+    "model_attributes_type": "Send a JSON object, with the header Content-Type: application/json.",
+}
+"""What is said of a body that is none, by Pydantic's word for it."""
 
 
 def _plain(text: str) -> str:
@@ -144,10 +149,10 @@ def messages(errors: Any, skip: tuple[str, ...] = ()) -> list[tuple[str, str]]:
     """Pydantic's errors as (field, message), without what was sent: nothing of a request is echoed."""
     found: dict[str, str] = {}
     for error in errors:
-        path = [str(part) for part in error["loc"] if part not in skip]
+        path = [str(part) for part in error["loc"] if part not in skip and error["type"] != "json_invalid"]
         if path[:1] == ["config"]:
             path = path[:2]  # the rest names the branch of the union that was tried
-        message = error["msg"].removeprefix("Value error, ")
+        message = UNREAD.get(error["type"]) or error["msg"].removeprefix("Value error, ")
         found.setdefault(".".join(path) or "body", message)
     return list(found.items())
 

@@ -135,6 +135,20 @@ def test_malformed_body_is_refused(client: httpx2.Client, body: bytes) -> None:
     assert wrong(reply)
 
 
+@pytest.mark.parametrize(
+    ("body", "media", "said"),
+    [
+        (b"{", "application/json", "no JSON"),
+        (b'"\xff"', "application/json", "UTF-8"),
+        (b"[]", "application/json", "a JSON object"),
+        (b"{}", "text/plain", "Content-Type: application/json"),
+    ],
+)
+def test_body_that_is_none_is_told_so(client: httpx2.Client, body: bytes, media: str, said: str) -> None:
+    reply = client.post("/api/v1/runs", content=body, headers={"Content-Type": media})
+    assert said in wrong(reply)["body"]
+
+
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e400", "1" * 400])
 def test_numbers_out_of_reach_are_refused(client: httpx2.Client, number: str) -> None:
     body = f'{{"world": "{WORLD}", "config": {{"p_guid": {number}}}}}'
@@ -246,6 +260,7 @@ def test_unknown_path_and_method(client: httpx2.Client, run: Run) -> None:
     wrong_method = client.put(f"/api/v1/runs/{run.id}")
     assert (wrong_method.status_code, wrong_method.json()["error"]["code"]) == (405, "method_not_allowed")
     assert wrong_method.headers["allow"] == "GET"
+    assert client.put("/api/v1/runs").headers["allow"] == "GET, POST"
 
 
 def test_page_that_is_not_there_is_a_page(client: httpx2.Client) -> None:
