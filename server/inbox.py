@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
+import torch
 from pydantic import TypeAdapter
 
 from agent import query as queries
@@ -52,12 +53,14 @@ class QueueParent:
         """The answer to be heard in the tick that comes, or none."""
         self.policy = int(state.maturity[0]), int(state.learner.steps[0])
         taken = mailbox.take_answer(self.db, self.mine, self.tick) if self.answers else None
-        nothing = queries.empty(1, self.stages, self.world.height, self.world.width)
-        self.heard = queries.silence(nothing)
-        if taken is not None:
+        if taken is None:
+            nothing = queries.empty(1, self.stages, self.world.height, self.world.width)
+            self.heard = queries.silence(nothing)
+        else:
             row = taken.query
             query = decode(self.world, self.stages, row.kind, row.maturity, row.clips)
-            self.heard = Answer(query=query, choice=self.heard.choice + int(CHOICES[taken.answer.choice]))
+            choice = torch.full_like(query.kind, int(CHOICES[taken.answer.choice]))
+            self.heard = Answer(query=query, choice=choice)
         return self.heard
 
     def post(self, query: Query) -> None:

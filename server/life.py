@@ -31,6 +31,8 @@ log = structlog.get_logger()
 CHECKPOINT_SECONDS = 2.0
 """A restart lives at most the ticks of this long a second time; they replay exactly."""
 METRIC_SECONDS = 1.0
+HURRY_SECONDS = 0.25
+"""For so long after an answer nothing comes between the ticks that lead to the next question."""
 
 
 class Life:
@@ -53,7 +55,7 @@ class Life:
         self.record_ends = mailbox.high_water(db, mine.run_id)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.tick, time.monotonic(), 0.0
-        self._measured_tick, self._lived_at = self.tick, 0.0
+        self._measured_tick, self._lived_at, self._heard_at = self.tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
         runs.report(db, mine, versions=versions())
 
@@ -135,8 +137,10 @@ class Life:
             self._hold_to_the_record(query)
         self._note()
         at_once = not bool(state.waiting) and bool(query.kind[0] == Kind.NONE)
-        self._measure(at_once)
-        self.save_if_due()
+        hurried = at_once and self._lived_at - self._heard_at < HURRY_SECONDS
+        self._measure(at_once, hurried)
+        if not hurried:
+            self.save_if_due()
         return at_once
 
     def _hold_to_the_record(self, query: Query) -> None:
@@ -153,11 +157,12 @@ class Life:
     def _note(self) -> None:
         """Keep what the next row of metrics says of this tick."""
         assert self.parent.heard is not None
-        self._news |= bool(self.parent.heard.choice[0])
+        if self.parent.heard.choice[0]:
+            self._news, self._heard_at = True, self._lived_at
         if bool(self.saved.state.report.trained):
             self._learnt = learnt(self.saved)
 
-    def _measure(self, at_once: bool) -> None:
+    def _measure(self, at_once: bool, hurried: bool = False) -> None:
         """Write a row of metrics after the parent was heard, and once a second besides.
 
         It waits until the next question is out: a person waits for that, and nobody for a row. Where a look
@@ -165,7 +170,7 @@ class Life:
         ends a stage has its row in any case: a stage is judged by what it ended with.
         """
         late, stage = time.monotonic() - self._measured_at, int(self.saved.state.maturity[0])
-        due = late >= METRIC_SECONDS or (self._news and not at_once)
+        due = not hurried and (late >= METRIC_SECONDS or (self._news and not at_once))
         if stage == self.stage and (not due or late < self.evaluation.rest):
             return
         speed = (self.tick - self._measured_tick) / late if self._measured_at and late else None
@@ -193,6 +198,11 @@ class Life:
         self._saved_tick, self._saved_at = self.tick, time.monotonic()
 
 
+def reached(seen: Watch) -> bool:
+    """Whether the goal of answered questions is reached: then a look comes before each tick."""
+    return seen.goal is not None and seen.answered >= seen.goal
+
+
 def resting(seen: Watch) -> bool:
-    """Whether the goal of answered questions is reached, and every answer heard: the agent rests."""
-    return seen.goal is not None and seen.answered >= seen.goal and not seen.answers
+    """Whether the goal is reached, and every answer heard: the agent rests."""
+    return reached(seen) and not seen.answers

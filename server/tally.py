@@ -36,9 +36,10 @@ def count(world: Gridworld, tally: Tally, answer: Answer, state: AgentState) -> 
     died = report.moved & world.unsafe(report.before, report.action, now)
     ended = report.moved & (now.over | world.truncated(now))
     heard = answer.choice != Choice.NONE
-    return Tally(
-        deaths=tally.deaths + died,
-        episodes=tally.episodes + ended,
+    tally = tally.replace(deaths=tally.deaths + died, episodes=tally.episodes + ended)
+    if not bool(heard.any()):
+        return tally
+    return tally.replace(
         kinds=tally.kinds + (torch.nn.functional.one_hot(answer.query.kind, len(Kind)) * heard[:, None]),
         choices=tally.choices + (torch.nn.functional.one_hot(answer.choice, len(Choice)) * heard[:, None]),
     )

@@ -19,7 +19,7 @@ from agent.process import settle
 from server import mailbox, runs, workers
 from server.db import Database, connect
 from server.errors import Busy, DiskFull, LostClaim
-from server.life import Life
+from server.life import Life, reached
 from server.mailbox import Watch
 from server.runs import Claim
 from server.schema import require
@@ -30,7 +30,7 @@ log = structlog.get_logger()
 
 POLL_SECONDS = 0.05
 SLICE_SECONDS = 0.01
-"""How long one run may live before the next has its turn."""
+"""How long one run may live on after a tick before the next has its turn."""
 CLAIM_EVERY = 0.5
 
 
@@ -57,10 +57,11 @@ class Worker:
         self.bell.listen()
         try:
             while not self.stopping:
-                self._sign()
-                self._claim()
                 self._soonest = POLL_SECONDS
-                if not self._round():
+                lived = self._round()
+                self._sign()
+                self._claim(2 * CLAIM_EVERY if lived else CLAIM_EVERY)
+                if not lived:
                     self.bell.wait(self._soonest)
         finally:
             self._close()
@@ -71,10 +72,13 @@ class Worker:
             workers.sign(self.db, self.name)
             self._signed_at = time.monotonic()
 
-    def _claim(self) -> None:
-        """Signs of life for what we raise, and a look for runs that nobody raises."""
+    def _claim(self, every: float = CLAIM_EVERY) -> None:
+        """Signs of life for what we raise, and a look for runs that nobody raises.
+
+        While something lives it comes less often: a person may wait for the next question.
+        """
         now = time.monotonic()
-        if now - self._claimed_at < CLAIM_EVERY:
+        if now - self._claimed_at < every:
             return
         self._claimed_at = now
         kept = runs.beat(self.db, list(self.claims.values()))
@@ -85,9 +89,10 @@ class Worker:
         }
 
     def _round(self) -> bool:
-        """A turn for every run that may live on; whether any did."""
+        """A turn for every run that may live on, first where an answer waits; whether any did."""
         lived = False
-        for run_id, seen in mailbox.watch(self.db, list(self.claims)).items():
+        found = mailbox.watch(self.db, list(self.claims))
+        for run_id, seen in sorted(found.items(), key=lambda item: not item[1].answers):
             if seen.status in runs.OVER:
                 self._end(run_id)
             elif seen.status == "active" and not self.stopping:
@@ -121,8 +126,8 @@ class Worker:
         if (early := life.early(seen.pace)) > 0:
             self._soonest = min(self._soonest, early)
             return False
+        lively = life.beat(seen) and seen.pace is None and not reached(seen)
         until = time.monotonic() + SLICE_SECONDS
-        lively = life.beat(seen) and seen.pace is None
         while lively and time.monotonic() < until and not life.finished():
             lively = life.beat()
         if life.finished():
