@@ -27,6 +27,9 @@ from server.wake import Bell
 PERIOD = 0.25
 """Seconds between polls, and at least between two events of the same browser, questions excepted."""
 
+ROWS = 10_000
+"""Metrics in one event, at most."""
+
 
 @dataclass
 class Watcher:
@@ -91,12 +94,14 @@ class Streams:
             self._leave(run_id, watcher)
 
     async def _metrics(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
-        if after is None:
-            return
-        rows = await run_in_threadpool(metrics, self.db, run_id, after)
-        if rows:
-            shown = [row.model_dump(mode="json") for row in shape_metrics(rows)]
-            yield ServerSentEvent(event="metrics", data={"rows": shown}, id=str(rows[-1].tick))
+        while after is not None:
+            rows = await run_in_threadpool(metrics, self.db, run_id, after, ROWS)
+            if rows:
+                shown = [row.model_dump(mode="json") for row in shape_metrics(rows)]
+                yield ServerSentEvent(event="metrics", data={"rows": shown}, id=str(rows[-1].tick))
+            after = (
+                rows[-1].tick if len(rows) == ROWS else None
+            )  # there may be more: a run that is over stays so
 
     def next_ring(self) -> asyncio.Event:
         """Set when the worker rings for the next time: a hint for whoever waits for a question."""

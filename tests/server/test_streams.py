@@ -118,6 +118,15 @@ def test_metrics_follow_a_tick(url: str, db: Database, mine: Claim) -> None:
     assert stream.wait_for("metrics", 2)[1] == {"rows": [{"tick": 3, "values": {"loss": None}}]}
 
 
+def test_metrics_of_a_long_life_come_in_parts(
+    url: str, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.streams.ROWS", 2)
+    write_metrics(db, mine, {tick: {"loss": 0.5} for tick in range(5)})
+    told = follow(url, mine, "?after=-1").wait_for("metrics", 3)
+    assert [[row["tick"] for row in part["rows"]] for part in told] == [[0, 1], [2, 3], [4]]
+
+
 def test_parents_page_is_spared_the_metrics(url: str, db: Database, mine: Claim) -> None:
     write_metrics(db, mine, {1: {"loss": 0.5}})
     stream = follow(url, mine)
