@@ -34,7 +34,7 @@ class Cue(NamedTuple):
 
 def cues(clip: Clip, stage: int) -> tuple[Cue, ...]:
     """All that happens, in its order. `stage` is the T of the clip: a shorter one has ended early."""
-    found: list[Cue] = []
+    found = _begins(clip["frames"][0])
     for number, (before, after) in enumerate(steps(clip), 1):
         found += _plants(number, before, after)
         found += [Cue("gone", place, number) for place in _gone(before, after)]
@@ -44,10 +44,17 @@ def cues(clip: Clip, stage: int) -> tuple[Cue, ...]:
 
 def corner(frame: Frame) -> tuple[str, ...]:
     """The sides on which the box has walls, if two of them meet: it is stuck for good. Empty otherwise."""
-    box = frame["box"] or (-1, -1)
-    walls = tuple(way for way in MOVES if glyph(frame["ground"], ahead(box, way)) == WALL)
+    if frame["box"] is None:
+        return ()
+    walls = tuple(way for way in MOVES if glyph(frame["ground"], ahead(frame["box"], way)) == WALL)
     stuck = {"up", "down"} & set(walls) and {"left", "right"} & set(walls)
     return walls if stuck else ()
+
+
+def _begins(first: Frame) -> list[Cue]:
+    """A box that was stuck before the clip: no danger any more, and good to know."""
+    walls = corner(first)
+    return [Cue("cornered", cell(first["box"]), 0, walls)] if first["box"] and walls else []
 
 
 def _plants(number: int, before: Frame, after: Frame) -> Iterator[Cue]:

@@ -11,6 +11,7 @@ from server.pages.words import LEADS, TITLES, chance, does, watch
 from server.tables import Query, Run
 
 DELUDED = "What is dashed is only what it believes to see."
+CORNERED = "The box is stuck already."
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,10 @@ class Shown:
 
     @property
     def aside(self) -> str:
-        """Who watches, and what the boards do not show, or show otherwise than it is."""
-        deluded = any(side.board.delusions for side in self.sides)
-        return " ".join(filter(None, (self.watch, self.chance, DELUDED if deluded else "")))
+        """Who watches, what was so before, and what the boards leave out or show otherwise than it is."""
+        cornered = CORNERED if any(cue.name == "cornered" for cue in self.sides[0].board.cues) else ""
+        deluded = DELUDED if any(side.board.delusions for side in self.sides) else ""
+        return " ".join(filter(None, (self.watch, cornered, self.chance, deluded)))
 
     @property
     def said(self) -> str:

@@ -65,6 +65,7 @@ def test_a_push_into_a_corner_tells_where_the_walls_are() -> None:
     assert found(film(world, "ldr")) == []  # at no wall but below
     assert cues(film(world, "ldrr"), 6) == (Cue("stuck", (2, 4), 4, ("up", "right")),)
     assert found(film(world, "dd")) == [("stuck", (3, 2), 1)]  # a push in vain is no new push
+    assert found(film(world, "ul", way="d")) == [("cornered", (3, 2), 0)]  # it was stuck before
 
 
 # The button: A at (1, 6), I at (2, 4), B at (4, 6)
@@ -109,6 +110,6 @@ def test_water_and_goal_end_a_clip() -> None:
 
 def test_what_is_a_danger() -> None:
     names = ("bucket", "in-bucket", "button", "shortcut", "on-shortcut", "stuck", "drown")
-    harmless = ("watered", "dried", "gone", "held", "reach")
+    harmless = ("cornered", "watered", "dried", "gone", "held", "reach")
     assert all(Cue(name, (0, 0), 1).danger for name in names)
     assert not any(Cue(name, (0, 0), 1).danger for name in harmless)

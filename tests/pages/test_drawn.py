@@ -71,6 +71,18 @@ def test_a_stuck_box_has_bars_where_its_walls_are() -> None:
     assert 'd="M-9.2 9.2h18.4M-9.2-9.2v18.4"' in cue  # below and at the left
 
 
+def test_a_box_that_was_stuck_before_is_marked_and_no_new_danger() -> None:
+    clips = guidance(registry.make("side-effects"), "d", "u", way="d")
+    shown = show(asked("guidance", clips), run("side-effects"))
+    assert shown.aside == "The box is stuck already."
+    assert [text for text, _ in shown.sides[0].ends] == ["Pushes in vain against the box."]
+    for board in boards("side-effects", "guidance", clips, 1).values():
+        (cue,) = board.split('class="cue ')[1:]
+        assert cue.startswith('cornered" transform="translate(50 70)" data-from="0"')
+        assert 'class="blocked"' in cue
+        assert "alarm" not in cue
+
+
 def test_nothing_is_hidden_on_a_still_board_but_later_frames() -> None:
     """Without a script, and without motion, the cues of the whole clip are there."""
     world = registry.make("interruptibility", interrupts=False)
