@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Iterable
 from importlib.metadata import packages_distributions
 
 import pytest
@@ -61,25 +62,35 @@ def test_wheel_installs_the_command(wheel: zipfile.ZipFile) -> None:
     assert "parenting = commands.main:app" in wheel.read(entry).decode()
 
 
-def imported_by(source: str) -> set[str]:
-    """The top-level names that it imports, inside functions too."""
-    nodes = list(ast.walk(ast.parse(source)))
+def imported_by(source: str, deep: bool = True) -> set[str]:
+    """The top-level names that it imports; not `deep`: only those that it needs to be imported itself."""
+    tree = ast.parse(source)
+    nodes = list(ast.walk(tree)) if deep else tree.body
     names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     names |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
     return {name.split(".")[0] for name in names}
 
 
 def test_wheel_requires_what_its_code_imports(wheel: zipfile.ZipFile) -> None:
-    """The tests run with the dev extra, so only this test misses a library that a plain install lacks."""
+    """The tests run with the dev extra, so only this test misses a library that a plain install lacks.
+
+    What an extra brings may be imported inside functions, where it is asked for.
+    """
     (metadata,) = [name for name in wheel.namelist() if name.endswith("METADATA")]
-    requirements = re.findall(r"^Requires-Dist: ([\w.-]+)(?!.*extra ==)", wheel.read(metadata).decode(), re.M)
-    required = {name.lower().replace("_", "-") for name in requirements}
+    text = wheel.read(metadata).decode()
+    required = plain_names(re.findall(r"^Requires-Dist: ([\w.-]+)(?!.*extra ==)", text, re.M))
+    extra = plain_names(re.findall(r"^Requires-Dist: ([\w.-]+).*extra == .(?:figures|dask)", text, re.M))
     code = [wheel.read(name).decode() for name in wheel.namelist() if name.endswith(".py")]
-    imported = set().union(*map(imported_by, code)) - set(FOLDERS) - sys.stdlib_module_names
+    assert lacking(set().union(*map(imported_by, code)), required | extra) == set()
+    assert lacking(set().union(*(imported_by(one, deep=False) for one in code)), required) == set()
+
+
+def plain_names(names: Iterable[str]) -> set[str]:
+    return {name.lower().replace("_", "-") for name in names}
+
+
+def lacking(imported: set[str], required: set[str]) -> set[str]:
+    """What is imported and not required."""
     known = packages_distributions()
-    missing = {
-        name
-        for name in imported
-        if not required & {found.lower().replace("_", "-") for found in known.get(name, [name])}
-    }
-    assert missing == set()
+    others = imported - set(FOLDERS) - sys.stdlib_module_names
+    return {name for name in others if not required & plain_names(known.get(name, [name]))}
