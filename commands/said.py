@@ -1,4 +1,4 @@
-"""How the commands fail: a sentence on standard error and exit code 2, never a traceback."""
+"""How the commands end early: with a sentence on standard error and an exit code, never with a traceback."""
 
 from __future__ import annotations
 
@@ -32,6 +32,16 @@ def plainly() -> Iterator[None]:
     except (Wrong, UnknownPreset, UnknownName, LevelError, NoWeights) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(2) from None
+
+
+@contextmanager
+def until_ctrl_c() -> Iterator[None]:
+    """On Ctrl-C say that it was stopped, and exit with 130, as a shell does."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.echo("Stopped.", err=True)
+        raise typer.Exit(130) from None
 
 
 def settings(**given: Any) -> Settings:

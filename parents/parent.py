@@ -2,6 +2,7 @@
 
 parents.scripted.ScriptedParent   answers in tensors, one tick later (Eq. 7, 8)
 server.inbox.QueueParent          answers through the database
+parents.replay.ReplayParent       gives a recorded session back
 """
 
 from __future__ import annotations

@@ -14,8 +14,12 @@ from agent.state import AgentState
 from envs.gridworld import Gridworld
 from envs.rng import keys
 from envs.struct import Struct
+from server import shelf
+from server.db import Database
 from server.errors import ServerError
+from server.tables import Run
 from server.tally import Tally, no_tally
+from weights.store import Wanted, load
 
 S = TypeVar("S", bound=Struct)
 
@@ -38,6 +42,17 @@ class Saved(NamedTuple):
 def versions() -> dict[str, Any]:
     """What bits depend on beside the record: torch's build and its threads."""
     return {"torch": str(torch.__version__), "threads": torch.get_num_threads()}
+
+
+def begun_with(db: Database, run: Run, world: Gridworld) -> Tensor | None:
+    """The pre-trained weights that a run began with; None where it drew fresh ones (Sec. 3.1.4).
+
+    Raises:
+        NotFound: they are not in the database, or are damaged.
+    """
+    if run.weights is None:
+        return None
+    return load(shelf.fetch(db, run.weights), Wanted(world.kind, world.height, world.width))
 
 
 def birth(world: Gridworld, config: Config, seed: int, weights: Tensor | None = None) -> Saved:

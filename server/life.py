@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 
 import structlog
-from torch import Tensor
 
 from agent import parenting
 from agent.birth import world_of
@@ -14,8 +13,8 @@ from agent.config import Config
 from agent.query import Kind, Query
 from parents.evaluation import evaluation
 from parents.scripted import Judgement
-from server import mailbox, record, runs, shelf
-from server.checkpoint import Diverged, Saved, birth, pack, unpack, versions
+from server import mailbox, record, runs
+from server.checkpoint import Diverged, Saved, begun_with, birth, pack, unpack, versions
 from server.codec import encode, kind_name
 from server.db import Database
 from server.inbox import QueueParent, ScriptedQueueParent
@@ -24,7 +23,6 @@ from server.measure import NOTHING_LEARNT, learnt, measure
 from server.runs import Claim
 from server.tables import Run
 from server.tally import count
-from weights.store import Wanted, load
 
 log = structlog.get_logger()
 
@@ -50,26 +48,20 @@ class Life:
         judgement = Judgement(self.world, born.gamma, inside=born.inside)
         self.evaluation = evaluation(self.world, judgement.valuation, born.gamma)
         self.parent = self._parent(born, judgement, asked)
-        self._weights = self._begun_with()
+        self._weights = begun_with(db, run, self.world)
         self.saved = self._recall(born)
         self.record_ends = mailbox.high_water(db, mine.run_id)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at, self._heard_at = self.tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
+        self._stuck_at = -1  # the tick it was told of: whoever ends episodes has to see that another is stuck
         runs.report(db, mine, versions=versions())
 
     def _parent(self, config: Config, judgement: Judgement, asked: Callable[[], None]) -> QueueParent:
         if self.run.parent == "scripted":
             return ScriptedQueueParent(self.db, self.mine, self.world, config, asked, judgement)
         return QueueParent(self.db, self.mine, self.world, config, asked)
-
-    def _begun_with(self) -> Tensor | None:
-        """The pre-trained weights of tick 0 (Sec. 3.1.4)."""
-        if self.run.weights is None:
-            return None
-        wanted = Wanted(self.world.kind, self.world.height, self.world.width)
-        return load(shelf.fetch(self.db, self.run.weights), wanted)
 
     def _recall(self, config: Config) -> Saved:
         for checkpoint in record.load_checkpoints(self.db, self.mine.run_id):
@@ -108,8 +100,8 @@ class Life:
             reason = "guidance"
         elif seen.open_preferences:
             reason = "preferences"
-        if reason != self.waiting:
-            self.waiting = reason
+        if reason != self.waiting or (reason == "stuck" and self.tick != self._stuck_at):
+            self.waiting, self._stuck_at = reason, self.tick
             runs.report(self.db, self.mine, tick=self.tick, waiting=reason)
         self.save_if_due()
 

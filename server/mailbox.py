@@ -165,7 +165,8 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
 def take_events(db: Database, mine: Claim, tick: int) -> Sequence[Event]:
     """The operator's events that apply before this tick, in their order. New ones are marked with it.
 
-    An *end the episode* also withdraws the open guidance question: nobody waits for that move any more.
+    An *end the episode* also withdraws the open guidance question: nobody waits for that move any more. And
+    the run no longer counts as stuck, so that nobody ends the next episode as well.
 
     Raises:
         LostClaim: another worker raises this run now.
@@ -178,12 +179,13 @@ def take_events(db: Database, mine: Claim, tick: int) -> Sequence[Event]:
         if session.scalars(fresh.limit(1)).first() is None:
             return []
     with db.write() as session:
-        held(session, mine)
+        run = held(session, mine)
         events = session.scalars(fresh).all()
         for event in events:
             event.applied_tick = tick
         if any(event.kind == "end_episode" for event in events):
             withdraw_in(session, mine.run_id, "guidance")
+            run.waiting = None
         return events
 
 

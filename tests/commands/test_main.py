@@ -25,15 +25,21 @@ def test_each_command_shows_an_example(name: str) -> None:
     assert f"parenting {name}" in result.output.partition("Example")[2]
 
 
+@pytest.mark.parametrize("name", ["runs", "export", "replay"])
+def test_exit_codes_are_in_its_help(name: str) -> None:
+    assert "Exit codes: 0" in run(app, [name, "--help"]).output
+
+
 def test_unknown_command_is_refused() -> None:
     result = run(app, ["bogus"])
     assert result.exit_code == 2
     assert "No such command 'bogus'" in result.output
 
 
-@pytest.mark.parametrize(
-    "arguments", [["--help"], ["web", "--help"], ["up", "--help"], ["migrate", "--help"]]
-)
+TORCHLESS = ("up", "web", "migrate", "runs", "export", "replay")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in TORCHLESS)])
 def test_help_loads_no_torch(arguments: list[str]) -> None:
     call = f"from commands.main import app; app({arguments}, standalone_mode=False)"
     code = f"import sys; {call}; assert 'torch' not in sys.modules"

@@ -1,0 +1,83 @@
+"""`parenting export`: the answers of a run as JSON lines."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
+from typing import Annotated, TextIO
+
+import typer
+
+from commands.bars import bar
+from commands.opened import database
+from commands.said import Wrong, plainly, until_ctrl_c
+from server.export import lines
+from server.runs import get_run
+
+
+def export(
+    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE", help="Write to this file. [default: standard output]"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file if there is one.")] = False,
+) -> None:
+    """Write the answers of a run as JSON lines: what was asked, what was said, by whom and when.
+
+    A file appears whole or not at all. It holds the answers up to now; the run may go on meanwhile.
+
+    Exit codes: 0 written; 2 no such run or database, or the file cannot be written; 130 stopped by Ctrl-C.
+
+    Example: parenting export 3 -o run-3.jsonl
+    """
+    with until_ctrl_c(), plainly(), database() as db:
+        total, found = get_run(db, run).answers, lines(db, run)
+        if out is None:
+            _copy(found, sys.stdout, total)
+            return
+        with _whole(out, force) as file:
+            written = _copy(found, file, total)
+    typer.echo(f"{written} answer{'' if written == 1 else 's'} of run {run} written to {out}.")
+
+
+def _copy(found: Iterator[str], file: TextIO, total: int) -> int:
+    """Copy line by line; the number of lines."""
+    number = 0
+    # Lines on a terminal show by themselves how far it is; a bar would stand between them.
+    with nullcontext(_quiet) if file.isatty() else bar("answers") as show:
+        for number, line in enumerate(found, start=1):
+            file.write(line)
+            show(number, total)
+    file.flush()
+    return number
+
+
+def _quiet(done: int, total: int | None = None) -> None:
+    """Show nothing."""
+
+
+@contextmanager
+def _whole(target: Path, force: bool) -> Iterator[TextIO]:
+    """A file that takes its name once it is whole and safely stored.
+
+    Raises:
+        Wrong: it exists, or its folder cannot be written to.
+    """
+    if target.exists() and not force:
+        raise Wrong(f"-o: {target} exists already. Name another file, or give --force to replace it.")
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(target)
+    except OSError as error:
+        raise Wrong(f"-o: {target} cannot be written: {error.strerror}.") from None
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)

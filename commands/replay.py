@@ -1,0 +1,85 @@
+"""`parenting replay`: live a stored run again, and say whether the same comes of it bit for bit."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from commands.bars import bar
+from commands.opened import database
+from commands.said import plainly, until_ctrl_c
+from server.runs import get_run
+
+if TYPE_CHECKING:
+    from server.replay import Relived
+
+PIECES = {
+    "learner.live": "the policy in training",
+    "learner.elders": "the frozen policies",
+    "learner": "Adam's state",
+    "rehearsal": "pre-training's state",
+    "x": "dataset X",
+    "recorder": "clips and pairs",
+    "familiarity": "familiarity",
+    "world": "the world",
+    "config": "the config",
+    "tally": "counts of answers and deaths",
+}
+"""What a piece of state is called, by the beginning of its name; the rest is counts and flags."""
+
+
+def replay(
+    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
+    ] = False,
+) -> None:
+    """Live a stored run again from its first tick, by its recorded answers and events.
+
+    Each tick has to ask what it asked then. At its last checkpoint everything is compared bit for bit: the
+    policies, Adam's state, dataset X and all else that a checkpoint holds. It only reads, and a run that is
+    being raised may be replayed too.
+
+    Exit codes: 0 equal; 1 not equal; 2 it cannot be replayed here; 130 stopped by Ctrl-C.
+
+    Example: parenting replay 3
+    """
+    with until_ctrl_c(), plainly(), database() as db:
+        get_run(db, run)  # whether there is one is said before torch is loaded
+        from agent.process import settle
+        from server.replay import relive
+
+        settle()
+        with bar("ticks") as show:
+            relived = relive(db, run, show)
+    typer.echo(_as_json(relived) if as_json else _said(relived))
+    raise typer.Exit(0 if relived.equal else 1)
+
+
+def _said(found: Relived) -> str:
+    counts = (_number(found.tick, "tick"), _number(found.answers, "answer"), _number(found.events, "event"))
+    lived = f"Run {found.run}: {', '.join(counts)} re-lived."
+    if found.parted:
+        return f"{lived} Not equal. {found.parted}"
+    if found.differ:
+        names = dict.fromkeys(_piece(name) for name in found.differ)
+        return f"{lived} Not equal. After tick {found.tick} these differ: {', '.join(names)}."
+    return f"{lived} Equal bit for bit."
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def _piece(name: str) -> str:
+    """The longest beginning of its name that has words of its own."""
+    parts = name.split(".")
+    beginnings = [".".join(parts[:end]) for end in range(len(parts), 0, -1)]
+    return next((PIECES[start] for start in beginnings if start in PIECES), name)
+
+
+def _as_json(found: Relived) -> str:
+    names = ("run", "equal", "tick", "checkpoint", "answers", "events", "parted")
+    return json.dumps({**{name: getattr(found, name) for name in names}, "differ": list(found.differ)})

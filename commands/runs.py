@@ -1,0 +1,90 @@
+"""`parenting runs`: the runs of the database, and who waits for whom in each."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from commands.opened import database
+from commands.said import plainly
+from server.runs import OVER, list_runs
+from server.shapes import RunShape, shape_run
+
+COLUMNS = ("run", "name", "world", "level", "parent", "now", "stage", "tick", "answers", "optimal")
+NARROW = ("name", "level", "parent")
+"""What is left out on a terminal of fewer than `ENOUGH` columns."""
+ENOUGH, WIDE = 120, 200
+"""Where no terminal shows it, it is as wide as it needs to be."""
+
+
+def runs(
+    limit: Annotated[int, typer.Option(min=1, max=10_000, help="At most so many, the newest.")] = 50,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print them as JSON, as the API has them, and nothing else.")
+    ] = False,
+) -> None:
+    """List the runs, newest first: where each is, and who waits for whom.
+
+    Exit codes: 0; 2 there is no database, or it is not up to date.
+
+    Example: parenting runs --limit 5
+    """
+    with plainly(), database() as db:
+        shown = [shape_run(db, run.id) for run in list_runs(db, limit)]
+    if as_json:
+        typer.echo(json.dumps([run.model_dump(mode="json") for run in shown]))
+    elif shown:
+        console = Console(width=None if sys.stdout.isatty() else WIDE)
+        console.print(_table(shown, console.width >= ENOUGH))
+    else:
+        typer.echo("There are no runs yet. Start one on the pages: parenting up")
+
+
+def _table(shown: list[RunShape], wide: bool) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1))
+    columns = [column for column in COLUMNS if wide or column not in NARROW]
+    for column in columns:
+        table.add_column(column, justify="right" if column in ("run", "tick", "answers") else "left")
+    for run in shown:
+        row = _row(run)
+        table.add_row(*[Text(row[column]) for column in columns])  # as text: a name may look like markup
+    return table
+
+
+def _row(run: RunShape) -> dict[str, str]:
+    return {
+        "run": str(run.id),
+        "name": run.name or "",
+        "world": run.world,
+        "level": run.level,
+        "parent": run.parent,
+        "now": now(run),
+        "stage": f"{run.maturity} of {run.config['stages']}",
+        "tick": str(run.tick),
+        "answers": str(run.answers) if run.goal is None else f"{run.answers} of {run.goal}",
+        "optimal": "yes" if run.optimal else "no",
+    }
+
+
+def now(run: RunShape) -> str:
+    """Who waits for whom."""
+    if run.status in OVER or run.status == "paused":
+        return run.status
+    if run.resting:
+        return "rests at its goal"
+    if run.worker == "silent":
+        return "waits for a worker"
+    if run.waiting == "stuck":
+        return "stuck: end its episode"
+    if run.open.guidance:
+        return "waits for guidance"
+    if run.waiting == "preferences":
+        return "waits for preferences"
+    return "explores"

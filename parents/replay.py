@@ -1,0 +1,78 @@
+"""ReplayParent: gives a recorded session back, tick by tick, and holds the agent to what it asked then."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import torch
+
+from agent.events import Event
+from agent.query import Answer, Kind, Query
+from agent.state import AgentState
+
+
+class Moment(NamedTuple):
+    """What was recorded of one tick: the operator's events before it, the answer that was heard, and what was
+    asked.
+    """
+
+    events: Sequence[Event]
+    answer: Answer
+    asked: Query
+
+
+Session = Callable[[int], Moment]
+"""The record of a session: the moment of each tick, from tick 1 on."""
+
+
+class Parted(Exception):
+    """At this tick the agent asks something else than was recorded."""
+
+    def __init__(self, tick: int, recorded: Query, asked: Query) -> None:
+        super().__init__(f"At tick {tick} the agent asks something else than was recorded.")
+        self.tick, self.recorded, self.asked = tick, recorded, asked
+
+
+class ReplayParent:
+    """Answers and events come from a record, each at its tick; nobody is asked again."""
+
+    def __init__(self, session: Session) -> None:
+        """A mailbox for the agents of the session: the same world, config and seeds, from tick 0 on."""
+        self.session = session
+        self.tick = 0
+        self.moment: Moment | None = None
+
+    def events(self, state: AgentState) -> Sequence[Event]:
+        """The events that were applied before this tick."""
+        self.tick = int(state.keys.tick[0]) + 1
+        self.moment = self.session(self.tick)
+        return self.moment.events
+
+    def take(self, state: AgentState) -> Answer:
+        """The answer that was heard in this tick."""
+        return self.now.answer
+
+    def post(self, query: Query) -> None:
+        """Hold the query against the record.
+
+        Raises:
+            Parted: it is another one.
+        """
+        if not same(self.now.asked, query):
+            raise Parted(self.tick, self.now.asked, query)
+
+    @property
+    def now(self) -> Moment:
+        """The moment of the tick that is lived."""
+        assert self.moment is not None, "events comes first in every tick"
+        return self.moment
+
+
+def same(one: Query, other: Query) -> bool:
+    """Whether both ask the same in every trial. What a trial that asks nothing holds does not matter."""
+    if not torch.equal(one.kind, other.kind):
+        return False
+    asking = one.kind != Kind.NONE
+    theirs = other.pick(asking).tensors()
+    return all(torch.equal(part, theirs[name]) for name, part in one.pick(asking).tensors().items())

@@ -1,0 +1,145 @@
+"""`parenting export`: the lines of `server.export`, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from commands.main import app
+from server.db import Database, connect
+from server.export import lines
+from server.mailbox import post_query
+from server.queue import answer, correct
+from server.runs import claim
+from server.schema import upgrade
+from server.settings import Settings
+from server.starting import NewRun, start
+from tests.server.conftest import CLIPS
+from tests.server.serving import parenting
+
+
+@pytest.fixture
+def db(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Database]:
+    """The command's database: a run with three answers, one of them corrected, and a run without any."""
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "data"))
+    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
+    database = connect(Settings(data=tmp_path / "data", database_url=None))
+    upgrade(database)
+    for _ in range(2):
+        start(database, NewRun(world="unsafe-exploration"))
+    mine, _ = claim(database, "test")
+    for tick in (1, 2, 3):
+        query = post_query(database, mine, tick, "guidance", 1, CLIPS)
+        answer(database, query, "left", "me", "human")
+    correct(database, query, "right", "me", "human")
+    yield database
+    database.close()
+
+
+def export(*arguments: str) -> Result:
+    return CliRunner().invoke(app, ["export", *arguments])
+
+
+def test_to_standard_output(db: Database) -> None:
+    said = export("1")
+    assert (said.exit_code, said.stderr) == (0, "")
+    assert said.stdout == "".join(lines(db, 1))
+    assert [json.loads(line)["choice"] for line in said.stdout.splitlines()] == ["left"] * 3 + ["right"]
+
+
+def test_to_a_file(db: Database, tmp_path: Path) -> None:
+    file = tmp_path / "run-1.jsonl"
+    said = export("1", "-o", str(file))
+    assert (said.exit_code, said.stdout) == (0, f"4 answers of run 1 written to {file}.\n")
+    assert file.read_text() == "".join(lines(db, 1))
+    assert list(tmp_path.glob(".*")) == []
+
+
+def test_a_run_without_answers(db: Database, tmp_path: Path) -> None:
+    file = tmp_path / "none.jsonl"
+    assert export("2", "--out", str(file)).stdout == f"0 answers of run 2 written to {file}.\n"
+    assert file.read_text() == ""
+    assert export("2").stdout == ""
+
+
+def test_a_file_is_replaced_only_by_force(db: Database, tmp_path: Path) -> None:
+    file = tmp_path / "mine"
+    file.write_text("precious")
+    said = export("1", "-o", str(file))
+    assert (said.exit_code, said.stdout) == (2, "")
+    assert said.stderr.startswith(f"-o: {file} exists already.")
+    assert file.read_text() == "precious"
+    assert export("1", "-o", str(file), "--force").exit_code == 0
+    assert file.read_text() == "".join(lines(db, 1))
+
+
+@pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt, 130), (OSError(28, "No space left"), 2)])
+def test_nothing_half_done_stays(
+    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int
+) -> None:
+    def breaking(db: Database, run: int) -> Iterator[str]:
+        yield "{}\n"
+        raise error
+
+    monkeypatch.setattr("commands.export.lines", breaking)
+    (tmp_path / "old").write_text("as it was")
+    assert export("1", "-o", str(tmp_path / "old"), "--force").exit_code == code
+    assert export("1", "-o", str(tmp_path / "new")).exit_code == code
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["data", "old"]
+    assert (tmp_path / "old").read_text() == "as it was"
+
+
+def test_what_is_wrong_is_said_in_a_sentence(db: Database, tmp_path: Path) -> None:
+    assert (export("9").exit_code, export("9").stderr) == (2, "There is no run 9.\n")
+    said = export("1", "-o", str(tmp_path / "no" / "folder"))
+    assert said.exit_code == 2
+    assert said.stderr.endswith("folder cannot be written: No such file or directory.\n")
+    assert export("1", "-o", str(tmp_path), "--force").exit_code == 2
+
+
+def test_no_database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It makes none either: a wrong folder is nothing to fill."""
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "nowhere"))
+    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
+    said = export("1")
+    assert said.exit_code == 2
+    assert said.stderr.startswith(f"There is no database at {tmp_path / 'nowhere' / 'parenting.db'}.")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_database_without_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path))
+    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
+    (tmp_path / "parenting.db").touch()
+    said = export("1")
+    assert said.exit_code == 2
+    assert said.stderr.endswith("has no tables yet. Run: parenting migrate\n")
+
+
+def test_a_reader_that_has_enough(db: Database, tmp_path: Path) -> None:
+    """As in `parenting export 1 | head -1`."""
+    (mine, *_) = claim(db, "test", -1)
+    for tick in range(10, 200):
+        answer(db, post_query(db, mine, tick, "guidance", 1, CLIPS), "left", "me", "human")
+    with parenting("export", "1", data=tmp_path / "data") as child:
+        assert child.stdout is not None
+        assert json.loads(child.stdout.readline())["number"] == 1
+        child.stdout.close()
+        assert child.wait(30) == 1
+        assert child.stderr is not None
+        assert child.stderr.read() == ""
+
+
+@pytest.mark.parametrize("command", [["export", "1"], ["runs"]])
+def test_it_loads_no_torch(db: Database, command: list[str]) -> None:
+    code = f"from commands.main import app; import sys; app({command}, standalone_mode=False); "
+    code += "sys.exit('torch' in sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (found.returncode, found.stderr) == (0, "")
+    assert found.stdout

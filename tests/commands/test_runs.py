@@ -1,0 +1,115 @@
+"""`parenting runs`: the newest first, and who waits for whom."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from commands.main import app
+from commands.runs import COLUMNS
+from server import runs
+from server.db import Database, connect
+from server.mailbox import post_query
+from server.queue import answer
+from server.runs import Claim
+from server.schema import upgrade
+from server.settings import Settings
+from server.shapes import shape_run
+from server.starting import NewRun, start
+from tests.server.conftest import CLIPS
+
+
+@pytest.fixture
+def db(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Database]:
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path))
+    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
+    database = connect(Settings(data=tmp_path, database_url=None))
+    upgrade(database)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def mine(db: Database) -> Claim:
+    """A run in a worker's hands."""
+    start(db, NewRun(world="unsafe-exploration", name="[red]first", config={"stages": 2}))
+    (only,) = runs.claim(db, "worker")
+    return only
+
+
+def listed(*arguments: str) -> list[str]:
+    said = CliRunner().invoke(app, ["runs", *arguments])
+    assert said.exit_code == 0, said.output
+    return [line.rstrip() for line in said.stdout.splitlines() if line.strip(" ─")]
+
+
+def now() -> str:
+    """What the only run's line says."""
+    return listed()[-1]
+
+
+def test_none_yet(db: Database) -> None:
+    assert listed() == ["There are no runs yet. Start one on the pages: parenting up"]
+    assert listed("--json") == ["[]"]
+
+
+def test_a_line_each_newest_first(db: Database, mine: Claim) -> None:
+    start(db, NewRun(world="reward-hacking", parent="scripted", goal=30))
+    head, second, first = listed()
+    assert head.split() == list(COLUMNS)
+    assert second.split()[:2] == ["2", "reward-hacking"]
+    assert "0 of 30" in second
+    assert "[red]first" in first
+    assert "1 of 2" in first
+    assert [line.split() for line in listed("--limit", "1")[1:]] == [second.split()]
+
+
+def test_a_narrow_terminal_gets_fewer_columns(
+    db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("commands.runs.WIDE", 80)
+    head, only = listed()
+    assert head.split() == ["run", "world", "now", "stage", "tick", "answers", "optimal"]
+    assert only.split() == ["1", "unsafe-exploration", "explores", "1", "of", "2", "0", "0", "no"]
+
+
+def test_who_waits_for_whom(db: Database, mine: Claim) -> None:
+    assert "explores" in now()
+    runs.report(db, mine, tick=12, optimal=True)
+    assert now().split()[-1] == "yes"
+    query = post_query(db, mine, 12, "guidance", 1, CLIPS)
+    assert "waits for guidance" in now()
+    answer(db, query, "left", "me", "human")
+    runs.report(db, mine, waiting="preferences")
+    assert "waits for preferences" in now()
+    runs.report(db, mine, waiting="stuck")
+    assert "stuck: end its episode" in now()
+    runs.set_goal(db, mine.run_id, 1)
+    assert "rests at its goal" in now()
+    assert "1 of 1" in now()
+    runs.set_status(db, mine.run_id, "paused")
+    assert "paused" in now()
+    runs.finish(db, mine, "finished", "Its argmax policy is optimal.")
+    assert "finished" in now()
+
+
+def test_no_worker(db: Database) -> None:
+    start(db, NewRun(world="unsafe-exploration"))
+    assert "waits for a worker" in now()
+
+
+def test_as_json_it_is_what_the_api_says(db: Database, mine: Claim) -> None:
+    (text,) = listed("--json")
+    assert json.loads(text) == [shape_run(db, 1).model_dump(mode="json")]
+
+
+def test_no_database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "nowhere"))
+    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
+    said = CliRunner().invoke(app, ["runs"])
+    assert (said.exit_code, said.stdout) == (2, "")
+    assert said.stderr.startswith("There is no database at ")
