@@ -67,7 +67,7 @@ def _row(db: Database, run: Run, answered: Answered) -> dict[str, Any]:
 
 
 def _time(moment: datetime) -> str:
-    """ISO 8601 in UTC, always of the same length, so that readers take the column for times."""
+    """ISO 8601 in UTC, always of the same length, so that it sorts as text."""
     return moment.replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"
 
 
