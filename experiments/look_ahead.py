@@ -46,7 +46,7 @@ def worth(world: RewardHacking, garden: Garden, state: WorldState, depth: int) -
 def best(world: RewardHacking, garden: Garden, state: WorldState, depth: int) -> Int64[Tensor, "N"]:
     """The first move of the best search, some trials at a time; the first of equals."""
     some = max(1, TOGETHER // 4**depth)
-    parts = torch.arange(len(state.t)).split(some)
+    parts = torch.split(torch.arange(len(state.t)), some)
     # Equal up to rounding is equal: the first of them, as argmax does where bits agree.
     return torch.cat(
         [worth(world, garden, state.pick(part), depth).round(decimals=9).argmax(1) for part in parts]
