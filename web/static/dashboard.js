@@ -13,10 +13,11 @@ const SERIES = {
   entropy: [["entropy_global", "global head"], ["entropy_local", "local head"]],
   size: [["rows", "distinct rows"], ["size", "entries"]],
 };
+const CALM = 1000; // ms between two drawings: eight charts are dear, and the parent's page may share the machine
 const COUNTS = new Set(["deaths", "asked", "answers", "size"]);
 const ticks = [], values = { maturity: [] }; // by name, one for each tick
 const firsts = [];                           // where in them each stage begins
-let last = -1, queued = false;
+let last = -1, queued = false, drawn = -CALM;
 
 for (const name of Object.values(SERIES).flat().map(([key]) => key)) values[name] = [];
 
@@ -97,7 +98,7 @@ const figures = [...document.querySelectorAll("[data-chart]")];
 
 function draw() {
   queued = false;
-  fill();
+  drawn = performance.now();
   for (const figure of figures) {
     const id = figure.dataset.chart, plot = figure.querySelector(".plot");
     window.Plotly.react(plot, traces(id), layout(id), { displayModeBar: false, responsive: true });
@@ -108,7 +109,7 @@ function redraw() {
   if (queued || !ticks.length) return;
   queued = true;
   document.getElementById("charts").hidden = false;
-  requestAnimationFrame(draw);
+  setTimeout(() => requestAnimationFrame(draw), Math.max(0, drawn + CALM - performance.now()));
 }
 
 // ---- what comes in
@@ -128,6 +129,7 @@ function add(rows) {
   }
   const newest = rows.at(-1)?.values;
   if (newest) for (const name of ["deaths", "return", "optimal_return", "stage_queries"]) put(name, newest[name]);
+  fill();
   redraw();
 }
 
