@@ -4,8 +4,8 @@ import { play } from "./play.js";
 const players = new Map();
 
 function begin(entry) {
-  if (players.has(entry)) players.get(entry).replay();
-  else players.set(entry, play(entry));
+  if (!players.has(entry)) players.set(entry, play(entry));
+  players.get(entry).replay();
 }
 
 function end(entry) {

@@ -16,7 +16,7 @@ const QUIET = 350; // an answered question stays this long before the page says 
 
 let current = null;    // the form on the stage, until it is answered
 let player = null;
-let ahead = null;      // markup of the question after it
+let ahead = null;      // the form after it
 let prefetches = 0;    // the last request for it counts
 let asking = false, again = false; // a request for a question is under way; another was wanted meanwhile
 let state = main.dataset.state;
@@ -46,17 +46,25 @@ async function next(seconds = 0) {
       markup = await ask([], seconds);
       seconds = 0;
     } while (!markup && again && !current);
-    if (markup && !current) show(markup);
+    if (markup && !current) show(parse(markup));
     else if (!current) wait(state === "question" ? "elsewhere" : state);
   } catch { wait("offline"); } finally { asking = false; }
 }
 
+function parse(markup) {
+  const holder = document.createElement("template");
+  holder.innerHTML = markup;
+  return holder.content.firstElementChild;
+}
+
+// The next question is parsed while nobody waits for it.
 async function prefetch() {
   const mine = ++prefetches, form = current;
   try {
     const markup = await ask([form.dataset.query]);
-    if (mine === prefetches && form === current) ahead = markup;
-    form.dataset.ahead = /data-query="(\d+)"/.exec(markup)?.[1] ?? "";
+    const found = markup && parse(markup);
+    if (mine === prefetches && form === current) ahead = found;
+    form.dataset.ahead = found?.dataset.query ?? "";
   } catch { /* the stream or the poll will bring it */ }
 }
 
@@ -67,10 +75,9 @@ async function renew() {
   prefetch();
 }
 
-function show(markup) {
+function show(form) {
   const focused = stage.querySelector(".answers :focus-visible")?.value;
-  if (markup) stage.innerHTML = markup;
-  const form = stage.querySelector("#question");
+  if (!form.isConnected) stage.replaceChildren(form);
   clearTimeout(quiet);
   quiet = 0;
   current = form;
@@ -155,6 +162,7 @@ function answer(choice) {
   took();
   const sent = give({ query, choice, client_id: client }, report);
   if (ahead) return show(ahead);
+  player.still();
   Promise.race([sent, new Promise((done) => { setTimeout(done, HASTE); })]).then(() => { if (!current) next(PATIENCE); });
   wait(state === "question" ? "exploring" : state);
 }
@@ -202,6 +210,6 @@ $("help-open").addEventListener("click", () => help.showModal());
 
 history.replaceState(null, "", `/runs/${run}/parent`);
 const first = stage.querySelector("#question");
-if (first && !kept().includes(Number(first.dataset.query))) show();
+if (first && !kept().includes(Number(first.dataset.query))) show(first);
 setInterval(renew, RENEW);
 flush(report).then(() => follow(run, tell, { background: true }));

@@ -46,24 +46,44 @@ function animate(board, total) {
   return parts;
 }
 
-// Start both boards; returns replay and step for the page's keys and buttons.
+// Start both boards; returns what the page's keys and buttons do with them.
+// Before the first step and after the last the clock stands still. A page that moves is painted sixty times a second, and
+// what comes next has to queue for its frame; a page that stands still paints the next question at once.
 export function play(question) {
   const boards = [...question.querySelectorAll(".board")];
   const steps = Math.max(...boards.map((board) => board.dataset.actions.split(" ").length));
-  const total = LEAD + steps * STEP + TAIL;
+  const end = LEAD + steps * STEP, total = end + TAIL;
   const parts = boards.flatMap((board) => animate(board, total));
   const bar = question.querySelector(".steps"), shown = bar.querySelector("output");
-  let held = null; // the step at which both boards stand still
+  let held = null; // the step at which both boards are held
+  let timer = 0;
   const count = () => held ?? Math.min(steps, Math.max(0, Math.round((parts[0].currentTime % total - LEAD) / STEP)));
-  const tell = () => { shown.value = `Step ${count()} of ${steps}`; };
-  const replay = () => {
+  const tell = () => {
+    const words = `Step ${count()} of ${steps}`;
+    if (shown.value !== words) shown.value = words;
+  };
+  // Whoever has taken the clock meanwhile keeps it: `state` says how it was left.
+  const later = (ms, state, then) => {
+    clearTimeout(timer);
+    timer = setTimeout(() => { if (question.isConnected && parts[0].playState === state) then(); }, ms);
+  };
+  const still = () => {
+    clearTimeout(timer);
+    for (const part of parts) part.pause();
+  };
+  const run = (from) => {
     const now = document.timeline.currentTime;
     held = null;
-    for (const part of parts) { part.play(); part.startTime = now; }
+    for (const part of parts) { part.play(); part.startTime = now - from; }
+    later(end - from, "running", () => { still(); later(TAIL, "paused", begin); });
+  };
+  const begin = () => {
+    for (const part of parts) part.currentTime = 0;
+    later(LEAD, "paused", () => { if (parts[0].currentTime === 0) run(LEAD); });
   };
   const go = (by) => {
     const step = held = Math.min(steps, Math.max(0, count() + by));
-    for (const part of parts) part.pause();
+    still();
     // A time that is set before the pause has come about is not painted by Chromium.
     Promise.all(parts.map((part) => part.ready)).then(() => {
       if (held !== step) return;
@@ -77,7 +97,9 @@ export function play(question) {
   if (!shown.hidden) {
     const timer = setInterval(() => { if (question.isConnected) tell(); else clearInterval(timer); }, STEP / 4);
   }
+  const replay = () => run(0);
   bar.querySelector("[data-replay]").addEventListener("click", replay);
-  if (calm.matches) go(0); else replay();
-  return { replay, go };
+  still();
+  if (calm.matches) go(0); else begin();
+  return { replay, go, still };
 }
