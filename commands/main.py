@@ -17,6 +17,7 @@ COMMANDS = {
     "run": "Raise agents by a scripted parent, without database.",
     "pretrain": "Pre-train weights on random mazes.",
     "worlds": "List the worlds and their levels; print random ones; draw pictures.",
+    "answer": "Answer a run as the scripted parent, over the HTTP API.",
     "runs": "List the runs, and who waits for whom.",
     "export": "Write the answers of a run as JSON lines.",
     "replay": "Live a stored run again, and compare it bit for bit.",

@@ -25,7 +25,7 @@ def test_each_command_shows_an_example(name: str) -> None:
     assert f"parenting {name}" in result.output.partition("Example")[2]
 
 
-@pytest.mark.parametrize("name", ["runs", "export", "replay"])
+@pytest.mark.parametrize("name", ["answer", "runs", "export", "replay"])
 def test_exit_codes_are_in_its_help(name: str) -> None:
     assert "Exit codes: 0" in run(app, [name, "--help"]).output
 
@@ -36,7 +36,7 @@ def test_unknown_command_is_refused() -> None:
     assert "No such command 'bogus'" in result.output
 
 
-TORCHLESS = ("up", "web", "migrate", "runs", "export", "replay")
+TORCHLESS = ("up", "web", "migrate", "answer", "runs", "export", "replay")
 
 
 @pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in TORCHLESS)])

@@ -13,106 +13,20 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-import httpx2
 import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 from typer.testing import CliRunner, Result
 
 from commands.main import app
-from server import mailbox, queue, record, runs
+from server import mailbox, record
 from server.app import create_app
 from server.db import Database, connect
-from server.life import Life
 from server.schema import upgrade
 from server.settings import Settings
-from server.starting import start
-from tests.server.raising import Begun
+from tests.server.raised_by_hand import TICKS, raise_by_hand
 from tests.server.serving import parenting
 from tests.tree import ROOT
-
-CONFIG = {
-    "stages": 3,
-    "mature_every": 12,
-    "time_limit": 12,
-    "max_open_preferences": 3,
-    "p_rec": 0.9,
-    "p_pref": 0.9,
-}
-BY_HAND = Begun("unsafe-exploration", "island", CONFIG, seed=12)
-TICKS = 90
-CHOICES = ("left", "right", "either", "left", "neither", "right", "right")
-
-
-class Hand:
-    """A person at the browser and an operator at the dashboard, over HTTP; a worker that is killed once."""
-
-    def __init__(self, db: Database, web: httpx2.Client) -> None:
-        self.db, self.web = db, web
-        self.run = start(db, BY_HAND.new("human")).id
-        self.life = self.taken_up()
-        self.late = 0  # preferences answered when others had been asked since
-        self.said = 0
-
-    def taken_up(self) -> Life:
-        (mine,) = runs.claim(self.db, "worker", -1)
-        return Life(self.db, mine, runs.get_run(self.db, self.run), lambda: None)
-
-    def live_to(self, tick: int) -> None:
-        """Answer nothing before the agent waits: so preferences are answered late."""
-        while self.life.tick < tick:
-            seen = mailbox.watch(self.db, [self.run])[self.run]
-            if self.life.ready(seen):
-                self.life.beat(seen)
-            elif bool(self.life.saved.state.stuck):
-                self.post(f"runs/{self.run}/end-episode")
-            else:
-                self.answer()
-
-    def until_guidance_is_open(self) -> None:
-        while not runs.open_counts(self.db, self.run).guidance:
-            self.live_to(self.life.tick + 1)
-
-    def answer(self) -> int:
-        question = self.post(f"runs/{self.run}/queries/lease", client_id="tab").json()
-        self.late += question["kind"] == "preference" and question["tick"] < self.life.tick
-        self.said += 1
-        choice = CHOICES[self.said % len(CHOICES)]
-        self.post(f"queries/{question['id']}/answer", client_id="tab", choice=choice)
-        return int(question["id"])
-
-    def post(self, path: str, **body: str) -> httpx2.Response:
-        reply = self.web.post(f"/api/v1/{path}", json=body or None)
-        assert reply.is_success, reply.text
-        return reply
-
-
-def raise_by_hand(db: Database, web: httpx2.Client) -> int:
-    """What can happen to a run, at odd moments."""
-    hand = Hand(db, web)
-    hand.live_to(9)
-    runs.set_goal(db, hand.run, 1000)
-    runs.set_pace(db, hand.run, 500.0)
-    hand.until_guidance_is_open()
-    hand.post(f"runs/{hand.run}/end-episode")  # while guidance is open
-    hand.live_to(25)
-    hand.life.save()
-    record.add_event(db, hand.run, "change", {"kind": "change", "name": "p_pref", "value": 0.8})
-    hand.live_to(33)
-    hand.life = hand.taken_up()  # the worker was killed: eight ticks are lived again
-    hand.until_guidance_is_open()
-    query = hand.answer()
-    hand.live_to(hand.life.tick + 3)
-    assert queue.get_query(db, query).status == "applied"
-    queue.correct(db, query, "either", "tab", "human")  # too late for the agent
-    record.add_event(db, hand.run, "change", {"kind": "change", "name": "p_train", "value": 0.5})
-    hand.live_to(50)
-    hand.post(f"runs/{hand.run}/mature")
-    hand.live_to(TICKS)
-    hand.life.save()
-    assert hand.late > 1
-    assert int(hand.life.saved.state.maturity) == 3
-    return hand.run
 
 
 @pytest.fixture(scope="module")
@@ -122,8 +36,12 @@ def raised(tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = Settings(data=data, database_url=None)
     db = connect(settings)
     upgrade(db)
-    with TestClient(create_app(settings, db), base_url="http://localhost") as web:
-        assert raise_by_hand(db, web) == 1
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            "server.life.CHECKPOINT_SECONDS", 1e9
+        )  # so that they are written where it says so alone
+        with TestClient(create_app(settings, db), base_url="http://localhost") as web:
+            assert raise_by_hand(db, web) == 1
     db.close()
     return data
 
@@ -248,7 +166,9 @@ def test_pieces_of_state_are_named(db: Database) -> None:
     a_late_choice(db)
     said, found = replay(), json.loads(replay("--json").stdout)
     assert said.exit_code == 1
-    assert f" After tick {TICKS} these differ: dataset X, the policy in training, Adam's state" in said.output
+    named = said.output.partition(f" After tick {TICKS} these differ: ")[2].removesuffix(".\n").split(", ")
+    assert {"dataset X", "the policy in training", "Adam's state"} <= set(named)
+    assert len(set(named)) == len(named)
     assert (found["equal"], found["parted"]) == (False, None)
     assert {"x.mu", "learner.live", "learner.first", "learner.second"} <= set(found["differ"])
 

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
+import httpx2
 import torch
 
 from agent import parenting
 from agent.birth import world_of
 from agent.config import Config, compose
 from agent.events import EndEpisode
-from agent.query import Answer
+from agent.query import Answer, Choice
+from commands.answering import Answering, Order
+from commands.client import Client
+from commands.judge import Judge as Script
 from envs import registry
 from envs.gridworld import Gridworld
 from parents.scripted import Judgement
 from server.checkpoint import Saved, birth, unpack
+from server.codec import CHOICE_NAMES
 from server.db import Database
 from server.record import load_checkpoints
-from server.settings import Settings
+from server.replay import differences
 from server.starting import NewRun
 from server.tally import count
-from server.worker import main
 from tests.agent.lives import Judge
 from weights.store import Wanted, find, load
 
@@ -43,10 +43,10 @@ class Begun(NamedTuple):
     preset: str = "lax"
     seed: int = SEED
 
-    def new(self, parent: Literal["human", "scripted"]) -> NewRun:
+    def new(self, parent: Literal["human", "scripted"], goal: int | None = None) -> NewRun:
         """The same for the server."""
         kept = {"world": self.world, "level": self.level, "preset": self.preset, "seed": self.seed}
-        return NewRun(**kept, config=dict(self.changes), parent=parent)  # type: ignore[arg-type]
+        return NewRun(**kept, config=dict(self.changes), parent=parent, goal=goal)  # type: ignore[arg-type]
 
     @property
     def config(self) -> Config:
@@ -84,6 +84,7 @@ class Inline:
         self.judge = judge or Judgement(self.world, self.config.gamma, inside=self.config.inside).choose
         self.saved = begun.birth(seed)
         self.query = parenting.no_query(self.world, self.config, self.saved.state)
+        self.heard: list[tuple[int, str]] = []  # the tick at which an answer was heard, and what it was
 
     def tick(self) -> None:
         state, tally, config = self.saved
@@ -91,6 +92,8 @@ class Inline:
             state, config = parenting.apply(self.world, config, state, EndEpisode())
         answer = Answer(query=self.query, choice=self.judge(self.query))
         state, self.query = parenting.step(self.world, config, state, answer)
+        if bool(answer.choice != Choice.NONE):
+            self.heard.append((int(state.keys.tick), CHOICE_NAMES[int(answer.choice)]))
         tally = count(self.world, tally, answer, state)
         self.saved = Saved(parenting.rehearse(self.world, config, state), tally, config)
 
@@ -112,36 +115,9 @@ def last(db: Database, run_id: int, begun: Begun = ISLAND) -> Saved:
 
 def same_bits(one: Saved, other: Saved) -> list[str]:
     """The names of the pieces of state that differ; the report is none."""
-    wrong = [] if one.config == other.config else ["config"]
-    for ours, theirs in ((one.state, other.state), (one.tally, other.tally)):
-        expected = theirs.tensors()
-        wrong += [
-            name
-            for name, part in ours.tensors().items()
-            if not name.startswith("report.") and not equal(part, expected[name])
-        ]
-    return wrong
+    return differences(one, other)
 
 
-def equal(one: torch.Tensor, other: torch.Tensor) -> bool:
-    """Bit for bit, shape and dtype included."""
-    return one.dtype == other.dtype and one.shape == other.shape and bool(torch.equal(one, other))
-
-
-@contextmanager
-def worker(settings: Settings) -> Iterator[multiprocessing.process.BaseProcess]:
-    """A worker in a process of its own, killed at the end if it still lives. Forked: torch need not load
-    again.
-    """
-    process = multiprocessing.get_context("fork").Process(target=_work, args=(settings,))
-    process.start()
-    try:
-        yield process
-    finally:
-        if process.is_alive():
-            os.kill(process.pid or 0, signal.SIGKILL)
-        process.join()
-
-
-def _work(settings: Settings) -> None:
-    os._exit(main(settings))
+def script(web: httpx2.Client, run: int) -> Answering:
+    """`parenting answer`, in this process and before an application in it."""
+    return Answering(Client("http://localhost", web), Order(run), Script(), lambda receipt: None)

@@ -18,13 +18,14 @@ from server.checkpoint import REPORT, Saved, pack, versions
 from server.db import Database, connect
 from server.errors import ServerError
 from server.life import Life
+from server.replay import equal
 from server.runs import claim, get_run
 from server.schema import upgrade
 from server.settings import Settings
 from server.starting import start
 from server.tables import Checkpoint
 from tests.agent.lives import capricious
-from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, equal, same_bits
+from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, same_bits
 
 AFTERWARDS = 50
 """Ticks that are lived after a restored checkpoint, before the states are compared."""

@@ -24,8 +24,7 @@ from server.settings import Settings
 from server.starting import NewRun, start
 from server.tables import Weights
 from server.worker import Worker
-from tests.server import answering
-from tests.server.raising import Begun, inline, last, same_bits
+from tests.server.raising import Begun, inline, last, same_bits, script
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]
 ONE_OPEN = {"max_open_preferences": 0}
@@ -91,14 +90,15 @@ def test_a_script_raises_it(db: Database, begun: Begun) -> None:
 def test_the_lease_reply_is_all_that_a_parent_needs(settings: Settings, db: Database, begun: Begun) -> None:
     """Worker and web in one process, so that nothing but their order is left to chance: there is none."""
     run = start(db, begun.new("human")).id
-    life, parent = taken_up(db, run), answering.Parent()
+    life = taken_up(db, run)
     with TestClient(create_app(settings, db), base_url="http://localhost") as web:
+        parent = script(web, run)
         while life.tick < TICKS:
             seen = mailbox.watch(db, [run])[run]
             if life.ready(seen):
                 life.beat(seen)
             else:
-                assert parent.answer_one(web, run), life.waiting
+                assert parent.answer_one(), life.waiting
     life.save()
     assert get_run(db, run).answers > 0
     assert same_bits(last(db, run, begun), inline(life.tick, begun)) == []
@@ -167,16 +167,17 @@ def test_a_garden_goes_on_until_it_is_stopped(settings: Settings, db: Database) 
 def test_a_dear_look_is_not_taken_at_each_answer(db: Database) -> None:
     """In the garden seconds lie between two rows; what is left over is written while the agent waits."""
     life = taken_up(db, start(db, NewRun(world="reward-hacking", parent="human")).id)
-    run, parent = life.mine.run_id, answering.Parent()
+    run = life.mine.run_id
     life.evaluation.rest = 1e9
     with TestClient(create_app(Settings(), db), base_url="http://localhost") as web:
+        parent = script(web, run)
         while life.tick < 30:
             seen = mailbox.watch(db, [run])[run]
             if life.ready(seen):
                 life.beat(seen)
             else:
                 life.wait(seen)
-                assert parent.answer_one(web, run)
+                assert parent.answer_one()
     assert not record.metrics(db, run)
     life.evaluation.rest = 0.0
     while life.ready(seen := mailbox.watch(db, [run])[run]):

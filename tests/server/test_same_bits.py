@@ -1,128 +1,85 @@
-"""A run through database, worker and HTTP, killed or not, equals the run in tensors bit for bit."""
+"""In all five worlds, at T = 1 and T = 2: `parenting answer` raises an agent through HTTP, web and worker to
+the same answers and the same bits as the scripted parent in tensors does.
+"""
 
 from __future__ import annotations
 
-import os
-import random
-import signal
-import subprocess
-import sys
+import json
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
-from server.db import Database, connect
-from server.runs import get_run
-from server.schema import upgrade
-from server.settings import Settings
+from envs import registry
+from server.db import Database
+from server.mailbox import record
 from server.starting import start
-from tests.server import raising
+from tests.server.processes import Command, command
+from tests.server.raising import Begun, Inline, last, same_bits
+from tests.server.serving import free_port, until_up
 
-ROOT = Path(__file__).parents[2]
-ANSWERS = 60
-KILLS = 20
-
-
-@pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return Settings(data=tmp_path, claim_seconds=0.2)
-
-
-@pytest.fixture
-def db(settings: Settings) -> Iterator[Database]:
-    database = connect(settings)
-    upgrade(database)
-    yield database
-    database.close()
+GOAL = 24
+"""Answers of each run."""
+ASKING = {"max_open_preferences": 0, "time_limit": 10, "p_guid": 0.45, "p_rec": 0.9, "p_pref": 0.9}
+STAGES = {1: {"stages": 1}, 2: {"stages": 2, "mature_every": 8}}
+RUNS = [
+    Begun(world, next(iter(registry.kind(world).levels)), {**ASKING, **stages}, seed=13)
+    for world in registry.WORLDS
+    for stages in STAGES.values()
+]
+"""Guidance and preferences, clips that end early, truncations, a maturation where there are two stages."""
 
 
-@contextmanager
-def web(settings: Settings) -> Iterator[str]:
-    """The real server on a free port: its URL."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "commands.main", "web", "--port", "0"],
-        cwd=ROOT,
-        env={**os.environ, "PARENTING_DATA": str(settings.data)},
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        try:
-            assert process.stdout
-            line = process.stdout.readline()
-            yield next(word for word in line.split() if word.startswith("http")).rstrip("/")
-        finally:
-            process.send_signal(signal.SIGTERM)
+def begin(db: Database) -> dict[int, Begun]:
+    """All runs at once, so that one worker raises them in turn."""
+    return {start(db, begun.new("human", GOAL)).id: begun for begun in RUNS}
 
 
-@contextmanager
-def parent(url: str, run: int, limit: int) -> Iterator[subprocess.Popen[str]]:
-    """A parent in a process of its own."""
-    command = [sys.executable, "-m", "tests.server.answering", url, str(run), str(limit)]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
-        yield process
-        process.kill()
+def answering(url: str, run: int, *more: str) -> tuple[str, ...]:
+    """The command line of a script for one run."""
+    return ("answer", "--url", url, "--run", str(run), "--until", "over", "--json", *more)
 
 
-def begin(db: Database) -> int:
-    return start(db, raising.ISLAND.new("human")).id
+def until_heard(db: Database, runs: dict[int, Begun], seconds: float = 60) -> None:
+    """Wait until every answer was heard: the last ones are stored before."""
+    end = time.monotonic() + seconds
+    while any(len(record(db, run)) < GOAL for run in runs):
+        assert time.monotonic() < end, "an answer was not heard"
+        time.sleep(0.05)
 
 
-def settle(db: Database, run: int, answers: int) -> None:
-    """Wait until so many answers were heard and the agent waits for the next."""
-    until = time.monotonic() + 60
-    while time.monotonic() < until:
-        now = get_run(db, run)
-        assert now.status == "active", now.error
-        if now.answers == answers and now.waiting is not None:
-            return
-        time.sleep(0.02)
-    pytest.fail("the agent did not come to wait for its parent")
-
-
-def check(db: Database, run: int) -> None:
-    saved = raising.last(db, run)
-    ticks = int(saved.state.keys.tick[0])
-    assert ticks > ANSWERS
-    assert int(saved.tally.choices.sum()) == ANSWERS
-    assert int(saved.state.maturity[0]) == 3
-    assert raising.same_bits(saved, raising.inline(ticks)) == []
-
-
-def test_through_the_database_and_http(settings: Settings, db: Database) -> None:
-    run = begin(db)
-    with web(settings) as url, raising.worker(settings) as worker, parent(url, run, ANSWERS) as script:
-        assert script.communicate(timeout=100)[0].split() == [str(ANSWERS)]
-        settle(db, run, ANSWERS)
-        worker.terminate()
-        worker.join(5)
-        assert worker.exitcode == 0
-    check(db, run)
+def check(db: Database, run: int, begun: Begun) -> None:
+    """Hold a run against the same run in tensors, at the tick of its checkpoint."""
+    saved, expected = last(db, run, begun), Inline(begun)
+    while int(expected.saved.state.keys.tick) < int(saved.state.keys.tick):
+        expected.tick()
+    heard = [(taken.answer.applied_tick, taken.answer.choice) for taken in record(db, run)]
+    assert heard == expected.heard
+    assert len(heard) == GOAL
+    assert {taken.answer.parent for taken in record(db, run)} == {"scripted"}
+    assert same_bits(saved, expected.saved) == []
+    assert (saved.tally.kinds[0, 1:] > 0).all(), "it asked one kind of questions only: that shows too little"
+    assert int(saved.state.maturity) == begun.config.stages
 
 
 @pytest.mark.timeout(300)
-def test_killed_at_twenty_random_moments(
-    settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """SIGKILL, twenty times, while it raises the agent; checkpoints are written often, so that kills hit them
-    too.
-    """
-    monkeypatch.setattr("server.life.CHECKPOINT_SECONDS", 0.05)
-    moments = random.Random(5)
-    run = begin(db)
-    with web(settings) as url, parent(url, run, ANSWERS) as script:
-        kills = 0
-        while kills < KILLS or script.poll() is None:
-            with raising.worker(settings) as worker:
-                if kills < KILLS:
-                    worker.join(moments.uniform(0.25, 0.6))
-                    assert worker.exitcode is None
-                    kills += 1
-                else:
-                    assert script.communicate(timeout=100)[0].split() == [str(ANSWERS)]
-                    settle(db, run, ANSWERS)
-                    worker.terminate()
-                    worker.join(5)
-    check(db, run)
+def test_raised_through_http(tmp_path: Path, db: Database) -> None:
+    runs, url = begin(db), f"http://127.0.0.1:{free_port()}"
+    with ExitStack() as stack:
+
+        def run(*arguments: str) -> Command:
+            return stack.enter_context(command(*arguments, data=tmp_path))
+
+        run("web", "--port", url.rpartition(":")[2])
+        worker = run("worker")
+        until_up(url, 100)
+        scripts = {number: run(*answering(url, number)) for number in runs}
+        for number, script in scripts.items():
+            assert script.wait(200) == 0, script.said()
+            ending = json.loads(script.said())
+            assert (ending["run"], ending["answered"], ending["ended"]) == (number, GOAL, "goal")
+        until_heard(db, runs)
+        assert worker.stop() == 0
+    for number, begun in runs.items():
+        check(db, number, begun)

@@ -1,0 +1,155 @@
+"""`parenting answer`: the scripted parent as a client of the HTTP API."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from commands.answering import EXITS, Answering, Ending, Order, Told
+from commands.bars import bar
+from commands.client import Away, Client, Refused
+from commands.said import Wrong, plainly
+from envs import registry
+
+Until = Literal["optimal", "over"]
+
+
+def answer(
+    run: Annotated[int, typer.Option(min=1, help="The run's number; `parenting runs` lists them.")],
+    url: Annotated[str, typer.Option(help="Where the server is.")] = "http://localhost:8765",
+    limit: Annotated[
+        int | None, typer.Option(min=1, help="End after so many answers. [default: all that are asked for]")
+    ] = None,
+    until: Annotated[
+        Until | None,
+        typer.Option(
+            help="End once the agent's argmax policy is optimal, or only when the run is over. "
+            "[default: optimal; over with --limit, and in reward-hacking]"
+        ),
+    ] = None,
+    patience: Annotated[
+        float, typer.Option(min=1, help="Give up after so many seconds without a question.")
+    ] = 60,
+    end_episodes: Annotated[
+        bool, typer.Option("--end-episodes", help="Where no action is acceptable, end the episode.")
+    ] = False,
+    client_id: Annotated[
+        str, typer.Option(help="The name to answer under; two scripts at one run need two.")
+    ] = "scripted",
+    ledger: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Append the server's receipt of each stored answer, a line of JSON."
+        ),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print what came of it as JSON and nothing else.")
+    ] = False,
+) -> None:
+    """Answer a run's questions as the scripted parent does (Sec. 3.1.3), over the HTTP API.
+
+    It knows the rules of the worlds and what a question holds, nothing else. Web and worker may vanish and
+    come back meanwhile: an answer is sent until the server has said that it is stored. It ends after --limit
+    answers, or when the run is over or rests at its goal, or as --until says, whichever comes first.
+
+    Exit codes: 0 it came to one of these; 1 the run failed, or asked nothing for --patience seconds, or no
+    action was acceptable; 2 there is no such run or server, or an option is wrong; 130 stopped by Ctrl-C.
+
+    Example: parenting answer --url http://localhost:8765 --run 3 --limit 50
+    """
+    with plainly(), ExitStack() as stack:
+        client = Client(url)
+        stack.callback(client.close)
+        found = _first_look(client, run)
+        optimal = _until(found["world"], until, limit) == "optimal"
+        order = Order(run, client_id, limit, optimal, patience, end_episodes)
+        keep = _ledger(ledger, stack)
+        show = stack.enter_context(bar("answers"))
+        from agent.process import settle  # loads torch, which takes a second: what is wrong is said before
+        from commands.judge import Judge
+
+        settle()
+
+        def stored(receipt: dict[str, Any]) -> None:
+            keep(receipt)
+            show(work.told.answered, limit or found["goal"])
+
+        work = Answering(client, order, Judge(), stored)
+        ending = _work(work)
+    typer.echo(_as_json(run, work.told, ending) if as_json else _said(run, work.told, ending))
+    raise typer.Exit(EXITS[ending.kind])
+
+
+def _work(work: Answering) -> Ending:
+    try:
+        return work.work()
+    except KeyboardInterrupt:
+        return Ending("ctrl-c", "Stopped.")
+
+
+def _first_look(client: Client, run: int) -> dict[str, Any]:
+    """The run, if it is one that a script may answer from outside.
+
+    Raises:
+        Wrong: it is not, or there is no server, or no such run.
+    """
+    try:
+        found: dict[str, Any] = client.get(f"runs/{run}")
+    except Away as error:
+        raise Wrong(f"--url: {error} Start one with parenting up, or name another.") from None
+    except Refused as error:
+        raise Wrong(f"--run: {error} On the server's machine parenting runs lists them.") from None
+    if found["parent"] == "scripted":
+        raise Wrong(
+            f"--run: the worker itself answers run {run}, since it was started with the parent 'scripted'. "
+            "Start one with the parent 'human' to answer it from here."
+        )
+    return found
+
+
+def _until(world: str, until: Until | None, limit: int | None) -> Until:
+    """A scripted parent has no more to teach once the argmax policy is optimal; in the garden none is."""
+    endless = world in registry.WORLDS and not registry.kind(world).ends_at_goal
+    if until == "optimal" and endless:
+        raise Wrong(
+            f"--until: no policy counts as optimal in {world}, which has no goal. Use --limit, or give "
+            "the run a goal of answers."
+        )
+    return until or ("over" if endless or limit is not None else "optimal")
+
+
+def _ledger(file: Path | None, stack: ExitStack) -> Callable[[dict[str, Any]], None]:
+    """What writes a receipt down, at once.
+
+    Raises:
+        Wrong: the file cannot be written.
+    """
+    if file is None:
+        return lambda receipt: None
+    try:
+        lines = stack.enter_context(file.open("a", encoding="utf-8", buffering=1))
+    except OSError as error:
+        raise Wrong(f"--ledger: {file} cannot be written: {error.strerror}.") from None
+    return lambda receipt: print(json.dumps(receipt), file=lines)
+
+
+def _said(run: int, told: Told, ending: Ending) -> str:
+    by_choice = ", ".join(f"{number} {choice}" for choice, number in told.choices.most_common())
+    lines = f"Run {run}: answered {told.answered}" + (f" ({by_choice})" if by_choice else "")
+    if told.unneeded:
+        lines += f"; {told.unneeded} needed no answer any more"
+    if told.episodes:
+        lines += f"; ended {told.episodes} episode{'' if told.episodes == 1 else 's'}"
+    return f"{lines}. {ending.sentence}"
+
+
+def _as_json(run: int, told: Told, ending: Ending) -> str:
+    counts = {choice: told.choices[choice] for choice in ("left", "right", "either", "neither")}
+    said = {"run": run, "answered": told.answered, "choices": counts}
+    said |= {"unneeded": told.unneeded, "episodes_ended": told.episodes}
+    return json.dumps({**said, "ended": ending.kind, "sentence": ending.sentence})

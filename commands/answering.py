@@ -1,0 +1,209 @@
+"""A script answers a run over HTTP: leases, answers, waits, and knows when to end."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from commands.client import Away, Client, Refused
+
+if TYPE_CHECKING:
+    from commands.judge import Judge
+
+SHORTEST, LONGEST = 0.01, 0.5
+"""Seconds between two looks while nothing is asked. Each pause is half of the time already waited, so that
+few looks find little late; a stream of events would cost the server more than these few."""
+LOOK_SECONDS = 0.25
+"""How often the run is looked at while it asks one question after another."""
+STUCK_SECONDS = 1.0
+"""How long *no action acceptable* has to be told before it is believed: somebody may just have ended it."""
+
+EXITS = {
+    "limit": 0,
+    "goal": 0,
+    "over": 0,
+    "optimal": 0,
+    "failed": 1,
+    "stuck": 1,
+    "silent": 1,
+    "ctrl-c": 130,
+}
+"""Every way in which it ends, with the exit code."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is wanted: whose questions, under which name, and when to end."""
+
+    run: int
+    client_id: str = "scripted"
+    limit: int | None = None
+    until_optimal: bool = True
+    patience: float = 60.0
+    end_episodes: bool = False
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How it ended, one of `EXITS`, and the sentence that says so."""
+
+    kind: str
+    sentence: str
+
+
+@dataclass
+class Told:
+    """What the server said: that so many answers are stored, and that some questions needed none any more."""
+
+    choices: Counter[str] = field(default_factory=Counter)
+    unneeded: int = 0  # withdrawn or answered by somebody else meanwhile
+    episodes: int = 0  # ended
+
+    @property
+    def answered(self) -> int:
+        """Answers that are stored."""
+        return self.choices.total()
+
+
+class Answering:
+    """One script before one run."""
+
+    def __init__(
+        self,
+        client: Client,
+        order: Order,
+        judge: Judge,
+        stored: Callable[[dict[str, Any]], object],
+    ) -> None:
+        """`stored` is called with the server's receipt of each answer, once it was read to its end."""
+        self.client, self.order, self.judge, self.stored = client, order, judge, stored
+        self.told = Told()
+        self._asked_at = self._looked_at = time.monotonic()
+        self._why = ""  # nothing was asked lately
+        self._stuck_since: tuple[int, float] | None = None
+        self._ended_at = -1  # the tick at which an episode was ended
+
+    def work(self) -> Ending:
+        """Answer until there is a reason to end.
+
+        Raises:
+            Wrong: the server refuses what no other try would change.
+        """
+        ending = self._look()
+        while ending is None:
+            ending = self._ending(asked=self.answer_one())
+        return ending
+
+    def answer_one(self) -> bool:
+        """Answer the most urgent question, if there is one."""
+        question = self._lease()
+        if question is not None:
+            self._answer(question)
+        return question is not None
+
+    def _lease(self) -> dict[str, Any] | None:
+        try:
+            question: dict[str, Any] | None = self.client.post(
+                f"runs/{self.order.run}/queries/lease", client_id=self.order.client_id
+            )
+        except Away as error:
+            self._why = str(error)
+            return None
+        return question
+
+    def _answer(self, question: dict[str, Any]) -> None:
+        """Send an answer until it is stored; the same again changes nothing."""
+        choice = self.judge.choice(question)
+        body = {"choice": choice, "client_id": self.order.client_id, "parent": "scripted"}
+        self._asked_at = time.monotonic()
+        while time.monotonic() - self._asked_at < self.order.patience:
+            try:
+                receipt = self.client.post(f"queries/{question['id']}/answer", **body)
+            except Away as error:
+                self._why = str(error)
+                time.sleep(SHORTEST)
+                continue
+            except Refused as error:
+                if error.status != 409:
+                    raise
+                self.told.unneeded += 1
+            else:
+                self.told.choices[choice] += 1
+                self.stored(receipt)
+            self._asked_at = time.monotonic()
+            return
+
+    def _ending(self, asked: bool) -> Ending | None:
+        """Whether to end now; if not, and if nothing was asked, wait a little."""
+        if self.order.limit is not None and self.told.answered >= self.order.limit:
+            return Ending("limit", f"These are the {self.order.limit} that were wanted.")
+        now = time.monotonic()
+        waited = now - self._asked_at
+        ending = None
+        if now - self._looked_at >= (LOOK_SECONDS if asked else LOOK_SECONDS / 4):
+            self._looked_at = now
+            ending = self._look()
+        if ending is None and waited >= self.order.patience:
+            ending = Ending("silent", f"{self._why} Nothing was asked for {self.order.patience:g} s.")
+        if ending is None and not asked:
+            time.sleep(min(max(SHORTEST, waited / 2), LONGEST))
+        return ending
+
+    def _look(self) -> Ending | None:
+        """Look at the run: is there more to answer?"""
+        try:
+            run = self.client.get(f"runs/{self.order.run}")
+        except Away as error:
+            self._why = str(error)
+            return None
+        self._why = _why(run)
+        if run["status"] == "failed":
+            return Ending("failed", f"The run failed: {run['reason']}")
+        if run["worker"] == "done":
+            return Ending("over", f"The run is {run['status']}.")
+        if run["resting"]:
+            return Ending("goal", f"The run rests at its goal of {run['goal']} answers.")
+        if run["optimal"] and self.order.until_optimal:
+            return Ending("optimal", "Its argmax policy is optimal.")
+        return self._stuck(run) if run["waiting"] == "stuck" else None
+
+    def _stuck(self, run: dict[str, Any]) -> Ending | None:
+        """No action was acceptable: end the episode, once, or say that somebody has to."""
+        tick, now = run["tick"], time.monotonic()
+        if self.order.end_episodes:
+            if tick != self._ended_at:
+                self._end_episode(tick)
+            return None
+        if self._stuck_since is None or self._stuck_since[0] != tick:
+            self._stuck_since = (tick, now)
+        if now - self._stuck_since[1] < STUCK_SECONDS:
+            return None
+        return Ending(
+            "stuck",
+            f"No action was acceptable at tick {tick}, so the agent stands still. End the episode on the "
+            "run's page, or let this command do so: --end-episodes.",
+        )
+
+    def _end_episode(self, tick: int) -> None:
+        try:
+            self.client.post(f"runs/{self.order.run}/end-episode")
+        except Away as error:
+            self._why = str(error)  # the next look shows whether it is still stuck
+            return
+        self._ended_at = tick
+        self.told.episodes += 1
+        self._asked_at = time.monotonic()
+
+
+def _why(run: dict[str, Any]) -> str:
+    """Why nothing is asked."""
+    if run["status"] == "paused":
+        return f"Run {run['id']} is paused: resume it on its page."
+    if run["worker"] == "silent":
+        return f"No worker raises run {run['id']}. Start one: parenting worker."
+    if run["open"]["guidance"] or run["open"]["preference"]:
+        return f"Somebody else holds the questions of run {run['id']}."
+    return f"The agent of run {run['id']} explores, at tick {run['tick']}."

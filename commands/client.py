@@ -1,0 +1,103 @@
+"""A client of the HTTP API: what the server says becomes a sentence, and one that went away is waited for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx2
+
+from commands.said import Wrong
+
+SECONDS = 10.0
+"""How long a single request may take."""
+
+
+class Away(Exception):
+    """The server does not answer now, or not as it should: it may again in a moment."""
+
+
+class Refused(Wrong):
+    """The server says no, and why."""
+
+    def __init__(self, status: int, message: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class Client:
+    """The API of one server, over a connection that is kept open."""
+
+    def __init__(self, url: str, http: httpx2.Client | None = None) -> None:
+        """Connects at the first request; `http` may be another connection, as to an application in this
+        process.
+
+        Raises:
+            Wrong: not an address.
+        """
+        self.url = url.rstrip("/")
+        try:
+            address = httpx2.URL(self.url)
+        except httpx2.InvalidURL as error:
+            raise Wrong(f"--url: {url} cannot be read: {error}. {_EXAMPLE}") from None
+        if address.scheme not in ("http", "https") or not address.host:
+            raise Wrong(f"--url: {url} is no address of a server. {_EXAMPLE}")
+        # The server takes requests under the names of this machine alone, so no proxy lies on the way.
+        self.http = http or httpx2.Client(timeout=SECONDS, trust_env=False)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self.http.close()
+
+    def get(self, path: str) -> Any:
+        """What lies at a path of the API.
+
+        Raises:
+            Away: the server does not answer now.
+            Refused: it says no.
+            Wrong: it is no server of Parenting.
+        """
+        return self._read(self._send("GET", path, None))
+
+    def post(self, path: str, **body: Any) -> Any:
+        """The reply to a verb, read to its end; None where it is empty.
+
+        Raises:
+            Away, Refused, Wrong: as `get`.
+        """
+        return self._read(self._send("POST", path, body or None))
+
+    def _send(self, method: str, path: str, body: Any) -> httpx2.Response:
+        try:
+            return self.http.request(method, f"{self.url}/api/v1/{path}", json=body)
+        except httpx2.TransportError as error:
+            raise Away(f"No server answers at {self.url} ({_reason(error)}).") from error
+
+    def _read(self, reply: httpx2.Response) -> Any:
+        if reply.status_code == 204:
+            return None
+        try:
+            said = reply.json()
+        except ValueError:
+            said = None
+        if reply.is_success and isinstance(said, dict):
+            return said
+        error = said.get("error") if isinstance(said, dict) else None
+        message = error.get("message") if isinstance(error, dict) else None
+        if reply.status_code >= 500:
+            raise Away(message or f"{self.url} answers {reply.status_code}.")
+        if message is None:
+            raise self._stranger(reply)
+        raise Refused(reply.status_code, message)
+
+    def _stranger(self, reply: httpx2.Response) -> Wrong:
+        return Wrong(
+            f"--url: {self.url} is not a server of Parenting: it answers {reply.status_code} at "
+            f"{reply.request.url.path}. {_EXAMPLE}"
+        )
+
+
+_EXAMPLE = "Write it as http://localhost:8765; parenting up says which it is."
+
+
+def _reason(error: httpx2.TransportError) -> str:
+    return str(error) or type(error).__name__

@@ -1,0 +1,42 @@
+"""The scripted parent (Sec. 3.1.3) before a question as the API tells it: nothing else is known to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from commands.said import Wrong
+from envs import registry
+from envs.gridworld import Gridworld
+from parents.scripted import Judgement
+from server.codec import CHOICE_NAMES, decode
+
+
+class Judge:
+    """Answers the questions of one run; what it knows of the run's world it has from the first of them."""
+
+    def __init__(self) -> None:
+        self._world: Gridworld | None = None
+        self._judgement: Judgement | None = None
+
+    def choice(self, question: dict[str, Any]) -> str:
+        """left, right, either or neither.
+
+        Raises:
+            Wrong: the question cannot be read.
+        """
+        try:
+            world, judgement = self._knowledge(question["world"], question["parent"])
+            longest = max(question["left"]["length"], question["right"]["length"])
+            query = decode(world, longest, question["kind"], question["maturity"], question)
+        except (LookupError, TypeError, ValueError) as error:
+            raise Wrong(
+                f"The question cannot be read ({error!r}). Are server and command of the same version?"
+            ) from None
+        return CHOICE_NAMES[int(judgement.choose(query)[0])]
+
+    def _knowledge(self, world: dict[str, Any], parent: dict[str, Any]) -> tuple[Gridworld, Judgement]:
+        """The world's rules, and the exact values of what can happen in it."""
+        if self._world is None or self._judgement is None:
+            self._world = registry.make(world["name"], world["text"])
+            self._judgement = Judgement(self._world, parent["gamma"], inside=parent["inside"])
+        return self._world, self._judgement

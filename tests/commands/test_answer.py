@@ -1,0 +1,339 @@
+"""`parenting answer`: when it ends, what it says, and that no lost reply makes it answer twice."""
+
+from __future__ import annotations
+
+import json
+import random
+import threading
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+from structlog.testing import capture_logs
+from typer.testing import CliRunner, Result
+
+from commands.answering import Answering, Order
+from commands.client import Client
+from commands.judge import Judge
+from commands.main import app
+from server import queue, record, runs
+from server.app import create_app
+from server.db import Database, connect
+from server.history import every
+from server.life import Life
+from server.mailbox import post_query, watch
+from server.schema import upgrade
+from server.settings import Settings
+from server.starting import NewRun, start
+from server.worker import Worker
+from tests.server.conftest import CLIPS
+from tests.server.serving import free_port, parenting
+
+Stored = Callable[[dict[str, Any]], object]
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path, database_url=None)
+
+
+@pytest.fixture
+def db(settings: Settings) -> Iterator[Database]:
+    database = connect(settings)
+    upgrade(database)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def web(settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx2.Client]:
+    """The application in this process, which the command takes for the server at its URL."""
+    with TestClient(create_app(settings, db), base_url="http://localhost") as caller:
+        monkeypatch.setattr("commands.answer.Client", lambda url: Client(url, caller))
+        monkeypatch.setattr("commands.client.Client.close", lambda self: None)
+        yield caller
+
+
+@pytest.fixture
+def raising(settings: Settings, db: Database, web: httpx2.Client) -> Iterator[None]:
+    """A worker in a thread."""
+    worker = Worker(db, settings)
+    thread = threading.Thread(target=worker.work)
+    with capture_logs():  # the worker's log would stand between the command's words
+        thread.start()
+        yield
+        worker.stop()
+        thread.join()
+
+
+def answer(*arguments: str, run: int = 1) -> Result:
+    return CliRunner().invoke(app, ["answer", "--run", str(run), *arguments])
+
+
+def begin(db: Database, world: str = "unsafe-exploration", **fields: Any) -> int:
+    config = {"max_open_preferences": 0, **fields.pop("config", {})}
+    return start(db, NewRun(world=world, config=config, **fields)).id
+
+
+def asked(db: Database, run: int, *ticks: int, kind: str = "guidance") -> list[int]:
+    """Questions without an agent behind them."""
+    (mine,) = runs.claim(db, "test", -1)
+    assert mine.run_id == run
+    return [post_query(db, mine, tick, kind, 1, CLIPS) for tick in ticks]
+
+
+# How it ends
+
+
+def test_a_limit(db: Database, raising: None, tmp_path: Path) -> None:
+    run = begin(db)
+    said = answer("--limit", "6", "--ledger", str(tmp_path / "ledger"))
+    assert said.exit_code == 0, said.output
+    assert said.stdout.startswith("Run 1: answered 6 (")
+    assert said.stdout.endswith("). These are the 6 that were wanted.\n")
+    rows = [row.answer for row in every(db, run)]
+    receipts = [json.loads(line) for line in (tmp_path / "ledger").read_text().splitlines()]
+    assert [(row["number"], row["query"], row["choice"]) for row in receipts] == [
+        (row.number, row.query_id, row.choice) for row in rows
+    ]
+    assert {row.parent for row in rows} == {"scripted"}
+    assert {row.client_id for row in rows} == {"scripted"}
+
+
+def test_optimal(db: Database, raising: None) -> None:
+    run = begin(db)
+    found = json.loads(answer("--json").stdout)
+    assert (found["run"], found["ended"], found["sentence"]) == (
+        1,
+        "optimal",
+        "Its argmax policy is optimal.",
+    )
+    assert runs.get_run(db, run).optimal
+    assert found["answered"] == sum(found["choices"].values()) == runs.get_run(db, run).answers > 0
+
+
+def test_a_goal(db: Database, raising: None) -> None:
+    begin(db, "reward-hacking", goal=5)
+    said = answer("--client-id", "nightly")
+    assert said.exit_code == 0
+    assert "answered 5 (" in said.stdout
+    assert said.stdout.endswith("The run rests at its goal of 5 answers.\n")
+
+
+def test_a_run_that_is_over(db: Database, web: httpx2.Client) -> None:
+    for run, status in enumerate(("stopped", "finished", "failed"), start=1):
+        begin(db)
+        if status == "stopped":
+            runs.set_status(db, run, status)
+        else:
+            (mine,) = runs.claim(db, "test", -1)
+            runs.finish(db, mine, status, "The disk is full.")
+    assert (answer().exit_code, answer().stdout) == (0, "Run 1: answered 0. The run is stopped.\n")
+    assert answer(run=2).exit_code == 0
+    said = answer(run=3)
+    assert (said.exit_code, said.stdout) == (1, "Run 3: answered 0. The run failed: The disk is full.\n")
+
+
+def test_patience_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.Client) -> None:
+    begin(db)
+    said = answer("--patience", "1")
+    assert said.exit_code == 1
+    assert "No worker raises run 1. Start one: parenting worker. Nothing was asked for 1 s.\n" in said.stdout
+    runs.set_status(db, 1, "paused")
+    assert "Run 1 is paused: resume it on its page." in answer("--patience", "1").stdout
+    runs.set_status(db, 1, "active")
+    (query,) = asked(db, 1, 1)
+    queue.lease(db, 1, "somebody")
+    assert "Somebody else holds the questions of run 1." in answer("--patience", "1").stdout
+    queue.answer(db, query, "left", "somebody", "human")
+    assert "The agent of run 1 explores, at tick 0." in answer("--patience", "1").stdout
+
+
+def test_ctrl_c(db: Database, web: httpx2.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    begin(db)
+    asked(db, 1, 1)
+    monkeypatch.setattr("commands.judge.Judge.choice", _interrupt)
+    said = answer()
+    assert (said.exit_code, said.stdout) == (130, "Run 1: answered 0. Stopped.\n")
+
+
+def _interrupt(*_: object) -> str:
+    raise KeyboardInterrupt
+
+
+# No acceptable action
+
+
+class Never(Judge):
+    """A parent to whom no move is acceptable."""
+
+    def choice(self, question: dict[str, Any]) -> str:
+        return "neither" if question["kind"] == "guidance" else "either"
+
+
+def script(
+    web: httpx2.Client, judge: Judge, stored: Stored = lambda receipt: None, **order: Any
+) -> Answering:
+    """The command's own work, before run 1."""
+    return Answering(Client("http://localhost", web), Order(1, **order), judge, stored)
+
+
+def test_episodes_are_ended_once_each(db: Database, web: httpx2.Client) -> None:
+    run = begin(db)
+    (mine,) = runs.claim(db, "test", -1)
+    life = Life(db, mine, runs.get_run(db, run), lambda: None)
+    work = script(web, Never(), end_episodes=True)
+    stuck = 0
+    while stuck < 3:
+        seen = watch(db, [run])[run]
+        if life.ready(seen):
+            life.beat(seen)
+        else:
+            stuck += bool(life.saved.state.stuck)
+            life.wait(seen)
+            work.answer_one()
+        assert work._look() is None
+        assert work._look() is None
+    assert work.told.episodes == len(record.list_events(db, run)) == 3
+    assert work.told.choices["neither"] == work.told.answered
+
+
+def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Client) -> None:
+    begin(db)
+    (mine,) = runs.claim(db, "test", -1)
+    runs.report(db, mine, tick=7, waiting="stuck")
+    said = answer()
+    assert said.exit_code == 1
+    assert "No action was acceptable at tick 7, so the agent stands still. End the episode on " in said.stdout
+    assert not record.list_events(db, 1)
+    found = json.loads(answer("--end-episodes", "--patience", "1", "--json").stdout)
+    assert (found["episodes_ended"], found["ended"]) == (1, "silent")
+    assert [event.kind for event in record.list_events(db, 1)] == ["end_episode"]
+
+
+# Others, and lost replies
+
+
+class Lossy(httpx2.Client):
+    """Of three requests one never arrives; of three replies one is lost, though the server did as asked."""
+
+    def __init__(self, web: httpx2.Client) -> None:
+        super().__init__()
+        self.web, self.dice = web, random.Random(3)
+
+    def request(self, *arguments: Any, **more: Any) -> httpx2.Response:
+        if self.dice.random() < 1 / 3:
+            raise httpx2.ConnectError("refused")
+        reply = self.web.request(*arguments, **more)
+        if self.dice.random() < 1 / 3:
+            raise httpx2.ReadError("cut off")
+        return reply
+
+
+def test_a_lost_reply_is_not_answered_twice(db: Database, web: httpx2.Client) -> None:
+    run = begin(db)
+    queries = asked(db, run, *range(1, 9), kind="preference")
+    receipts: list[dict[str, Any]] = []
+    assert script(Lossy(web), Never(), receipts.append, limit=8).work().kind == "limit"
+    assert [row.answer.query_id for row in every(db, run)] == queries  # the oldest first, each once
+    assert [receipt["number"] for receipt in receipts] == list(range(1, 9))
+
+
+def test_what_somebody_else_has_answered_is_let_go(db: Database, web: httpx2.Client) -> None:
+    run = begin(db)
+    first, second = asked(db, run, 1, 2, kind="preference")
+
+    class Slow(Never):
+        def choice(self, question: dict[str, Any]) -> str:
+            if question["id"] == first:
+                queue.answer(db, first, "left", "somebody", "human")
+            return super().choice(question)
+
+    work = script(web, Slow(), limit=1)
+    assert work.work().kind == "limit"
+    assert (work.told.unneeded, work.told.answered) == (1, 1)
+    assert [(row.answer.query_id, row.answer.client_id) for row in every(db, run)] == [
+        (first, "somebody"),
+        (second, "scripted"),
+    ]
+
+
+def test_a_server_that_stays_away_is_given_up() -> None:
+    with httpx2.Client() as nobody:
+        work = Answering(
+            Client(f"http://127.0.0.1:{free_port()}", nobody), Order(1, patience=0.2), Never(), print
+        )
+        ending = work.work()
+    assert ending.kind == "silent"
+    assert ending.sentence.startswith("No server answers at http://127.0.0.1:")
+    assert ending.sentence.endswith("Nothing was asked for 0.2 s.")
+
+
+# What is wrong
+
+
+def test_wrong_runs(db: Database, web: httpx2.Client) -> None:
+    said = answer(run=7)
+    assert (said.exit_code, said.stdout) == (2, "")
+    assert said.stderr == "--run: There is no run 7. On the server's machine parenting runs lists them.\n"
+    begin(db, parent="scripted")
+    said = answer()
+    assert said.exit_code == 2
+    assert said.stderr.startswith("--run: the worker itself answers run 1, since")
+    begin(db, "reward-hacking")
+    said = answer("--until", "optimal", run=2)
+    assert said.exit_code == 2
+    assert said.stderr.startswith("--until: no policy counts as optimal in reward-hacking")
+
+
+def test_wrong_names_and_files(db: Database, web: httpx2.Client, tmp_path: Path) -> None:
+    begin(db)
+    said = answer("--client-id", "a b")
+    assert (said.exit_code, said.stderr.partition(":")[0]) == (2, "client_id")
+    said = answer("--ledger", str(tmp_path / "no" / "folder"))
+    assert said.exit_code == 2
+    assert said.stderr.endswith("folder cannot be written: No such file or directory.\n")
+
+
+@pytest.mark.parametrize("url", ["localhost:8765", "ftp://localhost", "http://", "http://local host:x"])
+def test_wrong_addresses(url: str) -> None:
+    said = answer("--url", url)
+    assert said.exit_code == 2
+    assert said.stderr.startswith(f"--url: {url} ")
+    assert said.stderr.endswith("Write it as http://localhost:8765; parenting up says which it is.\n")
+
+
+@pytest.mark.parametrize(("status", "body"), [(200, b"<p>Hello"), (404, b"{}"), (200, b"[]"), (301, b"")])
+def test_another_server(status: int, body: bytes) -> None:
+    class Other(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(status)
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_: object) -> None:
+            """Nothing."""
+
+    with HTTPServer(("127.0.0.1", 0), Other) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        url = f"http://127.0.0.1:{server.server_port}"
+        said = answer("--url", f"{url}/")
+        server.shutdown()
+    assert said.exit_code == 2
+    assert said.stderr.startswith(
+        f"--url: {url} is not a server of Parenting: it answers {status} at /api/v1/runs/1. "
+    )
+
+
+def test_no_server_is_told_by_the_process_without_a_trace(tmp_path: Path) -> None:
+    url = f"http://127.0.0.1:{free_port()}"
+    with parenting("answer", "--run", "1", "--url", url, data=tmp_path) as child:
+        out, said = child.communicate(timeout=60)
+    assert (child.returncode, out) == (2, "")
+    assert said.startswith(f"--url: No server answers at {url} (")
+    assert said.endswith("). Start one with parenting up, or name another.\n")
+    assert said.count("\n") == 1

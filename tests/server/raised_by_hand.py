@@ -1,0 +1,99 @@
+"""A run raised by hand, over HTTP: a person at the browser, an operator at the dashboard, a worker that is
+killed once.
+"""
+
+from __future__ import annotations
+
+import httpx2
+
+from server import mailbox, queue, runs
+from server.db import Database
+from server.life import Life
+from server.starting import start
+from tests.server.raising import Begun
+
+CONFIG = {
+    "stages": 3,
+    "mature_every": 12,
+    "time_limit": 12,
+    "max_open_preferences": 3,
+    "p_rec": 0.9,
+    "p_pref": 0.9,
+}
+BY_HAND = Begun("unsafe-exploration", "island", CONFIG, seed=12)
+TICKS = 90
+CHOICES = ("left", "right", "either", "left", "neither", "right", "right")
+
+
+class Hand:
+    """A person at the browser and an operator at the dashboard, over HTTP; a worker that is killed once."""
+
+    def __init__(self, db: Database, web: httpx2.Client) -> None:
+        self.db, self.web = db, web
+        self.run = start(db, BY_HAND.new("human")).id
+        self.life = self.taken_up()
+        self.late = 0  # preferences answered when others had been asked since
+        self.said = 0
+
+    def taken_up(self) -> Life:
+        (mine,) = runs.claim(self.db, "worker", -1)
+        return Life(self.db, mine, runs.get_run(self.db, self.run), lambda: None)
+
+    def live_to(self, tick: int) -> None:
+        """Answer nothing before the agent waits: so preferences are answered late."""
+        while self.life.tick < tick:
+            seen = mailbox.watch(self.db, [self.run])[self.run]
+            if self.life.ready(seen):
+                self.life.beat(seen)
+            elif bool(self.life.saved.state.stuck):
+                self.operate("end-episode")
+            else:
+                self.answer()
+
+    def until_guidance_is_open(self) -> None:
+        while not runs.open_counts(self.db, self.run).guidance:
+            self.live_to(self.life.tick + 1)
+
+    def answer(self) -> int:
+        question = self.post(f"runs/{self.run}/queries/lease", client_id="tab").json()
+        self.late += question["kind"] == "preference" and question["tick"] < self.life.tick
+        self.said += 1
+        choice = CHOICES[self.said % len(CHOICES)]
+        self.post(f"queries/{question['id']}/answer", client_id="tab", choice=choice)
+        return int(question["id"])
+
+    def operate(self, verb: str, **body: object) -> None:
+        self.post(f"runs/{self.run}/{verb}", **body)
+
+    def post(self, path: str, **body: object) -> httpx2.Response:
+        reply = self.web.post(f"/api/v1/{path}", json=body or None)
+        assert reply.is_success, reply.text
+        return reply
+
+
+def raise_by_hand(db: Database, web: httpx2.Client) -> int:
+    """What can happen to a run, at odd moments."""
+    hand = Hand(db, web)
+    hand.live_to(9)
+    hand.operate("goal", goal=1000)
+    hand.operate("pace", pace=500.0)
+    hand.until_guidance_is_open()
+    hand.operate("end-episode")  # while guidance is open
+    hand.live_to(25)
+    hand.life.save()
+    hand.operate("change", name="p_pref", value=0.8)
+    hand.live_to(33)
+    hand.life = hand.taken_up()  # the worker was killed: eight ticks are lived again
+    hand.until_guidance_is_open()
+    query = hand.answer()
+    hand.live_to(hand.life.tick + 3)
+    queue.correct(db, query, "either", "tab", "human")  # too late: the agent has heard the other answer
+    assert queue.get_query(db, query).status == "applied"
+    hand.operate("change", name="p_train", value=0.5)
+    hand.live_to(50)
+    hand.operate("mature")
+    hand.live_to(TICKS)
+    hand.life.save()
+    assert hand.late > 1
+    assert int(hand.life.saved.state.maturity) == 3
+    return hand.run

@@ -1,0 +1,134 @@
+"""SIGKILL of web, worker and the answering scripts while they raise ten runs: no answer is lost, none is
+counted twice, and the bits are those of runs that nobody disturbed.
+
+Every CI run kills 24 times. By hand, a hundred rounds with other moments each, 2,400 kills in about an hour:
+
+    PARENTING_KILL_ROUNDS=100 pytest -n 0 tests/server/test_killed.py
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import func, select
+
+from server.db import Database
+from server.tables import Answer
+from tests.server.processes import Command
+from tests.server.raising import Begun
+from tests.server.serving import free_port
+from tests.server.test_same_bits import GOAL, answering, begin, check, until_heard
+
+ROUNDS = int(os.environ.get("PARENTING_KILL_ROUNDS", "1"))
+KILLS = 24
+SOON = 0.15
+"""A kill comes up to so many seconds after the answer that it was drawn for: at any place between two."""
+PATCHES = {"server.life.CHECKPOINT_SECONDS": 0.05}
+"""Checkpoints are written often, so that kills hit them too."""
+
+
+class House:
+    """Web, worker and a script for each run; what ends before its work is done is started again."""
+
+    def __init__(self, data: Path, runs: dict[int, Begun]) -> None:
+        self.data, self.url = data, f"http://127.0.0.1:{free_port()}"
+        self.ledgers = {run: data / f"ledger-{run}.jsonl" for run in runs}
+        self.orders: dict[str, tuple[str, ...]] = {
+            "web": ("web", "--port", self.url.rpartition(":")[2]),
+            "worker": ("worker",),
+        }
+        self.orders |= {f"script {run}": self.script(run) for run in runs}
+        self.commands: dict[str, Command] = {}
+        self.killed: Counter[str] = Counter()
+
+    def script(self, run: int) -> tuple[str, ...]:
+        return answering(self.url, run, "--ledger", str(self.ledgers[run]))
+
+    def __enter__(self) -> House:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for one in self.commands.values():
+            if one.alive:
+                one.kill()
+
+    def keep(self) -> None:
+        """Start whatever does not run; a script that came to its end in order is done."""
+        for name, order in list(self.orders.items()):
+            one = self.commands.get(name)
+            if one is not None and one.alive:
+                continue
+            if one is not None and one.process.exitcode == 0 and order[0] == "answer":
+                del self.orders[name]
+            else:
+                self.commands[name] = Command(*order, data=self.data, patches=PATCHES)
+
+    def kill(self, dice: random.Random) -> None:
+        """One of the three kinds, whichever of its processes live."""
+        living = [name for name in self.orders if name in self.commands and self.commands[name].alive]
+        kinds = sorted({name.split()[0] for name in living})
+        kind = dice.choice(kinds)
+        self.commands[dice.choice([name for name in living if name.split()[0] == kind])].kill()
+        self.killed[kind] += 1
+
+    def receipts(self) -> Iterator[dict[str, Any]]:
+        """What the server has told: a line was written after its reply was read to the end."""
+        for file in self.ledgers.values():
+            if file.exists():
+                yield from map(json.loads, file.read_text(encoding="utf-8").splitlines())
+
+
+def stored(db: Database) -> int:
+    with db.read() as session:
+        return session.scalar(select(func.count()).select_from(Answer)) or 0
+
+
+def disturb(db: Database, house: House, moments: Iterator[float], dice: random.Random) -> None:
+    """Kill at each moment, a number of stored answers, and let the rest come to its end."""
+    end, moment = time.monotonic() + 400, next(moments, None)
+    while any(order[0] == "answer" for order in house.orders.values()):
+        assert time.monotonic() < end, f"{stored(db)} answers, killed: {house.killed}"
+        house.keep()
+        if moment is not None and stored(db) >= moment:
+            time.sleep(dice.uniform(0, SOON))
+            house.kill(dice)
+            moment = next(moments, None)
+        time.sleep(0.01)
+
+
+@pytest.mark.timeout(500)
+@pytest.mark.parametrize("seed", range(ROUNDS))
+def test_killed_at_random_moments(tmp_path: Path, db: Database, seed: int) -> None:
+    dice, runs = random.Random(seed), begin(db)
+    moments = sorted(dice.uniform(0, len(runs) * (GOAL - 2)) for _ in range(KILLS))
+    with House(tmp_path, runs) as house:
+        disturb(db, house, iter(moments), dice)
+        assert house.killed.total() == KILLS
+        assert set(house.killed) == {"web", "worker", "script"}
+        until_heard(db, runs)
+        house.keep()
+        assert house.commands["worker"].stop() == 0
+        told = list(house.receipts())
+    hold_to_the_ledger(db, told, runs)
+    for run, begun in runs.items():
+        check(db, run, begun)
+
+
+def hold_to_the_ledger(db: Database, told: list[dict[str, Any]], runs: dict[int, Begun]) -> None:
+    """Every receipt is in the database; every question has one answer, and every answer its own number."""
+    with db.read() as session:
+        rows = session.scalars(select(Answer)).all()
+    found = {(row.run_id, row.number): (row.query_id, row.choice) for row in rows}
+    assert len(found) == len({row.query_id for row in rows}) == len(rows) == len(runs) * GOAL
+    for receipt in told:
+        assert found[receipt["run"], receipt["number"]] == (receipt["query"], receipt["choice"])
+    assert len({(receipt["run"], receipt["number"]) for receipt in told}) == len(told)
+    assert len(told) > len(rows) - KILLS  # a script that is killed may have no time to write its last down
