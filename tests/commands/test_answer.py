@@ -1,61 +1,26 @@
-"""`parenting answer`: when it ends, what it says, and that no lost reply makes it answer twice."""
+"""`parenting answer`: when it ends, with which exit code, and what it says."""
 
 from __future__ import annotations
 
 import json
-import random
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
-from typing import Any
 
 import httpx2
 import pytest
-from fastapi.testclient import TestClient
 from structlog.testing import capture_logs
 from typer.testing import CliRunner, Result
 
-from commands.answering import Answering, Order
-from commands.client import Client
-from commands.judge import Judge
 from commands.main import app
 from server import queue, record, runs
-from server.app import create_app
-from server.db import Database, connect
+from server.db import Database
 from server.history import every
-from server.life import Life
-from server.mailbox import post_query, watch
-from server.schema import upgrade
 from server.settings import Settings
-from server.starting import NewRun, start
 from server.worker import Worker
-from tests.server.conftest import CLIPS
+from tests.commands.asking import asked, begin
 from tests.server.serving import free_port, parenting
-
-Stored = Callable[[dict[str, Any]], object]
-
-
-@pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return Settings(data=tmp_path, database_url=None)
-
-
-@pytest.fixture
-def db(settings: Settings) -> Iterator[Database]:
-    database = connect(settings)
-    upgrade(database)
-    yield database
-    database.close()
-
-
-@pytest.fixture
-def web(settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx2.Client]:
-    """The application in this process, which the command takes for the server at its URL."""
-    with TestClient(create_app(settings, db), base_url="http://localhost") as caller:
-        monkeypatch.setattr("commands.answer.Client", lambda url: Client(url, caller))
-        monkeypatch.setattr("commands.client.Client.close", lambda self: None)
-        yield caller
 
 
 @pytest.fixture
@@ -72,18 +37,6 @@ def raising(settings: Settings, db: Database, web: httpx2.Client) -> Iterator[No
 
 def answer(*arguments: str, run: int = 1) -> Result:
     return CliRunner().invoke(app, ["answer", "--run", str(run), *arguments])
-
-
-def begin(db: Database, world: str = "unsafe-exploration", **fields: Any) -> int:
-    config = {"max_open_preferences": 0, **fields.pop("config", {})}
-    return start(db, NewRun(world=world, config=config, **fields)).id
-
-
-def asked(db: Database, run: int, *ticks: int, kind: str = "guidance") -> list[int]:
-    """Questions without an agent behind them."""
-    (mine,) = runs.claim(db, "test", -1)
-    assert mine.run_id == run
-    return [post_query(db, mine, tick, kind, 1, CLIPS) for tick in ticks]
 
 
 # How it ends
@@ -165,43 +118,6 @@ def _interrupt(*_: object) -> str:
     raise KeyboardInterrupt
 
 
-# No acceptable action
-
-
-class Never(Judge):
-    """A parent to whom no move is acceptable."""
-
-    def choice(self, question: dict[str, Any]) -> str:
-        return "neither" if question["kind"] == "guidance" else "either"
-
-
-def script(
-    web: httpx2.Client, judge: Judge, stored: Stored = lambda receipt: None, **order: Any
-) -> Answering:
-    """The command's own work, before run 1."""
-    return Answering(Client("http://localhost", web), Order(1, **order), judge, stored)
-
-
-def test_episodes_are_ended_once_each(db: Database, web: httpx2.Client) -> None:
-    run = begin(db)
-    (mine,) = runs.claim(db, "test", -1)
-    life = Life(db, mine, runs.get_run(db, run), lambda: None)
-    work = script(web, Never(), end_episodes=True)
-    stuck = 0
-    while stuck < 3:
-        seen = watch(db, [run])[run]
-        if life.ready(seen):
-            life.beat(seen)
-        else:
-            stuck += bool(life.saved.state.stuck)
-            life.wait(seen)
-            work.answer_one()
-        assert work._look() is None
-        assert work._look() is None
-    assert work.told.episodes == len(record.list_events(db, run)) == 3
-    assert work.told.choices["neither"] == work.told.answered
-
-
 def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Client) -> None:
     begin(db)
     (mine,) = runs.claim(db, "test", -1)
@@ -213,64 +129,6 @@ def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Clie
     found = json.loads(answer("--end-episodes", "--patience", "1", "--json").stdout)
     assert (found["episodes_ended"], found["ended"]) == (1, "silent")
     assert [event.kind for event in record.list_events(db, 1)] == ["end_episode"]
-
-
-# Others, and lost replies
-
-
-class Lossy(httpx2.Client):
-    """Of three requests one never arrives; of three replies one is lost, though the server did as asked."""
-
-    def __init__(self, web: httpx2.Client) -> None:
-        super().__init__()
-        self.web, self.dice = web, random.Random(3)
-
-    def request(self, *arguments: Any, **more: Any) -> httpx2.Response:
-        if self.dice.random() < 1 / 3:
-            raise httpx2.ConnectError("refused")
-        reply = self.web.request(*arguments, **more)
-        if self.dice.random() < 1 / 3:
-            raise httpx2.ReadError("cut off")
-        return reply
-
-
-def test_a_lost_reply_is_not_answered_twice(db: Database, web: httpx2.Client) -> None:
-    run = begin(db)
-    queries = asked(db, run, *range(1, 9), kind="preference")
-    receipts: list[dict[str, Any]] = []
-    assert script(Lossy(web), Never(), receipts.append, limit=8).work().kind == "limit"
-    assert [row.answer.query_id for row in every(db, run)] == queries  # the oldest first, each once
-    assert [receipt["number"] for receipt in receipts] == list(range(1, 9))
-
-
-def test_what_somebody_else_has_answered_is_let_go(db: Database, web: httpx2.Client) -> None:
-    run = begin(db)
-    first, second = asked(db, run, 1, 2, kind="preference")
-
-    class Slow(Never):
-        def choice(self, question: dict[str, Any]) -> str:
-            if question["id"] == first:
-                queue.answer(db, first, "left", "somebody", "human")
-            return super().choice(question)
-
-    work = script(web, Slow(), limit=1)
-    assert work.work().kind == "limit"
-    assert (work.told.unneeded, work.told.answered) == (1, 1)
-    assert [(row.answer.query_id, row.answer.client_id) for row in every(db, run)] == [
-        (first, "somebody"),
-        (second, "scripted"),
-    ]
-
-
-def test_a_server_that_stays_away_is_given_up() -> None:
-    with httpx2.Client() as nobody:
-        work = Answering(
-            Client(f"http://127.0.0.1:{free_port()}", nobody), Order(1, patience=0.2), Never(), print
-        )
-        ending = work.work()
-    assert ending.kind == "silent"
-    assert ending.sentence.startswith("No server answers at http://127.0.0.1:")
-    assert ending.sentence.endswith("Nothing was asked for 0.2 s.")
 
 
 # What is wrong

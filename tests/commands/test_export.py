@@ -12,34 +12,26 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from commands.main import app
-from server.db import Database, connect
+from server.db import Database
 from server.export import lines
 from server.mailbox import post_query
 from server.queue import answer, correct
 from server.runs import claim
-from server.schema import upgrade
-from server.settings import Settings
 from server.starting import NewRun, start
 from tests.server.conftest import CLIPS
 from tests.server.serving import parenting
 
 
-@pytest.fixture
-def db(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Database]:
-    """The command's database: a run with three answers, one of them corrected, and a run without any."""
-    monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "data"))
-    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
-    database = connect(Settings(data=tmp_path / "data", database_url=None))
-    upgrade(database)
+@pytest.fixture(autouse=True)
+def answered(db: Database) -> None:
+    """A run with three answers, one of them corrected, and a run without any."""
     for _ in range(2):
-        start(database, NewRun(world="unsafe-exploration"))
-    mine, _ = claim(database, "test")
+        start(db, NewRun(world="unsafe-exploration"))
+    mine, _ = claim(db, "test")
     for tick in (1, 2, 3):
-        query = post_query(database, mine, tick, "guidance", 1, CLIPS)
-        answer(database, query, "left", "me", "human")
-    correct(database, query, "right", "me", "human")
-    yield database
-    database.close()
+        query = post_query(db, mine, tick, "guidance", 1, CLIPS)
+        answer(db, query, "left", "me", "human")
+    correct(db, query, "right", "me", "human")
 
 
 def export(*arguments: str) -> Result:
@@ -103,22 +95,24 @@ def test_what_is_wrong_is_said_in_a_sentence(db: Database, tmp_path: Path) -> No
     assert export("1", "-o", str(tmp_path), "--force").exit_code == 2
 
 
-def test_no_database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("command", [["export", "1"], ["replay", "1"], ["runs"]])
+def test_no_database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]) -> None:
     """It makes none either: a wrong folder is nothing to fill."""
     monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "nowhere"))
-    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
-    said = export("1")
-    assert said.exit_code == 2
+    said = CliRunner().invoke(app, command)
+    assert (said.exit_code, said.stdout) == (2, "")
     assert said.stderr.startswith(f"There is no database at {tmp_path / 'nowhere' / 'parenting.db'}.")
-    assert list(tmp_path.iterdir()) == []
+    assert not (tmp_path / "nowhere").exists()
 
 
-def test_a_database_without_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("command", [["export", "1"], ["replay", "1"], ["runs"]])
+def test_a_database_without_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
+) -> None:
     monkeypatch.setenv("PARENTING_DATA", str(tmp_path))
-    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
     (tmp_path / "parenting.db").touch()
-    said = export("1")
-    assert said.exit_code == 2
+    said = CliRunner().invoke(app, command)
+    assert (said.exit_code, said.stdout) == (2, "")
     assert said.stderr.endswith("has no tables yet. Run: parenting migrate\n")
 
 

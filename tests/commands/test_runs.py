@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -12,25 +10,13 @@ from typer.testing import CliRunner
 from commands.main import app
 from commands.runs import COLUMNS
 from server import runs
-from server.db import Database, connect
+from server.db import Database
 from server.mailbox import post_query
 from server.queue import answer
 from server.runs import Claim
-from server.schema import upgrade
-from server.settings import Settings
 from server.shapes import shape_run
 from server.starting import NewRun, start
 from tests.server.conftest import CLIPS
-
-
-@pytest.fixture
-def db(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Database]:
-    monkeypatch.setenv("PARENTING_DATA", str(tmp_path))
-    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
-    database = connect(Settings(data=tmp_path, database_url=None))
-    upgrade(database)
-    yield database
-    database.close()
 
 
 @pytest.fixture
@@ -105,11 +91,3 @@ def test_no_worker(db: Database) -> None:
 def test_as_json_it_is_what_the_api_says(db: Database, mine: Claim) -> None:
     (text,) = listed("--json")
     assert json.loads(text) == [shape_run(db, 1).model_dump(mode="json")]
-
-
-def test_no_database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "nowhere"))
-    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
-    said = CliRunner().invoke(app, ["runs"])
-    assert (said.exit_code, said.stdout) == (2, "")
-    assert said.stderr.startswith("There is no database at ")

@@ -1,0 +1,41 @@
+"""The database of the commands, and the application in this process, which they take for the server."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+
+from commands.client import Client
+from server.app import create_app
+from server.db import Database, connect
+from server.schema import upgrade
+from server.settings import Settings
+
+
+@pytest.fixture
+def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Settings:
+    """Those that the commands find, too."""
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "data"))
+    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
+    return Settings(data=tmp_path / "data", database_url=None)
+
+
+@pytest.fixture
+def db(settings: Settings) -> Iterator[Database]:
+    database = connect(settings)
+    upgrade(database)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def web(settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx2.Client]:
+    """The application in this process, which the command takes for the server at its URL."""
+    with TestClient(create_app(settings, db), base_url="http://localhost") as caller:
+        monkeypatch.setattr("commands.answer.Client", lambda url: Client(url, caller))
+        monkeypatch.setattr("commands.client.Client.close", lambda self: None)
+        yield caller

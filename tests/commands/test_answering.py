@@ -1,0 +1,111 @@
+"""A script before a run: stuck episodes are ended once each, and no lost reply makes it answer twice."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from typing import Any
+
+import httpx2
+
+from commands.answering import Answering, Order
+from commands.client import Client
+from commands.judge import Judge
+from server import queue, record, runs
+from server.db import Database
+from server.history import every
+from server.life import Life
+from server.mailbox import watch
+from tests.commands.asking import asked, begin
+from tests.server.serving import free_port
+
+Stored = Callable[[dict[str, Any]], object]
+
+
+class Never(Judge):
+    """A parent to whom no move is acceptable."""
+
+    def choice(self, question: dict[str, Any]) -> str:
+        return "neither" if question["kind"] == "guidance" else "either"
+
+
+def script(
+    web: httpx2.Client, judge: Judge, stored: Stored = lambda receipt: None, **order: Any
+) -> Answering:
+    """The command's own work, before run 1."""
+    return Answering(Client("http://localhost", web), Order(1, **order), judge, stored)
+
+
+def test_episodes_are_ended_once_each(db: Database, web: httpx2.Client) -> None:
+    run = begin(db)
+    (mine,) = runs.claim(db, "test", -1)
+    life = Life(db, mine, runs.get_run(db, run), lambda: None)
+    work = script(web, Never(), end_episodes=True)
+    stuck = 0
+    while stuck < 3:
+        seen = watch(db, [run])[run]
+        if life.ready(seen):
+            life.beat(seen)
+        else:
+            stuck += bool(life.saved.state.stuck)
+            life.wait(seen)
+            work.answer_one()
+        assert work._look() is None
+        assert work._look() is None
+    assert work.told.episodes == len(record.list_events(db, run)) == 3
+    assert work.told.choices["neither"] == work.told.answered
+
+
+class Lossy(httpx2.Client):
+    """Of three requests one never arrives; of three replies one is lost, though the server did as asked."""
+
+    def __init__(self, web: httpx2.Client) -> None:
+        super().__init__()
+        self.web, self.dice = web, random.Random(3)
+
+    def request(self, *arguments: Any, **more: Any) -> httpx2.Response:
+        if self.dice.random() < 1 / 3:
+            raise httpx2.ConnectError("refused")
+        reply = self.web.request(*arguments, **more)
+        if self.dice.random() < 1 / 3:
+            raise httpx2.ReadError("cut off")
+        return reply
+
+
+def test_a_lost_reply_is_not_answered_twice(db: Database, web: httpx2.Client) -> None:
+    run = begin(db)
+    queries = asked(db, run, *range(1, 9), kind="preference")
+    receipts: list[dict[str, Any]] = []
+    assert script(Lossy(web), Never(), receipts.append, limit=8).work().kind == "limit"
+    assert [row.answer.query_id for row in every(db, run)] == queries  # the oldest first, each once
+    assert [receipt["number"] for receipt in receipts] == list(range(1, 9))
+
+
+def test_what_somebody_else_has_answered_is_let_go(db: Database, web: httpx2.Client) -> None:
+    run = begin(db)
+    first, second = asked(db, run, 1, 2, kind="preference")
+
+    class Slow(Never):
+        def choice(self, question: dict[str, Any]) -> str:
+            if question["id"] == first:
+                queue.answer(db, first, "left", "somebody", "human")
+            return super().choice(question)
+
+    work = script(web, Slow(), limit=1)
+    assert work.work().kind == "limit"
+    assert (work.told.unneeded, work.told.answered) == (1, 1)
+    assert [(row.answer.query_id, row.answer.client_id) for row in every(db, run)] == [
+        (first, "somebody"),
+        (second, "scripted"),
+    ]
+
+
+def test_a_server_that_stays_away_is_given_up() -> None:
+    with httpx2.Client() as nobody:
+        work = Answering(
+            Client(f"http://127.0.0.1:{free_port()}", nobody), Order(1, patience=0.2), Never(), print
+        )
+        ending = work.work()
+    assert ending.kind == "silent"
+    assert ending.sentence.startswith("No server answers at http://127.0.0.1:")
+    assert ending.sentence.endswith("Nothing was asked for 0.2 s.")
