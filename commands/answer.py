@@ -33,7 +33,7 @@ def answer(
         ),
     ] = None,
     patience: Annotated[
-        float, typer.Option(min=1, help="Give up after so many seconds without a question.")
+        float, typer.Option(min=0.1, help="Give up after so many seconds without a question.")
     ] = 60,
     end_episodes: Annotated[
         bool, typer.Option("--end-episodes", help="Where no action is acceptable, end the episode.")

@@ -93,17 +93,19 @@ def test_a_run_that_is_over(db: Database, web: httpx2.Client) -> None:
 
 def test_patience_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.Client) -> None:
     begin(db)
-    said = answer("--patience", "1")
+    said = answer("--patience", "0.3")
     assert said.exit_code == 1
-    assert "No worker raises run 1. Start one: parenting worker. Nothing was asked for 1 s.\n" in said.stdout
+    assert (
+        "No worker raises run 1. Start one: parenting worker. Nothing was asked for 0.3 s.\n" in said.stdout
+    )
     runs.set_status(db, 1, "paused")
-    assert "Run 1 is paused: resume it on its page." in answer("--patience", "1").stdout
+    assert "Run 1 is paused: resume it on its page." in answer("--patience", "0.3").stdout
     runs.set_status(db, 1, "active")
     (query,) = asked(db, 1, 1)
     queue.lease(db, 1, "somebody")
-    assert "Somebody else holds the questions of run 1." in answer("--patience", "1").stdout
+    assert "Somebody else holds the questions of run 1." in answer("--patience", "0.3").stdout
     queue.answer(db, query, "left", "somebody", "human")
-    assert "The agent of run 1 explores, at tick 0." in answer("--patience", "1").stdout
+    assert "The agent of run 1 explores, at tick 0." in answer("--patience", "0.3").stdout
 
 
 def test_ctrl_c(db: Database, web: httpx2.Client, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,7 +128,7 @@ def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Clie
     assert said.exit_code == 1
     assert "No action was acceptable at tick 7, so the agent stands still. End the episode on " in said.stdout
     assert not record.list_events(db, 1)
-    found = json.loads(answer("--end-episodes", "--patience", "1", "--json").stdout)
+    found = json.loads(answer("--end-episodes", "--patience", "0.3", "--json").stdout)
     assert (found["episodes_ended"], found["ended"]) == (1, "silent")
     assert [event.kind for event in record.list_events(db, 1)] == ["end_episode"]
 

@@ -25,7 +25,6 @@ from server.db import Database, connect
 from server.schema import upgrade
 from server.settings import Settings
 from tests.server.raised_by_hand import TICKS, raise_by_hand
-from tests.server.serving import parenting
 from tests.tree import ROOT
 
 
@@ -201,13 +200,6 @@ def test_ctrl_c_ends_it_cleanly(data: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("server.replay.birth", interrupt)
     said = replay()
     assert (said.exit_code, said.stdout, said.stderr) == (130, "", "Stopped.\n")
-
-
-def test_as_a_process(data: Path) -> None:
-    with parenting("replay", "1", data=data) as child:
-        out, said = child.communicate(timeout=60)
-    assert (child.returncode, said) == (0, "")
-    assert out.endswith("re-lived. Equal bit for bit.\n")
 
 
 def test_a_bar_on_the_terminal_and_ctrl_c(data: Path) -> None:

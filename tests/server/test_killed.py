@@ -66,9 +66,11 @@ class House:
             one = self.commands.get(name)
             if one is not None and one.alive:
                 continue
-            if one is not None and one.process.exitcode == 0 and order[0] == "answer":
+            code = None if one is None else one.process.exitcode
+            assert one is None or code != 1, f"{name} gave up: {one.said()}"
+            if code == 0 and order[0] == "answer":
                 del self.orders[name]
-            else:
+            else:  # killed, or a script that found no server, or a server that found its port taken
                 self.commands[name] = Command(*order, data=self.data, patches=PATCHES)
 
     def kill(self, dice: random.Random) -> None:

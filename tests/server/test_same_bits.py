@@ -14,6 +14,7 @@ import pytest
 from envs import registry
 from server.db import Database
 from server.mailbox import record
+from server.replay import relive
 from server.starting import start
 from tests.server.processes import Command, command
 from tests.server.raising import Begun, Inline, last, same_bits
@@ -83,3 +84,4 @@ def test_raised_through_http(tmp_path: Path, db: Database) -> None:
         assert worker.stop() == 0
     for number, begun in runs.items():
         check(db, number, begun)
+        assert relive(db, number).equal
