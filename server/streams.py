@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
+import time
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from fastapi.sse import ServerSentEvent
 from starlette.concurrency import run_in_threadpool
@@ -26,6 +27,10 @@ from server.wake import Bell
 
 PERIOD = 0.25
 """Seconds between polls, and at least between two events of the same browser, questions excepted."""
+COURTESY = 0.02
+"""Seconds after a ring for which the streams let those go first who wait for a question."""
+
+Found = TypeVar("Found")
 
 ROWS = 10_000
 """Metrics in one event, at most."""
@@ -49,6 +54,7 @@ class Streams:
         self.db, self.bell, self.limit = db, bell, limit
         self.watchers: dict[int, Watcher] = {}
         self.closed = False
+        self._askers = 0
         self._rung = asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -103,9 +109,20 @@ class Streams:
                 rows[-1].tick if len(rows) == ROWS else None
             )  # there may be more: a run that is over stays so
 
-    def next_ring(self) -> asyncio.Event:
-        """Set when the worker rings for the next time: a hint for whoever waits for a question."""
-        return self._rung
+    async def first(self, look: Callable[[], Found | None], seconds: float) -> Found | None:
+        """What a look finds, now or within `seconds`; it looks again at every ring, and now and then."""
+        until = time.monotonic() + seconds
+        self._askers += 1
+        try:
+            while True:
+                rung = self._rung
+                found = await run_in_threadpool(look)
+                left = until - time.monotonic()
+                if found is not None or left <= 0 or self.closed:
+                    return found
+                await _either(rung, min(left, PERIOD))
+        finally:
+            self._askers -= 1
 
     def _join(self, run_id: int) -> Watcher:
         watcher = self.watchers.setdefault(run_id, Watcher())
@@ -132,6 +149,8 @@ class Streams:
                 watcher.run, watcher.question = run, question
                 _tell(watcher)
             await _either(rung, PERIOD)
+            if rung.is_set() and self._askers:
+                await asyncio.sleep(COURTESY)
 
     def _on_ring(self) -> None:
         self.bell.drain()

@@ -7,17 +7,14 @@ a form carries it too, for browsers that keep no cookies.
 
 from __future__ import annotations
 
-import asyncio
 import re
 import secrets
 import time
-from contextlib import suppress
 from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Form, Query, Request, Response
 from pydantic import Field
-from starlette.concurrency import run_in_threadpool
 
 from server import queue, runs
 from server.api.words import Choice, ClientId, RunId
@@ -40,9 +37,6 @@ YEAR = 365 * 24 * 3600
 NAME = re.compile(r"[A-Za-z0-9_-]{8,64}")
 PATIENCE = 0.5
 """Seconds for which a plain form waits for the next question before the page says that the agent explores."""
-
-POLL = 0.25
-"""Seconds between looks at the database while nobody rings."""
 
 ClientField = Annotated[ClientId, Form()]
 ChoiceField = Annotated[Choice, Form()]
@@ -91,15 +85,7 @@ async def question(
     """
     streams: Streams = request.app.state.streams
     take = partial(_markup, db, run_id, client_id, shown, settings.lease_seconds)
-    until = time.monotonic() + wait
-    while True:
-        rung = streams.next_ring()
-        response = await run_in_threadpool(take)
-        left = until - time.monotonic()
-        if response is not None or left <= 0 or streams.closed:
-            return response or Response(status_code=204)
-        with suppress(TimeoutError):
-            await asyncio.wait_for(rung.wait(), min(left, POLL))
+    return await streams.first(take, wait) or Response(status_code=204)
 
 
 @router.post("/runs/{run_id}/parent/next")

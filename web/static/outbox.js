@@ -42,10 +42,9 @@ async function drain(report) {
   }
 }
 
-// Keep an answer and send it.
-export function give(answer, report) {
+// Keep an answer, to be sent.
+export function keep(answer) {
   write([...read().filter(({ query }) => query !== answer.query), answer]);
-  return flush(report);
 }
 
 // Send whatever is kept, oldest first; resolves when nothing is left.

@@ -2,7 +2,7 @@
 // The markup of a question comes from the server (server/pages/board.py says why); this file swaps it in.
 import { left, took } from "./left.js";
 import { follow, stateOf } from "./live.js";
-import { flush, give, kept } from "./outbox.js";
+import { flush, keep, kept } from "./outbox.js";
 import { play } from "./play.js";
 
 const $ = (id) => document.getElementById(id);
@@ -12,6 +12,7 @@ const KEYS = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "either", ArrowD
 const RENEW = 25_000;
 const PATIENCE = 1; // seconds that a request for a question may lie at the server
 const HASTE = 40;   // ms after an answer when the next question is asked for, if the answer's reply is not there before
+const CALM = 20;   // ms after a question is painted when the page turns to what nobody waits for
 const QUIET = 350; // an answered question stays this long before the page says that the agent explores
 
 let current = null;    // the form on the stage, until it is answered
@@ -59,6 +60,7 @@ function parse(markup) {
 
 // The next question is parsed while nobody waits for it.
 async function prefetch() {
+  if (!current) return;
   const mine = ++prefetches, form = current;
   try {
     const markup = await ask([form.dataset.query]);
@@ -90,7 +92,15 @@ function show(form) {
   player = play(form);
   if (focused) form.querySelector(`.answers [value=${focused}]`).focus();
   performance.mark("question", { detail: form.dataset.query });
-  prefetch();
+  painted(prefetch);
+}
+
+// Do something once the stage is painted: until then the page, and the server on the same machine, have nothing else to do.
+function painted(then) {
+  let timer = 0;
+  const once = () => { clearTimeout(timer); then?.(); then = null; };
+  requestAnimationFrame(() => setTimeout(once, CALM));
+  timer = setTimeout(once, 5 * CALM); // a hidden page is never painted
 }
 
 // ---- waiting
@@ -160,10 +170,13 @@ function answer(choice) {
   $("alert").textContent = "";
   performance.mark("answer", { detail: String(query) });
   took();
-  const sent = give({ query, choice, client_id: client }, report);
-  if (ahead) return show(ahead);
+  keep({ query, choice, client_id: client });
+  if (ahead) {
+    painted(() => flush(report));
+    return show(ahead);
+  }
   player.still();
-  Promise.race([sent, new Promise((done) => { setTimeout(done, HASTE); })]).then(() => { if (!current) next(PATIENCE); });
+  Promise.race([flush(report), new Promise((done) => { setTimeout(done, HASTE); })]).then(() => { if (!current) next(PATIENCE); });
   wait(state === "question" ? "exploring" : state);
 }
 
@@ -208,6 +221,7 @@ $("help-open").addEventListener("click", () => help.showModal());
 
 // ---- begin: send what an earlier visit left behind, then follow the run
 
+addEventListener("pagehide", () => flush(report));
 history.replaceState(null, "", `/runs/${run}/parent`);
 const first = stage.querySelector("#question");
 if (first && !kept().includes(Number(first.dataset.query))) show(first);
