@@ -103,6 +103,8 @@ def _first_look(client: Client, run: int) -> dict[str, Any]:
     except Away as error:
         raise Wrong(f"--url: {error} Start one with parenting up, or name another.") from None
     except Refused as error:
+        if error.status != 404:
+            raise Wrong(f"--url: {error}") from None
         raise Wrong(f"--run: {error} On the server's machine parenting runs lists them.") from None
     if found["parent"] == "scripted":
         raise Wrong(

@@ -150,6 +150,13 @@ def test_wrong_runs(db: Database, web: httpx2.Client) -> None:
     assert said.stderr.startswith("--until: no policy counts as optimal in reward-hacking")
 
 
+def test_a_name_that_the_server_does_not_go_by(db: Database, web: httpx2.Client) -> None:
+    begin(db)
+    said = answer("--url", "http://elsewhere.example")
+    assert said.exit_code == 2
+    assert said.stderr == "--url: This server is called localhost or 127.0.0.1, and by no other name.\n"
+
+
 def test_wrong_names_and_files(db: Database, web: httpx2.Client, tmp_path: Path) -> None:
     begin(db)
     said = answer("--client-id", "a b")
