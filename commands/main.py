@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 COMMANDS = {
     "up": "Start everything: migrate, web and worker; opens the pages in a browser.",
     "run": "Raise agents by a scripted parent, without database.",
+    "experiment": "Run the paper's experiments: its numbers beside ours.",
     "pretrain": "Pre-train weights on random mazes.",
     "worlds": "List the worlds and their levels; print random ones; draw pictures.",
     "answer": "Answer a run as the scripted parent, over the HTTP API.",
