@@ -23,13 +23,14 @@ def answer(
     run: Annotated[int, typer.Option(min=1, help="The run's number; `parenting runs` lists them.")],
     url: Annotated[str, typer.Option(help="Where the server is.")] = "http://localhost:8765",
     limit: Annotated[
-        int | None, typer.Option(min=1, help="End after so many answers. [default: all that are asked for]")
+        int | None,
+        typer.Option(min=1, help="End after so many answers.", show_default="all that are asked for"),
     ] = None,
     until: Annotated[
         Until | None,
         typer.Option(
-            help="End once the agent's argmax policy is optimal, or only when the run is over. "
-            "[default: optimal; over with --limit, and in reward-hacking]"
+            help="End once the agent's argmax policy is optimal, or only when the run is over.",
+            show_default="optimal; over with --limit, and in reward-hacking",
         ),
     ] = None,
     patience: Annotated[

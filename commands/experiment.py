@@ -33,7 +33,7 @@ def experiment(
         int | None, typer.Option(min=1, help="Trials, in place of the scale's. More go on from fewer.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**53 - 1)] = 0,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes. [default: one a core]")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="one a core")] = None,
     cluster: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://127.0.0.1:8786.")
     ] = None,

@@ -22,7 +22,9 @@ def export(
     run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="Write to this file. [default: standard output]"),
+        typer.Option(
+            "--out", "-o", metavar="FILE", help="Write to this file.", show_default="standard output"
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace the file if there is one.")] = False,
 ) -> None:

@@ -38,7 +38,7 @@ def pretrain(
     seed: Annotated[int, typer.Option(min=0, max=2**53 - 1, help="Weights and episodes follow from it.")] = 0,
     max_steps: Annotated[int, typer.Option(min=1, help="Steps after which it gives up for now.")] = 50_000,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the files. [default: `weights` in the data folder]")
+        Path | None, typer.Option(help="Folder for the files.", show_default="weights in the data folder")
     ] = None,
     again: Annotated[bool, typer.Option("--again", help="Make weights that are there already anew.")] = False,
     as_json: Annotated[

@@ -45,10 +45,11 @@ def run(
         str | None,
         typer.Option(
             metavar="optimal|queries:N|ticks:N",
-            help="When a trial is finished. [default: optimal; queries:1000 in reward-hacking]",
+            help="When a trial is finished.",
+            show_default="optimal; queries:1000 in reward-hacking",
         ),
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes. [default: one a core]")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="one a core")] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
     ] = False,

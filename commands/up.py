@@ -37,7 +37,7 @@ Children = Mapping[str, subprocess.Popen[bytes]]
 
 def up(
     port: Annotated[
-        int | None, typer.Option(help="Port of the pages; 0 takes a free one. [default: 8765]")
+        int | None, typer.Option(help="Port of the pages; 0 takes a free one.", show_default="8765")
     ] = None,
     browser: Annotated[bool, typer.Option(help="Open the pages in a browser.")] = True,
 ) -> None:

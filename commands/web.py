@@ -11,7 +11,7 @@ from commands.lifeline import follow
 from commands.said import plainly, settings
 from server.serve import bind, make_server
 
-Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a free one. [default: 8765]")]
+Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a free one.", show_default="8765")]
 
 
 def web(

@@ -25,6 +25,13 @@ def test_each_command_shows_an_example(name: str) -> None:
     assert f"parenting {name}" in result.output.partition("Example")[2]
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_stands_in_brackets_is_shown(name: str) -> None:
+    """Brackets in a help text are markup to rich, and vanish: `show_default` names a default in words."""
+    source = (ROOT / "commands" / f"{name}.py").read_text(encoding="utf-8")
+    assert "[default:" not in source
+
+
 @pytest.mark.parametrize("name", ["answer", "runs", "export", "replay"])
 def test_exit_codes_are_in_its_help(name: str) -> None:
     assert "Exit codes: 0" in run(app, [name, "--help"]).output
