@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import socket
 from types import FrameType
 
@@ -72,4 +73,5 @@ def make_server(settings: Settings) -> Server:
         timeout_keep_alive=30,
         server_header=False,
     )
+    gc.freeze()  # what is loaded stays: to look through it for garbage would take a tenth of a second
     return Server(config)

@@ -5,6 +5,7 @@ It sleeps on a bell that the web rings after an answer; the bell is a hint, a po
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import socket
@@ -170,6 +171,7 @@ def main(settings: Settings) -> int:
     db = connect(settings)
     require(db)
     worker = Worker(db, settings)
+    gc.freeze()  # what is loaded stays: to look through it for garbage would take a tenth of a second
     signal.signal(signal.SIGTERM, worker.stop)
     signal.signal(signal.SIGINT, worker.stop)
     worker.work()

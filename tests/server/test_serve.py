@@ -1,11 +1,14 @@
 """Where the server listens: on this machine only, and in a container on that container's own network."""
 
+import gc
 import socket
 
 import pytest
 
+from server.db import Database
 from server.errors import SetupError
-from server.serve import bind
+from server.serve import bind, make_server
+from server.settings import Settings
 
 ELSEWHERE = ["0.0.0.0", "192.168.1.2", "::", "localhost", ""]
 
@@ -56,3 +59,10 @@ def test_in_a_container_it_may_listen_on_its_whole_network() -> None:
 def test_a_container_changes_nothing_for_any_other_address(host: str) -> None:
     with pytest.raises(SetupError, match="would let others in"):
         bind(host, 0, container=True)
+
+
+def test_what_is_loaded_is_not_searched_for_garbage(db: Database, settings: Settings) -> None:
+    make_server(settings)
+    frozen = gc.get_freeze_count()
+    gc.unfreeze()
+    assert frozen > 10_000
