@@ -39,7 +39,8 @@ def begin(db: Database) -> dict[int, Begun]:
 
 def answering(url: str, run: int, *more: str) -> tuple[str, ...]:
     """The command line of a script for one run."""
-    return ("answer", "--url", url, "--run", str(run), "--until", "over", "--json", *more)
+    patient = ("--until", "over", "--patience", "150")
+    return ("answer", "--url", url, "--run", str(run), *patient, "--json", *more)
 
 
 def until_heard(db: Database, runs: dict[int, Begun], seconds: float = 60) -> None:
