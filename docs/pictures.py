@@ -2,41 +2,65 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import sys
 import tempfile
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tests.by_hand import answer, chromium, distances, start, up
+from tests.by_hand import answer, chromium, create, distances, start, tell, up
 
 FOLDER = Path(__file__).parent / "pictures"
-DESKTOP, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
-ANSWERS = 25
+SCREENS = {"desktop": (1280, 800), "phone": (390, 844)}
+TALL = {"desktop": (1280, 1400), "phone": (390, 1400)}
+ANSWERS, GOAL = 25, 50
+COLOURS = 256
+"""A picture of a page needs no more, and is a third as large."""
+
+GARDEN = {"stages": 3, "mature_every": 15, "time_limit": 10}
+"""A life in stages that is over within a minute or two."""
 
 
-def shoot(browser: Browser, url: str, path: str, name: str, wait: str, folder: Path) -> None:
-    """One page on a desktop and on a phone, light and dark."""
-    for device, size in (("desktop", DESKTOP), ("phone", PHONE)):
+def shoot(page: Page, name: str, folder: Path, sizes: dict[str, tuple[int, int]] = SCREENS) -> None:
+    """What a page shows, on a desktop and on a phone, light and dark."""
+    for device, (width, height) in sizes.items():
+        page.set_viewport_size({"width": width, "height": height})
         for scheme in ("light", "dark"):
-            page = browser.new_page(viewport=size, color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]
-            page.goto(url + path)
-            page.wait_for_selector(wait)
-            page.wait_for_timeout(700)
-            page.screenshot(path=folder / f"{name}-{device}-{scheme}.png", full_page=name != "parent")
-            page.close()
+            page.emulate_media(color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]
+            page.wait_for_timeout(1500)
+            drawn = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+            few = drawn.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+            few.save(folder / f"{name}-{device}-{scheme}.png", optimize=True)
 
 
-def raise_a_little(page: Page, url: str) -> None:
-    """Answer so many questions that the dashboard has something to show."""
-    start(page, url, seed=3)
+def raised(browser: Browser, url: str) -> Page:
+    """A parent's page after so many answers that dashboard and history have something to show."""
+    page = browser.new_context(reduced_motion="reduce").new_page()
+    start(page, url, seed=3, goal=GOAL)
     to_goal = distances()
     for _ in range(ANSWERS):
         answer(page, to_goal)
+    page.wait_for_selector("#question")
+    return page
+
+
+def compared(browser: Browser, url: str) -> Page:
+    """A parent's page that asks about two clips of three steps."""
+    run = create(url, world="unsafe-exploration", preset="direct", config={"stages": 3}, seed=7)
+    for _ in range(2):
+        tell(url, run, "mature")
+    page = browser.new_page(reduced_motion="reduce")
+    page.goto(f"{url}/runs/{run}/parent")
+    steps = "[...document.querySelectorAll('#question .board')].map(b => b.dataset.actions.split(' ').length)"
+    while page.wait_for_selector("#question") and page.evaluate(steps) != [3, 3]:
+        answer(page, distances())
+    return page
 
 
 def main(folder: Path) -> None:
@@ -44,30 +68,31 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     path = os.environ.get("PARENTING_CHROMIUM") or shutil.which("chromium") or "chromium"
     with tempfile.TemporaryDirectory() as data, up(Path(data)) as url, chromium(path) as browser:
-        page = browser.new_page(viewport=DESKTOP)  # type: ignore[arg-type]
-        raise_a_little(page, url)
-        page.close()
-        shoot(browser, url, "/runs/1", "dashboard", ".js-plotly-plot", folder)
-        shoot(browser, url, "/", "runs", "main", folder)
-        start(fresh := browser.new_page(viewport=DESKTOP), url, seed=4)  # type: ignore[arg-type]
-        fresh.wait_for_selector("#question")
-        fresh.close()
-        shoot_parent(browser, url, folder)
-
-
-def shoot_parent(browser: Browser, url: str, folder: Path) -> None:
-    """The parent's page with a question: a run for each picture, since a question goes to one browser."""
-    for number, (device, size) in enumerate((("desktop", DESKTOP), ("phone", PHONE))):
-        for scheme in ("light", "dark"):
-            page = browser.new_page(viewport=size, color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]
-            start(page, url, seed=20 + number)
-            to_goal = distances()
-            for _ in range(6):
-                answer(page, to_goal)
-            page.wait_for_selector("#question")
-            page.wait_for_timeout(700)
-            page.screenshot(path=folder / f"parent-{device}-{scheme}.png")
-            page.close()
+        garden = create(
+            url,
+            world="reward-hacking",
+            level="garden-mirrored",
+            parent="scripted",
+            config=GARDEN,
+            goal=45,
+            pace=4,
+        )
+        parent = raised(browser, url)
+        shoot(parent, "parent", folder)
+        shoot(compared(browser, url), "preference", folder)
+        page = browser.new_page(reduced_motion="reduce")
+        page.goto(f"{url}/runs/{garden}")
+        page.wait_for_selector("main[data-state=resting]", timeout=600_000)
+        page.wait_for_selector(".js-plotly-plot")
+        shoot(page, "dashboard", folder, TALL)
+        page = parent.context.new_page()  # of the browser that has answered
+        for name, address in (("history", "/runs/2/history"), ("runs", "/"), ("docs", "/docs")):
+            page.goto(url + address)
+            shoot(page, name, folder)
+        tell(url, 2, "goal", goal=ANSWERS)
+        parent.reload()
+        parent.wait_for_selector("main[data-state=resting]")
+        shoot(parent, "resting", folder)
 
 
 if __name__ == "__main__":

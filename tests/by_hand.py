@@ -11,7 +11,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import httpx2
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from envs import registry
@@ -56,10 +58,21 @@ def chromium(path: str) -> Iterator[Browser]:
         browser.close()
 
 
-def start(page: Page, url: str, seed: int = 3) -> None:
+def create(url: str, **new: Any) -> int:
+    """A new run, by the API: its id."""
+    return int(httpx2.post(f"{url}/api/v1/runs", json=new).raise_for_status().json()["id"])
+
+
+def tell(url: str, run: int, verb: str, **body: Any) -> None:
+    """One of the operator's verbs, by the API."""
+    httpx2.post(f"{url}/api/v1/runs/{run}/{verb}", json=body or None).raise_for_status()
+
+
+def start(page: Page, url: str, seed: int = 3, goal: int | None = None) -> None:
     """Fill in the form on the first page, as a person does, and begin."""
     page.goto(url)
     page.fill("input[name=seed]", str(seed))
+    page.fill("input[name=goal]", "" if goal is None else str(goal))
     page.click("main form button[type=submit], main form button.primary")
     page.wait_for_selector("#main[data-run]")
 

@@ -121,7 +121,7 @@ def test_a_preset_of_the_pace_shows_that_it_holds(client: httpx2.Client, mine: C
     assert held() == ["5"]
     client.post("/runs/1/pace", data={"pace": "0.2"})
     assert held() == []
-    assert "at most 0.2" in client.get("/runs/1").text
+    assert "<small>of 0.2</small>" in client.get("/runs/1").text
 
 
 def test_the_last_stage_cannot_be_ended(client: httpx2.Client, db: Database, mine: Claim) -> None:

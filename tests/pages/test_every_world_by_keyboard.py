@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from envs import registry
-from tests.by_hand import until, up
+from tests.by_hand import create, until, up
 from tests.pages.watched import Watched
 
 QUESTIONS = 30
@@ -50,9 +50,7 @@ def answer(page: Page, number: int) -> str:
 
 def raised(watched: Watched, world: str, stage: int) -> dict[str, Any]:
     """A run with thirty answers by keyboard: what the API says of it."""
-    api = f"{watched.address}/api/v1/runs"
-    new = {"world": world, "config": STAGES[stage], "goal": QUESTIONS, "seed": 5}
-    run = httpx2.post(api, json=new).raise_for_status().json()["id"]
+    run = create(watched.address, world=world, config=STAGES[stage], goal=QUESTIONS, seed=5)
     dashboard = watched.open(f"/runs/{run}")
     page = watched.open(f"/runs/{run}/parent")
     page.set_default_timeout(30_000)
@@ -67,7 +65,7 @@ def raised(watched: Watched, world: str, stage: int) -> dict[str, Any]:
     expect(dashboard.get_by_role("status")).to_contain_text("The goal of 30 questions is reached.")
     expect(dashboard.locator("#now-maturity")).to_have_text(str(stage))
     expect(dashboard.locator(".js-plotly-plot").first).to_be_visible()
-    told: dict[str, Any] = httpx2.get(f"{api}/{run}").json()
+    told: dict[str, Any] = httpx2.get(f"{watched.address}/api/v1/runs/{run}").json()
     page.context.close()
     dashboard.context.close()
     return told

@@ -113,7 +113,7 @@ def test_the_time_that_is_left_of_a_goal(watched: Watched, db: Database, setting
     expect(page.locator("#goal")).to_have_text("of 6")
     for count in range(1, 6):
         expect(page.locator("#question")).to_have_attribute("data-query", str(count))
-        expect(page.locator("#left")).to_have_text("" if count < 5 else ", under a minute")
+        expect(page.locator("#left")).to_have_text("" if count < 5 else "about 1 min")
         page.keyboard.press("ArrowLeft")
         expect(page.locator("#count")).to_have_text(str(count))
     expect(page.locator("#question")).to_have_attribute("data-query", "6")
@@ -130,6 +130,11 @@ def test_it_is_told_from_the_median_of_the_last_answers(watched: Watched, db: Da
     page = watched.open("/")
     page.evaluate("localStorage.setItem('parenting.times', '[100, 3000, 3000, 3500, 90000]')")
     page.goto(f"{watched.address}/runs/1/parent")
-    expect(page.locator(".count")).to_contain_text("0 of 50 answered, about 3 min")
+    expect(page.locator("#goal")).to_have_text("of 50")
+    expect(page.locator("#left")).to_have_text("about 3 min")
+    page.evaluate("document.getElementById('saved').textContent = 'Saved'")
+    for width in (320, 390):
+        page.set_viewport_size({"width": width, "height": 640})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
     words = page.evaluate("import('/static/left.js').then(({ left }) => [5, 50, 5000, 0].map(left))")
-    assert words == [", under a minute", ", about 3 min", ", about 4 h", ""]
+    assert words == ["about 1 min", "about 3 min", "about 4 h", ""]

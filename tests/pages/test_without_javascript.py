@@ -89,7 +89,7 @@ def test_from_start_to_stop(watched: Watched, db: Database, worker: Worker) -> N
     expect(page.locator("#now-maturity")).to_have_text("2")
     expect(page.get_by_role("button", name="Mature now")).to_have_count(0)
     press(page, "5 a second")
-    expect(page.get_by_text("at most 5")).to_be_visible()
+    expect(page.get_by_text("of 5", exact=True)).to_be_visible()
     page.get_by_label("Goal, in answers").fill("20")
     page.locator("form:has(#goal)").get_by_role("button").click()
     expect(page.get_by_text("of 20", exact=True)).to_be_visible()

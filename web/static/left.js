@@ -21,6 +21,5 @@ export function took() {
 export function left(answers) {
   if (times.length < FEW || answers <= 0) return "";
   const seconds = times.toSorted((a, b) => a - b)[times.length >> 1] * answers / 1000;
-  if (seconds < 60) return ", under a minute";
-  return seconds < 5400 ? `, about ${Math.round(seconds / 60)} min` : `, about ${Math.round(seconds / 3600)} h`;
+  return seconds < 5400 ? `about ${Math.max(1, Math.round(seconds / 60))} min` : `about ${Math.round(seconds / 3600)} h`;
 }
