@@ -12,6 +12,7 @@ from playwright.sync_api import Page, expect
 
 from server import queue, record, runs
 from server.db import Database
+from tests.by_hand import until
 from tests.pages import island
 from tests.pages.watched import Watched
 
@@ -160,7 +161,10 @@ def test_the_charts_are_drawn_and_go_on(watched: Watched, db: Database, lives: N
     (mine,) = (claim for claim in runs.claim(db, "another", seconds=-1) if claim.run_id == 1)
     island.measure(db, mine, 55)
     expect(page.locator("#now-tick")).to_have_text("55")
-    page.wait_for_function("document.querySelector('.plot').data[0].x.at(-1) === 55")
+    drawn = "[...document.querySelectorAll('.plot')].every(plot => plot._fullLayout.xaxis.range[1] >= 55)"
+    until(lambda: page.evaluate(drawn), 10, "the charts do not go on")
+    island.measure(db, mine, 56, begin=56)
+    until(lambda: page.evaluate(drawn.replace("55", "56")), 10, "the charts do not go on a second time")
     log = page.get_by_role("button", name="Logarithmic axis for Loss")
     log.click()
     expect(log).to_have_attribute("aria-pressed", "true")

@@ -99,6 +99,10 @@ def test_the_clips_of_an_answer_play_while_it_is_pointed_at(watched: Watched, db
     step = entries.nth(0).get_by_role("button", name="One step on")
     step.click()
     expect(entries.nth(0).locator("output")).to_have_text(re.compile("Step . of 2"))
+    calm = watched.open("/runs/1/history", reduced_motion="reduce")
+    calm.locator(".entry").first.hover()
+    expect(calm.locator(".entry output").first).to_have_text("Step 0 of 2")
+    assert calm.evaluate("document.getAnimations().filter(a => a.playState === 'running').length") == 0
     still = watched.open("/runs/1/history", java_script_enabled=False)
     expect(still.locator("svg.board .trail.of-agent")).to_have_count(4)
     expect(still.get_by_role("button", name="Play")).to_have_count(0)

@@ -64,7 +64,7 @@ function layout(id) {
   const axis = { color: colour("quiet"), gridcolor: colour("line"), zeroline: false, fixedrange: false, automargin: true };
   const many = SERIES[id].length > 1, by = id === "stages";
   return {
-    margin: { l: 8, r: 8, t: many ? 26 : 8, b: 8 }, height: 240, autosize: true, hovermode: "x unified", showlegend: many, uirevision: id,
+    margin: { l: 8, r: 8, t: many ? 26 : 8, b: 8 }, height: 240, autosize: true, hovermode: "x unified", showlegend: many, uirevision: id, datarevision: last, // our arrays grow in place
     paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { family: "system-ui, DejaVu Sans, sans-serif", size: 12, color: colour("quiet") },
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { color: colour("ink") } },
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },

@@ -2,10 +2,11 @@
 import { play } from "./play.js";
 
 const players = new Map();
+const calm = matchMedia("(prefers-reduced-motion: reduce)"); // then nothing moves unless a button says so
 
 function begin(entry) {
   if (!players.has(entry)) players.set(entry, play(entry));
-  players.get(entry).replay();
+  if (!calm.matches) players.get(entry).replay();
 }
 
 function end(entry) {
