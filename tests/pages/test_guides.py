@@ -1,0 +1,31 @@
+"""The guide for researchers cannot rot: every measured number and every key of the export has its line."""
+
+from __future__ import annotations
+
+import re
+
+from server.db import Database
+from server.export import rows
+from server.life import Life
+from server.mailbox import watch
+from server.record import metrics
+from server.runs import claim
+from server.starting import NewRun, start
+from tests.tree import ROOT
+
+GUIDE = (ROOT / "docs/guide-researchers.md").read_text(encoding="utf-8")
+
+
+def names(section: str) -> list[str]:
+    """What begins the lines of the table of a section."""
+    text = GUIDE.partition(f"# {section}\n")[2].partition("\n#")[0]
+    return re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)
+
+
+def test_numbers_and_keys_have_their_lines(db: Database) -> None:
+    run = start(db, NewRun(world="unsafe-exploration", parent="scripted"))
+    life = Life(db, claim(db, "test")[0], run, lambda: None)
+    for _ in range(20):
+        life.beat(watch(db, [run.id])[run.id])
+    assert sorted(names("The numbers")) == sorted(metrics(db, run.id)[-1].values)
+    assert names("The record, exported") == list(next(iter(rows(db, run.id))))
