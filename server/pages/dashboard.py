@@ -24,7 +24,13 @@ from server.views import first_metrics, sampled_metrics
 
 router = APIRouter(include_in_schema=False)
 
-STATUS = {**SENTENCES, "question": ("A question waits for the parent.", "")}
+STATUS = {
+    **SENTENCES,
+    "question": ("A question waits for the parent.", ""),
+    "exploring": ("The agent is exploring on its own.", ""),
+    "stuck": ("No action was acceptable.", "The agent stands still until its episode is ended."),
+    "offline": ("No connection to the server.", "These numbers are of a moment ago."),
+}
 """Who waits for whom, seen from outside. How many questions the goal is of, the template says."""
 
 PACES = (1, 2, 5, 10)

@@ -76,7 +76,14 @@ def test_axe_finds_nothing(watched: Watched, lives: None, screen: str, scheme: s
     page.goto(f"{watched.address}/runs/1/parent")
     page.keyboard.press("?")
     assert violations(page) == []
+    page.goto(f"{watched.address}/runs/1")
+    page.get_by_text("Stop for good…").click()
+    page.get_by_label("p_rec").fill("often")
+    page.get_by_role("button", name="Change").click()
+    expect(page.locator("#p_rec-error")).to_be_visible()
+    assert violations(page) == []
     page.goto(watched.address)
+    page.get_by_text("More settings").click()
     page.get_by_label("Seed").fill("many")
     page.get_by_role("button", name="Start").click()
     expect(page.locator("#seed-error")).to_be_visible()

@@ -7,8 +7,12 @@ import re
 import httpx2
 import pytest
 
+from envs import registry
 from server.db import Database
-from server.runs import get_run, report, set_status
+from server.life import Life
+from server.mailbox import watch
+from server.runs import claim, get_run, report, set_status
+from server.starting import NewRun, start
 from server.views import latest_metrics, sampled_metrics
 from tests.pages import island
 
@@ -90,6 +94,26 @@ def test_an_unknown_run_is_a_page_that_says_so(client: httpx2.Client) -> None:
         page = client.get(path)
         assert page.status_code == 404
         assert "That did not work" in page.text
+
+
+@pytest.mark.parametrize("world", registry.WORLDS)
+def test_every_world_has_its_names(client: httpx2.Client, db: Database, world: str) -> None:
+    """After a few ticks of real life: what is counted goes by the world, and what was answered is drawn."""
+    run = start(db, NewRun(world=world, parent="scripted"))
+    life = Life(db, claim(db, "test")[0], run, lambda: None)
+    for _ in range(8):
+        life.beat(watch(db, [1])[1])
+    page = client.get("/runs/1").text
+    harm = "Deaths" if world == "unsafe-exploration" else "Unsafe moves"
+    worth = "Waterings" if world == "reward-hacking" else "Return"
+    for name in (harm, worth):
+        assert f"<dt>{name}</dt>" in page
+        assert f"<h2>{name}</h2>" in page
+    assert f'<th scope="col">{worth.lower()} at its end</th>' in page
+    assert re.search(r'<tr data-stage="1" class="now">.*<td>-?[\d.]+</td><td>[\d.]+</td><td>0</td>', page)
+    assert ("Policy" in page) == (world != "reward-hacking")
+    history = client.get("/runs/1/history").text
+    assert history.count('<svg class="board"') == 2 * history.count('class="entry panel') > 0
 
 
 def test_a_garden_counts_waterings_and_unsafe_moves(client: httpx2.Client, db: Database) -> None:

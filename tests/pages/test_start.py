@@ -9,7 +9,10 @@ import pytest
 
 from envs.registry import WORLDS
 from server.db import Database
-from server.runs import get_run, list_runs, report
+from server.pages.start import PAGE
+from server.queue import answer
+from server.runs import get_run, let_go, list_runs, report, set_goal, set_status
+from server.starting import NewRun, start
 from tests.pages import island
 
 FORM = {
@@ -134,6 +137,68 @@ def test_a_size_without_weights_is_refused_beside_pre_training(client: httpx2.Cl
     assert '<details class="more" open>' in page.text
     assert not list_runs(db)
     assert client.post("/runs", data={**given, "config.pretrain": "false"}).status_code == 303
+
+
+def test_goal_pace_and_stages(client: httpx2.Client, db: Database) -> None:
+    given = {"goal": "50", "pace": "2.5", "config.stages": "3", "config.mature_every": "20"}
+    assert client.post("/runs", data={**FORM, **given}).status_code == 303
+    run = get_run(db, 1)
+    assert (run.goal, run.pace) == (50, 2.5)
+    assert (run.config["stages"], run.config["mature_every"]) == (3, 20)
+    page = client.get("/").text
+    assert "<dt>Stage</dt><dd>1 <small>of 3</small>" in page
+    assert "<dt>Answered</dt><dd>0 <small>of 50</small>" in page
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("goal", "0"), ("goal", "some"), ("pace", "-1"), ("config.stages", "17"), ("config.mature_every", "x")],
+)
+def test_a_wrong_number_among_the_settings(client: httpx2.Client, field: str, value: str) -> None:
+    page = client.post("/runs", data={**FORM, field: value})
+    assert page.status_code == 422
+    assert page.text.partition(f'id="{field}-error">')[2].partition("</p>")[0]
+    assert f'value="{value}"' in page.text
+    assert ('<details class="more" open>' in page.text) == (field != "goal")
+
+
+def test_hundreds_of_runs_are_listed_page_by_page(client: httpx2.Client, db: Database) -> None:
+    for seed in range(2 * PAGE + 5):
+        set_status(db, start(db, NewRun(world="unsafe-exploration", seed=seed)).id, "stopped")
+    seen, path = [], "/"
+    while path:
+        page = client.get(path).text
+        seen.append([int(number) for number in re.findall(r'<h2><a href="/runs/(\d+)">', page)])
+        older = re.search(r'href="([^"]*)">Older runs', page)
+        path = older[1] if older else ""
+    assert [len(part) for part in seen] == [PAGE, PAGE, 5]
+    assert [number for part in seen for number in part] == list(range(2 * PAGE + 5, 0, -1))
+    assert ">Newest</a>" in page
+    for wrong in ("0", "x", "-1"):
+        assert client.get(f"/?before={wrong}").status_code == 422
+
+
+def test_the_list_says_who_waits_for_whom(client: httpx2.Client, db: Database) -> None:
+    def chips() -> list[str]:
+        return re.findall(r'<span class="chip[^"]*">([^<]*)</span>', client.get("/").text)
+
+    _, mine = island.live(db)
+    assert chips() == ["exploring"]
+    report(db, mine, waiting="stuck")
+    assert chips() == ["no action acceptable"]
+    query = island.ask(db, mine, 1, "guidance", island.guidance("left", "down"))
+    assert chips() == ["a question waits"]
+    set_status(db, 1, "paused")
+    assert chips() == ["paused"]
+    set_status(db, 1, "active")
+    set_goal(db, 1, 1)
+    answer(db, query, "left", "me", "human")
+    assert chips() == ["goal reached"]
+    set_goal(db, 1, None)
+    let_go(db, [mine])
+    assert chips() == ["no worker"]
+    set_status(db, 1, "stopped")
+    assert chips() == ["stopped"]
 
 
 def test_every_world_names_its_glyphs(client: httpx2.Client) -> None:
