@@ -140,16 +140,17 @@ def timed(act: Callable[[], object], times: int) -> list[float]:
     return found
 
 
-def begin(web: httpx2.Client, world: str, preset: str) -> int:
+def begin(web: httpx2.Client, world: str, preset: str, **config: float) -> int:
     """A run that waits for a person: its number."""
-    reply = web.post("/api/v1/runs", json={"world": world, "preset": preset, "seed": SEED})
+    body = {"world": world, "preset": preset, "seed": SEED, "config": config}
+    reply = web.post("/api/v1/runs", json=body)
     reply.raise_for_status()
     return int(reply.json()["id"])
 
 
 def applied(web: httpx2.Client, data: Path, world: str, answers: int) -> Iterator[Line]:
-    """Answer a run over HTTP, and see in its database when each answer is heard, and the next one asked."""
-    run = begin(web, world, "conservative")
+    """Answer guidance over HTTP, and see in the database when each answer is heard, and the next one asked."""
+    run = begin(web, world, "conservative", p_pref=0.0)
     store = sqlite_module().connect(f"file:{data / 'parenting.db'}?mode=ro", uri=True, isolation_level=None)
     draws = random.Random(SEED)
     times = [answer(web, store, run, draws) for _ in range(answers)]
