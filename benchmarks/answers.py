@@ -149,7 +149,7 @@ def begin(web: httpx2.Client, world: str, preset: str, **config: float) -> int:
 
 
 def applied(web: httpx2.Client, data: Path, world: str, answers: int) -> Iterator[Line]:
-    """Answer guidance over HTTP, and see in the database when each answer is heard, and the next one asked."""
+    """Give guidance over HTTP; see in the database when each answer is heard, and the next question asked."""
     run = begin(web, world, "conservative", p_pref=0.0)
     store = sqlite_module().connect(f"file:{data / 'parenting.db'}?mode=ro", uri=True, isolation_level=None)
     draws = random.Random(SEED)
