@@ -98,6 +98,15 @@ def test_a_new_question_appears_by_itself(watched: Watched, db: Database, ask: C
     assert given(db) == [(number, "right")]
 
 
+def test_a_question_that_comes_later_is_fetched_ahead_too(watched: Watched, ask: Callable[..., int]) -> None:
+    first = ask("preference", "down down", "left")
+    page = watched.open("/runs/1/parent")
+    shown(page, first)
+    expect(page.locator("#question")).to_have_attribute("data-ahead", "")
+    second = ask("preference", "left left", "down")
+    expect(page.locator("#question")).to_have_attribute("data-ahead", str(second))
+
+
 def test_guidance_goes_before_what_was_leased_ahead(watched: Watched, ask: Callable[..., int]) -> None:
     first, second = (ask("preference", "down down", "left") for _ in range(2))
     page = watched.open("/runs/1/parent")

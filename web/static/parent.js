@@ -134,7 +134,10 @@ const tell = {
     $("optimal").hidden = !now.optimal || state === "over";
     count(now.answers);
     if (current && state === "over") current = null;
-    if (current) return;
+    if (current) {
+      if (!ahead && now.open.guidance + now.open.preference > 1) prefetch();
+      return;
+    }
     if (state === "question") next();
     else wait(state);
   },
