@@ -9,7 +9,8 @@ milliseconds:
 - *applied*: an answer is sent, until its row holds the tick that heard it. HTTP, database and worker.
 - *next stored*: the same, until the agent's next question is in the database.
 - *ahead*: a key is pressed in headless Chromium, until the next question is on the screen, where the page has
-  fetched it ahead: a run that asks preferences (preset direct) and may have some of them open.
+  fetched it ahead: a run that asks preferences (preset direct, which compares pairs again, so that it never
+  runs out of questions) and may have some of them open.
 - *live*: the same where nothing is open: the answer goes to the database and to the worker, the agent acts on
   it and trains on it, asks for guidance again (preset conservative), and the page shows that. Presses after
   which a preference came count as well, and those after which the agent first took some steps alone.
@@ -140,7 +141,7 @@ def timed(act: Callable[[], object], times: int) -> list[float]:
     return found
 
 
-def begin(web: httpx2.Client, world: str, preset: str, **config: float) -> int:
+def begin(web: httpx2.Client, world: str, preset: str, **config: float | bool) -> int:
     """A run that waits for a person: its number."""
     body = {"world": world, "preset": preset, "seed": SEED, "config": config}
     reply = web.post("/api/v1/runs", json=body)
@@ -213,7 +214,7 @@ def empty_page(browser: Browser, times: int) -> Iterator[Line]:
 
 def keys(browser: Browser, web: httpx2.Client, world: str, ahead: bool, answers: int) -> Iterator[Line]:
     """Answer a run by keys; count where the next question had been fetched ahead, or where it had not."""
-    run = begin(web, world, "direct" if ahead else "conservative")
+    run = begin(web, world, "direct", recompare=True) if ahead else begin(web, world, "conservative")
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.add_init_script(PROBE)
     page.goto(str(web.base_url.join(f"/runs/{run}/parent")))
