@@ -13,15 +13,15 @@ from importlib import import_module
 from agent.process import settle
 from experiments.pieces import Row, Store, Task
 
-TRIES = 3
-"""How often in a row workers may die without one piece coming back before we give up."""
+TRIES = 2
+"""How often a worker may die over one piece, with no other in work, before we give it up."""
 
 Told = Callable[[Task], None]
 """Told of every piece that is done, those of an earlier run first."""
 
 
 class WorkersDied(RuntimeError):
-    """Worker processes were killed again and again, often for want of memory."""
+    """Workers were killed again and again over some pieces, often for want of memory; the rest is done."""
 
 
 def do(task: Task) -> list[Row]:
@@ -56,28 +56,51 @@ def work(
 
 
 def _until_done(tasks: Sequence[Task], store: Store, workers: int, told: Told) -> None:
-    failed = 0
-    while left := [task for task in tasks if store.find(task) is None]:
-        try:
-            for task, rows in _hand_out(left, workers):
-                store.keep(task, rows)
-                told(task)
-        except _died():
-            now = sum(store.find(task) is None for task in tasks)
-            failed = failed + 1 if now == len(left) else 0
-            if failed == TRIES:
-                raise WorkersDied(
-                    f"Worker processes died {TRIES} times and no piece was done. Memory may be short. "
-                    "Take fewer workers or smaller chunks; what was done is stored."
-                ) from None
+    fatal: list[Task] = []
+    while left := [task for task in tasks if task not in fatal and store.find(task) is None]:
+        if not _keep(left, store, workers, told):
+            fatal += _fatal(_suspects(left, store, workers), store, workers, told)
+    if fatal:
+        raise WorkersDied(
+            f"Worker processes died {TRIES} times over {', '.join(task.key for task in fatal)}. "
+            "Memory may be short. Take fewer workers; all other pieces are done and stored."
+        )
+
+
+def _keep(tasks: Sequence[Task], store: Store, workers: int, told: Told) -> bool:
+    """Store each piece as it comes back; whether all workers lived."""
+    try:
+        for task, rows in _hand_out(tasks, workers):
+            store.keep(task, rows)
+            told(task)
+    except _died():
+        return False
+    return True
+
+
+def _suspects(tasks: Sequence[Task], store: Store, workers: int) -> list[Task]:
+    """What may have been in work when a worker died: all workers go down with it."""
+    return [task for task in _in_order(tasks) if store.find(task) is None][: workers + 1]
+
+
+def _fatal(suspects: Sequence[Task], store: Store, workers: int, told: Told) -> list[Task]:
+    """Do the suspects one at a time, so that a death falls on its own piece; return those that always die."""
+    return [
+        task for task in suspects if not any(_keep([task], store, workers, told) for _try in range(TRIES))
+    ]
+
+
+def _in_order(tasks: Sequence[Task]) -> list[Task]:
+    """The dear ones first, so that none is left over at the end."""
+    return sorted(tasks, key=lambda task: -task.share)
 
 
 def _hand_out(tasks: Sequence[Task], workers: int) -> Iterator[tuple[Task, list[Row]]]:
-    """The dear ones first, so that none is left over at the end; each as soon as it comes back."""
+    """Each as soon as it comes back."""
     from joblib import Parallel, delayed
 
-    ordered = sorted(tasks, key=lambda task: -task.share)
-    if workers == 1 and len(ordered):
+    ordered = _in_order(tasks)
+    if workers == 1:
         yield from ((task, do(task)) for task in ordered)
         return
     calls = (delayed(_named)(task) for task in ordered)

@@ -100,7 +100,9 @@ def test_a_worker_that_dies_costs_its_piece_only(store: Store, tmp_path: Path) -
 
 
 @pytest.mark.usefixtures("importable")
-def test_workers_that_always_die_are_said(store: Store) -> None:
-    with pytest.raises(WorkersDied, match=rf"died {TRIES} times and no piece was done\..*smaller chunks"):
-        work([Task("fatal", f"{__name__}:die", {}), task(1)], store, 2)
-    assert store.find(task(1)) == [{"sum": 2}]
+def test_workers_that_always_die_are_said_and_all_else_is_done(store: Store) -> None:
+    fatal = Task("fatal", f"{__name__}:die", {})
+    with pytest.raises(WorkersDied, match=rf"died {TRIES} times over fatal\..*fewer workers"):
+        work([fatal, *(task(number) for number in range(2))], store, 2)
+    assert [store.find(task(number)) for number in range(2)] == [[{"sum": n + 1}] for n in range(2)]
+    assert store.find(fatal) is None
