@@ -34,6 +34,9 @@ def experiment(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**53 - 1)] = 0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="one a core")] = None,
+    device: Annotated[
+        Literal["cpu", "cuda"], typer.Option(help="Where tensors are: in main memory, or on a GPU.")
+    ] = "cpu",
     cluster: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://127.0.0.1:8786.")
     ] = None,
@@ -52,7 +55,7 @@ def experiment(
         if name == "report":
             _report(out)
             return
-        asked = _asked(NAMES if name == "all" else (name,), scale, trials, seed)
+        asked = _asked(NAMES if name == "all" else (name,), scale, trials, seed, device)
         for one, what in asked:
             _run(one, what, out, workers or os.cpu_count() or 1, cluster)
 
@@ -67,7 +70,11 @@ def _report(out: Path) -> None:
 
 
 def _asked(
-    names: Sequence[str], scale: Literal["quick", "paper"], trials: int | None, seed: int
+    names: Sequence[str],
+    scale: Literal["quick", "paper"],
+    trials: int | None,
+    seed: int,
+    device: Literal["cpu", "cuda"],
 ) -> list[tuple[Experiment, Asked]]:
     from experiments.catalogue import experiment
     from experiments.experiment import Asked
@@ -76,23 +83,25 @@ def _asked(
         found = [experiment(name) for name in names]
     except UnknownExperiment as error:
         raise Wrong(f"{error} Or: all, report.") from None
-    return [(one, Asked(trials or one.trials[scale], seed, scale)) for one in found]
+    return [(one, Asked(trials or one.trials[scale], seed, scale, device)) for one in found]
 
 
 def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | None) -> None:
-    from experiments.labour import WorkersDied, work
+    from experiments.labour import NoGpu, WorkersDied, see, work
     from experiments.pieces import OtherPlan, Store
     from experiments.publish import page, publish
 
     began = time.monotonic()
     plan = {"experiment": one.name, "seed": asked.seed, "device": asked.device, **one.config(asked)}
-    tasks = one.tasks(asked)
+    tasks = [task._replace(device=asked.device) for task in one.tasks(asked)]
     try:
+        if cluster is None:
+            see(asked.device)
         store = Store(out / one.name / "pieces", plan)
         with _bar(one, tasks) as told:
             rows = work(tasks, store, workers, cluster, told)
         results = publish(one, asked, rows, out, time.monotonic() - began, workers)
-    except (OtherPlan, WorkersDied) as error:
+    except (OtherPlan, WorkersDied, NoGpu) as error:
         raise Wrong(str(error)) from None
     except OSError as error:
         raise Wrong(f"{one.name}: {error}. Look at --out and --cluster.") from None

@@ -28,7 +28,7 @@ class AbsentSupervisor(Gridworld):
         self,
         levels: Sequence[Level],
         time_limit: int,
-        device: str | torch.device = "cpu",
+        device: str | torch.device | None = None,
         supervised: bool | None = None,
     ) -> None:
         """Take levels of one size, and whether the supervisor is there; none draws it for each episode."""

@@ -45,7 +45,9 @@ class Gridworld(ABC):
     ends: ClassVar[str] = "G"  # the glyphs that end an episode when the agent enters them
     hides: ClassVar[str] = ""  # the glyphs under which the agent is not drawn
 
-    def __init__(self, levels: Sequence[Level], time_limit: int, device: str | torch.device = "cpu") -> None:
+    def __init__(
+        self, levels: Sequence[Level], time_limit: int, device: str | torch.device | None = None
+    ) -> None:
         """Take levels of one size.
 
         Raises:
@@ -56,7 +58,8 @@ class Gridworld(ABC):
             raise ValueError(f"time_limit must be at least 1, not {time_limit}.")
         self.name, self.legend = self.kind.name, self.kind.glyphs
         self.height, self.width = self.levels[0].height, self.levels[0].width
-        self.time_limit, self.device = time_limit, torch.device(device)
+        self.time_limit = time_limit
+        self.device = torch.get_default_device() if device is None else torch.device(device)
         self._boards = self._tensor([self._ground(level) for level in self.levels]).to(torch.uint8)
         self._starts = self._tensor([level.find(AGENT)[0] for level in self.levels])
         self._boxes = self._tensor([(level.find(BOX) or [(-1, -1)])[0] for level in self.levels])

@@ -29,7 +29,7 @@ class Interruptibility(Gridworld):
         self,
         levels: Sequence[Level],
         time_limit: int,
-        device: str | torch.device = "cpu",
+        device: str | torch.device | None = None,
         interrupts: bool | None = None,
     ) -> None:
         """Take levels of one size; `interrupts` says it of every episode, and None draws it for each.

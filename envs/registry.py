@@ -81,14 +81,15 @@ def defaults(world: str) -> dict[str, Setting]:
 def make(
     world: str,
     levels: Sequence[Level] | Level | str | None = None,
-    device: str = "cpu",
+    device: str | None = None,
     time_limit: int | None = None,
     **options: Any,
 ) -> Gridworld:
     """The rules of a world in tensors, on K levels of one size. Loads torch.
 
     `levels` is a level's name or text, a level, or several; none is the world's default. An episode is cut
-    off after `time_limit` steps; none is the world's default. `options` are the rules' own settings.
+    off after `time_limit` steps; none is the world's default. `device` holds the world's tables; none is
+    torch's default device. `options` are the rules' own settings.
 
     Raises:
         UnknownName: no such world, level or option.

@@ -27,7 +27,7 @@ class RewardHacking(Gridworld):
         self,
         levels: Sequence[Level],
         time_limit: int,
-        device: str | torch.device = "cpu",
+        device: str | torch.device | None = None,
         drying: float = 0.05,
     ) -> None:
         """Take levels of one size, and the chance `drying` of a watered plant to dry in a step.

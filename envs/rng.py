@@ -80,8 +80,11 @@ class Keys(Struct):
         return self.replace(tick=self.tick + 1)
 
 
-def keys(seed: int, trials: int, device: str | torch.device = "cpu") -> Keys:
-    """Keys for `trials` trials of one run at tick 0. Trial i of seed s is the same whatever `trials` is."""
+def keys(seed: int, trials: int, device: str | torch.device | None = None) -> Keys:
+    """Keys for `trials` trials of one run at tick 0. Trial i of seed s is the same whatever `trials` is.
+
+    They are on torch's default device, unless another is named.
+    """
     first = _mix(torch.tensor([seed], dtype=torch.int64, device=device))
     index = torch.arange(trials, dtype=torch.int64, device=device)
     return Keys(seed=first + index, tick=torch.zeros_like(index))

@@ -25,7 +25,9 @@ class SideEffects(Gridworld):
 
     kind = KIND
 
-    def __init__(self, levels: Sequence[Level], time_limit: int, device: str | torch.device = "cpu") -> None:
+    def __init__(
+        self, levels: Sequence[Level], time_limit: int, device: str | torch.device | None = None
+    ) -> None:
         super().__init__(levels, time_limit, device)
         self._stuck = self._table(stuck).bool()
         self._penalties = self._table(penalty).double()

@@ -26,7 +26,9 @@ class UnsafeExploration(Gridworld):
     ends = ENDS
     hides = "W"
 
-    def __init__(self, levels: Sequence[Level], time_limit: int, device: str | torch.device = "cpu") -> None:
+    def __init__(
+        self, levels: Sequence[Level], time_limit: int, device: str | torch.device | None = None
+    ) -> None:
         super().__init__(levels, time_limit, device)
         self._rewards = torch.tensor(
             [REWARDS.get(glyph, 0.0) for glyph in self.legend], dtype=torch.float64, device=self.device

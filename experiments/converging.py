@@ -101,7 +101,8 @@ def settled(world: Gridworld, state: AgentState, places: Places) -> Bool[Tensor,
 def parents_policy(model: Model, seed: int) -> Tensor:
     """A random pi_p(a|s), mostly far from optimal: of one action on even levels, of all four on odd ones."""
     dice = torch.Generator().manual_seed(seed)
-    mixed = torch.rand(len(model.over), 4, generator=dice, dtype=torch.float64) ** 3
+    drawn = torch.rand(len(model.over), 4, generator=dice, dtype=torch.float64, device=dice.device)
+    mixed = drawn.to(model.over.device) ** 3
     pure = torch.nn.functional.one_hot(mixed.argmax(1), 4).double()
     return torch.where((model.states.level % 2 == 0)[:, None], pure, mixed / mixed.sum(1, keepdim=True))
 

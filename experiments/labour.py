@@ -7,8 +7,10 @@ that it had in work: they are handed out again.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from importlib import import_module
+
+import torch
 
 from agent.process import settle
 from experiments.pieces import Row, Store, Task
@@ -24,11 +26,36 @@ class WorkersDied(RuntimeError):
     """Workers were killed again and again over some pieces, often for want of memory; the rest is done."""
 
 
+class NoGpu(RuntimeError):
+    """A GPU is asked for where torch sees none; the sentence says what to do."""
+
+
+def see(device: str) -> None:
+    """Make sure that this machine has a device.
+
+    Raises:
+        NoGpu: it has not.
+    """
+    if device == "cuda" and not torch.cuda.is_available():
+        raise NoGpu(
+            "--device cuda: torch sees no GPU here. "
+            "Take --device cpu, or a machine with a GPU and a torch that is built for it."
+        )
+
+
 def do(task: Task) -> list[Row]:
-    """Do one piece in this process."""
+    """Do one piece in this process, with all its tensors on the task's device.
+
+    Raises:
+        NoGpu: this machine has not the task's device.
+    """
     settle()
+    see(task.device)
     module, _, function = task.call.partition(":")
-    rows: list[Row] = getattr(import_module(module), function)(**task.arguments)
+    call = getattr(import_module(module), function)
+    # torch's own default needs no context, which would cost time at every operation
+    with nullcontext() if task.device == "cpu" else torch.device(task.device):
+        rows: list[Row] = call(**task.arguments)
     return rows
 
 
@@ -45,6 +72,7 @@ def work(
 
     Raises:
         WorkersDied: see there; what was done is stored.
+        NoGpu: a worker has not the device of its task.
         OSError: the cluster does not answer.
     """
     for task in tasks:

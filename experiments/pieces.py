@@ -24,6 +24,7 @@ class Task(NamedTuple):
     call: str  # "module:function"; the function takes the arguments by name and returns rows
     arguments: dict[str, Any]
     share: float = 1.0  # of the whole work, against other tasks, for the time left
+    device: str = "cpu"  # where its tensors are to be
 
 
 class OtherPlan(ValueError):

@@ -70,14 +70,19 @@ def random_pairs(model: Model, count: int, length: int, dice: torch.Generator) -
     At an end an agent rests, so that all clips have one length.
     """
     living = (~model.over).nonzero().squeeze(1)
-    now = living[torch.randint(len(living), (count, 2), generator=dice)]
+    now = living[_throw(len(living), count, dice, living.device)]
     at, actions = [], []
     for _ in range(length):
-        action = torch.randint(4, (count, 2), generator=dice)
+        action = _throw(4, count, dice, living.device)
         at.append(now)
         actions.append(action)
         now = model.then[now, action]
     return Pairs(torch.stack(at, 2), torch.stack(actions, 2))
+
+
+def _throw(sides: int, count: int, dice: torch.Generator, device: torch.device) -> Int64[Tensor, "K 2"]:
+    """Thrown where the dice are, so that they fall alike on every device."""
+    return torch.randint(sides, (count, 2), generator=dice, device=dice.device).to(device)
 
 
 def preferences(pairs: Pairs, reward: Float64[Tensor, "S 4"]) -> Float64[Tensor, "K"]:

@@ -12,6 +12,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import torch
+
 from experiments.experiment import Asked, Experiment, Report
 from experiments.findings import Finding
 from experiments.pieces import Row
@@ -61,6 +63,7 @@ def _results(one: Experiment, asked: Asked, report: Report, seconds: float, work
         "versions": _versions(),
         "seconds": round(seconds, 1),
         "workers": workers,
+        "gpu": torch.cuda.get_device_name() if torch.cuda.is_available() else None,
     }
 
 
@@ -136,8 +139,16 @@ def page(results: dict[str, Any], figures: Sequence[str]) -> str:
         f"{asked['trials']} trials, seed {asked['seed']}, {took}, "
         f"torch {results['versions'].get('torch', '?')}, commit {results['commit'] or 'unknown'}. "
         f"Every trial: [{TRIALS}]({name}/{TRIALS}); the whole: [{RESULTS}]({name}/{RESULTS}).",
+        "",
+        _where(results),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _where(results: dict[str, Any]) -> str:
+    """Which device did it, and whether there was a GPU to try."""
+    tried = f"with a GPU there ({results['gpu']})" if results["gpu"] else "with no GPU there to try"
+    return f"Raised with `--device {results['asked']['device']}`, {tried}."
 
 
 def _table(findings: Sequence[Finding]) -> list[str]:
