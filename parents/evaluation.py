@@ -91,25 +91,24 @@ class ListedEvaluation:
         self.starts = torch.arange(len(world.levels), device=world.device)
 
     def optimal(self, parameters: Float[Tensor, "N P"]) -> Bool[Tensor, "N"]:
-        """Whether the argmax policy reaches every level's goal by a shortest safe path."""
-        good = torch.ones(len(parameters), dtype=torch.bool, device=parameters.device)
-        for start in self.starts:
-            trial = good.nonzero().squeeze(1)
-            good[trial] = self._follow(parameters, trial, start)
-        return good
+        """Whether the argmax policy reaches every level's goal by a shortest safe path.
 
-    def _follow(self, parameters: Tensor, trial: Int64[Tensor, "n"], start: Tensor) -> Bool[Tensor, "n"]:
-        """All on one way: the first step that does not bring the goal nearer ends a trial's walk."""
-        every, at = trial, start.expand(len(trial))
-        for left in range(int(self.distance[start]), 0, -1):
+        All levels are walked at once: the first step that brings a goal no nearer ends a trial's walks.
+        """
+        every = torch.arange(len(parameters), device=parameters.device)
+        trial, at = every, self.starts.expand(len(parameters), -1)
+        while len(trial) and not bool(self.model.over[at].all()):
             weights = parameters if len(trial) == len(parameters) else parameters[trial]
-            action = self.brain.logits(weights, self.seen[at], self.near[at]).argmax(1)
-            at = self._safely(at, action)
-            nearer = self.distance[at] == left - 1
-            trial, at = trial[nearer], at[nearer]
-            if not len(trial):
-                break
+            then = self._safely(at, self._argmax(weights, at))
+            nearer = (self.distance[then] == self.distance[at] - 1) | self.model.over[at]
+            kept = nearer.all(1)
+            trial, at = trial[kept], then[kept]
         return torch.isin(every, trial)
+
+    def _argmax(self, parameters: Float[Tensor, "n P"], at: Int64[Tensor, "n K"]) -> Int64[Tensor, "n K"]:
+        with torch.no_grad():
+            layers = self.brain.unpack(parameters)
+            return self.brain.heads(layers, self.seen[at], self.near[at]).logits.argmax(2)
 
     def _safely(self, at: Tensor, action: Tensor) -> Tensor:
         """The next state; a forbidden step leads nowhere, so that it never counts as nearer."""
