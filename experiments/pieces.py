@@ -1,7 +1,7 @@
 """An experiment's work in pieces, each stored as soon as it is done: a kill costs the pieces in work alone.
 
 A piece is rows of plain data, one for each trial as a rule. What a piece holds depends on its task alone, not
-on who did it, when, or beside which others.
+on who did it, when, or beside which others; seconds that it took are the one exception.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 Row = dict[str, Any]
-"""Name -> number, word, truth value or null."""
+"""Name -> number, word, truth value or null. A name that begins with HIDDEN is for other pieces alone."""
+HIDDEN = "_"
 PLAN = "plan.json"
 
 
@@ -25,6 +26,7 @@ class Task(NamedTuple):
     arguments: dict[str, Any]
     share: float = 1.0  # of the whole work, against other tasks, for the time left
     device: str = "cpu"  # where its tensors are to be
+    needs: tuple[str, ...] = ()  # keys of pieces to be done before; the function takes their rows as `given`
 
 
 class OtherPlan(ValueError):
@@ -51,18 +53,26 @@ class Store:
 
     def find(self, task: Task) -> list[Row] | None:
         """A finished piece; None if it is still to be done."""
-        path = self._path(task)
-        if not path.exists():
-            return None
-        rows: list[Row] = json.loads(path.read_text(encoding="utf-8"))
-        return rows
+        return self.rows((task.key,)) if self.has(task.key) else None
+
+    def rows(self, keys: Sequence[str]) -> list[Row]:
+        """The rows of finished pieces.
+
+        Raises:
+            FileNotFoundError: one is not done.
+        """
+        return [row for key in keys for row in json.loads(self._path(key).read_text(encoding="utf-8"))]
+
+    def has(self, key: str) -> bool:
+        """Whether the piece of this key is finished."""
+        return self._path(key).exists()
 
     def keep(self, task: Task, rows: Sequence[Row]) -> None:
         """Store a finished piece, whole or not at all."""
-        _write(self._path(task), list(rows))
+        _write(self._path(task.key), list(rows))
 
-    def _path(self, task: Task) -> Path:
-        return self.folder / f"{task.key}.json"
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}.json"
 
 
 def _write(path: Path, data: object) -> None:

@@ -39,6 +39,16 @@ def refuse(first: int, second: int) -> list[Row]:
     raise AssertionError("done twice")
 
 
+def double(given: list[Row], and_: int) -> list[Row]:
+    """What is done with the rows of other pieces."""
+    return [{"sum": 2 * row["sum"] + and_, "_of": row["_blob"]} for row in given]
+
+
+def heavy(first: int) -> list[Row]:
+    """A row with something that only other pieces are to see."""
+    return [{"sum": first, "_blob": "x" * first}]
+
+
 def task(first: int, call: str = "add") -> Task:
     return Task(f"piece-{first}", f"{__name__}:{call}", {"first": first, "second": 1})
 
@@ -69,6 +79,20 @@ def test_what_is_done_is_not_done_again(store: Store) -> None:
     assert told == ["piece-1", "piece-2", "piece-5"]
 
 
+def test_what_a_piece_needs_is_done_before_and_given_to_it(store: Store) -> None:
+    """Named later and cheaper, it still comes first; what is hidden comes to the other piece alone."""
+    both = Task("both", f"{__name__}:double", {"and_": 1}, share=9, needs=("one", "two"))
+    needed = [Task(key, f"{__name__}:heavy", {"first": n}) for key, n in (("two", 2), ("one", 1))]
+    assert work([both, *needed], store, 1) == [{"sum": 3}, {"sum": 5}, {"sum": 2}, {"sum": 1}]
+    assert store.find(both) == [{"sum": 3, "_of": "x"}, {"sum": 5, "_of": "xx"}]
+
+
+def test_a_need_that_no_task_makes_is_loud(store: Store) -> None:
+    alone = task(1)._replace(needs=("nowhere",))
+    with pytest.raises(FileNotFoundError, match=r"piece-1\.json"):
+        work([alone], store, 1)
+
+
 def test_a_piece_that_was_not_renamed_is_no_piece(store: Store) -> None:
     (store.folder / ".piece-1.json.99").write_text('[{"sum": 9')
     assert store.find(task(1)) is None
@@ -89,7 +113,11 @@ def test_numbers_that_are_none_are_refused(store: Store) -> None:
 
 @pytest.mark.usefixtures("importable")
 def test_processes_do_the_same(store: Store) -> None:
-    assert work([task(number) for number in range(4)], store, 2) == [{"sum": n + 1} for n in range(4)]
+    """One of them waits for another."""
+    both = Task("both", f"{__name__}:double", {"and_": 1}, needs=("two", "three"))
+    needed = [Task(key, f"{__name__}:heavy", {"first": n}) for key, n in (("two", 2), ("three", 3))]
+    rows = work([both, task(4), *needed], store, 2)
+    assert rows == [{"sum": 5}, {"sum": 7}, {"sum": 5}, {"sum": 2}, {"sum": 3}]
 
 
 @pytest.mark.usefixtures("importable")
@@ -102,7 +130,9 @@ def test_a_worker_that_dies_costs_its_piece_only(store: Store, tmp_path: Path) -
 @pytest.mark.usefixtures("importable")
 def test_workers_that_always_die_are_said_and_all_else_is_done(store: Store) -> None:
     fatal = Task("fatal", f"{__name__}:die", {})
+    needy = Task("needy", f"{__name__}:double", {"and_": 1}, needs=("fatal",))
     with pytest.raises(WorkersDied, match=rf"died {TRIES} times over fatal\..*fewer workers"):
-        work([fatal, *(task(number) for number in range(2))], store, 2)
+        work([fatal, needy, *(task(number) for number in range(2))], store, 2)
     assert [store.find(task(number)) for number in range(2)] == [[{"sum": n + 1}] for n in range(2)]
-    assert store.find(fatal) is None
+    assert not store.has("fatal")
+    assert not store.has("needy")
