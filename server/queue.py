@@ -199,10 +199,10 @@ def guidance_first() -> ColumnElement[int]:
     return case((Query.kind == "guidance", 0), else_=1)
 
 
-def rests(session: Session, run_id: int, more: int = 0) -> bool:
-    """Whether a run's goal is reached once `more` questions are answered: it offers no others."""
+def rests(session: Session, run_id: int) -> bool:
+    """Whether a run's goal is reached: it offers no more questions."""
     run = session.get(Run, run_id)
-    return run is not None and run.goal is not None and run.answers + more >= run.goal
+    return run is not None and run.goal is not None and run.answers >= run.goal
 
 
 def _urgent(run_id: int) -> Select[Query]:

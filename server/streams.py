@@ -27,7 +27,7 @@ from server.wake import Bell
 
 PERIOD = 0.25
 """Seconds between polls, and at least between two events of the same browser, questions excepted."""
-COURTESY = 0.02
+COURTESY = 0.1
 """Seconds after a ring for which the streams let those go first who wait for a question."""
 
 Found = TypeVar("Found")
@@ -110,8 +110,11 @@ class Streams:
             )  # there may be more: a run that is over stays so
 
     async def first(self, look: Callable[[], Found | None], seconds: float) -> Found | None:
-        """What a look finds, now or within `seconds`; it looks again at every ring, and now and then."""
-        until = time.monotonic() + seconds
+        """What a look finds, now or within `seconds`; it looks again at every ring, and now and then.
+
+        Where as many wait already as streams are allowed, it does not wait.
+        """
+        until = time.monotonic() + (seconds if self._askers < self.limit else 0.0)
         self._askers += 1
         try:
             while True:

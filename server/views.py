@@ -5,12 +5,36 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import timedelta
 
-from sqlalchemy import func, or_, select
+from sqlalchemy import BindParameter, bindparam, func, or_, select
+from sqlalchemy.orm import aliased
 
 from server.db import Database
 from server.queue import LEASE_SECONDS, guidance_first, rests
-from server.runs import hold
-from server.tables import Metric, Query
+from server.runs import lock
+from server.tables import Metric, Query, Run
+
+_SHOWN: BindParameter[Sequence[int]] = bindparam("shown", expanding=True)
+_other = aliased(Query)
+_ANSWERS_TO_COME = (
+    select(func.count())
+    .where(_other.run_id == Run.id, _other.status == "open", _other.id.in_(_SHOWN))
+    .correlate(Run)
+    .scalar_subquery()
+)
+_FREE = or_(
+    Query.leased_until.is_(None),
+    Query.leased_until <= bindparam("now"),
+    Query.leased_by == bindparam("client_id"),
+)
+_AHEAD = (
+    select(Query)
+    .join(Run, Run.id == Query.run_id)
+    .where(Run.id == bindparam("run_id"), Query.status == "open", Query.id.not_in(_SHOWN), _FREE)
+    .where(or_(Run.goal.is_(None), Run.answers + _ANSWERS_TO_COME < Run.goal))
+    .order_by(guidance_first(), Query.tick)
+    .limit(1)
+)
+_ANY_AHEAD = _AHEAD.with_only_columns(Query.id)
 
 
 def lease_ahead(
@@ -18,19 +42,19 @@ def lease_ahead(
 ) -> Query | None:
     """The most urgent question besides those `shown`, held for this client too, so that nobody waits for it.
 
+    None if there is none, or if the run's goal is reached once those shown are answered.
+
     Raises:
         NotFound: there is no such run.
     """
     now = db.clock()
-    free = or_(Query.leased_until.is_(None), Query.leased_until <= now, Query.leased_by == client_id)
-    rows = select(Query).where(Query.run_id == run_id, Query.status == "open", Query.id.not_in(shown), free)
-    rows = rows.order_by(guidance_first(), Query.tick).limit(1)
+    asks = {"run_id": run_id, "client_id": client_id, "shown": list(shown), "now": now}
     with db.read() as session:  # nothing to offer is the common case, and takes no lock
-        if rests(session, run_id, len(shown)) or session.scalars(rows).first() is None:
+        if session.execute(_ANY_AHEAD, asks).first() is None:
             return None
-    with db.write() as session:
-        hold(session, run_id)
-        query = session.scalars(rows).first()
+    with db.write(durable=False) as session:
+        lock(session, run_id)
+        query = session.scalars(_AHEAD, asks).first()
         if query is not None:
             query.leased_by, query.leased_until = client_id, now + timedelta(seconds=seconds)
         return query

@@ -15,6 +15,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Form, Query, Request, Response
 from pydantic import Field
+from starlette.concurrency import run_in_threadpool
 
 from server import queue, runs
 from server.api.words import Choice, ClientId, RunId
@@ -42,7 +43,7 @@ ClientField = Annotated[ClientId, Form()]
 ChoiceField = Annotated[Choice, Form()]
 Number = Annotated[int, Form(ge=1, le=LARGEST_INT)]
 Numbers = Annotated[tuple[Annotated[int, Field(ge=1, le=LARGEST_INT)], ...], Form(max_length=100)]
-Seconds = Annotated[float, Form(ge=0, le=2, allow_inf_nan=False)]
+Seconds = Annotated[float, Form(ge=0, le=10, allow_inf_nan=False)]
 QueryShown = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 
 
@@ -81,10 +82,12 @@ async def question(
     """For the script: the next question as markup, leased; 204 if there is none within `wait` seconds.
 
     `shown` are those that the page has already or whose answers are on their way: it asks for another one.
-    Asked right after an answer, the request lies here until the agent asks, so that no round trip is lost.
+    The request lies here until the agent asks, also while the parent still thinks about the last question:
+    when the next one comes, its reply is on its way at once.
     """
     streams: Streams = request.app.state.streams
-    take = partial(_markup, db, run_id, client_id, shown, settings.lease_seconds)
+    run = await run_in_threadpool(runs.get_run, db, run_id)
+    take = partial(_markup, db, run, client_id, shown, settings.lease_seconds)
     return await streams.first(take, wait) or Response(status_code=204)
 
 
@@ -114,13 +117,12 @@ def answer(
 
 
 def _markup(
-    db: Database, run_id: int, client_id: str, shown: tuple[int, ...], seconds: float
+    db: Database, run: Run, client_id: str, shown: tuple[int, ...], seconds: float
 ) -> Response | None:
-    run = runs.get_run(db, run_id)
     if shown:
-        query = lease_ahead(db, run_id, client_id, shown, seconds)
+        query = lease_ahead(db, run.id, client_id, shown, seconds)
     else:
-        query = queue.lease(db, run_id, client_id, seconds)
+        query = queue.lease(db, run.id, client_id, seconds)
     return None if query is None else page("_question.html", shown=show(query, run), client=client_id)
 
 

@@ -161,6 +161,21 @@ def test_the_next_question_is_leased_ahead(client: httpx2.Client, db: Database, 
     assert [query.leased_by for query in rows(db, Query)] == [ME, ME]
 
 
+def test_nothing_is_leased_ahead_of_the_goal(client: httpx2.Client, db: Database, asked: list[int]) -> None:
+    def offered() -> bool:
+        data = {"client_id": ME, "shown": [asked[1]]}
+        return client.post("/runs/1/parent/question", data=data).status_code == 200
+
+    runs.set_goal(db, 1, 1)
+    assert not offered(), "the one that is shown is the last"
+    runs.set_goal(db, 1, 2)
+    assert offered()
+    queue.answer(db, asked[1], "left", ME, "human")
+    assert offered(), "the one that was shown counts once"
+    runs.set_goal(db, 1, 1)
+    assert not offered()
+
+
 def test_somebody_elses_question_is_not_promised(
     client: httpx2.Client, db: Database, asked: list[int]
 ) -> None:
@@ -244,7 +259,7 @@ def test_a_request_for_a_question_waits_for_it(
 
 
 @pytest.mark.parametrize(
-    ("wait", "status"), [("0.1", 204), ("-1", 422), ("3", 422), ("nan", 422), ("x", 422)]
+    ("wait", "status"), [("0.1", 204), ("-1", 422), ("11", 422), ("nan", 422), ("x", 422)]
 )
 def test_it_does_not_wait_for_ever(
     client: httpx2.Client, life: tuple[Run, Claim], wait: str, status: int

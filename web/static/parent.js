@@ -11,26 +11,28 @@ const { run, client, name } = main.dataset;
 const KEYS = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "either", ArrowDown: "neither", 1: "left", 2: "right", 3: "either", 4: "neither" };
 const RENEW = 25_000;
 const PATIENCE = 1; // seconds that a request for a question may lie at the server
+const LOOKOUT = 5; // the same for the one after it, while somebody thinks
 const HASTE = 40;   // ms after an answer when the next question is asked for, if the answer's reply is not there before
-const CALM = 20;   // ms after a question is painted when the page turns to what nobody waits for
+const CALM = 60;   // ms after a question is painted when the page turns to what nobody waits for
 const QUIET = 350; // an answered question stays this long before the page says that the agent explores
 
 let current = null;    // the form on the stage, until it is answered
 let player = null;
 let ahead = null;      // the form after it
-let prefetches = 0;    // the last request for it counts
+let lookout = null;    // aborts the request for it, which lies at the server
 let asking = false, again = false; // a request for a question is under way; another was wanted meanwhile
 let state = main.dataset.state;
 let answered = Number($("count").textContent), goal = Number($("goal").firstElementChild.textContent), unsaved = 0, quiet = 0;
+let saved = []; // what the server said while an answered question was still on the stage
 
 // ---- questions
 
 // Markup of the most urgent question, besides those given and those whose answers are on their way; null if there is
 // none within `seconds`.
-async function ask(shown = [], seconds = 0) {
+async function ask(shown = [], seconds = 0, signal = undefined) {
   const body = new URLSearchParams({ client_id: client, wait: seconds });
   for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
-  const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body });
+  const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body, signal });
   if (!reply.ok) throw new Error(reply.statusText);
   return reply.status === 204 ? null : reply.text();
 }
@@ -58,23 +60,31 @@ function parse(markup) {
   return holder.content.firstElementChild;
 }
 
-// The next question is parsed while nobody waits for it.
+// The question after this one: its request lies at the server while somebody thinks. If this one is answered meanwhile,
+// the next is shown as soon as the agent asks, and no request has to be made for it.
 async function prefetch() {
-  if (!current) return;
-  const mine = ++prefetches, form = current;
-  try {
-    const markup = await ask([form.dataset.query]);
-    const found = markup && parse(markup);
-    if (mine === prefetches && form === current) ahead = found;
+  if (!current || document.hidden) return;
+  lookout?.abort();
+  const mine = lookout = new AbortController(), form = current, began = performance.now();
+  form.dataset.ahead = "";
+  const found = await ask([form.dataset.query], LOOKOUT, mine.signal).then((markup) => markup && parse(markup), () => null);
+  if (mine !== lookout) return;
+  lookout = null;
+  if (form === current) {
+    ahead = found;
     form.dataset.ahead = found?.dataset.query ?? "";
-  } catch { /* the stream or the poll will bring it */ }
+    if (!found && performance.now() - began > 1000 * PATIENCE) prefetch();
+  } else if (!current) {
+    if (found) show(found);
+    else next(PATIENCE);
+  }
 }
 
 // A question is held for this browser for a minute; while somebody looks at it, it is held on.
 async function renew() {
   if (!current || document.hidden) return;
   await ask().catch(() => null);
-  prefetch();
+  if (!lookout) prefetch();
 }
 
 function show(form) {
@@ -89,6 +99,7 @@ function show(form) {
   main.dataset.state = "question";
   document.title = `● ${form.dataset.title} · ${name}`;
   $("said").textContent = form.dataset.said;
+  for (const reply of saved.splice(0)) report("saved", reply);
   player = play(form);
   if (focused) form.querySelector(`.answers [value=${focused}]`).focus();
   performance.mark("question", { detail: form.dataset.query });
@@ -113,6 +124,7 @@ function wait(which) {
   if (!waiting.hidden) return announce(which);
   quiet ||= setTimeout(() => {
     quiet = 0;
+    for (const reply of saved.splice(0)) report("saved", reply);
     if (current) return;
     stage.replaceChildren();
     waiting.hidden = false;
@@ -135,7 +147,7 @@ const tell = {
     count(now.answers);
     if (current && state === "over") current = null;
     if (current) {
-      if (!ahead && now.open.guidance + now.open.preference > 1) prefetch();
+      if (!ahead && !lookout && now.open.guidance + now.open.preference > 1) prefetch();
       return;
     }
     if (state === "question") next();
@@ -144,7 +156,7 @@ const tell = {
   question(asked) {
     if (!asked) return;
     if (!current) next();
-    else if (asked.kind === "guidance" && String(asked.id) !== current.dataset.query) prefetch(); // it goes first
+    else if (asked.kind === "guidance" && String(asked.id) !== current.dataset.query && !lookout) prefetch(); // it goes first
   },
   lost() {
     state = "offline";
@@ -179,11 +191,13 @@ function answer(choice) {
     return show(ahead);
   }
   player.still();
-  Promise.race([flush(report), new Promise((done) => { setTimeout(done, HASTE); })]).then(() => { if (!current) next(PATIENCE); });
+  Promise.race([flush(report), new Promise((done) => { setTimeout(done, HASTE); })]).then(() => { if (!current && !lookout) next(PATIENCE); });
   wait(state === "question" ? "exploring" : state);
 }
 
+// A page that changes twice is painted twice: what was saved is told together with the next question, if that comes soon.
 function report(outcome, reply) {
+  if (outcome === "saved" && quiet) return saved.push(reply);
   $("saved").classList.toggle("kept", outcome === "kept");
   if (outcome === "kept") {
     $("saved").textContent = "Kept here, not sent yet";
@@ -225,6 +239,10 @@ $("help-open").addEventListener("click", () => help.showModal());
 // ---- begin: send what an earlier visit left behind, then follow the run
 
 addEventListener("pagehide", () => flush(report));
+document.addEventListener("visibilitychange", () => {
+  if (document.hidden) lookout?.abort();
+  else if (!ahead) prefetch();
+});
 history.replaceState(null, "", `/runs/${run}/parent`);
 const first = stage.querySelector("#question");
 if (first && !kept().includes(Number(first.dataset.query))) show(first);
