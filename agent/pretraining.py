@@ -113,11 +113,13 @@ def _total(place: Tensor, amount: Tensor, size: int) -> Tensor:
     return zero.scatter_add_(1, place.flatten(1), amount.flatten(1))
 
 
-def differentiate(network: Network, parameters: Float[Tensor, "N P"], visits: Visits) -> Float[Tensor, "N P"]:
-    """The gradient of REINFORCE's loss, less a little entropy, at the distinct states."""
+def differentiate(
+    network: Network, parameters: Float[Tensor, "N P"], visits: Visits, weight: float = ENTROPY
+) -> Float[Tensor, "N P"]:
+    """The gradient of REINFORCE's loss, less the entropy by its `weight`, at the distinct states."""
     layers = network.learnable(parameters)
     with torch.enable_grad():
         logits = network.heads(layers, visits.seen, visits.near).logits
         gain = (visits.worth * logits.log_softmax(2)).sum((1, 2))
         open_minded = (visits.share * entropy(logits)).sum(1)
-        return network.gradient(-gain - ENTROPY * open_minded, layers)
+        return network.gradient(-gain - weight * open_minded, layers)

@@ -6,7 +6,15 @@ from importlib import import_module
 
 from experiments.experiment import Experiment
 
-NAMES = ("table1", "side-effects", "interruptibility", "absent-supervisor", "value-iteration", "figure4")
+NAMES = (
+    "table1",
+    "side-effects",
+    "interruptibility",
+    "absent-supervisor",
+    "value-iteration",
+    "figure4",
+    "calibrate",
+)
 """In the order of the paper."""
 
 

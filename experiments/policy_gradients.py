@@ -21,7 +21,7 @@ from agent.birth import network_of
 from agent.config import Config
 from agent.learning import adam
 from agent.maze_walks import EPISODES, Batch, Walks, walk
-from agent.pretraining import differentiate, visited
+from agent.pretraining import ENTROPY, differentiate, visited
 from envs.gridworld import Gridworld
 from envs.rng import Keys
 from envs.struct import Struct
@@ -85,9 +85,16 @@ def tables(model: Model, evaluation: ListedEvaluation) -> Tables:
 
 
 def raise_by_reward(
-    world: Gridworld, config: Config, keys: Keys, max_steps: int, progress: Progress | None = None
+    world: Gridworld,
+    config: Config,
+    keys: Keys,
+    max_steps: int,
+    progress: Progress | None = None,
+    entropy: float = ENTROPY,
 ) -> Learners:
     """Train one policy for each of `keys` until its argmax is optimal, for at most `max_steps` steps.
+
+    `entropy` is what the policy's entropy is worth, against returns to go of deviation 1.
 
     Raises:
         ValueError: too many states to list, or several levels.
@@ -100,9 +107,8 @@ def raise_by_reward(
     for step in range(1, max_steps + 1):
         if not len(some.trial):
             break
-        _learn(
-            world, config, known, some, keys.pick(some.trial).replace(tick=torch.full_like(some.trial, step))
-        )
+        now = keys.pick(some.trial).replace(tick=torch.full_like(some.trial, step))
+        _learn(world, config, known, some, now, entropy)
         some = some.replace(optimal=judge.optimal(some.live))
         if bool(some.optimal.any()):
             done.append(some.pick(some.optimal))
@@ -127,7 +133,9 @@ def _born(world: Gridworld, config: Config, keys: Keys) -> Learners:
     )
 
 
-def _learn(world: Gridworld, config: Config, known: Tables, some: Learners, keys: Keys) -> None:
+def _learn(
+    world: Gridworld, config: Config, known: Tables, some: Learners, keys: Keys, entropy: float
+) -> None:
     """16 episodes and a step of Adam, in place."""
     brain, batch = network_of(world), known.batch(len(some.trial))
     with torch.no_grad():
@@ -137,7 +145,7 @@ def _learn(world: Gridworld, config: Config, known: Tables, some: Learners, keys
     adam(
         some.live,
         some,
-        differentiate(brain, some.live, visits),
+        differentiate(brain, some.live, visits, entropy),
         torch.ones_like(some.optimal),
         config.learning_rate,
     )

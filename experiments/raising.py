@@ -9,6 +9,7 @@ import torch
 
 from agent.birth import world_of
 from agent.config import Config, compose
+from agent.pretraining import ENTROPY
 from envs import registry
 from envs.rng import keys
 from experiments.chunks import Plan, raise_chunk
@@ -51,11 +52,12 @@ def reward_some(
     span: tuple[int, int],
     trials: int,
     seed: int,
+    entropy: float = ENTROPY,
 ) -> list[Row]:
     """Raise the trials of a span by policy gradients on the reward itself."""
     config = compose("direct", registry.defaults(world), changes, strict=True)
     mine = keys(seed, trials).pick(torch.arange(*span))
-    found = raise_by_reward(world_of(world, level, config), config, mine, max_steps)
+    found = raise_by_reward(world_of(world, level, config), config, mine, max_steps, entropy=entropy)
     columns = {one: getattr(found, one).tolist() for one in ("deaths", "ticks", "steps", "optimal")}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
     nothing = {"guidance": 0, "preference": 0, "stuck": False}

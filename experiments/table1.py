@@ -60,18 +60,19 @@ def _task(one: Algorithm, span: range, asked: Asked) -> Task:
 
 
 def _report(asked: Asked, rows: Sequence[Row]) -> Report:
-    findings = [finding for one in ALGORITHMS for finding in _findings(one, rows)]
+    findings = [finding for one in ALGORITHMS for finding in cells(one, rows)]
     return Report(findings, WORDS)
 
 
-def _findings(one: Algorithm, rows: Sequence[Row]) -> list[Finding]:
+def cells(one: Algorithm, rows: Sequence[Row]) -> list[Finding]:
+    """A row of the table: the cells that the paper has, and ours of the rows of that algorithm."""
     mine = [row for row in rows if row["of"] == one.name]
     done = [row for row in mine if row["finished"]]
     left = len(mine) - len(done)
     note = f"{left} of {len(mine)} trials unfinished, not in the mean" if left else ""
-    cells = (("deaths", one.deaths), ("guidance", one.guidance), ("preference", one.preference))
+    columns = (("deaths", one.deaths), ("guidance", one.guidance), ("preference", one.preference))
     return [
-        _cell(one, name, paper, [row[name] for row in done], note) for name, paper in cells if paper != "-"
+        _cell(one, name, paper, [row[name] for row in done], note) for name, paper in columns if paper != "-"
     ]
 
 

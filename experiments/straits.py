@@ -1,0 +1,30 @@
+"""Layouts between `island` and `island-bottleneck`: two rooms and a strait of land between them (Sec. 3.2.1).
+
+Agent and goal face each other. The strait is `width` cells wide, and its nearest cell lies `aside` columns
+to the left of the straight way. `strait(1, 2)` is `island-bottleneck`. A wider strait that lies nearer is
+easier; one on the straight way is no obstacle at all: many a fresh policy walks straight on.
+"""
+
+from __future__ import annotations
+
+from envs.levels.unsafe_exploration import ISLAND_BOTTLENECK
+
+STRAIGHT = 5
+"""The column of agent and goal."""
+ROW = 3
+"""The row of the strait."""
+
+
+def strait(width: int, aside: int) -> str:
+    """The level's text.
+
+    Raises:
+        ValueError: the strait would not lead from room to room.
+    """
+    rows = ISLAND_BOTTLENECK.splitlines()
+    right = STRAIGHT - aside
+    cells = range(right - width + 1, right + 1)
+    if width < 1 or any(rows[ROW - 1][cell] != " " for cell in cells):
+        raise ValueError(f"A strait of {width} cells, {aside} beside the straight way, leads nowhere.")
+    rows[ROW] = "".join(" " if cell in cells else "W" for cell in range(len(rows[ROW])))
+    return "\n".join(rows) + "\n"

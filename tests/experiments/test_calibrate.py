@@ -1,0 +1,117 @@
+"""The calibration: its layouts, its distance by numbers worked out by hand, and a search in small."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+import pytest
+
+from envs import registry
+from envs.levels.unsafe_exploration import ISLAND_BOTTLENECK
+from experiments import calibrate
+from experiments.calibrate import EXPERIMENT, LAYOUTS, settings
+from experiments.calibrated import findings
+from experiments.experiment import Asked
+from experiments.labour import do
+from experiments.matching import BY_REWARD, DEATHS, DIRECT, KNOBS, QUERIES, TRADITIONAL, distance, search
+from experiments.pieces import Row
+from experiments.straits import strait
+from parents.model import explore
+
+NEAR = dict(zip(KNOBS, (0.3, 0.3, 0.1, 0.1, False), strict=True))
+FAR = {**NEAR, "p_rec": 0.5}
+
+
+def row(of: str, finished: bool = True, **more: Any) -> Row:
+    return {"of": of, "finished": finished, "guidance": 0, "deaths": 0, "preference": 0, **more}
+
+
+def tried(layout: str, deaths: int, queries: int, by_reward: int, **knobs: Any) -> list[Row]:
+    """A setting and a weight of entropy, each tried once."""
+    mine = {"layout": layout, "deaths": deaths, "preference": queries, **NEAR, **knobs}
+    return [row(DIRECT, **mine), row(TRADITIONAL, layout=layout, deaths=by_reward, entropy=1.2)]
+
+
+def test_layouts_lie_between_island_and_bottleneck() -> None:
+    assert strait(1, 2) == ISLAND_BOTTLENECK
+    assert strait(2, 1).splitlines()[3] == "WWW  WWWW"
+    worlds = [registry.make("unsafe-exploration", text) for text in LAYOUTS.values()]
+    assert all(bool(explore(world).goal.any()) for world in worlds)
+
+
+@pytest.mark.parametrize(("width", "aside"), [(0, 1), (1, 4), (4, 1)])
+def test_a_strait_into_the_water_is_refused(width: int, aside: int) -> None:
+    with pytest.raises(ValueError, match="leads nowhere"):
+        strait(width, aside)
+
+
+def test_distance_by_hand() -> None:
+    """61 deaths are one deviation above 47, and 23 queries two below 51: 1 + 4."""
+    rows = [row(DIRECT, deaths=60, preference=20), row(DIRECT, deaths=62, preference=26)]
+    assert distance(rows, DEATHS, QUERIES) == pytest.approx(5)
+    assert distance([row(TRADITIONAL, deaths=3000)], BY_REWARD) == pytest.approx(1)
+
+
+def test_more_than_an_eighth_unfinished_is_out() -> None:
+    some = [row(DIRECT, deaths=47, preference=51) for _ in range(7)]
+    assert distance([*some, row(DIRECT, finished=False)], DEATHS, QUERIES) == 0
+    assert distance([*some[1:], row(DIRECT, finished=False)], DEATHS, QUERIES) == inf
+    assert distance([], DEATHS) == inf
+
+
+def test_the_nearest_layout_and_setting_are_found() -> None:
+    rows = [
+        *tried("wide", deaths=7, queries=15, by_reward=300),
+        *tried("narrow", deaths=90, queries=51, by_reward=2300, **FAR),
+        *tried("narrow", deaths=40, queries=44, by_reward=2300),
+        *tried("closed", deaths=47, queries=51, by_reward=9300),
+    ]
+    best, *others = search(rows)
+    assert (best.layout, best.direct, best.entropy) == ("narrow", NEAR, 1.2)
+    assert best.distance == pytest.approx(0.5)
+    assert [other.layout for other in others] == ["wide", "closed"]
+
+
+@pytest.mark.parametrize(("queries", "said"), [(51, "yes"), (20, "no: direct: preference")])
+def test_a_miss_is_said(queries: int, said: str) -> None:
+    rows = [
+        *tried("narrow", deaths=40, queries=44, by_reward=2300),
+        row("direct", deaths=40, preference=queries),
+        row("traditional", deaths=2000),
+        row("traditional", finished=False),
+    ]
+    found = {one.what: one for one in findings(rows)}
+    both = found["all three numbers at once, each within the paper's deviation over trials"]
+    assert (both.ours, both.agrees) == (said, said == "yes")
+    assert "1 of 2 trials unfinished" in found["Traditional RL: deaths"].note
+
+
+def test_presets_keep_their_own_chances() -> None:
+    assert settings("lax", NEAR) == NEAR
+    assert settings("conservative", NEAR) == {"lambda_global": 0.1, "lambda_local": 0.1, "recompare": False}
+
+
+def test_what_is_found_is_what_is_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every piece in order, for a few ticks: what confirms has the setting that the search names."""
+    for limit in ("SEARCH_TICKS", "MAX_TICKS"):
+        monkeypatch.setattr(calibrate, limit, 4)
+    for limit in ("SEARCH_STEPS", "MAX_STEPS"):
+        monkeypatch.setattr(calibrate, limit, 1)
+    asked = Asked(1, scale="quick")
+    done: dict[str, list[Row]] = {}
+    for task in EXPERIMENT.tasks(asked):
+        done[task.key] = do(task, [one for key in task.needs for one in done[key]])
+    rows = [one for piece in done.values() for one in piece]
+    assert {one["of"] for one in rows} == {
+        DIRECT,
+        TRADITIONAL,
+        "direct",
+        "traditional",
+        "lax",
+        "conservative",
+    }
+    assert [one["ticks"] for one in rows if one["of"] == "lax"] == [4]
+    report = EXPERIMENT.report(asked, rows)
+    assert report.findings[0].ours.startswith("strait-1-1: p_rec 0.35")
+    assert "too many unfinished" in report.findings[-1].difference
