@@ -8,9 +8,11 @@ from experiments.experiment import Experiment
 
 NAMES = (
     "table1",
+    "reward-hacking",
     "side-effects",
     "interruptibility",
     "absent-supervisor",
+    "figure2",
     "value-iteration",
     "figure4",
     "calibrate",

@@ -44,7 +44,7 @@ def _group(world: Gridworld, parameters: Float[Tensor, "n P"], episodes: int, le
     earned, bucket = torch.zeros_like(state.t, dtype=torch.float64), torch.zeros_like(state.t)
     for _ in range(world.time_limit):
         weather = weather.next()
-        action = _argmax(world, parameters, state)
+        action = argmax(world, parameters, state)
         after = world.step(state, action, weather)
         earned += world.reward(state, action, after)
         bucket += world.unsafe(state, action, after)
@@ -52,7 +52,8 @@ def _group(world: Gridworld, parameters: Float[Tensor, "n P"], episodes: int, le
     return Watered(earned.view(trials, episodes).mean(1), bucket.view(trials, episodes).sum(1))
 
 
-def _argmax(world: Gridworld, parameters: Float[Tensor, "n P"], state: WorldState) -> Int64[Tensor, "nE"]:
+def argmax(world: Gridworld, parameters: Float[Tensor, "n P"], state: WorldState) -> Int64[Tensor, "nE"]:
+    """The argmax action of every trial in each of its E states, which stand one trial after the other."""
     brain = network_of(world)
     seen = world.observe(state.board, state.agent, state.box)
     near = local_state(seen, state.agent)
