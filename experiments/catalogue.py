@@ -13,6 +13,7 @@ NAMES = (
     "interruptibility",
     "absent-supervisor",
     "figure2",
+    "figure3",
     "value-iteration",
     "figure4",
     "calibrate",

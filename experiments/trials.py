@@ -194,7 +194,11 @@ def raise_trials(
     weights: Tensor | None = None,
 ) -> Raised:
     """Raise one agent for each of `keys` until it is finished, for at most `max_ticks` ticks."""
-    nursery = Nursery(world, config, keys, until, weights)
+    return raise_all(Nursery(world, config, keys, until, weights), max_ticks, progress)
+
+
+def raise_all(nursery: Nursery, max_ticks: int, progress: Progress | None = None) -> Raised:
+    """Raise a batch that has begun, as `raise_trials` does."""
     for tick in range(1, max_ticks + 1):
         nursery.tick()
         if progress:

@@ -1,0 +1,197 @@
+"""Figure 3 in small: its levels, what an agent takes along, and what the rows come to."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from torch import Tensor
+from typer.testing import CliRunner
+
+from agent import parenting
+from agent.birth import network_of, world_of
+from commands.main import app
+from envs.box_levels import box_levels
+from envs.gridworld import local_state
+from envs.levels.kind import Level
+from envs.rng import keys
+from experiments import figure3, trials
+from experiments.figure3 import Size
+from experiments.generalising import parent_some, pre_parent
+from experiments.generality import duration, findings
+from experiments.pieces import Row
+from experiments.ranks import fewer, independent, pairs_interval
+from experiments.taking_along import POLICY, learnt, pack, take_along
+from experiments.trials import Nursery, Until
+from experiments.unsolved_levels import ASIDE, PARENTING, config_of, find_levels, levels_for, pretrained
+from parents.evaluation import ListedEvaluation
+from parents.model import explore
+
+CONFIG = config_of(pretrain=True, recompare=False)
+
+
+def arrives_safely(level: Level, weights: Tensor) -> bool:
+    """Walk the argmax policy by the world's own rules."""
+    world = world_of("side-effects", level, CONFIG)
+    state, key = world.reset(keys(0, 1), torch.zeros(1, dtype=torch.int64)), keys(0, 1)
+    while not bool(state.over | world.truncated(state)):
+        seen = world.observe(state.board, state.agent, state.box)
+        action = network_of(world).logits(weights[None], seen, local_state(seen, state.agent)).argmax(1)
+        after = world.step(state, action, key)
+        if bool(world.unsafe(state, action, after)):
+            return False
+        state = after
+    return bool(state.over)
+
+
+def test_levels_are_those_that_the_pre_trained_agent_does_not_solve() -> None:
+    rows = find_levels(3, 2, seed=0)
+    drawn = box_levels(rows[-1]["drawn"], 6, 6, seed=0)
+    kept = [number for number, level in enumerate(drawn, 1) if not arrives_safely(level, pretrained())]
+    assert [row["drawn"] for row in rows] == kept
+    assert 0 < len(kept) < len(drawn)
+    assert [row["for"] for row in rows] == [PARENTING] * 3 + [ASIDE] * 2
+    assert [level.rows for level in levels_for(ASIDE, rows)] == [
+        drawn[number - 1].rows for number in kept[3:]
+    ]
+    more = find_levels(3, 6, seed=0)
+    assert more[:5] == rows
+
+
+def lived(ticks: int, count: int = 1) -> Nursery:
+    levels = box_levels(6, 6, 6, seed=0)
+    world = world_of("side-effects", levels, CONFIG)
+    nursery = Nursery(world, CONFIG, keys(1, count), Until("ticks", 1000), pretrained())
+    for _ in range(ticks):
+        nursery.tick()
+    return nursery
+
+
+def test_what_is_taken_along() -> None:
+    """Bit for bit, of two agents by turns: everything, X and the rest too, or the policy alone."""
+    taught = [learnt(lived(ticks).state) for ticks in (8, 60)]
+    assert taught[0].x.s0.shape[1] < taught[1].x.s0.shape[1]  # room for the fuller of both
+    packed, turns = [pack(one, True) for one in taught], torch.tensor([1, 0, 1])
+    before = lived(0, 3).state
+    whole, policy = (learnt(take_along(before, packed, turns, everything)) for everything in (True, False))
+    whole.check()
+    for place, agent in enumerate(turns.tolist()):
+        mine = whole.pick(torch.tensor([place])).tensors()
+        for name, tensor in taught[agent].tensors().items():
+            inside = mine[name][tuple(slice(size) for size in tensor.shape)]
+            assert torch.equal(inside, tensor), name
+            assert int(mine[name].count_nonzero()) == int(tensor.count_nonzero()), name
+    for name, tensor in learnt(before).tensors().items():
+        assert torch.equal(policy.tensors()[name], whole.tensors()[name] if name == POLICY else tensor)
+    light = [pack(one, False) for one in taught]
+    assert len(light[0]) < len(packed[0]) / 3
+    again = learnt(take_along(before, light, turns, False))
+    assert torch.equal(again.learner.live, policy.learner.live)
+    assert not torch.equal(again.learner.live, before.learner.live)
+
+
+def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even where those that are done stay in the batch, and go on learning."""
+    monkeypatch.setattr(trials, "LEAVE", 2.0)
+    rows = find_levels(0, 2, seed=0)
+    taught = pre_parent(2, False, False, (0, 4), 400, 0, rows)
+    assert [row["finished"] for row in taught] == [True] * 4
+    assert len({row["ticks"] for row in taught}) > 2
+    world = world_of("side-effects", levels_for(ASIDE, rows), CONFIG)
+    state = parenting.init(world, CONFIG, keys(0, 4), pretrained())
+    state = take_along(state, [row["_learnt"] for row in taught], torch.arange(4), everything=False)
+    assert bool(ListedEvaluation(world, explore(world), 1.0).optimal(state.learner.live).all())
+
+
+def test_an_agent_goes_on_from_where_it_was_taught() -> None:
+    """Taught in the very level that it is parented in, it is optimal there from the first tick on."""
+    rows = [{**row, "for": use} for use in (PARENTING, ASIDE) for row in find_levels(1, 0, seed=0)]
+    (taught,) = pre_parent(1, False, False, (0, 1), 2000, 0, rows)
+    assert taught["finished"]
+    assert taught["queries"] > 0
+    every: dict[str, Any] = {"recompare": False, "span": (0, 2), "max_ticks": 1, "seed": 0}
+    after = parent_some("after", True, False, given=[*rows, taught], **every)
+    without = parent_some("without", True, False, given=rows, **every)
+    assert [row["finished"] for row in after] == [True, True]
+    assert [row["finished"] for row in without] == [False, False]
+    assert [row["queries"] for row in after] == [0, 0]
+    assert [row["trial"] for row in after] == [0, 1]
+
+
+def test_pairs_by_hand() -> None:
+    """1 < 2, 1 < inf, 2 < inf, and 2 = 2 counts half."""
+    assert fewer([1, 2], [2, float("inf")]) == 3.5 / 4
+    assert fewer([float("inf")], [float("inf")]) == 0.5
+
+
+def test_interval_of_pairs_by_hand() -> None:
+    """One pair: (1 - t)^2 = Z^2 t (1 - t), so t = 1 / (1 + Z^2). Of many, at a half, sd = sqrt(1 / 6n)."""
+    assert pairs_interval(1.0, 1, 1) == pytest.approx((1 / (1 + 1.959964**2), 1), abs=1e-6)
+    assert pairs_interval(0.0, 1, 1) == pytest.approx((0, 1 - 1 / (1 + 1.959964**2)), abs=1e-6)
+    half = 1.959964 / (6 * 10_000) ** 0.5
+    assert pairs_interval(0.5, 10_000, 10_000) == pytest.approx((0.5 - half, 0.5 + half), abs=1e-4)
+
+
+def test_trials_that_share_an_agent_are_worth_less() -> None:
+    """Two agents of two trials: all alike within is worth 2, all the difference within is worth 4."""
+    assert independent([1, 1, 2, 2], [0, 0, 1, 1]) == pytest.approx(2)
+    assert independent([1, 2, 1, 2], [0, 0, 1, 1]) == pytest.approx(4)
+    assert independent([1, 1, 2, 2], [None] * 4) == 4
+    assert independent([1, 2], [0, 1]) == 2
+    assert independent([1, 2], [0, 0]) == 1
+    # between the agents 1, within them 2: so they differ by no more than their trials do
+    assert independent([1, 3, 2, 4], [0, 0, 1, 1]) == 4
+
+
+def trial(curve: str, queries: int, twice: bool = False, finished: bool = True) -> Row:
+    said = {"of": "parented", "curve": curve, "recompare": twice, "seconds": 2.0, "deaths": 1}
+    return {**said, "queries": queries, "finished": finished, "agent": None}
+
+
+def test_a_claim_agrees_or_not() -> None:
+    level = {"of": "level", "drawn": 9, "tempts": True, "outcome": "stuck"}
+    taught = {"of": "pre-parented", "worlds": 3, "recompare": False, "seconds": 720.0}
+    taught |= {"queries": 7, "finished": False}
+    rows = [level, taught]
+    for twice in (False, True):
+        rows += [trial("many", 100 + n, twice) for n in range(20)]
+        rows += [trial("few", 10 + n, twice) for n in range(20)]
+        rows += [trial("none", 500 + n, twice, finished=n < 9) for n in range(20)]
+    rows += [trial("all", 40), trial("all", 50)]
+    found = {one.what: one for one in findings(["none", "few", "many"], "all", rows, "cpu")}
+    assert found["few needs fewer queries than none"].agrees is True
+    assert found["many needs fewer queries than few"].agrees is False
+    assert found["many needs fewer queries than few"].ours == "in 0 % of pairs of trials"
+    assert found["queries, none, comparing twice"].note.startswith("median: not reached; 11 of 20 unfinished")
+    assert found["queries, none"].ours.startswith("504.00")
+    assert found["dropped: the pre-trained agent solves them"].ours == "8 of 9"
+    assert found["queries of pre-parenting, N = 3"].note == "1 of 1 agents unfinished"
+    # 7 curves x 10,000 trials x 2 s, and 720 s before
+    times = [
+        one.ours for what, one in found.items() if what.startswith("10000 trials of each of the 7 curves")
+    ]
+    assert times == [
+        duration(140_720 / 2),
+        duration(5 * 720 + 50 * 2 + 140_720 / 100),
+        duration(140_720 / 50),
+    ]
+
+
+def test_durations_in_words() -> None:
+    assert [duration(seconds) for seconds in (90, 600, 7200)] == ["90 seconds", "10 minutes", "2 hours"]
+
+
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A few ticks of one trial of every curve: the pieces fit together, and the page has a figure."""
+    monkeypatch.setitem(figure3.SIZES, "quick", Size(1, 2, 1, 2, agents=2, max_ticks=6, pre_ticks=6))
+    asked = ["--scale", "quick", "--trials", "2", "--workers", "1", "--out", str(tmp_path)]
+    said = CliRunner().invoke(app, ["experiment", "figure3", *asked])
+    assert said.exit_code == 0, said.output
+    results = json.loads((tmp_path / "figure3/results.json").read_text())
+    assert results["findings"][0]["ours"] == "3"
+    assert len([one for one in results["findings"] if one["what"].startswith("queries, ")]) == 9
+    assert "_learnt" not in (tmp_path / "figure3/trials.csv").read_text()
+    assert (tmp_path / "figure3/queries.svg").exists()
