@@ -1,22 +1,31 @@
 """Who does the pieces: processes of this machine, or the workers of a Dask cluster. The same code on both.
 
-joblib hands the tasks out. A piece that comes back is stored at once. A worker that dies costs the pieces
-that it had in work: they are handed out again.
+joblib hands the tasks to processes, and Dask to its workers. A piece that comes back is stored at once. A
+worker that dies costs the pieces that it had in work: they are handed out again, by a cluster of its own
+accord. (joblib's own way to Dask waits for ever for a piece whose worker was killed.)
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from importlib import import_module
+from typing import TYPE_CHECKING, NamedTuple
 
 import torch
 
 from agent.process import settle
 from experiments.pieces import HIDDEN, Row, Store, Task
 
+if TYPE_CHECKING:
+    from dask.distributed import Client
+
 TRIES = 2
 """How often a worker may die over one piece, with no other in work, before we give it up."""
+
+PATIENCE = 10
+"""Seconds that a cluster has to answer, and to have a worker."""
 
 Told = Callable[[Task], None]
 """Told of every piece that is done, those of an earlier run first."""
@@ -28,6 +37,19 @@ class WorkersDied(RuntimeError):
 
 class NoGpu(RuntimeError):
     """A GPU is asked for where torch sees none; the sentence says what to do."""
+
+
+Call = tuple[Task, Sequence[Row]]
+"""A task, and the rows of the pieces that it needs."""
+Done = tuple[Task, list[Row]]
+
+
+class Hands(NamedTuple):
+    """Who does the pieces."""
+
+    number: int
+    died: type[BaseException]  # raised when a worker died over a piece
+    out: Callable[[Sequence[Call]], Iterator[Done]]  # hands pieces out, and gives each back once it is done
 
 
 def see(device: str) -> None:
@@ -75,13 +97,13 @@ def work(
     Raises:
         WorkersDied: see there; what was done is stored.
         NoGpu: a worker has not the device of its task.
-        OSError: the cluster does not answer; or a piece is needed that no task makes.
+        OSError: the cluster does not answer, or has no worker; or a piece is needed that no task makes.
     """
     for task in tasks:
         if store.has(task.key):
             told(task)
-    with _hands(workers, cluster):
-        _until_done(tasks, store, workers, told)
+    with _hands(workers, cluster) as hands:
+        _until_done(tasks, store, hands, told)
     return [_shown(row) for row in store.rows([task.key for task in tasks])]
 
 
@@ -89,11 +111,11 @@ def _shown(row: Row) -> Row:
     return {name: value for name, value in row.items() if not name.startswith(HIDDEN)}
 
 
-def _until_done(tasks: Sequence[Task], store: Store, workers: int, told: Told) -> None:
+def _until_done(tasks: Sequence[Task], store: Store, hands: Hands, told: Told) -> None:
     fatal: list[Task] = []
     while left := [task for task in tasks if task not in fatal and _ready(task, store)]:
-        if not _keep(left, store, workers, told):
-            fatal += _fatal(_suspects(left, store, workers), store, workers, told)
+        if not _keep(left, store, hands, told):
+            fatal += _fatal(_suspects(left, store, hands), store, hands, told)
     if fatal:
         raise WorkersDied(
             f"Worker processes died {TRIES} times over {', '.join(task.key for task in fatal)}. "
@@ -106,27 +128,25 @@ def _ready(task: Task, store: Store) -> bool:
     return not store.has(task.key) and all(map(store.has, task.needs))
 
 
-def _keep(tasks: Sequence[Task], store: Store, workers: int, told: Told) -> bool:
+def _keep(tasks: Sequence[Task], store: Store, hands: Hands, told: Told) -> bool:
     """Store each piece as it comes back; whether all workers lived."""
     try:
-        for task, rows in _hand_out(tasks, store, workers):
+        for task, rows in _hand_out(tasks, store, hands):
             store.keep(task, rows)
             told(task)
-    except _died():
+    except hands.died:
         return False
     return True
 
 
-def _suspects(tasks: Sequence[Task], store: Store, workers: int) -> list[Task]:
+def _suspects(tasks: Sequence[Task], store: Store, hands: Hands) -> list[Task]:
     """What may have been in work when a worker died: all workers go down with it."""
-    return [task for task in _in_order(tasks) if not store.has(task.key)][: workers + 1]
+    return [task for task in _in_order(tasks) if not store.has(task.key)][: hands.number + 1]
 
 
-def _fatal(suspects: Sequence[Task], store: Store, workers: int, told: Told) -> list[Task]:
+def _fatal(suspects: Sequence[Task], store: Store, hands: Hands, told: Told) -> list[Task]:
     """Do the suspects one at a time, so that a death falls on its own piece; return those that always die."""
-    return [
-        task for task in suspects if not any(_keep([task], store, workers, told) for _try in range(TRIES))
-    ]
+    return [task for task in suspects if not any(_keep([task], store, hands, told) for _try in range(TRIES))]
 
 
 def _in_order(tasks: Sequence[Task]) -> list[Task]:
@@ -134,38 +154,58 @@ def _in_order(tasks: Sequence[Task]) -> list[Task]:
     return sorted(tasks, key=lambda task: -task.share)
 
 
-def _hand_out(tasks: Sequence[Task], store: Store, workers: int) -> Iterator[tuple[Task, list[Row]]]:
+def _hand_out(tasks: Sequence[Task], store: Store, hands: Hands) -> Iterator[Done]:
     """Each as soon as it comes back."""
-    from joblib import Parallel, delayed
-
     ordered = _in_order(tasks)
     given = {keys: store.rows(keys) for keys in {task.needs for task in ordered}}
-    if workers == 1:
-        yield from ((task, do(task, given[task.needs])) for task in ordered)
-        return
-    calls = (delayed(_numbered)(place, task, given[task.needs]) for place, task in enumerate(ordered))
+    return hands.out([(task, given[task.needs]) for task in ordered])
+
+
+def _here(calls: Sequence[Call]) -> Iterator[Done]:
+    """In this process, one after the other."""
+    yield from ((task, do(task, given)) for task, given in calls)
+
+
+def _by_processes(workers: int, calls: Sequence[Call]) -> Iterator[Done]:
+    """On this machine. joblib's processes outlive a call, and all go down when one dies."""
+    from joblib import Parallel, delayed
+
+    numbered = (delayed(_numbered)(place, *call) for place, call in enumerate(calls))
     hands = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
-    yield from ((ordered[place], rows) for place, rows in hands(calls))
+    yield from ((calls[place][0], rows) for place, rows in hands(numbered))
 
 
 def _numbered(place: int, task: Task, given: Sequence[Row]) -> tuple[int, list[Row]]:
     return place, do(task, given)
 
 
+def _by_cluster(client: Client, calls: Sequence[Call]) -> Iterator[Done]:
+    """On a cluster, which goes on when a worker dies; what it gives up is said when all else is done."""
+    from dask.distributed import KilledWorker, as_completed
+
+    futures = {client.submit(do, *call, pure=False): call[0] for call in calls}
+    killed: KilledWorker | None = None
+    for future in as_completed(futures):  # type: ignore[no-untyped-call]
+        try:
+            rows = future.result()
+        except KilledWorker as error:
+            killed = error
+        else:
+            yield futures[future], rows
+    if killed:
+        raise killed
+
+
 @contextmanager
-def _hands(workers: int, cluster: str | None) -> Iterator[None]:
+def _hands(workers: int, cluster: str | None) -> Iterator[Hands]:
     if cluster is None:
-        yield
+        from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+        out = _here if workers == 1 else partial(_by_processes, workers)
+        yield Hands(workers, TerminatedWorkerError, out)
         return
-    from dask.distributed import Client
-    from joblib import parallel_config
+    from dask.distributed import Client, KilledWorker
 
-    with Client(cluster, timeout=10), parallel_config(backend="dask"):  # type: ignore[no-untyped-call]
-        yield
-
-
-def _died() -> type[BaseException]:
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    died: type[BaseException] = TerminatedWorkerError
-    return died
+    with Client(cluster, timeout=PATIENCE) as client:  # type: ignore[no-untyped-call]
+        client.wait_for_workers(1, timeout=PATIENCE)
+        yield Hands(sum(client.nthreads().values()), KilledWorker, partial(_by_cluster, client))
