@@ -170,7 +170,7 @@ EXPERIMENT = Experiment(
     section="3.2.1",
     claim="Direct policy learning dies 47 +- 14 times with about 51 preference queries where traditional RL "
     "dies 2300 +- 700 times.",
-    trials={"quick": 2, "paper": 200},
+    trials={"quick": 2, "paper": 100},
     config=_config,
     tasks=_tasks,
     report=_report,
