@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import compress
 from typing import NamedTuple, Protocol
 
 import torch
@@ -33,6 +34,10 @@ class Rows(NamedTuple):
         entries = self.mu.sum(-1)
         return entries.new_zeros(self.near.shape[:2]).scatter_add_(1, self.at, entries)
 
+    def of(self, trial: Int64[Tensor, "K"]) -> Rows:
+        """Those of some trials, in order."""
+        return Rows(*(taken(part, trial) for part in self))
+
 
 class Terms(NamedTuple):
     """The terms of the objective, each summed over the entries of X."""
@@ -46,21 +51,23 @@ def train(network: Network, config: Config, state: AgentState, acted: Bool[Tenso
     """With probability p_train, `gradient_steps` steps of Adam on X. Updates the learner in place."""
     coin = state.keys.uniform(Stream.TRAIN) < config.p_train
     training = acted & coin & (state.x.rows > 0)
-    if not bool(training.any()):
+    trial = training.nonzero().squeeze(1)
+    if not len(trial):
         return state
     for step in range(config.gradient_steps):
-        rows = choose(config, state.x, state.keys, step)
-        terms, gradient = differentiate(network, config, state.learner.live, rows)
+        rows = choose(config, state.x, state.keys, step).of(trial)
+        parameters = taken(state.learner.live, trial)
+        terms, gradient = differentiate(network, config, parameters, rows)
         adam(state.learner.live, state.learner, gradient, training, config.learning_rate)
     entries = rows.mu.sum((-1, -2)).clamp_min(1)
-    return state.replace(
-        report=state.report.replace(
-            trained=training,
-            loss=terms.loss / entries,
-            entropy_global=terms.entropy_global / entries,
-            entropy_local=terms.entropy_local / entries,
-        )
-    )
+    means = {name: total / entries for name, total in terms._asdict().items()}
+    told = {name: mean.new_zeros(len(training)).index_put((trial,), mean) for name, mean in means.items()}
+    return state.replace(report=state.report.replace(trained=training, **told))
+
+
+def taken(every: Tensor, trial: Int64[Tensor, "K"]) -> Tensor:
+    """The rows of some trials, in order; no copy if it is all of them."""
+    return every if len(trial) == len(every) else every[trial]
 
 
 def choose(config: Config, x: Dataset, keys: Keys, step: int) -> Rows:
@@ -140,21 +147,33 @@ class Moments(Protocol):
 def adam(
     live: Float[Tensor, "N P"],
     moments: Moments,
-    gradient: Float[Tensor, "N P"],
+    gradient: Float[Tensor, "K P"],
     training: Bool[Tensor, "N"],
     rate: float,
 ) -> None:
-    """One step of Adam (Kingma & Ba 2014) in the trials that train; nothing moves in the others. In place.
+    """One step of Adam (Kingma & Ba 2014) in the K trials that train; nothing moves in the others. In place.
 
-    `gradient` serves as room for what is worked out, and is lost.
+    torch's fused step passes over the parameters once. Each trial is a tensor of its own to it, for each has
+    taken a number of steps of its own.
     """
     moments.steps.add_(training)
-    on = training.to(gradient.dtype)[:, None]
-    t = moments.steps.clamp_min(1).to(torch.float64)[:, None]
-    moments.first.lerp_(gradient, on * (1 - BETA1))
-    moments.second.lerp_(gradient.square_(), on * (1 - BETA2))
-    # rate m / (sqrt(v) + EPSILON), m and v corrected for their start at zero, with fewer passes over [N, P]
-    root = (1 - BETA2**t).sqrt()
-    size = (rate * root / (1 - BETA1**t)).to(gradient.dtype) * on
-    scale = torch.sqrt(moments.second, out=gradient).add_((EPSILON * root).to(gradient.dtype))
-    live.addcmul_(torch.div(moments.first, scale, out=scale), size, value=-1)
+    chosen = training.tolist()
+
+    def rows(every: Tensor) -> list[Tensor]:
+        return list(compress(every.unbind(), chosen))
+
+    torch._fused_adam_(
+        rows(live),
+        list(gradient.unbind()),
+        rows(moments.first),
+        rows(moments.second),
+        [],
+        rows(moments.steps.to(torch.float32)),
+        lr=rate,
+        beta1=BETA1,
+        beta2=BETA2,
+        weight_decay=0.0,
+        eps=EPSILON,
+        amsgrad=False,
+        maximize=False,
+    )

@@ -202,12 +202,15 @@ class _Patches(torch.autograd.Function):
 
     @staticmethod
     def backward(context: FunctionCtx, gradient: Float[Tensor, "N S H2 W2 9C"]) -> Float[Tensor, "N S H W C"]:
-        """Every cell gathers from the places that it surrounds."""
+        """Every cell gathers from the places that it surrounds: along its column, then along its row."""
+        trials, states, _height, _width, channels = context.shape  # type: ignore[attr-defined]
         tall, wide = gradient.shape[2:4]
+        columns = gradient.new_zeros(trials, states, tall + 2, wide, 3 * channels)
+        for shift, part in enumerate(gradient.chunk(3, dim=-1)):
+            columns.narrow(2, shift, tall).add_(part)
         total = gradient.new_zeros(context.shape)  # type: ignore[attr-defined]
-        for shift, part in enumerate(gradient.chunk(9, dim=-1)):
-            i, j = divmod(shift, 3)
-            total.narrow(2, i, tall).narrow(3, j, wide).add_(part)
+        for shift, part in enumerate(columns.chunk(3, dim=-1)):
+            total.narrow(3, shift, wide).add_(part)
         return total
 
 

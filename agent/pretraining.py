@@ -14,7 +14,7 @@ from jaxtyping import Float, Float64, UInt8
 from torch import Tensor
 
 from agent.config import Config
-from agent.learning import adam, entropy
+from agent.learning import adam, entropy, taken
 from agent.maze_walks import Batch, Pool, Walks, draw_mazes, pool, walk
 from agent.policy import Network
 from agent.state import AgentState
@@ -48,12 +48,9 @@ def rehearse(world: Gridworld, network: Network, config: Config, state: AgentSta
     mine = state.rehearsal
     trial = mine.owed.nonzero().squeeze(1)
     if len(trial):
-        everyone = len(trial) == len(mine.owed)
-        live = state.learner.live
-        some, keys = (live, state.keys) if everyone else (live[trial], state.keys.pick(trial))
-        found, _ = policy_gradient(network, some, pool(*_size(world)), keys)
-        whole = found if everyone else torch.zeros_like(live).index_put((trial,), found)
-        adam(live, mine, whole, mine.owed, RATE)
+        live, keys = state.learner.live, state.keys.pick(trial)
+        gradient, _ = policy_gradient(network, taken(live, trial), pool(*_size(world)), keys)
+        adam(live, mine, gradient, mine.owed, RATE)
     return state.replace(rehearsal=mine.replace(owed=state.report.trained))
 
 

@@ -59,7 +59,7 @@ def test_adam_is_torchs_and_leaves_other_trials_alone() -> None:
     theirs = start[0].clone().requires_grad_()
     optimiser = torch.optim.Adam([theirs], lr=0.01)
     for step in range(1, 6):
-        gradient = torch.tensor([[0.5, -2.0, 0.1]] * 2, dtype=DOUBLE) * step
+        gradient = torch.tensor([[0.5, -2.0, 0.1]], dtype=DOUBLE) * step  # of the trial that trains
         theirs.grad = gradient[0].clone()
         optimiser.step()
         adam(learner.live, learner, gradient, torch.tensor([True, False]), 0.01)
