@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import pytest
@@ -13,11 +14,15 @@ import uvicorn
 from fastapi.testclient import TestClient
 from playwright.sync_api import Browser, sync_playwright
 
+from server import runs
 from server.app import create_app
 from server.db import Database, connect
+from server.runs import Claim
 from server.schema import upgrade
 from server.serve import Server, bind
 from server.settings import Settings
+from server.wake import Bell
+from tests.pages import island
 from tests.pages.watched import Watched
 
 FLAGS = (
@@ -80,3 +85,23 @@ def watched(browser: Browser, address: str) -> Iterator[Watched]:
     yield found
     found.close()
     assert found.wrong == []
+
+
+@pytest.fixture
+def mine(db: Database) -> Claim:
+    return island.live(db)[1]
+
+
+@pytest.fixture
+def ask(db: Database, mine: Claim, settings: Settings) -> Callable[..., int]:
+    """Post a question as the worker does, and ring for the pages."""
+    ticks = iter(range(1, 1000))
+
+    def post(kind: str = "guidance", left: str = "left", right: str = "down", start: Any = (1, 2)) -> int:
+        runs.report(db, mine, tick=0)  # a sign of life
+        clips = {"guidance": island.guidance, "preference": island.preference}[kind](left, right, start)
+        number = island.ask(db, mine, next(ticks), kind, clips)
+        Bell(settings.data, "web").ring()
+        return number
+
+    return post

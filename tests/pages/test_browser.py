@@ -2,62 +2,15 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from typing import Any
 
-import pytest
-from playwright.sync_api import Page, Route, expect
-from sqlalchemy import select
+from playwright.sync_api import Route, expect
 
 from server import queue, runs
 from server.db import Database
 from server.runs import Claim
-from server.settings import Settings
-from server.tables import Answer, Query
-from server.wake import Bell
-from tests.pages import island
-from tests.pages.watched import Watched
-
-
-def given(db: Database) -> list[tuple[int, str]]:
-    """The stored answers, in their order."""
-    with db.read() as session:
-        rows = session.scalars(select(Answer).order_by(Answer.number)).all()
-        return [(row.query_id, row.choice) for row in rows]
-
-
-def until(holds: Callable[[], bool], seconds: float = 10.0) -> None:
-    """Wait until something holds that no page shows."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it did not happen"
-        time.sleep(0.02)
-
-
-def shown(page: Page, number: int) -> None:
-    """Wait until a question is on the page."""
-    expect(page.locator(f'#question[data-query="{number}"]')).to_be_visible()
-
-
-@pytest.fixture
-def mine(db: Database) -> Claim:
-    return island.live(db)[1]
-
-
-@pytest.fixture
-def ask(db: Database, mine: Claim, settings: Settings) -> Callable[..., int]:
-    """Post a question as the worker does, and ring for the pages."""
-    ticks = iter(range(1, 1000))
-
-    def post(kind: str = "guidance", left: str = "left", right: str = "down", start: Any = (1, 2)) -> int:
-        runs.report(db, mine, tick=0)  # a sign of life
-        clips = {"guidance": island.guidance, "preference": island.preference}[kind](left, right, start)
-        number = island.ask(db, mine, next(ticks), kind, clips)
-        Bell(settings.data, "web").ring()
-        return number
-
-    return post
+from server.tables import Query
+from tests.pages.watched import Watched, given, shown, until
 
 
 def test_keys_answer_one_question_after_another(
@@ -96,45 +49,6 @@ def test_a_new_question_appears_by_itself(watched: Watched, db: Database, ask: C
     page.keyboard.press("ArrowRight")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
     assert given(db) == [(number, "right")]
-
-
-def test_a_question_that_comes_later_is_fetched_ahead_too(watched: Watched, ask: Callable[..., int]) -> None:
-    first = ask("preference", "down down", "left")
-    page = watched.open("/runs/1/parent")
-    shown(page, first)
-    expect(page.locator("#question")).to_have_attribute("data-ahead", "")
-    second = ask("preference", "left left", "down")
-    expect(page.locator("#question")).to_have_attribute("data-ahead", str(second))
-
-
-def test_the_request_for_the_next_question_lies_at_the_server_while_somebody_thinks(
-    watched: Watched, db: Database, ask: Callable[..., int]
-) -> None:
-    first = ask()
-    page = watched.open("/")
-    with page.expect_request(lambda request: "shown=" in (request.post_data or "")) as lookout:
-        page.goto(f"{watched.address}/runs/1/parent")
-        shown(page, first)
-    page.keyboard.press("ArrowLeft")
-    until(lambda: given(db) == [(first, "left")])
-    second = ask()
-    shown(page, second)
-    reply = lookout.value.response()
-    assert reply is not None
-    assert f'data-query="{second}"' in reply.text()
-
-
-def test_guidance_goes_before_what_was_leased_ahead(watched: Watched, ask: Callable[..., int]) -> None:
-    first, second = (ask("preference", "down down", "left") for _ in range(2))
-    page = watched.open("/runs/1/parent")
-    shown(page, first)
-    expect(page.locator("#question")).to_have_attribute("data-ahead", str(second))
-    urgent = ask()
-    expect(page.locator("#question")).to_have_attribute("data-ahead", str(urgent))
-    page.keyboard.press("ArrowLeft")
-    shown(page, urgent)
-    page.keyboard.press("ArrowLeft")
-    shown(page, second)
 
 
 def test_it_works_where_no_stream_comes_through(

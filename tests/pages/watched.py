@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from typing import Any
 
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, expect
+from sqlalchemy import select
+
+from server.db import Database
+from server.tables import Answer
 
 
 class Watched:
@@ -39,3 +45,23 @@ class Watched:
     def _asked(self, request: Request) -> None:
         if not request.url.startswith((self.address, "data:", "blob:")):
             self.wrong.append(f"a request to {request.url}")
+
+
+def given(db: Database) -> list[tuple[int, str]]:
+    """The stored answers, in their order."""
+    with db.read() as session:
+        rows = session.scalars(select(Answer).order_by(Answer.number)).all()
+        return [(row.query_id, row.choice) for row in rows]
+
+
+def until(holds: Callable[[], bool], seconds: float = 10.0) -> None:
+    """Wait until something holds that no page shows."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.02)
+
+
+def shown(page: Page, number: int) -> None:
+    """Wait until a question is on the page."""
+    expect(page.locator(f'#question[data-query="{number}"]')).to_be_visible()

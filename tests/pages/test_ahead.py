@@ -1,0 +1,49 @@
+"""The question after the one that is shown: fetched while somebody thinks, there at once when wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from playwright.sync_api import expect
+
+from server.db import Database
+from tests.pages.watched import Watched, given, shown, until
+
+
+def test_a_question_that_comes_later_is_fetched_ahead_too(watched: Watched, ask: Callable[..., int]) -> None:
+    first = ask("preference", "down down", "left")
+    page = watched.open("/runs/1/parent")
+    shown(page, first)
+    expect(page.locator("#question")).to_have_attribute("data-ahead", "")
+    second = ask("preference", "left left", "down")
+    expect(page.locator("#question")).to_have_attribute("data-ahead", str(second))
+
+
+def test_the_request_for_the_next_question_lies_at_the_server_while_somebody_thinks(
+    watched: Watched, db: Database, ask: Callable[..., int]
+) -> None:
+    first = ask()
+    page = watched.open("/")
+    with page.expect_request(lambda request: "shown=" in (request.post_data or "")) as lookout:
+        page.goto(f"{watched.address}/runs/1/parent")
+        shown(page, first)
+    page.keyboard.press("ArrowLeft")
+    until(lambda: given(db) == [(first, "left")])
+    second = ask()
+    shown(page, second)
+    reply = lookout.value.response()
+    assert reply is not None
+    assert f'data-query="{second}"' in reply.text()
+
+
+def test_guidance_goes_before_what_was_leased_ahead(watched: Watched, ask: Callable[..., int]) -> None:
+    first, second = (ask("preference", "down down", "left") for _ in range(2))
+    page = watched.open("/runs/1/parent")
+    shown(page, first)
+    expect(page.locator("#question")).to_have_attribute("data-ahead", str(second))
+    urgent = ask()
+    expect(page.locator("#question")).to_have_attribute("data-ahead", str(urgent))
+    page.keyboard.press("ArrowLeft")
+    shown(page, urgent)
+    page.keyboard.press("ArrowLeft")
+    shown(page, second)
