@@ -1,10 +1,10 @@
 """An agent whose X holds every pair of the states that it reaches: Fig. 2 without a want of queries (3.3).
 
 Network, loss, optimiser and clips are the house's own; only where the questions come from is given to it. It
-walks a fixed number of episodes, whose weather is always the same. In every state that it comes to, the
-scripted parent compares all six pairs of first moves, each as a clip of length T that goes on by the frozen
-policies (Eq. 5, 6; drying left out, as in the look-ahead). It trains on all of that, walks again, and so on,
-until X holds all the states that it reaches, or it has had its rounds.
+walks a fixed number of episodes, whose weather is always the same; and then again, with some random moves.
+In every state that it comes to, the scripted parent compares all six pairs of first moves, each as a clip of
+length T that goes on by the frozen policies (Eq. 5, 6; drying left out, as in the look-ahead). It trains on
+all of that, and walks again, so many rounds.
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ TOGETHER = 128
 """Distinct states in a gradient step, each with all its pairs."""
 
 
+ASTRAY = 0.25
+"""Of the moves in every second walk: clips put the frozen policies where they would not go themselves."""
 LONG = 1_000_000
 """More passes over X than a stage has."""
 
@@ -80,8 +82,8 @@ class Facts:
         self.mu: Float64[Tensor, "S 6 2"] = torch.zeros(0, len(PAIRS), 2, dtype=torch.float64)
 
     def add(self, met: Met, mu: Float64[Tensor, "N 6 2"]) -> None:
-        """What the parent says in states that it was not asked about before."""
-        self.truth = torch.cat((self.truth, met.truth))
+        """What the parent says in the states of one more walk, those of earlier ones among them."""
+        self.truth = torch.unique(torch.cat((self.truth, met.truth)))
         fresh = first_of(met.sight)
         fresh = fresh[~torch.isin(met.sight[fresh], self.sight)]
         self.sight = torch.cat((self.sight, met.sight[fresh]))
@@ -141,15 +143,13 @@ def _stage(
     x = Facts(world)
     moments = Moments(torch.zeros_like(live), torch.zeros_like(live), torch.zeros(1, dtype=torch.int64))
     for _ in range(pace.rounds):
-        met = meet(world, live, pace.episodes)
-        fresh = ~torch.isin(met.truth, x.truth)
-        if bool(fresh.any()):
-            new = met.pick(fresh)
-            x.add(new, judged(world, judgement, new.states, elders))
+        for astray in (0.0, ASTRAY):
+            met = meet(world, live, pace.episodes, dice, astray)
+            x.add(met, judged(world, judgement, met.states, elders))
         for _ in range(pace.passes):
             dice = dice.next()
             _train(world, config, x, live, moments, dice)
-    sight = torch.unique(meet(world, live, pace.episodes).sight)
+    sight = torch.unique(meet(world, live, pace.episodes, dice).sight)
     return Covered(
         live=live,
         questions=len(PAIRS) * len(x.truth),
@@ -159,13 +159,17 @@ def _stage(
     )
 
 
-def meet(world: RewardHacking, live: Float[Tensor, "1 P"], episodes: int) -> Met:
-    """Walk the episodes by the argmax policy."""
+def meet(
+    world: RewardHacking, live: Float[Tensor, "1 P"], episodes: int, dice: Keys, astray: float = 0.0
+) -> Met:
+    """Walk the episodes by the argmax policy; a share `astray` of the moves is drawn from all four."""
     passed: list[WorldState] = []
 
     def choose(state: WorldState) -> Int64[Tensor, "N"]:
         passed.append(state)
-        return argmax(world, live, state)
+        place = torch.arange(episodes) + (2 * len(passed) * episodes)
+        coin, any_of_them = (dice.at(Stream.ACT, place + shift)[0] for shift in (0, episodes))
+        return torch.where(coin < astray, (4 * any_of_them).long(), argmax(world, live, state))
 
     walked(world, choose, 1, episodes)
     every = [one.tensors() for one in passed]

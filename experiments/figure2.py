@@ -43,7 +43,7 @@ LIVES: dict[Scale, dict[str, Life]] = {
         "more guidance, 4 gradient steps": Life({**ASKS, "gradient_steps": 4}, 1000, (1000, 2000, 3000), 30),
         "more guidance, pre-trained": Life({**ASKS, "pretrain": True}, 1000, (1000, 2000, 3000), 30),
         "10,000 a stage": Life(
-            {**ASKS, "p_rec": 1.0, "p_pref": 1.0, "p_train": 0.25},
+            {"batch": 64, "p_guid": 0.999, "p_rec": 1.0, "p_pref": 1.0, "p_train": 0.5},
             10_000,
             (1000, 3000, 10_000, 20_000),
             90,
@@ -69,7 +69,7 @@ LINES: dict[Scale, Lines] = {
         6,
         1000,
         (1000, 2000, 3000),
-        Pace(300, 10, 80),
+        Pace(150, 8, 50),
         {each: 4 if each == TRIED else 1 for each in COMBINATIONS},
     ),
 }
@@ -160,7 +160,7 @@ def _covers(asked: Asked) -> list[Task]:
                 "trial": 0,
                 "seed": asked.seed,
             },
-            50.0 * stages,
+            45.0 * stages,
         )
         for (level, inside), stages in lines.stages.items()
     ]

@@ -238,18 +238,22 @@ def _around(mean: float, error: float) -> str:
 
 
 WORDS = (
-    "Every number is a mean over 1000 episodes of 10 steps, argmax policies, with the same weather for all; "
-    "+- is the deviation over the trials. *up-down* and *left* say where the parent walks inside its cycle.",
-    "*Conservative* agents ask 1000 queries at every T, as the paper's do. Its probabilities are not legible "
-    "in our copy, and it may have begun with a pre-trained agent: here only the life that says so does. A "
-    "gradient step takes 32 rows of X, not all of them (`batch`): over all of X, T = 6 would take hours.",
-    "*More guidance* is p_guid = 0.99. *10,000 a stage* has it, too, always records and looks for pairs, and "
-    "trains in a quarter of its ticks, since it lives ten times as many of them.",
+    "Every number is a mean over 1000 episodes of 10 steps, argmax policies, with the same weather for all;"
+    " +- is the deviation over the trials. *up-down* and *left* say where the parent walks inside its "
+    "cycle.",
+    "*Conservative* agents ask 1000 queries at every T, as the paper's do. Its probabilities are not "
+    "legible in our copy, and it may have begun with a pre-trained agent: here only the life that says so "
+    "does. A gradient step takes 32 rows of X, not all of them (`batch`): over all of X, T = 6 would take "
+    "hours.",
+    "*More guidance* is p_guid = 0.99. *10,000 a stage* asks even more (0.999), for else most of its life "
+    "would be waiting for questions; it always records and looks for pairs, trains in half of its ticks on "
+    "64 rows, and goes to T = 2 alone.",
     "The look-ahead searches T moves on the reward, and then the parent's own value; it sees whether the "
     "plant under the agent has dried, which an agent does not.",
     "The coverage agent has the house's network, loss and clips, but asks about all six pairs of moves in "
-    "every state that its own policy comes to in its episodes. Its X is by what it sees, where each state "
-    "weighs the same. So what it lacks of the look-ahead is no want of queries.",
+    "every state that its own policy comes to in its episodes, and in those to which a quarter of random "
+    "moves leads: clips put the frozen policies where they would not go themselves. Its X is by what it "
+    "sees, where each state weighs the same. So what it lacks of the look-ahead is no want of queries.",
     "Policy gradients are REINFORCE on legitimate waterings (gamma 0.9), 16 episodes a step, without a "
     "bucket. A baseline is subtracted: the mean return to go of the 16 episodes at the same step.",
 )

@@ -33,15 +33,16 @@ def test_clips_go_on_by_the_frozen_policies_the_latest_first() -> None:
 
 
 def test_every_pair_is_judged_by_its_advantage() -> None:
-    """Of single moves the parent prefers the greater Q_p; the sides of a pair do not matter."""
+    """Of single moves the parent prefers the greater Q_p and shuns the bucket, on whichever side it is."""
     world = garden("garden-mirrored")
     valued, judgement = Garden(world, GAMMA), Judgement(world, GAMMA)
-    states = meet(world, always(world, LEFT), 5).states
+    states = meet(world, always(world, LEFT), 60, keys(0, 1), astray=0.9).states
     mu = judged(world, judgement, states, [])
-    q = torch.stack(
-        [valued.q(states.board, states.agent, states.level, torch.full_like(states.t, a)) for a in range(4)],
-        1,
-    )
+    every = [torch.full_like(states.t, action) for action in range(4)]
+    q = torch.stack([valued.q(states.board, states.agent, states.level, action) for action in every], 1)
+    wet = torch.stack([world.unsafe(states, action, world.forecast(states, action)) for action in every], 1)
+    assert bool(wet.any())
+    q = q.masked_fill(wet, -1.0)  # what ends in the bucket loses, and of two such neither
     for place, (one, other) in enumerate(PAIRS):
         better = (q[:, one] - q[:, other]).masked_fill((q[:, one] - q[:, other]).abs() < 1e-6, 0).sign()
         assert torch.equal(mu[:, place, 0] - mu[:, place, 1], better)

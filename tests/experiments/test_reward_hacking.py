@@ -33,11 +33,15 @@ def test_quick_and_paper_pieces_lie_in_one_folder() -> None:
     assert EXPERIMENT.config(quick) == EXPERIMENT.config(paper)
     keys = [{task.key for task in EXPERIMENT.tasks(asked)} for asked in (quick, paper)]
     assert not keys[0] & keys[1]
-    assert all(of.milestones[0] == 50 for of in VARIANTS.values())
+    assert len([task for task in EXPERIMENT.tasks(Asked(100)) if "long" in task.key]) == 1
+    assert (
+        sum(task.arguments["span"][1] for task in EXPERIMENT.tasks(Asked(40)) if "mirrored" in task.key) == 20
+    )
+    assert VARIANTS[NAME].one_of == 1
 
 
 def test_a_life_in_small() -> None:
-    rows = bucket_some("mirrored, not pre-trained", (3, 6), (1, 2), 2, 0)
+    rows = bucket_some(NAME, (3, 6), (1, 2), 2, 0)
     assert [(one["trial"], one["queries"], one["there"]) for one in rows] == [(1, 3, True), (1, 6, True)]
     assert [one["guidance"] + one["preference"] for one in rows] == [3, 6]
     assert all(0 <= one["caught_100"] <= one["bucket_100"] <= 100 for one in rows)
