@@ -13,7 +13,7 @@ from experiments.findings import SILENT, Finding, count_finding, mean_interval, 
 from experiments.pieces import Row, Task
 from experiments.raising import Goal
 
-MAX_TICKS = 20_000
+MAX_TICKS = 2_000
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "pre-trained": {},
