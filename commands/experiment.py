@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -91,7 +90,6 @@ def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | 
     from experiments.pieces import OtherPlan, Store
     from experiments.publish import page, publish
 
-    began = time.monotonic()
     plan = {"experiment": one.name, "seed": asked.seed, "device": asked.device, **one.config(asked)}
     tasks = [task._replace(device=asked.device) for task in one.tasks(asked)]
     try:
@@ -100,7 +98,7 @@ def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | 
         store = Store(out / one.name / "pieces", plan)
         with _bar(one, tasks) as told:
             rows = work(tasks, store, workers, cluster, told)
-        results = publish(one, asked, rows, out, time.monotonic() - began, workers)
+        results = publish(one, asked, rows, out, store.seconds(), workers)
     except (OtherPlan, WorkersDied, NoGpu) as error:
         raise Wrong(str(error)) from None
     except OSError as error:

@@ -10,12 +10,13 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from time import monotonic
 from typing import Any, NamedTuple
 
 Row = dict[str, Any]
 """Name -> number, word, truth value or null. A name that begins with HIDDEN is for other pieces alone."""
 HIDDEN = "_"
-PLAN = "plan.json"
+PLAN, SPENT = "plan.json", "spent.json"
 
 
 class Task(NamedTuple):
@@ -44,6 +45,7 @@ class Store:
             OSError: the folder cannot be made or read.
         """
         self.folder = folder
+        self._since = monotonic()
         folder.mkdir(parents=True, exist_ok=True)
         wanted = json.loads(json.dumps(plan))
         path = folder / PLAN
@@ -70,6 +72,14 @@ class Store:
     def keep(self, task: Task, rows: Sequence[Row]) -> None:
         """Store a finished piece, whole or not at all."""
         _write(self._path(task.key), list(rows))
+        now = monotonic()
+        _write(self.folder / SPENT, self.seconds() + now - self._since)
+        self._since = now
+
+    def seconds(self) -> float:
+        """How long all runs together took, each from its beginning to the last piece that it finished."""
+        path = self.folder / SPENT
+        return float(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else 0.0
 
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}.json"

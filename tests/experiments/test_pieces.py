@@ -98,6 +98,13 @@ def test_a_piece_that_was_not_renamed_is_no_piece(store: Store) -> None:
     assert store.find(task(1)) is None
 
 
+def test_the_time_of_all_runs_counts(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.pieces.monotonic", iter((0.0, 5.0, 100.0, 107.0)).__next__)
+    for first in (1, 2):
+        Store(store.folder, PLAN).keep(task(first), [])
+    assert store.seconds() == 12
+
+
 def test_another_plan_is_refused(store: Store) -> None:
     Store(store.folder, PLAN)
     with pytest.raises(OtherPlan, match=r"seed was 0 and is 1 now\. Name another folder by --out"):
