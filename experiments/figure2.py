@@ -40,7 +40,7 @@ LIVES: dict[Scale, dict[str, Life]] = {
         "conservative": Life({"batch": 32}, 1000, (1000, 2000, 3000, 4000, 5000, 6000), 45, everywhere=True),
         "more guidance": Life(ASKS, 1000, (1000, 2000, 3000, 4000), 15),
         "more guidance, own length": Life({**ASKS, "own_length": True}, 1000, (1000, 2000, 3000), 11),
-        "more guidance, 4 gradient steps": Life({**ASKS, "gradient_steps": 4}, 1000, (1000, 2000, 3000), 30),
+        "more guidance, 4 gradient steps": Life({**ASKS, "gradient_steps": 4}, 1000, (1000, 2000), 20),
         "more guidance, pre-trained": Life({**ASKS, "pretrain": True}, 1000, (1000, 2000, 3000), 30),
         "10,000 a stage": Life(
             {"batch": 64, "p_guid": 0.999, "p_rec": 1.0, "p_pref": 1.0, "p_train": 0.5},

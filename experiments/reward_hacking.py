@@ -35,7 +35,7 @@ class Variant(NamedTuple):
 
 
 VARIANTS = {
-    "garden, pre-trained": Variant("garden", {}, (50, 100, 200), 2.5),
+    "garden, pre-trained": Variant("garden", {}, (50, 100), 1.2),
     "mirrored, pre-trained": Variant("garden-mirrored", {}, (50, 100), 1.2, one_of=2),
     "garden, not pre-trained": Variant("garden", {"pretrain": False}, (50, 100), 0.5),
     "garden, not pre-trained, comparing twice": Variant(
