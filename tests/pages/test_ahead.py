@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from playwright.sync_api import expect
+from playwright.sync_api import APIResponse, Route, expect
 
 from server.db import Database
 from tests.pages.watched import Watched, given, shown, until
@@ -47,3 +47,39 @@ def test_guidance_goes_before_what_was_leased_ahead(watched: Watched, ask: Calla
     shown(page, urgent)
     page.keyboard.press("ArrowLeft")
     shown(page, second)
+
+
+def test_what_two_requests_bring_is_shown_once(
+    watched: Watched, db: Database, ask: Callable[..., int]
+) -> None:
+    first, held = ask(), dict[str, tuple[Route, APIResponse]]()
+
+    def hold(route: Route) -> None:
+        held["ahead" if "shown=" in (route.request.post_data or "") else "next"] = (route, route.fetch())
+
+    def release(which: str) -> None:
+        while which not in held:
+            page.wait_for_timeout(20)
+        route, reply = held.pop(which)
+        route.fulfill(response=reply)
+
+    page = watched.open("/")
+    page.route("**/parent/question", hold)
+    page.goto(f"{watched.address}/runs/1/parent")
+    release("next")
+    shown(page, first)
+    page.wait_for_timeout(200)  # the request for the question after it lies at the server
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_timeout(200)
+    second = ask()
+    while (
+        len(held) < 2
+    ):  # it brings the second question, and so does a request that the stream's word set off
+        page.wait_for_timeout(20)
+    release("ahead")
+    shown(page, second)
+    page.keyboard.press("ArrowRight")
+    page.wait_for_timeout(200)
+    release("next")
+    expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
+    assert given(db) == [(first, "left"), (second, "right")]

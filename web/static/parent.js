@@ -23,18 +23,27 @@ let lookout = null;    // aborts the request for it, which lies at the server
 let asking = false, again = false; // a request for a question is under way; another was wanted meanwhile
 let state = main.dataset.state;
 let answered = Number($("count").textContent), goal = Number($("goal").firstElementChild.textContent), unsaved = 0, quiet = 0;
+const given = new Set(); // questions that were answered on this page
 let saved = []; // what the server said while an answered question was still on the stage
 
 // ---- questions
 
-// Markup of the most urgent question, besides those given and those whose answers are on their way; null if there is
+// The form of the most urgent question, besides those given and those whose answers are on their way; null if there is
 // none within `seconds`.
 async function ask(shown = [], seconds = 0, signal = undefined) {
   const body = new URLSearchParams({ client_id: client, wait: seconds });
   for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
   const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body, signal });
   if (!reply.ok) throw new Error(reply.statusText);
-  return reply.status === 204 ? null : reply.text();
+  return reply.status === 204 ? null : parse(await reply.text());
+}
+
+// Two requests may bring the same question, and the second when it is answered: that one is not shown again.
+function parse(markup) {
+  const holder = document.createElement("template");
+  holder.innerHTML = markup;
+  const form = holder.content.firstElementChild;
+  return given.has(form.dataset.query) ? null : form;
 }
 
 // Fill the empty stage. One request at a time; what comes while it is under way is asked once more after it.
@@ -43,21 +52,15 @@ async function next(seconds = 0) {
   if (asking) return;
   asking = true;
   try {
-    let markup;
+    let form;
     do {
       again = false;
-      markup = await ask([], seconds);
+      form = await ask([], seconds);
       seconds = 0;
-    } while (!markup && again && !current);
-    if (markup && !current) show(parse(markup));
+    } while (!form && again && !current);
+    if (form && !current) show(form);
     else if (!current) wait(state === "question" ? "elsewhere" : state);
   } catch { wait("offline"); } finally { asking = false; }
-}
-
-function parse(markup) {
-  const holder = document.createElement("template");
-  holder.innerHTML = markup;
-  return holder.content.firstElementChild;
 }
 
 // The question after this one: its request lies at the server while somebody thinks. If this one is answered meanwhile,
@@ -67,7 +70,7 @@ async function prefetch() {
   lookout?.abort();
   const mine = lookout = new AbortController(), form = current, began = performance.now();
   form.dataset.ahead = "";
-  const found = await ask([form.dataset.query], LOOKOUT, mine.signal).then((markup) => markup && parse(markup), () => null);
+  const found = await ask([form.dataset.query], LOOKOUT, mine.signal).catch(() => null);
   if (mine !== lookout) return;
   lookout = null;
   if (form === current) {
@@ -178,6 +181,7 @@ function count(number) {
 function answer(choice) {
   if (!current) return;
   const query = Number(current.dataset.query);
+  given.add(current.dataset.query);
   for (const button of current.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
   current = null;
   unsaved++;
