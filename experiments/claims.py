@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from experiments.drawings import shares
 from experiments.experiment import Asked, Report, spans
 from experiments.findings import SILENT, Finding, count_finding, mean_interval, spread
 from experiments.pieces import Row, Task
@@ -79,7 +80,14 @@ class Claim(NamedTuple):
 
     def report(self, asked: Asked, rows: Sequence[Row]) -> Report:
         """Counts and means of every variant."""
-        return Report([one for name in self.tried(asked) for one in self._findings(name, rows)], self.words)
+        names = self.tried(asked)
+        counts = [each for name in names for each in self._counts(name, rows)]
+        found = [one for name in names for one in self._findings(name, rows)]
+        return Report(found, self.words, {"shares": lambda figure: shares(figure, counts)})
+
+    def _counts(self, name: str, rows: Sequence[Row]) -> list[tuple[str, int, int]]:
+        mine = [row for row in rows if row["of"] == name]
+        return [(f"{name}: {one.what}", _hits(one, mine), len(mine)) for one in self.counted]
 
     def _findings(self, name: str, rows: Sequence[Row]) -> list[Finding]:
         mine = [row for row in rows if row["of"] == name]
@@ -94,8 +102,11 @@ MEANS = (("unsafe moves while parented", "deaths"), ("guidance queries", "guidan
 
 
 def _count(what: str, one: Counted, rows: Sequence[Row], stands: bool) -> Finding:
-    hits = sum(row[one.column] in one.words for row in rows)
-    return count_finding(what, one.paper if stands else SILENT, hits, len(rows))
+    return count_finding(what, one.paper if stands else SILENT, _hits(one, rows), len(rows))
+
+
+def _hits(one: Counted, rows: Sequence[Row]) -> int:
+    return sum(row[one.column] in one.words for row in rows)
 
 
 def _mean(what: str, column: str, rows: Sequence[Row], note: str) -> Finding:

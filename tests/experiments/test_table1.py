@@ -42,7 +42,8 @@ def test_the_order_of_the_four_algorithms(tmp_path: Path) -> None:
     assert deaths[0] > 10 * deaths[1] > 10 * deaths[2]
     rows = list(csv.DictReader((tmp_path / "table1/trials.csv").read_text().splitlines()))
     assert len(rows) == 24
-    assert (tmp_path / "table1.md").read_text() == page(results, ())
+    assert (tmp_path / "table1.md").read_text() == page(results, ("deaths",))
+    assert all((tmp_path / f"table1/deaths.{kind}").stat().st_size > 1000 for kind in ("svg", "png"))
     before = [path.stat().st_mtime_ns for path in sorted((tmp_path / "table1/pieces").iterdir())]
     assert run(app, arguments).exit_code == 0
     assert [path.stat().st_mtime_ns for path in sorted((tmp_path / "table1/pieces").iterdir())] == before
