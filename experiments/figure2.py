@@ -45,8 +45,8 @@ LIVES: dict[Scale, dict[str, Life]] = {
         "10,000 a stage": Life(
             {"batch": 64, "p_guid": 0.999, "p_rec": 1.0, "p_pref": 1.0, "p_train": 0.5},
             10_000,
-            (1000, 2000, 5000, 10_000, 20_000),
-            90,
+            (1000, 2000, 5000, 10_000, 12_000),
+            54,
         ),
     },
 }
@@ -68,7 +68,7 @@ LINES: dict[Scale, Lines] = {
     "paper": Lines(
         6,
         1000,
-        (1000, 2000, 3000),
+        (1000, 2000),
         Pace(150, 8, 50),
         {each: 4 if each == TRIED else 1 for each in COMBINATIONS},
     ),
