@@ -24,29 +24,24 @@ let asking = false, again = false; // a request for a question is under way; ano
 let state = main.dataset.state;
 let answered = Number($("count").textContent), goal = Number($("goal").firstElementChild.textContent), unsaved = 0, quiet = 0;
 const given = new Set(); // questions that were answered on this page
-let saved = []; // what the server said while an answered question was still on the stage
+const saved = []; // replies to answers, until the stage changes
 
 // ---- questions
 
-// The form of the most urgent question, besides those given and those whose answers are on their way; null if there is
-// none within `seconds`.
+// The form of the most urgent question, besides those that were answered here; null if there is none within `seconds`.
 async function ask(shown = [], seconds = 0, signal = undefined) {
   const body = new URLSearchParams({ client_id: client, wait: seconds });
   for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
   const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body, signal });
   if (!reply.ok) throw new Error(reply.statusText);
-  return reply.status === 204 ? null : parse(await reply.text());
-}
-
-// Two requests may bring the same question, and the second when it is answered: that one is not shown again.
-function parse(markup) {
+  if (reply.status === 204) return null;
   const holder = document.createElement("template");
-  holder.innerHTML = markup;
+  holder.innerHTML = await reply.text();
   const form = holder.content.firstElementChild;
-  return given.has(form.dataset.query) ? null : form;
+  return given.has(form.dataset.query) ? null : form; // two requests may bring the same question, one of them late
 }
 
-// Fill the empty stage. One request at a time; what comes while it is under way is asked once more after it.
+// Fill the empty stage. One request at a time; what comes meanwhile is asked for once more.
 async function next(seconds = 0) {
   again = asking;
   if (asking) return;
@@ -63,8 +58,8 @@ async function next(seconds = 0) {
   } catch { wait("offline"); } finally { asking = false; }
 }
 
-// The question after this one: its request lies at the server while somebody thinks. If this one is answered meanwhile,
-// the next is shown as soon as the agent asks, and no request has to be made for it.
+// The question after this one: its request lies at the server while somebody thinks, so that its reply leaves as soon as
+// the agent asks.
 async function prefetch() {
   if (!current || document.hidden) return;
   lookout?.abort();
@@ -83,7 +78,7 @@ async function prefetch() {
   }
 }
 
-// A question is held for this browser for a minute; while somebody looks at it, it is held on.
+// A question is held for a minute, and for longer while somebody looks at it.
 async function renew() {
   if (!current || document.hidden) return;
   await ask().catch(() => null);
@@ -102,14 +97,14 @@ function show(form) {
   main.dataset.state = "question";
   document.title = `● ${form.dataset.title} · ${name}`;
   $("said").textContent = form.dataset.said;
-  for (const reply of saved.splice(0)) report("saved", reply);
+  settle();
   player = play(form);
   if (focused) form.querySelector(`.answers [value=${focused}]`).focus();
   performance.mark("question", { detail: form.dataset.query });
   painted(prefetch);
 }
 
-// Do something once the stage is painted: until then the page, and the server on the same machine, have nothing else to do.
+// Do something once the stage is painted: until then the page has nothing else to do.
 function painted(then) {
   let timer = 0;
   const once = () => { clearTimeout(timer); then?.(); then = null; };
@@ -127,7 +122,7 @@ function wait(which) {
   if (!waiting.hidden) return announce(which);
   quiet ||= setTimeout(() => {
     quiet = 0;
-    for (const reply of saved.splice(0)) report("saved", reply);
+    settle();
     if (current) return;
     stage.replaceChildren();
     waiting.hidden = false;
@@ -200,6 +195,10 @@ function answer(choice) {
 }
 
 // A page that changes twice is painted twice: what was saved is told together with the next question, if that comes soon.
+function settle() {
+  for (const reply of saved.splice(0)) report("saved", reply);
+}
+
 function report(outcome, reply) {
   if (outcome === "saved" && quiet) return saved.push(reply);
   $("saved").classList.toggle("kept", outcome === "kept");
