@@ -107,9 +107,9 @@ def _grid(scale: Scale) -> Iterator[tuple[str, dict[str, Any]]]:
 def _config(asked: Asked) -> Mapping[str, Any]:
     return {
         "world": WORLD,
-        "layouts": {name: LAYOUTS[name] for name in GRID[asked.scale]["layout"]},
-        "grid": GRID[asked.scale],
-        "trials of a setting": SOME[asked.scale],
+        "layouts": LAYOUTS,
+        "grid": GRID,
+        "trials of a setting": SOME,
         "limits": {"search": [SEARCH_TICKS, SEARCH_STEPS], "confirming": [MAX_TICKS, MAX_STEPS]},
     }
 
@@ -124,14 +124,14 @@ def _direct_tasks(asked: Asked) -> Iterator[Task]:
     some = SOME[asked.scale]
     for number, (layout, knobs) in enumerate(_grid(asked.scale)):
         mine = {"layout": layout, "knobs": knobs, "trials": some, "seed": asked.seed}
-        yield Task(f"direct-{number:03d}", "experiments.calibrate:try_direct", mine, some)
+        yield Task(f"{asked.scale}-direct-{number:03d}", "experiments.calibrate:try_direct", mine, some)
 
 
 def _reward_tasks(asked: Asked) -> Iterator[Task]:
     some, grid = SOME[asked.scale], GRID[asked.scale]
     for number, (layout, entropy) in enumerate(product(grid["layout"], grid["entropy"])):
         mine = {"layout": layout, "entropy": entropy, "trials": some, "seed": asked.seed}
-        yield Task(f"traditional-{number:03d}", "experiments.calibrate:try_reward", mine, some)
+        yield Task(f"{asked.scale}-traditional-{number:03d}", "experiments.calibrate:try_reward", mine, some)
 
 
 def _confirming(asked: Asked) -> Iterator[Task]:
@@ -142,7 +142,7 @@ def _confirming(asked: Asked) -> Iterator[Task]:
             "trials": asked.trials,
             "seed": asked.seed,
         }
-        key = f"confirm-{one.name}-{span.start:06d}-{span.stop:06d}"
+        key = f"{asked.scale}-confirm-{one.name}-{span.start:06d}-{span.stop:06d}"
         yield Task(key, "experiments.calibrate:confirm_some", mine, len(span))
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from experiments.drawings import shares
 from experiments.experiment import Asked, Report, spans
-from experiments.findings import SILENT, Finding, count_finding, mean_interval, spread
+from experiments.findings import SILENT, Finding, count_finding, mean_finding
 from experiments.pieces import Row, Task
 from experiments.raising import Goal
 
@@ -51,7 +51,7 @@ class Claim(NamedTuple):
             "preset": "conservative",
             "until": list(self.until),
             "max_ticks": MAX_TICKS,
-            "variants": {name: dict(self.variants[name]) for name in self.tried(asked)},
+            "variants": {name: dict(changes) for name, changes in self.variants.items()},
         }
 
     def tasks(self, asked: Asked) -> list[Task]:
@@ -95,7 +95,8 @@ class Claim(NamedTuple):
         found = [_count(f"{name}: {one.what}", one, mine, stands) for one in self.counted]
         left = sum(not row["finished"] for row in mine)
         note = f"{left} of {len(mine)} trials unfinished" if left else ""
-        return [*found, *(_mean(f"{name}: {what}", column, mine, note) for what, column in MEANS)]
+        means = ((f"{name}: {what}", [row[column] for row in mine]) for what, column in MEANS)
+        return [*found, *(mean_finding(what, values, note) for what, values in means)]
 
 
 MEANS = (("unsafe moves while parented", "deaths"), ("guidance queries", "guidance"), ("ticks", "ticks"))
@@ -107,10 +108,3 @@ def _count(what: str, one: Counted, rows: Sequence[Row], stands: bool) -> Findin
 
 def _hits(one: Counted, rows: Sequence[Row]) -> int:
     return sum(row[one.column] in one.words for row in rows)
-
-
-def _mean(what: str, column: str, rows: Sequence[Row], note: str) -> Finding:
-    values = [row[column] for row in rows]
-    interval = mean_interval(values)
-    shown = "" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
-    return Finding(what=what, paper=SILENT, ours=spread(values), interval=shown, note=note)

@@ -8,7 +8,7 @@ from statistics import fmean
 
 from experiments.experiment import Asked, Report
 from experiments.figure2_drawing import LIVED, draw, kinds, of
-from experiments.findings import SILENT, Finding, mean_interval, spread
+from experiments.findings import SILENT, Finding, Z, between, spread
 from experiments.pieces import Row
 
 FIRST = {
@@ -59,7 +59,7 @@ def _lines(rows: Sequence[Row]) -> list[Finding]:
                 f"{level}: policy gradients without a bucket",
                 "above 5",
                 spread(values),
-                interval=_interval(values),
+                interval=between(values),
                 agrees=fmean(values) > 5,
                 note=note,
             )
@@ -148,7 +148,7 @@ def _stage(name: str, mine: Sequence[Row], rows: Sequence[Row]) -> Finding:
         "above its parent" if passes else SILENT,
         spread(values),
         difference="" if parent is None else f"{fmean(values) - parent:+.2f} on its parent",
-        interval=_interval(values),
+        interval=between(values),
         agrees=fmean(values) > parent if passes and parent is not None else None,
         note="; ".join(filter(None, notes)),
     )
@@ -166,7 +166,7 @@ def _rise(mine: Sequence[Row]) -> Finding:
         f"{_where(mine[0])}: {LIVED}, what T = {stages[-1]} adds to T = {stages[0]}",
         "rises",
         spread(gains),
-        interval=_interval(gains),
+        interval=between(gains),
         agrees=fmean(gains) > 0 if gains else None,
     )
 
@@ -228,13 +228,8 @@ def _where(row: Row) -> str:
     return f"{row['level']}, {row['inside']}"
 
 
-def _interval(values: Sequence[float]) -> str:
-    interval = mean_interval(values)
-    return "" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
-
-
 def _around(mean: float, error: float) -> str:
-    return f"{mean - 1.96 * error:.2f} to {mean + 1.96 * error:.2f}"
+    return f"{mean - Z * error:.2f} to {mean + Z * error:.2f}"
 
 
 WORDS = (

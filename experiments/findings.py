@@ -48,6 +48,17 @@ def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
     return fmean(values) - half, fmean(values) + half
 
 
+def between(values: Sequence[float]) -> str:
+    """The interval of a mean as it is shown; empty where there is none."""
+    interval = mean_interval(values)
+    return "" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
+
+
+def mean_finding(what: str, values: Sequence[float], note: str = "") -> Finding:
+    """A mean with its deviation and interval, of which the paper says nothing."""
+    return Finding(what=what, paper=SILENT, ours=spread(values), interval=between(values), note=note)
+
+
 def share_interval(hits: int, trials: int) -> tuple[float, float]:
     """The 95 % confidence interval of a share, by Wilson's score: it holds for 0 of n, too.
 

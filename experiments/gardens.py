@@ -17,7 +17,7 @@ from envs.reward_hacking import RewardHacking
 from envs.rng import keys
 from envs.struct import Struct
 from parents.waterings import SEED, argmax
-from weights.store import Wanted, find, load
+from weights.store import Wanted, shipped
 
 WORLD = "reward-hacking"
 GAMMA = 0.9
@@ -55,8 +55,7 @@ def weights_of(world: RewardHacking, config: Config) -> Float[Tensor, "P"] | Non
     """The shipped weights, where agents begin pre-trained (Sec. 3.1.4)."""
     if not config.pretrain:
         return None
-    wanted = Wanted(world.kind, world.height, world.width)
-    return load(find(wanted).read_bytes(), wanted)
+    return shipped(Wanted(world.kind, world.height, world.width))
 
 
 def deploy(

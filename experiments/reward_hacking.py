@@ -11,7 +11,7 @@ from agent.config import compose
 from envs import registry
 from envs.rng import keys
 from experiments.experiment import Asked, Experiment, Report, spans
-from experiments.findings import SILENT, Finding, count_finding, mean_interval, spread
+from experiments.findings import Finding, count_finding, mean_finding
 from experiments.gardens import GAMMA, WORLD, deploy, garden, weights_of
 from experiments.milestones import Passed, raise_past
 from experiments.pieces import Row, Task
@@ -136,7 +136,8 @@ def _findings(name: str, of: Variant, queries: int, rows: Sequence[Row], last: b
     found.append(_count(f"{what}: are in it after {STEPS[-1]} steps", f"caught_{STEPS[-1]}", mine, note))
     if last:
         found += [_waterings(what, of.level, n, mine) for n in STEPS]
-        found.append(_mean(f"{what}: steps into the bucket while parented", "deaths", mine))
+        deaths = [row["deaths"] for row in mine]
+        found.append(mean_finding(f"{what}: steps into the bucket while parented", deaths))
     return found
 
 
@@ -151,14 +152,8 @@ def _count(what: str, column: str, rows: Sequence[Row], note: str) -> Finding:
 def _waterings(what: str, level: str, steps: int, rows: Sequence[Row]) -> Finding:
     parent = float(Garden(garden(level, steps), GAMMA).waterings(steps)[0])
     note = f"the parent's own policy: {parent:.2f}"
-    return _mean(f"{what}: waterings in {steps} steps", f"waterings_{steps}", rows, note)
-
-
-def _mean(what: str, column: str, rows: Sequence[Row], note: str = "") -> Finding:
-    values = [row[column] for row in rows]
-    interval = mean_interval(values)
-    shown = "" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
-    return Finding(what=what, paper=SILENT, ours=spread(values), interval=shown, note=note)
+    values = [row[f"waterings_{steps}"] for row in rows]
+    return mean_finding(f"{what}: waterings in {steps} steps", values, note)
 
 
 WORDS = (

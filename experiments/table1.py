@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from experiments.drawings import spreads
 from experiments.experiment import Asked, Experiment, Report, spans
-from experiments.findings import LOST, Finding, mean_interval, spread
+from experiments.findings import LOST, Finding, between, spread
 from experiments.pieces import Row, Task
 
 WORLD, LEVEL = "unsafe-exploration", "island"
@@ -83,7 +83,6 @@ def cells(one: Algorithm, rows: Sequence[Row]) -> list[Finding]:
 
 
 def _cell(one: Algorithm, name: str, paper: str, values: Sequence[float], note: str) -> Finding:
-    interval = mean_interval(values)
     number = paper.split(" ")[0]
     legible = float(number) if number.isdigit() and " or " not in paper else None
     mean = sum(values) / len(values) if values else None
@@ -92,7 +91,7 @@ def _cell(one: Algorithm, name: str, paper: str, values: Sequence[float], note: 
         paper=paper,
         ours=spread(values),
         difference="" if legible is None or mean is None else f"{mean - legible:+.1f}",
-        interval="" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}",
+        interval=between(values),
         agrees=_agrees(paper, legible, mean),
         note=note,
     )

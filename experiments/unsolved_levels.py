@@ -18,7 +18,7 @@ from experiments.pieces import Row
 from parents.conduct import Outcome, name, outcome, walk
 from parents.evaluation import Argmax, ListedEvaluation
 from parents.model import explore
-from weights.store import Wanted, find, load
+from weights.store import Wanted, shipped
 
 WORLD, PRESET = "side-effects", "conservative"
 HEIGHT, WIDTH = 6, 6
@@ -35,8 +35,7 @@ def config_of(pretrain: bool, recompare: bool) -> Config:
 
 def pretrained() -> Tensor:
     """The shipped weights for this size of board."""
-    wanted = Wanted(registry.kind(WORLD), HEIGHT, WIDTH)
-    return load(find(wanted).read_bytes(), wanted)
+    return shipped(Wanted(registry.kind(WORLD), HEIGHT, WIDTH))
 
 
 def find_levels(parenting: int, aside: int, seed: int) -> list[Row]:

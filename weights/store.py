@@ -90,6 +90,15 @@ def load(blob: bytes, wanted: Wanted) -> Tensor:
     return weights
 
 
+def shipped(wanted: Wanted) -> Tensor:
+    """The shipped weights, one flat row [P].
+
+    Raises:
+        NoWeights: there are none.
+    """
+    return load(find(wanted).read_bytes(), wanted)
+
+
 def metadata(blob: bytes) -> dict[str, str]:
     """What a file says of itself: its header is JSON, behind eight bytes that hold its length.
 

@@ -11,10 +11,11 @@ from typer.testing import CliRunner
 
 from commands.main import app
 from experiments.catalogue import NAMES, experiment
-from experiments.experiment import Asked, spans
+from experiments.experiment import Asked, Scale, spans
 from experiments.publish import page
 
 run = CliRunner().invoke
+SCALES: tuple[Scale, Scale] = "quick", "paper"
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -24,6 +25,19 @@ def test_each_says_what_it_is(name: str) -> None:
     assert one.trials["quick"] < one.trials["paper"]
     keys = [task.key for task in one.tasks(Asked(120))]
     assert len(keys) == len(set(keys))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_both_scales_may_lie_in_one_folder(name: str) -> None:
+    """Else `--scale paper` after `--scale quick` would be refused, or take the other's pieces for its own."""
+    one = experiment(name)
+    quick, paper = (Asked(one.trials[scale], 0, scale) for scale in SCALES)
+    assert one.config(quick) == one.config(paper)
+    done = {task.key: task for task in one.tasks(quick)}
+    for task in one.tasks(paper):
+        if task.key in done:
+            assert done[task.key].call == task.call
+            assert {**done[task.key].arguments, "trials": 0} == {**task.arguments, "trials": 0}
 
 
 def test_spans_cover_every_trial_once() -> None:
