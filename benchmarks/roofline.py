@@ -35,19 +35,33 @@ from time import perf_counter
 from typing import NamedTuple
 
 import torch
+from torch import Tensor
 
 from agent import learning
 from agent.birth import network_of
+from agent.config import compose
 from agent.policy import Network
 from agent.process import settle
-from benchmarks.ticks import LEVEL, PRESETS, WARM, WORLD, Product, born, copies, operands, products
-from experiments.trials import Nursery
+from envs import registry
+from envs.rng import keys
+from experiments.trials import Nursery, Until, no_tally
 
+WORLD, LEVEL, PRESETS = "unsafe-exploration", "island", ("conservative", "direct")
+WARM, BORN = 100, 50
+"""Ticks that the agents live before anything is timed, and how many agents; batches are copies of them."""
 SIZES, QUICK_SIZES = (1, 8, 50, 100, 200), (50,)
 REPEATS, QUICK_REPEATS = 7, 5
 TICKS = 6
 """Of a batch, between two turns of the yardstick."""
 HEAD = " trials  states  training  ms/trial-step  bmm GFLOP/s     step     Adam  whole: padded       own"
+
+
+class Product(NamedTuple):
+    """[N, left, inner] times [N, inner, right]."""
+
+    left: int
+    inner: int
+    right: int
 
 
 class Line(NamedTuple):
@@ -75,6 +89,19 @@ class Line(NamedTuple):
         )
 
 
+def products(network: Network, states: int) -> list[Product]:
+    """The products of one gradient step in one trial, forward and backward (derived above)."""
+    found: list[Product] = []
+    first = {network.layers[0], network.layers[2]}  # of the local head, and of the global one
+    for layer in network.layers:
+        places = layer.sides[0].length * layer.sides[1].length if layer.sides else 1
+        batch = states * places
+        found += [Product(batch, layer.rows, layer.columns), Product(layer.rows, batch, layer.columns)]
+        if layer not in first:
+            found.append(Product(batch, layer.columns, layer.rows))
+    return found
+
+
 def looks(network: Network) -> list[Product]:
     """The products of one look at one state."""
     return [
@@ -83,6 +110,12 @@ def looks(network: Network) -> list[Product]:
         )
         for layer in network.layers
     ]
+
+
+def operands(shape: Product, trials: int, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
+    """Two stacks of random matrices to multiply."""
+    left = torch.rand(trials, shape.left, shape.inner, dtype=dtype)
+    return left, torch.rand(trials, shape.inner, shape.right, dtype=dtype)
 
 
 def multiplying(shapes: Sequence[Product], trials: int) -> Callable[[], object]:
@@ -101,6 +134,25 @@ def seconds(act: Callable[[], object]) -> float:
     began = perf_counter()
     act()
     return perf_counter() - began
+
+
+def born(preset: str) -> Nursery:
+    """Fifty agents at tick `WARM`."""
+    config = compose(preset, registry.defaults(WORLD), {}, strict=True)
+    world = registry.make(WORLD, LEVEL, time_limit=config.time_limit)
+    nursery = Nursery(world, config, keys(0, BORN), Until("ticks", 10**9))
+    for _ in range(WARM):
+        nursery.tick()
+    return nursery
+
+
+def copies(nursery: Nursery, trials: int) -> Nursery:
+    """A batch of `trials` agents with their parent, copied from those of `nursery` in turn."""
+    index = torch.arange(trials) % BORN
+    batch = Nursery(nursery.world, nursery.config, keys(0, trials), nursery.until)
+    batch.state, batch.tally = nursery.state.pick(index), no_tally(trials)
+    batch.parent.query = nursery.parent.query.pick(index)
+    return batch
 
 
 def measure(nursery: Nursery, trials: int, repeats: int) -> Line:
