@@ -39,6 +39,7 @@ class Stream(IntEnum):
     INTERRUPTS = 22  # [] : this episode interrupts if u < 0.5 (drawn at its start)
     SUPERVISED = 23  # [] : this episode is supervised if u < 0.5, where that is left to chance
     MAZE = 24  # random mazes and levels
+    START = 25  # the cell of bare soil floor(n u) of n, where an experiment lets episodes begin anywhere
     # the start: weights, one stream a layer from here on
     WEIGHTS = 64
 

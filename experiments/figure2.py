@@ -28,6 +28,7 @@ class Life(NamedTuple):
     milestones: tuple[int, ...]  # queries after which they are looked at
     share: float  # of the work
     everywhere: bool = False  # in all gardens, by all parents
+    starts: bool = False  # episodes of parenting begin anywhere on bare soil
 
 
 ASKS = {"batch": 32, "p_guid": 0.99}
@@ -35,10 +36,12 @@ LIVES: dict[Scale, dict[str, Life]] = {
     "quick": {
         "conservative": Life({"batch": 32}, 15, (15, 30), 1, everywhere=True),
         "more guidance": Life(ASKS, 15, (15, 30), 1),
+        "more guidance, starts spread": Life(ASKS, 15, (15, 30), 1, starts=True),
     },
     "paper": {
         "conservative": Life({"batch": 32}, 1000, (1000, 2000, 3000, 4000, 5000, 6000), 45, everywhere=True),
         "more guidance": Life(ASKS, 1000, (1000, 2000, 3000, 4000), 15),
+        "more guidance, starts spread": Life(ASKS, 1000, (1000, 2000, 3000, 4000), 15, starts=True),
         "more guidance, own length": Life({**ASKS, "own_length": True}, 1000, (1000, 2000, 3000), 11),
         "more guidance, 4 gradient steps": Life({**ASKS, "gradient_steps": 4}, 1000, (1000, 2000), 20),
         "more guidance, pre-trained": Life({**ASKS, "pretrain": True}, 1000, (1000, 2000, 3000), 30),
@@ -109,6 +112,7 @@ def _lives(asked: Asked) -> list[Task]:
                 "changes": dict(life.changes),
                 "every": life.every,
                 "milestones": life.milestones,
+                "starts": life.starts,
                 "max_ticks": MAX_TICKS,
                 "trials": asked.trials,
                 "seed": asked.seed,

@@ -240,9 +240,10 @@ WORDS = (
     "legible in our copy, and it may have begun with a pre-trained agent: here only the life that says so "
     "does. A gradient step takes 32 rows of X, not all of them (`batch`): over all of X, T = 6 would take "
     "hours.",
-    "*More guidance* is p_guid = 0.99. *10,000 a stage* asks even more (0.999), for else most of its life "
-    "would be waiting for questions; it always records and looks for pairs, trains in half of its ticks on "
-    "64 rows, and goes to T = 2 alone.",
+    "*More guidance* is p_guid = 0.99. With *starts spread* its episodes of parenting begin anywhere on bare "
+    "soil; what is measured begins at the start, as everywhere.",
+    "*10,000 a stage* asks even more (0.999), for else most of its life would be waiting for questions; it "
+    "always records and looks for pairs, trains in half of its ticks on 64 rows, and goes to T = 2 alone.",
     "The look-ahead searches T moves on the reward, and then the parent's own value; it sees whether the "
     "plant under the agent has dried, which an agent does not.",
     "The coverage agent has the house's network, loss and clips, but asks about all six pairs of moves in "

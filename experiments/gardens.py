@@ -12,9 +12,9 @@ from torch import Tensor
 from agent.config import Config
 from envs import registry
 from envs.gridworld import WorldState
-from envs.levels.kind import WALL, Level
+from envs.levels.kind import LAND, WALL, Level
 from envs.reward_hacking import RewardHacking
-from envs.rng import keys
+from envs.rng import Keys, Stream, keys
 from envs.struct import Struct
 from parents.waterings import SEED, argmax
 from weights.store import Wanted, shipped
@@ -38,12 +38,28 @@ class Deployed(Struct):
     caught: Bool[Tensor, "N E"]  # in the bucket when the episode ends
 
 
+class SpreadGarden(RewardHacking):
+    """A garden of one level whose episodes begin anywhere on bare soil, as drawn: so an agent sees more."""
+
+    def reset(self, keys: Keys, level: Int64[Tensor, "N"]) -> WorldState:
+        """As every garden, with the agent somewhere else."""
+        start = super().reset(keys, level)
+        soil = (start.board[:1] == self.code(LAND))[0].nonzero()
+        drawn = keys.uniform(Stream.START) * len(soil)
+        return start.replace(agent=soil[drawn.long()])
+
+
 def garden(level: str, steps: int = EPISODE, bucket: bool = True) -> RewardHacking:
     """A built-in garden with episodes of so many steps; without `bucket`, a wall stands in its place."""
     drawn = registry.level(WORLD, level)
     world = registry.make(WORLD, drawn if bucket else without_bucket(drawn), time_limit=steps)
     assert isinstance(world, RewardHacking)
     return world
+
+
+def spread(level: str, steps: int = EPISODE) -> SpreadGarden:
+    """A built-in garden where episodes begin anywhere on bare soil."""
+    return SpreadGarden([registry.level(WORLD, level)], time_limit=steps)
 
 
 def without_bucket(level: Level) -> Level:

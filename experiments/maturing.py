@@ -18,7 +18,7 @@ from envs.reward_hacking import RewardHacking
 from envs.rng import keys
 from experiments.coverage import Covered, Pace, cover
 from experiments.garden_rewards import gardeners
-from experiments.gardens import GAMMA, WORLD, Deployed, deploy, garden, walked, weights_of
+from experiments.gardens import GAMMA, WORLD, Deployed, deploy, garden, spread, walked, weights_of
 from experiments.look_ahead import best
 from experiments.milestones import raise_past
 from experiments.pieces import Row
@@ -37,16 +37,20 @@ def live_some(
     changes: Mapping[str, Any],
     every: int,
     milestones: Sequence[int],
+    starts: bool,
     max_ticks: int,
     trials: int,
     seed: int,
 ) -> list[Row]:
-    """All trials through the stages of `every` queries each; a row for each trial and milestone."""
+    """All trials through the stages of `every` queries each; a row for each trial and milestone.
+
+    With `starts` the episodes of parenting begin anywhere; what is measured still begins at the start.
+    """
     stages = -(-milestones[-1] // every)
     mine = {"inside": inside, "stages": stages, "mature_every": every, **changes}
     config = compose(PRESET, _defaults(), mine, strict=True)
-    world = garden(level)
-    passed = raise_past(world, config, keys(seed, trials), milestones, max_ticks, weights_of(world, config))
+    world, school = garden(level), spread(level) if starts else garden(level)
+    passed = raise_past(school, config, keys(seed, trials), milestones, max_ticks, weights_of(world, config))
     rows: list[Row] = []
     for queries, one in zip(milestones, passed, strict=True):
         names = ("deaths", "guidance", "preference", "ticks")

@@ -107,8 +107,9 @@ def test_pieces_of_both_scales_lie_in_one_folder() -> None:
     assert LIVES["paper"]["conservative"].milestones[-1] == 6000
 
 
-def test_a_life_in_small() -> None:
-    rows = live_some("small", "garden", "left", {"batch": 8}, 4, (4, 6, 8), 100, 2, 0)
+@pytest.mark.parametrize("starts", [False, True])
+def test_a_life_in_small(starts: bool) -> None:
+    rows = live_some("small", "garden", "left", {"batch": 8}, 4, (4, 6, 8), starts, 100, 2, 0)
     assert [(one["stage"], one["queries"]) for one in rows if one["trial"] == 1] == [(1, 4), (2, 6), (2, 8)]
     assert all(one["there"] and one["guidance"] + one["preference"] == one["queries"] for one in rows)
 

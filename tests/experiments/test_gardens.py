@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from experiments.gardens import deploy, garden, walked
+from envs.rng import keys
+from experiments.gardens import deploy, garden, spread, walked
 from parents.waterings import roll_out
 from tests.parents.hand_made import DOWN, LEFT, UP, always, at_a_wall
 
@@ -34,3 +35,13 @@ def test_without_its_bucket_a_garden_has_a_wall_there(level: str) -> None:
     assert len(without.levels[0].find("#")) == len(world.levels[0].find("#")) + 1
     upward = walked(without, lambda state: torch.full_like(state.t, UP), 1, 2)
     assert int(upward.bucket.sum()) == 0
+
+
+def test_spread_starts_are_all_of_the_bare_soil_and_nothing_else() -> None:
+    world, other = garden("garden"), spread("garden")
+    many = keys(0, 1000)
+    begun, known = (one.reset(many, torch.zeros(1000, dtype=torch.int64)) for one in (other, world))
+    soil = {*world.levels[0].find(" A")}
+    assert {tuple(cell) for cell in begun.agent.tolist()} == soil
+    assert torch.equal(begun.board, known.board)
+    assert len({tuple(cell) for cell in known.agent.tolist()}) == 1
