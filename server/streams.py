@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar
@@ -109,21 +109,25 @@ class Streams:
                 rows[-1].tick if len(rows) == ROWS else None
             )  # there may be more: a run that is over stays so
 
-    async def first(self, look: Callable[[], Found | None], seconds: float) -> Found | None:
+    async def first(
+        self, look: Callable[[], Found | None], seconds: float, gone: Callable[[], Awaitable[bool]]
+    ) -> Found | None:
         """What a look finds, now or within `seconds`; it looks again at every ring, and now and then.
 
-        Where as many wait already as streams are allowed, it does not wait.
+        Where as many wait already as streams are allowed, it does not wait. Once who asked is `gone`, it does
+        not look: a question would be held for nobody.
         """
         until = time.monotonic() + (seconds if self._askers < self.limit else 0.0)
         self._askers += 1
         try:
-            while True:
+            while not await gone():
                 rung = self._rung
                 found = await run_in_threadpool(look)
                 left = until - time.monotonic()
                 if found is not None or left <= 0 or self.closed:
                     return found
                 await _either(rung, min(left, PERIOD))
+            return None
         finally:
             self._askers -= 1
 

@@ -88,7 +88,7 @@ async def question(
     streams: Streams = request.app.state.streams
     run = await run_in_threadpool(runs.get_run, db, run_id)
     take = partial(_markup, db, run, client_id, shown, settings.lease_seconds)
-    return await streams.first(take, wait) or Response(status_code=204)
+    return await streams.first(take, wait, request.is_disconnected) or Response(status_code=204)
 
 
 @router.post("/runs/{run_id}/parent/next")

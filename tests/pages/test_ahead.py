@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from playwright.sync_api import APIResponse, Route, expect
 
+from server import queue
 from server.db import Database
 from tests.pages.watched import Watched, given, shown, until
 
@@ -47,6 +49,20 @@ def test_guidance_goes_before_what_was_leased_ahead(watched: Watched, ask: Calla
     shown(page, urgent)
     page.keyboard.press("ArrowLeft")
     shown(page, second)
+
+
+def test_a_page_that_is_gone_is_promised_nothing(
+    watched: Watched, db: Database, ask: Callable[..., int]
+) -> None:
+    """Else the next question would be held for nobody, for as long as a lease is."""
+    first = ask()
+    page = watched.open("/runs/1/parent")
+    shown(page, first)
+    page.wait_for_timeout(200)  # the request for the question after it lies at the server
+    page.context.close()
+    second = ask()
+    time.sleep(0.5)  # longer than a look takes to come
+    assert queue.get_query(db, second).leased_by is None
 
 
 def test_what_two_requests_bring_is_shown_once(
