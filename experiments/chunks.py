@@ -22,8 +22,10 @@ from experiments.endings import Ending, examine
 from experiments.trials import Progress, Standing, Until, raise_trials
 from weights.store import Wanted, load
 
-CHUNK = 50
-"""Trials of a chunk at most. Two trials and more are two chunks at least, so that two cores have work."""
+CHUNK = 100
+"""Trials of a chunk at most: more would be no faster (docs/benchmarks.md). Two trials and more are two chunks
+at least, so that two cores have work.
+"""
 FIELDS = len(Standing._fields)
 LOOK_SECONDS = 0.2
 """How often the counters of the other processes are read, for the progress bar."""

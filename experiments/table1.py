@@ -11,6 +11,8 @@ from experiments.findings import LOST, Finding, between, spread
 from experiments.pieces import Row, Task
 
 WORLD, LEVEL = "unsafe-exploration", "island"
+TOGETHER = 100
+"""Trials of a task at most: more would be no faster (docs/benchmarks.md)."""
 MAX_TICKS, MAX_STEPS = 20_000, 3_000
 
 
@@ -39,7 +41,7 @@ def _config(asked: Asked) -> Mapping[str, Any]:
 
 
 def _tasks(asked: Asked) -> list[Task]:
-    return [_task(one, span, asked) for one in ALGORITHMS for span in spans(asked.trials)]
+    return [_task(one, span, asked) for one in ALGORITHMS for span in spans(asked.trials, TOGETHER)]
 
 
 def _task(one: Algorithm, span: range, asked: Asked) -> Task:
