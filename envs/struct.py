@@ -1,13 +1,13 @@
 """Frozen records of tensors whose fields declare their shapes.
 
 A `Struct` is a frozen dataclass. Its tensor fields are annotated as in ``UInt8[Tensor, "N H W"]``.
-The axis named ``N`` is the axis of trials, wherever it stands; `pick` and `merge` follow it.
+The axis named ``N`` is the axis of trials, wherever it stands; `pick`, `where` and `joined` follow it.
 Shapes are checked by `check`, which tests and checkpoint loading call; the hot loop never does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self, dataclass_transform, get_type_hints
 
@@ -63,6 +63,20 @@ class Struct:
         return self.map(
             lambda _name, tensor, axis: tensor if axis is None else tensor.index_select(axis, where)
         )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """The trials of all parts, one part after the other; what has no axis of trials is the first part's.
+
+        Raises:
+            IndexError: there is no part.
+        """
+        every = [part.tensors() for part in parts]
+
+        def join(name: str, tensor: Tensor, axis: int | None) -> Tensor:
+            return tensor if axis is None else torch.cat([one[name] for one in every], axis)
+
+        return parts[0].map(join)
 
     def where(self, mask: Tensor, other: Self) -> Self:
         """This record's trials where `mask` holds, the other's elsewhere. Both must have the same shapes.

@@ -55,8 +55,8 @@ def run(plan: Plan, workers: int, progress: Progress | None = None) -> Ending:
     """Raise all trials of a plan, on up to `workers` processes."""
     every = chunks(plan.trials)
     if len(every) == 1 or workers == 1:
-        return _join(list(_here(plan, every, progress)))
-    return _join(list(_elsewhere(plan, every, min(workers, len(every)), progress)))
+        return Ending.joined(list(_here(plan, every, progress)))
+    return Ending.joined(list(_elsewhere(plan, every, min(workers, len(every)), progress)))
 
 
 def raise_chunk(plan: Plan, chunk: range, progress: Progress | None = None) -> Ending:
@@ -125,8 +125,3 @@ def _read(counters: Any) -> Standing:
     """The standing of all chunks together."""
     trials, ticks, queries = (counters[place::FIELDS] for place in range(FIELDS))
     return Standing(sum(trials), max(ticks), sum(queries))
-
-
-def _join(parts: list[Ending]) -> Ending:
-    every = [part.tensors() for part in parts]
-    return parts[0].map(lambda name, _tensor, _axis: torch.cat([one[name] for one in every]))

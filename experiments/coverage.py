@@ -172,8 +172,7 @@ def meet(
         return torch.where(coin < astray, (4 * any_of_them).long(), argmax(world, live, state))
 
     walked(world, choose, 1, episodes)
-    every = [one.tensors() for one in passed]
-    whole = passed[0].map(lambda name, _tensor, _axis: torch.cat([one[name] for one in every]))
+    whole = WorldState.joined(passed)
     truth = together(fingerprint(whole.board.flatten(1)), fingerprint(whole.agent))
     first = first_of(truth)
     unique, count = torch.unique(truth, return_counts=True)

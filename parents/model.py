@@ -80,7 +80,7 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
                 f"This world has more than {most} states, too many for the scripted parent to list; "
                 "take a smaller level, or fewer levels at once."
             )
-    return _model(world, _join(found), known, steps)
+    return _model(world, WorldState.joined(found), known, steps)
 
 
 def _look(world: Gridworld, edge: WorldState) -> tuple[WorldState, dict[str, Tensor]]:
@@ -135,8 +135,3 @@ def _new(words: Tensor, known: Tensor) -> Tensor:
     places = torch.arange(len(words), device=words.device)
     first = torch.full_like(unique, len(words)).scatter_reduce(0, inverse, places, "amin")
     return first[~torch.isin(unique, known)].sort().values
-
-
-def _join(parts: list[WorldState]) -> WorldState:
-    every = [part.tensors() for part in parts]
-    return parts[0].map(lambda name, _tensor, _axis: torch.cat([part[name] for part in every]))
