@@ -2,30 +2,45 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
+from shutil import copytree
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
 from commands.main import app
-from experiments.catalogue import experiment
+from experiments.catalogue import NAMES
 from experiments.experiment import Asked
-from experiments.labour import do
-from experiments.publish import publish
-from experiments.report import NoResults, report
+from experiments.findings import LOST, SILENT, Finding
+from experiments.report import NO, NOTHING, OPEN, YES, NoResults, prose, report, verdict
 
 run = CliRunner().invoke
-ASKED = Asked(1)
+MAKE = ["experiment", "figure4", "--trials", "1", "--workers", "1", "--out"]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of Figure 4, made of one real fit."""
+    folder = tmp_path_factory.mktemp("made")
+    said = run(app, [*MAKE, str(folder)])
+    assert said.exit_code == 0, said.output
+    return folder
 
 
 @pytest.fixture
-def out(tmp_path: Path) -> Path:
-    """The results of Figure 4, made of one real fit."""
-    one = experiment("figure4")
-    (task,) = one.tasks(ASKED)
-    publish(one, ASKED, do(task), tmp_path, 1.0, 1)
-    return tmp_path
+def out(made: Path, tmp_path: Path) -> Path:
+    """A copy of them."""
+    return copytree(made, tmp_path / "results")
+
+
+def changed(out: Path, **others: Any) -> str:
+    """The page once something else stands in results.json."""
+    path = out / "figure4/results.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | others))
+    return report(out).read_text()
 
 
 def test_everything_found_stands_on_the_page(out: Path) -> None:
@@ -35,28 +50,92 @@ def test_everything_found_stands_on_the_page(out: Path) -> None:
     assert "planner on the fitted reward, shifted by -1" in page
     assert "1 of 1 do harm" in page
     assert "parenting experiment figure4 --scale paper --trials 1" in page
-    assert page.count("<svg") == 1
-    assert not re.findall(r'(?:src|href)="(?!#)', page)
+    assert "1 trial, seed 0" in page
+    assert page.count("<img") == 1
 
 
-def test_figures_share_no_ids(out: Path) -> None:
-    drawn = out / "figure4/shift.svg"
-    drawn.with_name("again.svg").write_text(drawn.read_text())
+def test_it_loads_nothing_and_runs_nothing(out: Path) -> None:
     page = report(out).read_text()
-    ids = re.findall(r'\bid="([^"]+)"', page)
-    assert len(ids) == len(set(ids))
-    wanted = set(re.findall(r'href="#([^"]+)"', page)) | set(re.findall(r"url\(#([^)]+)\)", page))
-    assert wanted <= set(ids)
+    assert "<script" not in page
+    sources = re.findall(r'src="([^"]*)"', page)
+    assert all(source.startswith("data:image/svg+xml;base64,") for source in sources)
+    links = re.findall(r'href="(?!#)([^"]*)"', page)
+    assert sorted(links) == ["figure4/results.json", "figure4/trials.csv"]
+    assert all((out / link).is_file() for link in links)
+
+
+def test_what_others_wrote_is_escaped(out: Path) -> None:
+    evil = "<b onclick=x>&\"'`<u>`*<u>*"
+    found = Finding(evil, evil, evil, evil, evil, None, evil).plain()
+    page = changed(out, title=evil, claim=evil, words=[evil], command=evil, commit=evil, findings=[found])
+    assert "<b onclick" not in page
+    assert "<u>" not in page
+
+
+def test_the_summary_counts_the_rows_and_leads_to_them(out: Path) -> None:
+    rows = [
+        *[Finding("a", "1", "1", agrees=True).plain()] * 5,
+        *[Finding("b", "never", "3", agrees=False).plain()] * 3,
+        *[Finding("c", "51", "40").plain()] * 2,
+        *[Finding("d", paper, "2").plain() for paper in (SILENT, LOST, LOST, LOST)],
+    ]
+    page = changed(out, findings=rows)
+    (line,) = re.findall(r'<tr[^>]*><th[^>]*><a href="#figure4">.*?</tr>', page, re.DOTALL)
+    assert re.findall(r">(\d+)</td>", line) == ["5", "3", "2", "4"]
+    assert '<section id="figure4"' in page
+
+
+@pytest.mark.parametrize(
+    ("paper", "agrees", "said"),
+    [
+        ("yes", True, YES),
+        ("lost", False, NO),
+        ("yes", None, OPEN),
+        ("51 +- (lost)", None, OPEN),
+        (SILENT, None, NOTHING),
+        (LOST, None, NOTHING),
+    ],
+)
+def test_no_verdict_on_a_claim_is_not_the_papers_silence(paper: str, agrees: bool | None, said: str) -> None:
+    assert verdict(Finding("it", paper, "ours", agrees=agrees)) == said
+
+
+def test_what_is_not_done_is_said_with_its_command(out: Path) -> None:
+    page = report(out).read_text()
+    missing = [name for name in NAMES if f"parenting experiment {name} --out {out}" in page]
+    assert missing == [name for name in NAMES if name != "figure4"]
+    assert page.count("not done here") == len(missing)
+
+
+def test_a_few_trials_are_not_taken_for_the_papers_number(out: Path) -> None:
+    assert "quick scale" not in report(out).read_text()
+    assert "quick scale: 3 trials" in changed(out, asked=Asked(3, scale="quick")._asdict())
+
+
+def test_words_keep_their_marks() -> None:
+    assert prose("`a < b` and *so on*, 2 * 3 * 4") == "<code>a &lt; b</code> and <i>so on</i>, 2 * 3 * 4"
 
 
 def test_the_same_numbers_draw_the_same_file(out: Path) -> None:
-    before = (out / "figure4/shift.svg").read_bytes()
-    one = experiment("figure4")
-    publish(one, ASKED, do(one.tasks(ASKED)[0]), out, 1.0, 1)
-    assert (out / "figure4/shift.svg").read_bytes() == before
+    drawn = out / "figure4/shift.svg"
+    before = drawn.read_bytes()
+    drawn.unlink()
+    assert run(app, [*MAKE, str(out)]).exit_code == 0
+    assert drawn.read_bytes() == before
 
 
 def test_no_results_are_said(tmp_path: Path) -> None:
     with pytest.raises(NoResults, match="parenting experiment all --scale quick"):
         report(tmp_path)
     assert run(app, ["experiment", "report", "--out", str(tmp_path)]).exit_code == 2
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"name": "figure4"}', "\x00"])
+def test_broken_results_are_named_with_the_remedy(out: Path, text: str) -> None:
+    path = out / "figure4/results.json"
+    path.write_text(text)
+    said = run(app, ["experiment", "report", "--out", str(out)])
+    assert said.exit_code == 2, said.output
+    assert str(path) in said.output
+    assert f"parenting experiment figure4 --out {out}" in said.output
+    assert not (out / "report.html").exists()
