@@ -60,11 +60,11 @@ def experiment(
 
 
 def _report(out: Path) -> None:
-    from experiments.report import NoResults, report
+    from experiments.report import BrokenResults, NoResults, report
 
     try:
         typer.echo(f"Written: {report(out)}")
-    except (NoResults, OSError) as error:
+    except (BrokenResults, NoResults, OSError) as error:
         raise Wrong(str(error)) from None
 
 
@@ -88,17 +88,19 @@ def _asked(
 def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | None) -> None:
     from experiments.labour import NoGpu, WorkersDied, see, work
     from experiments.pieces import OtherPlan, Store
-    from experiments.publish import page, publish
+    from experiments.provenance import settings
+    from experiments.publish import Work, page, publish
 
-    plan = {"experiment": one.name, "seed": asked.seed, "device": asked.device, **one.config(asked)}
+    plan = {"experiment": one.name, "seed": asked.seed, **one.config(asked), "settings": settings()}
     tasks = [task._replace(device=asked.device) for task in one.tasks(asked)]
     try:
         if cluster is None:
             see(asked.device)
-        store = Store(out / one.name / "pieces", plan)
+        store = Store(out / one.name / "pieces", plan, asked.scale)
         with _bar(one, tasks) as told:
             rows = work(tasks, store, workers, cluster, told)
-        results = publish(one, asked, rows, out, store.seconds(), workers)
+        commits = store.commits([task.key for task in tasks])
+        results = publish(one, asked, rows, out, Work(commits, store.seconds(), workers))
     except (OtherPlan, WorkersDied, NoGpu) as error:
         raise Wrong(str(error)) from None
     except OSError as error:

@@ -98,7 +98,9 @@ def work(
         WorkersDied: see there; what was done is stored.
         NoGpu: a worker has not the device of its task.
         OSError: the cluster does not answer, or has no worker; or a piece is needed that no task makes.
+        OtherPlan: a piece of the same name is of another task.
     """
+    store.expect(tasks)
     for task in tasks:
         if store.has(task.key):
             told(task)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
-import platform
-import subprocess
-from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 
+from experiments import provenance
 from experiments.experiment import Asked, Experiment, Report
 from experiments.findings import Finding
 from experiments.pieces import Row
@@ -21,12 +19,17 @@ from experiments.pieces import Row
 RESULTS, TRIALS = "results.json", "trials.csv"
 HEADS = ("what", "paper", "ours", "difference", "95 % interval", "agrees")
 AGREES = {True: "yes", False: "**no**", None: "–"}
-LIBRARIES = ("parenting", "torch", "numpy", "joblib")
 
 
-def publish(
-    one: Experiment, asked: Asked, rows: Sequence[Row], out: Path, seconds: float, workers: int
-) -> dict[str, Any]:
+class Work(NamedTuple):
+    """How the pieces came about."""
+
+    commits: Mapping[str, int]  # how many pieces each commit made
+    seconds: float
+    workers: int
+
+
+def publish(one: Experiment, asked: Asked, rows: Sequence[Row], out: Path, work: Work) -> dict[str, Any]:
     """Write everything below `out`, and return what stands in results.json.
 
     Raises:
@@ -34,7 +37,7 @@ def publish(
     """
     folder = out / one.name
     report = one.report(asked, rows)
-    results = _results(one, asked, report, seconds, workers)
+    results = _results(one, asked, report, work)
     _write(folder / RESULTS, json.dumps(results, indent=2) + "\n")
     _write_rows(folder / TRIALS, rows)
     drawn = _draw(report, folder)
@@ -48,7 +51,7 @@ def command(one: str, asked: Asked) -> str:
     return " ".join([*words, f"--seed {asked.seed}", f"--device {asked.device}", "--out docs/results"])
 
 
-def _results(one: Experiment, asked: Asked, report: Report, seconds: float, workers: int) -> dict[str, Any]:
+def _results(one: Experiment, asked: Asked, report: Report, work: Work) -> dict[str, Any]:
     return {
         "name": one.name,
         "title": one.title,
@@ -59,38 +62,14 @@ def _results(one: Experiment, asked: Asked, report: Report, seconds: float, work
         "findings": [finding.plain() for finding in report.findings],
         "words": list(report.words),
         "command": command(one.name, asked),
-        "commit": _commit(),
-        "versions": _versions(),
-        "seconds": round(seconds, 1),
-        "workers": workers,
+        "commit": provenance.commit(),
+        "commits": dict(work.commits),
+        "versions": provenance.versions(),
+        "settings": provenance.settings(),
+        "seconds": round(work.seconds, 1),
+        "workers": work.workers,
         "gpu": torch.cuda.get_device_name() if torch.cuda.is_available() else None,
     }
-
-
-def _commit() -> str | None:
-    """The commit of the checkout, with a mark if files were changed since; none outside of one."""
-    here = Path(__file__).parent
-    try:
-        said = subprocess.run(
-            ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"],
-            cwd=here,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return None
-    return said.stdout.strip()
-
-
-def _versions() -> dict[str, str]:
-    found = {"python": platform.python_version(), "machine": platform.machine()}
-    for name in LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
 
 
 def _write(path: Path, text: str) -> None:
@@ -137,12 +116,19 @@ def page(results: dict[str, Any], figures: Sequence[str]) -> str:
         f"    {results['command']}",
         "",
         f"{asked['trials']} trials, seed {asked['seed']}, {took}, "
-        f"torch {results['versions'].get('torch', '?')}, commit {results['commit'] or 'unknown'}. "
+        f"torch {results['versions'].get('torch', '?')}, {_commits(results)}. "
         f"Every trial: [{TRIALS}]({name}/{TRIALS}); the whole: [{RESULTS}]({name}/{RESULTS}).",
         "",
         _where(results),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _commits(results: dict[str, Any]) -> str:
+    """Which commits made the pieces, and which the page."""
+    made = sorted(results["commits"])
+    said = f"trials of commit{'s' * (len(made) > 1)} {', '.join(made)}"
+    return f"{said}, page of {results['commit'] or 'unknown'}"
 
 
 def _where(results: dict[str, Any]) -> str:
