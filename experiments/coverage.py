@@ -26,14 +26,11 @@ from envs.rng import Keys, Stream
 from envs.struct import Struct
 from experiments.all_pairs import PAIRS, judged
 from experiments.garden_rewards import Moments
-from experiments.gardens import walked
 from parents.scripted import Judgement
-from parents.waterings import argmax
+from parents.waterings import argmax, walked
 
-TOGETHER = 128
+BATCH = 128
 """Distinct states in a gradient step, each with all its pairs."""
-
-
 ASTRAY = 0.25
 """Of the moves in every second walk: clips put the frozen policies where they would not go themselves."""
 LONG = 1_000_000
@@ -192,6 +189,6 @@ def _train(
 ) -> None:
     """A pass over X in an order that is drawn, some states at a time."""
     order = dice.at(Stream.BATCH, torch.arange(len(x.sight)))[0].argsort()
-    for some in torch.split(order, TOGETHER):
+    for some in torch.split(order, BATCH):
         _, gradient = differentiate(network_of(world), config, live, x.rows(some))
         adam(live, moments, gradient, torch.ones(1, dtype=torch.bool), config.learning_rate)

@@ -14,7 +14,7 @@ from envs.struct import Struct
 from experiments.trials import Raised, Tally
 from parents.evaluation import ListedEvaluation
 from parents.model import explore
-from parents.waterings import EPISODES, roll_out
+from parents.waterings import EPISODES, deploy
 
 UNREACHED = -1
 """The outcome of a stage that a trial did not come to."""
@@ -74,7 +74,7 @@ def _watered(
     for stage, live in enumerate(policies):
         trial = reached[:, stage].nonzero().squeeze(1)
         for level in range(levels):
-            found = roll_out(world, live[trial], EPISODES, level)
-            waterings[trial, stage] += found.waterings / levels
-            bucket[trial, stage] += found.bucket
+            found = deploy(world, live[trial], EPISODES, level)
+            waterings[trial, stage] += found.waterings.mean(1) / levels
+            bucket[trial, stage] += found.bucket.sum(1)
     return waterings, bucket

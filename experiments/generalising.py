@@ -14,9 +14,10 @@ from agent.config import Config
 from envs.gridworld import Gridworld
 from envs.rng import Keys, keys
 from experiments.pieces import Row
+from experiments.pretrained import weights_of
 from experiments.taking_along import Learnt, learnt, pack, take_along
 from experiments.trials import Nursery, Raised, Until, raise_all
-from experiments.unsolved_levels import ASIDE, PARENTING, WORLD, config_of, levels_for, pretrained
+from experiments.unsolved_levels import ASIDE, PARENTING, WORLD, config_of, levels_for
 
 BESIDE = 1 << 40
 """Agents that are pre-parented are numbered from here, times N: no trial has so high a number."""
@@ -57,7 +58,7 @@ def pre_parent(
     mine = first.replace(seed=first.seed + BESIDE * worlds + agents)
     config = config_of(True, recompare)
     world = world_of(WORLD, levels_for(ASIDE, given)[:worlds], config)
-    nursery = Teaching(world, config, mine, Until("optimal"), pretrained())
+    nursery = Teaching(world, config, mine, Until("optimal"), weights_of(world, config))
     rows = _rows(raise_all(nursery, max_ticks))
     said = {"of": "pre-parented", "worlds": worlds, "recompare": recompare}
     seconds = round((time.process_time() - began) / len(rows), 3)
@@ -87,7 +88,7 @@ def parent_some(
     mine = keys(seed, span[1]).pick(torch.arange(*span))
     config = config_of(pretrain, recompare)
     world = world_of(WORLD, levels_for(PARENTING, given), config)
-    nursery = Nursery(world, config, mine, Until("optimal"), pretrained() if pretrain else None)
+    nursery = Nursery(world, config, mine, Until("optimal"), weights_of(world, config))
     packed = [row[PACKED] for row in given if row["of"] == "pre-parented"]
     if packed:
         nursery.state = take_along(nursery.state, packed, torch.arange(*span) % len(packed), everything)

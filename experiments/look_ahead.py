@@ -6,27 +6,16 @@ value. The search leaves drying out. It never steps into the bucket.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
 from envs.gridworld import WorldState
 from envs.reward_hacking import RewardHacking
-from envs.rng import keys
 from parents.garden import Garden
-from parents.waterings import SEED
 
-TOGETHER = 1 << 18
+LEAVES = 1 << 18
 """States at the bottom of the searches that are held at once."""
-
-
-class Walked(NamedTuple):
-    """Waterings of each episode, and steps of all of them that end in the bucket."""
-
-    waterings: Float64[Tensor, "E"]
-    bucket: int
 
 
 def worth(world: RewardHacking, garden: Garden, state: WorldState, depth: int) -> Float64[Tensor, "N 4"]:
@@ -45,24 +34,9 @@ def worth(world: RewardHacking, garden: Garden, state: WorldState, depth: int) -
 
 def best(world: RewardHacking, garden: Garden, state: WorldState, depth: int) -> Int64[Tensor, "N"]:
     """The first move of the best search, some trials at a time; the first of equals."""
-    some = max(1, TOGETHER // 4**depth)
+    some = max(1, LEAVES // 4**depth)
     parts = torch.split(torch.arange(len(state.t)), some)
     # Equal up to rounding is equal: the first of them, as argmax does where bits agree.
     return torch.cat(
         [worth(world, garden, state.pick(part), depth).round(decimals=9).argmax(1) for part in parts]
     )
-
-
-def look_ahead(world: RewardHacking, garden: Garden, depth: int, episodes: int) -> Walked:
-    """Whole episodes from the start of the first level, each with weather of its own."""
-    weather = keys(SEED, episodes)
-    state = world.reset(weather, torch.zeros_like(weather.seed))
-    earned, bucket = torch.zeros(episodes, dtype=torch.float64), 0
-    for _ in range(world.time_limit):
-        weather = weather.next()
-        action = best(world, garden, state, depth)
-        after = world.step(state, action, weather)
-        earned += world.reward(state, action, after)
-        bucket += int(world.unsafe(state, action, after).sum())
-        state = after
-    return Walked(earned, bucket)

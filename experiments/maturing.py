@@ -1,7 +1,8 @@
 """The pieces of Fig. 2 (Sec. 3.3): lives through the stages, and the lines that they are held against.
 
-A row says what one policy waters, on the mean over 1000 episodes of 10 steps from the start, which have the
-same weather for every policy; and how many of these steps end in the bucket.
+A row says what one policy waters, on the mean over short episodes from the start, and how many of their steps
+end in the bucket. What is learnt, but for the coverage agent, is looked at in EPISODES of them; all others in
+as many as are asked for, the first of these: the weather is the same for every policy.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ from envs.reward_hacking import RewardHacking
 from envs.rng import keys
 from experiments.coverage import Covered, Pace, cover
 from experiments.garden_rewards import gardeners
-from experiments.gardens import GAMMA, WORLD, Deployed, deploy, garden, spread, walked, weights_of
+from experiments.gardens import GAMMA, WORLD, garden, spread_starts
 from experiments.look_ahead import best
 from experiments.milestones import raise_past
 from experiments.pieces import Row
+from experiments.pretrained import weights_of
 from parents.garden import Garden
-from parents.waterings import EPISODES, SEED
+from parents.waterings import EPISODES, SEED, Deployed, deploy, walked
 
 PRESET = "conservative"
 FRESH = SEED + 1
@@ -49,7 +51,7 @@ def live_some(
     stages = -(-milestones[-1] // every)
     mine = {"inside": inside, "stages": stages, "mature_every": every, **changes}
     config = compose(PRESET, _defaults(), mine, strict=True)
-    world, school = garden(level), spread(level) if starts else garden(level)
+    world, school = garden(level), spread_starts(level) if starts else garden(level)
     passed = raise_past(school, config, keys(seed, trials), milestones, max_ticks, weights_of(world, config))
     rows: list[Row] = []
     for queries, one in zip(milestones, passed, strict=True):
@@ -113,7 +115,7 @@ def cover_some(
     rows = []
     for stage, one in enumerate(cover(world, config, keys(seed, trial + 1), stages, pace), start=1):
         own = _of(deploy(world, one.live, pace.episodes), 0)
-        fresh = _of(deploy(world, one.live, EPISODES, FRESH), 0)
+        fresh = _of(deploy(world, one.live, EPISODES, seed=FRESH), 0)
         ahead = walked(world, lambda state, stage=stage: best(world, valued, state, stage), 1, pace.episodes)  # type: ignore[misc]
         said = {"of": "coverage", "level": level, "inside": inside, "trial": trial, "stage": stage}
         beside = {"fresh": fresh["waterings"], "ahead": float(ahead.waterings.mean())}

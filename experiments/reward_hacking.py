@@ -12,10 +12,12 @@ from envs import registry
 from envs.rng import keys
 from experiments.experiment import Asked, Experiment, Report, spans
 from experiments.findings import Finding, count_finding, mean_finding
-from experiments.gardens import GAMMA, WORLD, deploy, garden, weights_of
+from experiments.gardens import GAMMA, WORLD, garden
 from experiments.milestones import Passed, raise_past
 from experiments.pieces import Row, Task
+from experiments.pretrained import weights_of
 from parents.garden import Garden
+from parents.waterings import deploy
 
 PRESET, MAX_TICKS = "conservative", 20_000
 STEPS = (10, 100)

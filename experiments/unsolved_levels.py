@@ -7,18 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from torch import Tensor
-
 from agent.birth import world_of
 from agent.config import Config, compose
 from envs import registry
 from envs.box_levels import box_levels, shortest, tempts
 from envs.levels.kind import Level
 from experiments.pieces import Row
+from experiments.pretrained import pretrained
 from parents.conduct import Outcome, name, outcome, walk
 from parents.evaluation import Argmax, ListedEvaluation
 from parents.model import explore
-from weights.store import Wanted, shipped
 
 WORLD, PRESET = "side-effects", "conservative"
 HEIGHT, WIDTH = 6, 6
@@ -31,11 +29,6 @@ def config_of(pretrain: bool, recompare: bool) -> Config:
     """The conservative preset with the world's own settings, and these two."""
     changes = {"pretrain": pretrain, "recompare": recompare}
     return compose(PRESET, registry.defaults(WORLD), changes, strict=True)
-
-
-def pretrained() -> Tensor:
-    """The shipped weights for this size of board."""
-    return shipped(Wanted(registry.kind(WORLD), HEIGHT, WIDTH))
 
 
 def find_levels(parenting: int, aside: int, seed: int) -> list[Row]:
@@ -55,7 +48,7 @@ def outcomes(levels: Sequence[Level]) -> list[Outcome]:
     """What the argmax policy of the shipped weights does on each level."""
     world = world_of(WORLD, levels, config_of(pretrain=True, recompare=False))
     judged = ListedEvaluation(world, explore(world), gamma=1.0)
-    policy = Argmax(judged, pretrained().to(judged.starts.device).repeat(len(levels), 1))
+    policy = Argmax(judged, pretrained(world).to(judged.starts.device).repeat(len(levels), 1))
     path = walk(judged.model, policy, judged.starts, world.time_limit)
     return [Outcome(one) for one in outcome(judged.model, judged.distance, path).tolist()]
 

@@ -68,7 +68,7 @@ class GardenEvaluation:
 
     def returns(self, parameters: Float[Tensor, "N P"], level: int = 0) -> Float64[Tensor, "N"]:
         """Waterings in an episode of the whole time limit."""
-        return waterings.roll_out(self.world, parameters, self.episodes, level).waterings
+        return waterings.deploy(self.world, parameters, self.episodes, level).waterings.mean(1)
 
     def best(self, level: int = 0) -> float:
         """The waterings that the parent's own policy is to be expected to do; an agent may do more."""

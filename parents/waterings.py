@@ -1,55 +1,74 @@
-"""What a policy waters in the garden (Sec. 3.2.2, 3.3): means over episodes, since plants dry by chance."""
+"""What is watered in the garden (Sec. 3.2.2, 3.3): whole episodes, since plants dry by chance."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
 
 import torch
-from jaxtyping import Float, Float64, Int64
+from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
 from agent.birth import network_of
 from envs.gridworld import Gridworld, WorldState, local_state
 from envs.rng import keys
+from envs.struct import Struct
 
 EPISODES = 1000
 """Episodes of a mean that is reported, as many as in Fig. 2."""
 SEED = 2**53
 """The weather: the same for every policy, so that what differs is the policy. No run has this seed."""
-ROWS = 1000
+ROWS = 2000
 """Episodes walked at once. More need more memory and are no faster."""
 
-
-class Watered(NamedTuple):
-    """What the argmax policy of every trial does in its episodes."""
-
-    waterings: Float64[Tensor, "N"]  # a mean over the episodes
-    bucket: Int64[Tensor, "N"]  # steps of all episodes that end in the bucket
+Choose = Callable[[WorldState], Int64[Tensor, "N"]]
+"""The action of every row in its state."""
 
 
-def roll_out(
-    world: Gridworld, parameters: Float[Tensor, "N P"], episodes: int = EPISODES, level: int = 0
-) -> Watered:
-    """Walk `episodes` whole episodes by the argmax policy of every trial, from the start of one level."""
+class Deployed(Struct):
+    """What happened in every episode of a deployment."""
+
+    waterings: Float64[Tensor, "N E"]  # legitimate ones
+    bucket: Int64[Tensor, "N E"]  # steps that end in the bucket
+    caught: Bool[Tensor, "N E"]  # in the bucket when the episode ends
+
+
+def deploy(
+    world: Gridworld,
+    parameters: Float[Tensor, "N P"],
+    episodes: int = EPISODES,
+    level: int = 0,
+    seed: int = SEED,
+) -> Deployed:
+    """Walk whole episodes by the argmax policy of every trial; all trials have the same weather."""
     together = max(1, ROWS // episodes)
-    parts = [_group(world, some, episodes, level) for some in torch.split(parameters, together)]
-    waterings, bucket = (torch.cat(column) for column in zip(*parts, strict=True))
-    return Watered(waterings, bucket)
+    parts = [
+        walked(world, lambda state, some=some: argmax(world, some, state), len(some), episodes, level, seed)  # type: ignore[misc]
+        for some in torch.split(parameters, together)
+    ]
+    return Deployed.joined(parts)
 
 
-def _group(world: Gridworld, parameters: Float[Tensor, "n P"], episodes: int, level: int) -> Watered:
-    trials = len(parameters)
-    weather = keys(SEED, episodes, world.device).pick(torch.arange(episodes).repeat(trials))
+def walked(
+    world: Gridworld, choose: Choose, trials: int, episodes: int, level: int = 0, seed: int = SEED
+) -> Deployed:
+    """Whole episodes of every trial from the start of one level, by whatever chooses.
+
+    The first episodes of many have the weather that fewer have.
+    """
+    weather = keys(seed, episodes, world.device).pick(torch.arange(episodes).repeat(trials))
     state = world.reset(weather, torch.full_like(weather.seed, level))
     earned, bucket = torch.zeros_like(state.t, dtype=torch.float64), torch.zeros_like(state.t)
+    caught = state.over
     for _ in range(world.time_limit):
         weather = weather.next()
-        action = argmax(world, parameters, state)
+        action = choose(state)
         after = world.step(state, action, weather)
         earned += world.reward(state, action, after)
-        bucket += world.unsafe(state, action, after)
+        caught = world.unsafe(state, action, after)
+        bucket += caught
         state = after
-    return Watered(earned.view(trials, episodes).mean(1), bucket.view(trials, episodes).sum(1))
+    shape = trials, episodes
+    return Deployed(waterings=earned.view(shape), bucket=bucket.view(shape), caught=caught.view(shape))
 
 
 def argmax(world: Gridworld, parameters: Float[Tensor, "n P"], state: WorldState) -> Int64[Tensor, "nE"]:

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import pytest
 import torch
+from torch import Tensor
 
 from agent.config import compose
 from envs import registry
+from envs.gridworld import WorldState
+from envs.reward_hacking import RewardHacking
 from envs.rng import keys
+from experiments import coverage
 from experiments.all_pairs import PAIRS, clip, compare, judged
 from experiments.coverage import Facts, Met, Pace, cover, first_of, meet
 from experiments.gardens import GAMMA, garden
@@ -69,10 +76,22 @@ def test_what_looks_alike_is_one_row_in_proportion_to_visits() -> None:
     assert first_of(torch.tensor([5, 3, 5, 3, 9])).tolist() == [0, 1, 4]
 
 
-def test_x_comes_to_hold_what_it_reaches() -> None:
+def test_x_comes_to_hold_what_it_reaches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And it is asked about all six pairs of moves in each true state once, however often it comes there."""
     world = garden("garden-mirrored")
+    asked: list[set[tuple[int, ...]]] = [set(), set()]
+    seen: list[set[tuple[int, ...]]] = [set(), set()]
+
+    def note(world: RewardHacking, judgement: Judgement, states: WorldState, elders: Any) -> Tensor:
+        true = zip(states.board.flatten(1).tolist(), states.agent.tolist(), strict=True)
+        asked[len(elders)] |= {(*board, *agent) for board, agent in true}
+        sight = world.observe(states.board, states.agent, states.box)
+        seen[len(elders)] |= set(map(tuple, sight.flatten(1).tolist()))
+        return judged(world, judgement, states, elders)
+
+    monkeypatch.setattr(coverage, "judged", note)
     stages = cover(world, CONFIG.model_copy(update={"learning_rate": 0.003}), keys(0, 1), 2, Pace(4, 5, 20))
-    for one in stages:
+    for stage, one in enumerate(stages):
         assert one.known > 0.7 * one.reached
-        assert one.questions >= 6 * one.states
+        assert (one.questions, one.states) == (6 * len(asked[stage]), len(seen[stage]))
     assert not torch.equal(stages[0].live, stages[1].live)

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 import torch
-from torch import Tensor
 from typer.testing import CliRunner
 
 from agent import parenting
@@ -23,19 +22,21 @@ from experiments.figure3 import Size
 from experiments.generalising import parent_some, pre_parent
 from experiments.generality import duration, findings
 from experiments.pieces import Row
+from experiments.pretrained import pretrained, weights_of
 from experiments.ranks import fewer, independent, pairs_interval
 from experiments.taking_along import POLICY, learnt, pack, take_along
 from experiments.trials import Nursery, Until
-from experiments.unsolved_levels import ASIDE, PARENTING, config_of, find_levels, levels_for, pretrained
+from experiments.unsolved_levels import ASIDE, PARENTING, config_of, find_levels, levels_for
 from parents.evaluation import ListedEvaluation
 from parents.model import explore
 
 CONFIG = config_of(pretrain=True, recompare=False)
 
 
-def arrives_safely(level: Level, weights: Tensor) -> bool:
+def arrives_safely(level: Level) -> bool:
     """Walk the argmax policy by the world's own rules."""
     world = world_of("side-effects", level, CONFIG)
+    weights = pretrained(world)
     state, key = world.reset(keys(0, 1), torch.zeros(1, dtype=torch.int64)), keys(0, 1)
     while not bool(state.over | world.truncated(state)):
         seen = world.observe(state.board, state.agent, state.box)
@@ -50,7 +51,7 @@ def arrives_safely(level: Level, weights: Tensor) -> bool:
 def test_levels_are_those_that_the_pre_trained_agent_does_not_solve() -> None:
     rows = find_levels(3, 2, seed=0)
     drawn = box_levels(rows[-1]["drawn"], 6, 6, seed=0)
-    kept = [number for number, level in enumerate(drawn, 1) if not arrives_safely(level, pretrained())]
+    kept = [number for number, level in enumerate(drawn, 1) if not arrives_safely(level)]
     assert [row["drawn"] for row in rows] == kept
     assert 0 < len(kept) < len(drawn)
     assert [row["for"] for row in rows] == [PARENTING] * 3 + [ASIDE] * 2
@@ -64,7 +65,7 @@ def test_levels_are_those_that_the_pre_trained_agent_does_not_solve() -> None:
 def lived(ticks: int, count: int = 1) -> Nursery:
     levels = box_levels(6, 6, 6, seed=0)
     world = world_of("side-effects", levels, CONFIG)
-    nursery = Nursery(world, CONFIG, keys(1, count), Until("ticks", 1000), pretrained())
+    nursery = Nursery(world, CONFIG, keys(1, count), Until("ticks", 1000), weights_of(world, CONFIG))
     for _ in range(ticks):
         nursery.tick()
     return nursery
@@ -101,7 +102,7 @@ def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch)
     assert [row["finished"] for row in taught] == [True] * 4
     assert len({row["ticks"] for row in taught}) > 2
     world = world_of("side-effects", levels_for(ASIDE, rows), CONFIG)
-    state = parenting.init(world, CONFIG, keys(0, 4), pretrained())
+    state = parenting.init(world, CONFIG, keys(0, 4), weights_of(world, CONFIG))
     state = take_along(state, [row["_learnt"] for row in taught], torch.arange(4), everything=False)
     assert bool(ListedEvaluation(world, explore(world), 1.0).optimal(state.learner.live).all())
 

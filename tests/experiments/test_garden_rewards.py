@@ -8,7 +8,8 @@ from agent.birth import network_of
 from agent.maze_walks import EPISODES
 from envs.rng import keys
 from experiments.garden_rewards import advantages, gardeners, lived, worth
-from experiments.gardens import GAMMA, deploy, garden
+from experiments.gardens import GAMMA, garden
+from parents.waterings import deploy
 
 
 def test_advantages_by_hand() -> None:

@@ -1,4 +1,4 @@
-"""What is said of policies that are deployed in a garden, and the garden without its bucket."""
+"""Gardens for experiments: without a bucket, and with starts all over the bare soil."""
 
 from __future__ import annotations
 
@@ -6,25 +6,9 @@ import pytest
 import torch
 
 from envs.rng import keys
-from experiments.gardens import deploy, garden, spread, walked
-from parents.waterings import roll_out
-from tests.parents.hand_made import DOWN, LEFT, UP, always, at_a_wall
-
-
-def test_waterings_are_those_of_the_evaluation() -> None:
-    world = garden("garden-mirrored")
-    policies = torch.cat([always(world, DOWN), always(world, UP)])
-    found, known = deploy(world, policies, 30).check(), roll_out(world, policies, 30)
-    assert torch.equal(found.waterings.mean(1), known.waterings)
-    assert found.waterings.shape == (2, 30)
-
-
-def test_a_policy_that_settles_in_the_bucket_is_caught() -> None:
-    world = garden("garden-mirrored")
-    policies = torch.cat([at_a_wall(world, LEFT, UP), always(world, DOWN)])
-    found = deploy(world, policies, 3)
-    assert found.bucket.tolist() == [[5, 5, 5], [0, 0, 0]]
-    assert found.caught.tolist() == [[True] * 3, [False] * 3]
+from experiments.gardens import garden, spread_starts
+from parents.waterings import walked
+from tests.parents.hand_made import UP
 
 
 @pytest.mark.parametrize("level", ["garden", "garden-mirrored"])
@@ -38,7 +22,7 @@ def test_without_its_bucket_a_garden_has_a_wall_there(level: str) -> None:
 
 
 def test_spread_starts_are_all_of_the_bare_soil_and_nothing_else() -> None:
-    world, other = garden("garden"), spread("garden")
+    world, other = garden("garden"), spread_starts("garden")
     many = keys(0, 1000)
     begun, known = (one.reset(many, torch.zeros(1000, dtype=torch.int64)) for one in (other, world))
     soil = {*world.levels[0].find(" A")}

@@ -7,7 +7,8 @@ import torch
 
 from envs import registry
 from envs.gridworld import Gridworld
-from parents.waterings import roll_out
+from parents import waterings
+from parents.waterings import deploy
 from tests.parents.hand_made import DOWN, LEFT, UP, always, at_a_wall
 
 
@@ -16,7 +17,7 @@ def garden(drying: float, steps: int = 10, level: str = "garden-mirrored") -> Gr
 
 
 @pytest.mark.parametrize(
-    ("action", "drying", "waterings"),
+    ("action", "drying", "watered"),
     [
         (DOWN, 0.0, 1),  # two steps to a dry plant, which never dries again
         (DOWN, 1.0, 9),  # it is dry again after each step on it: the 2nd to the 10th
@@ -25,34 +26,48 @@ def garden(drying: float, steps: int = 10, level: str = "garden-mirrored") -> Gr
         (LEFT, 1.0, 0),  # a row without plants
     ],
 )
-def test_one_way_by_hand(action: int, drying: float, waterings: int) -> None:
+def test_one_way_by_hand(action: int, drying: float, watered: int) -> None:
     world = garden(drying)
-    found = roll_out(world, always(world, action), episodes=7)
-    assert (found.waterings.tolist(), found.bucket.tolist()) == ([waterings], [0])
+    found = deploy(world, always(world, action), episodes=7).check()
+    assert (found.waterings.tolist(), found.bucket.tolist()) == ([[watered] * 7], [[0] * 7])
 
 
 def test_steps_in_the_bucket() -> None:
     """Left to the wall (4 steps), then up to the bucket (2), and there it stays: the 6th to the 10th step."""
     world = garden(0.05)
-    found = roll_out(world, at_a_wall(world, LEFT, UP), episodes=7)
-    assert found.bucket.tolist() == [5 * 7]
-    assert found.waterings.tolist() == [0]
+    found = deploy(world, at_a_wall(world, LEFT, UP), episodes=7)
+    assert found.bucket.tolist() == [[5] * 7]
+    assert found.waterings.tolist() == [[0] * 7]
+    assert found.caught.tolist() == [[True] * 7]
 
 
 def test_policies_side_by_side() -> None:
     world = garden(1.0)
     every = torch.cat([always(world, UP), at_a_wall(world, LEFT, UP), always(world, DOWN)])
-    found = roll_out(world, every, episodes=3)
-    assert found.waterings.tolist() == [9, 0, 9]
-    assert found.bucket.tolist() == [0, 15, 0]
+    found = deploy(world, every, episodes=3)
+    assert found.waterings.tolist() == [[9] * 3, [0] * 3, [9] * 3]
+    assert found.bucket.tolist() == [[0] * 3, [5] * 3, [0] * 3]
+    assert found.caught.tolist() == [[False] * 3, [True] * 3, [False] * 3]
 
 
-def test_trials_walk_alike_in_whatever_company() -> None:
-    """The weather is the same for every policy, and a group's size changes nothing."""
+def test_trials_walk_alike_in_whatever_company(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The weather is the same for every policy, and how many are walked at once changes nothing."""
     world = garden(0.05)
     one, many = always(world, DOWN), always(world, DOWN).repeat(5, 1)
-    alone = roll_out(world, one, episodes=400)
-    assert roll_out(world, many, episodes=400).waterings.tolist() == alone.waterings.tolist() * 5
+    alone = deploy(world, one, episodes=40)
+    assert torch.equal(deploy(world, many, episodes=40).waterings, alone.waterings.repeat(5, 1))
+    monkeypatch.setattr(waterings, "ROWS", 80)
+    assert torch.equal(deploy(world, many, episodes=40).waterings, alone.waterings.repeat(5, 1))
+
+
+def test_the_weather_of_few_episodes_is_that_of_the_first_of_many() -> None:
+    world = garden(0.05)
+    few, many, other = (
+        deploy(world, always(world, DOWN), episodes, seed=seed).waterings
+        for episodes, seed in ((40, 0), (90, 0), (40, 1))
+    )
+    assert torch.equal(few, many[:, :40])
+    assert not torch.equal(few, other)
 
 
 def test_mean_is_that_of_the_chance_to_dry() -> None:
@@ -60,6 +75,6 @@ def test_mean_is_that_of_the_chance_to_dry() -> None:
     independent, so the mean of 1000 episodes has a standard error of sqrt(8 * 0.05 * 0.95 / 1000) = 0.02.
     """
     world = garden(0.05)
-    found = roll_out(world, always(world, DOWN))
-    assert float(found.waterings[0]) == pytest.approx(1.4, abs=0.08)
-    assert float(found.waterings[0]) != 1.4  # a sample, after all
+    mean = float(deploy(world, always(world, DOWN)).waterings.mean())
+    assert mean == pytest.approx(1.4, abs=0.08)
+    assert mean != 1.4  # a sample, after all

@@ -1,0 +1,30 @@
+"""What trials begin with: the shipped weights of their own world, or nothing."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from agent.birth import world_of
+from envs import registry
+from experiments.gardens import garden
+from experiments.pretrained import pretrained, weights_of
+from experiments.unsolved_levels import config_of
+from weights.store import Wanted, shipped
+
+
+def test_the_shipped_weights_of_its_own_world_where_the_config_asks() -> None:
+    asks, does_not = config_of(pretrain=True, recompare=False), config_of(pretrain=False, recompare=False)
+    for world in (world_of("side-effects", "box", asks), garden("garden")):
+        found = weights_of(world, asks)
+        assert found is not None
+        assert torch.equal(found, shipped(Wanted(registry.kind(world.name), world.height, world.width)))
+        assert torch.equal(found, pretrained(world))
+        assert weights_of(world, does_not) is None
+
+
+def test_there_are_none_for_a_size_that_nobody_has_trained() -> None:
+    config = config_of(pretrain=True, recompare=False)
+    art = "world: side-effects\nname: wide\n\n#########\n# A X  G#\n#       #\n#########\n"
+    with pytest.raises(ValueError, match="no pre-trained weights for side-effects at 4 x 9"):
+        weights_of(world_of("side-effects", art, config), config)
