@@ -10,15 +10,26 @@ from experiments.findings import share_interval
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLOUR = "#0072b2"
+COLOUR, GREY = "#0072b2", "#b0b0b0"
 
 
-def spreads(figure: Figure, groups: Mapping[str, Sequence[float]], label: str) -> None:
+def spreads(
+    figure: Figure,
+    groups: Mapping[str, Sequence[float]],
+    label: str,
+    paper: Mapping[str, tuple[float, float]],
+) -> None:
     """A box for each group from its first quarter to its third, whiskers over 90 %, a point at the mean.
 
-    The axis is linear up to 1 and logarithmic beyond, so that 0 and 2000 both have a place.
+    Grey is from where to where the paper has a group. The axis is linear up to 1 and logarithmic beyond, so
+    that 0 and 2000 both have a place; it says so.
     """
     axes = figure.subplots()
+    for row, name in enumerate(groups, start=1):
+        if name in paper:
+            low, high = paper[name]
+            said = "the paper: mean +- deviation, or 0 or 1" if name == next(iter(paper)) else None
+            axes.barh(row, high - low, left=low, height=0.8, color=GREY, alpha=0.5, label=said)
     axes.boxplot(
         list(groups.values()),
         orientation="horizontal",
@@ -30,9 +41,11 @@ def spreads(figure: Figure, groups: Mapping[str, Sequence[float]], label: str) -
         flierprops={"marker": ".", "markersize": 2, "alpha": 0.3},
     )
     axes.set_xscale("symlog", linthresh=1)
-    axes.set_xlim(left=0)
-    axes.set_xlabel(label)
+    axes.set_xlim(left=-0.2)  # so that a box at 0 is whole
+    axes.xaxis.set_major_formatter(lambda number, _place: f"{number:g}")
+    axes.set_xlabel(f"{label} (linear up to 1, logarithmic beyond)")
     axes.invert_yaxis()
+    figure.legend(loc="outside lower center")
 
 
 def shares(figure: Figure, counts: Sequence[tuple[str, int, int]]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import sqrt
-from statistics import fmean, stdev
+from statistics import fmean, stdev, variance
 from typing import Any
 
 Z = 1.959964
@@ -48,9 +48,25 @@ def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
     return fmean(values) - half, fmean(values) + half
 
 
+def difference_interval(more: Sequence[float], less: Sequence[float]) -> tuple[float, float] | None:
+    """The 95 % interval of the difference of two means; None where either is of fewer than two values.
+
+    The values count as drawn apart from each other.
+    """
+    if min(len(more), len(less)) < 2:
+        return None
+    half = Z * sqrt(variance(more) / len(more) + variance(less) / len(less))
+    difference = fmean(more) - fmean(less)
+    return difference - half, difference + half
+
+
 def between(values: Sequence[float]) -> str:
     """The interval of a mean as it is shown; empty where there is none."""
-    interval = mean_interval(values)
+    return shown(mean_interval(values))
+
+
+def shown(interval: tuple[float, float] | None) -> str:
+    """An interval in words; none is an empty one."""
     return "" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
 
 
@@ -74,13 +90,16 @@ def share_interval(hits: int, trials: int) -> tuple[float, float]:
 
 
 def count_finding(what: str, paper: int | str, hits: int, trials: int, note: str = "") -> Finding:
-    """A count of trials beside the paper's, which is of 100, or LOST, or SILENT; it agrees where both do."""
+    """A count of trials beside the paper's, which is of 100, or LOST, or SILENT; it agrees where both do.
+
+    The difference is in points: what share of 100 trials ours is, less the paper's.
+    """
     low, high = share_interval(hits, trials)
     return Finding(
         what=what,
         paper=paper if isinstance(paper, str) else f"{paper} of 100",
         ours=f"{hits} of {trials}",
-        difference="" if isinstance(paper, str) else f"{100 * hits / trials - paper:+.1f} %",
+        difference="" if isinstance(paper, str) else f"{100 * hits / trials - paper:+.1f} points",
         interval=f"{100 * low:.1f} to {100 * high:.1f} %",
         agrees=None if isinstance(paper, str) else hits / trials == paper / 100,
         note=note,

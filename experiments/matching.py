@@ -65,8 +65,8 @@ def search(rows: Sequence[Row]) -> list[Found]:
 
 def _nearest(layout: str, rows: Sequence[Row]) -> Found:
     mine = [row for row in rows if row.get("layout") == layout]
-    direct = _grouped(mine, DIRECT, KNOBS)
-    rewarded = _grouped(mine, TRADITIONAL, ("entropy",))
+    direct = grouped(mine, DIRECT, KNOBS)
+    rewarded = grouped(mine, TRADITIONAL, ("entropy",))
     knobs = min(direct, key=lambda one: distance(direct[one], DEATHS, QUERIES))
     entropy = min(rewarded, key=lambda one: distance(rewarded[one], BY_REWARD))
     far = distance(direct[knobs], DEATHS, QUERIES) + distance(rewarded[entropy], BY_REWARD)
@@ -74,7 +74,7 @@ def _nearest(layout: str, rows: Sequence[Row]) -> Found:
     return Found(layout, found, entropy[0], far, direct[knobs], rewarded[entropy])
 
 
-def _grouped(rows: Sequence[Row], of: str, columns: Sequence[str]) -> dict[tuple[Any, ...], list[Row]]:
+def grouped(rows: Sequence[Row], of: str, columns: Sequence[str]) -> dict[tuple[Any, ...], list[Row]]:
     """The rows by their values in some columns, in the order in which they were tried."""
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:

@@ -10,7 +10,6 @@ episodes are looked up in tables. So it needs a world whose states can be listed
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
@@ -58,10 +57,6 @@ class Learners(Struct):
     optimal: Bool[Tensor, "N"]
 
 
-Progress = Callable[[int, int], None]
-"""Told the trials that are done and the gradient steps so far."""
-
-
 def tables(model: Model, evaluation: ListedEvaluation) -> Tables:
     """A model's states as rows; the start of the only level is row 0.
 
@@ -85,16 +80,12 @@ def tables(model: Model, evaluation: ListedEvaluation) -> Tables:
 
 
 def raise_by_reward(
-    world: Gridworld,
-    config: Config,
-    keys: Keys,
-    max_steps: int,
-    progress: Progress | None = None,
-    entropy: float = ENTROPY,
+    world: Gridworld, config: Config, keys: Keys, max_steps: int, entropy: float = ENTROPY
 ) -> Learners:
     """Train one policy for each of `keys` until its argmax is optimal, for at most `max_steps` steps.
 
-    `entropy` is what the policy's entropy is worth, against returns to go of deviation 1.
+    Whoever is born optimal takes no step. `entropy` is what the policy's entropy is worth, against returns to
+    go of deviation 1.
 
     Raises:
         ValueError: too many states to list, or several levels.
@@ -102,20 +93,22 @@ def raise_by_reward(
     model = explore(world)
     judge = ListedEvaluation(world, model, config.gamma)
     known = tables(model, judge)
-    some = _born(world, config, keys)
+    some = _judged(judge, _born(world, config, keys))
     done: list[Learners] = []
     for step in range(1, max_steps + 1):
+        if bool(some.optimal.any()):
+            done.append(some.pick(some.optimal))
+            some = some.pick(~some.optimal)
         if not len(some.trial):
             break
         now = keys.pick(some.trial).replace(tick=torch.full_like(some.trial, step))
         _learn(world, config, known, some, now, entropy)
-        some = some.replace(optimal=judge.optimal(some.live))
-        if bool(some.optimal.any()):
-            done.append(some.pick(some.optimal))
-            some = some.pick(~some.optimal)
-        if progress:
-            progress(len(keys.seed) - len(some.trial), step)
+        some = _judged(judge, some)
     return _together([*done, some])
+
+
+def _judged(judge: ListedEvaluation, some: Learners) -> Learners:
+    return some.replace(optimal=judge.optimal(some.live))
 
 
 def _born(world: Gridworld, config: Config, keys: Keys) -> Learners:
@@ -162,6 +155,5 @@ def returns_to_go(known: Tables, walks: Walks, gamma: float) -> Float64[Tensor, 
 
 
 def _together(parts: list[Learners]) -> Learners:
-    every = [part.tensors() for part in parts]
-    whole = parts[0].map(lambda name, _tensor, _axis: torch.cat([one[name] for one in every]))
+    whole = Learners.joined(parts)
     return whole.pick(whole.trial.argsort())

@@ -3,37 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from experiments.drawings import spreads
 from experiments.experiment import Asked, Experiment, Report, spans
-from experiments.findings import LOST, Finding, between, spread
 from experiments.pieces import Row, Task
+from experiments.table1_report import AGREEMENT, ALGORITHMS, Algorithm, born, cells, done, order, reach
 
 WORLD, LEVEL = "unsafe-exploration", "island"
 TOGETHER = 100
 """Trials of a task at most: more would be no faster (docs/benchmarks.md)."""
 MAX_TICKS, MAX_STEPS = 20_000, 3_000
-
-
-class Algorithm(NamedTuple):
-    """A row of the table."""
-
-    name: str
-    title: str
-    preset: str | None  # None: policy gradients
-    share: float  # how much work a trial is, against the others
-    deaths: str  # the paper's cells, as it prints them
-    guidance: str
-    preference: str
-
-
-ALGORITHMS = (
-    Algorithm("traditional", "Traditional RL", None, 0.4, "2300 +- 700", "-", "-"),
-    Algorithm("direct", "Direct policy learning", "direct", 1.0, "47 +- 14", "-", f"51 +- ({LOST})"),
-    Algorithm("lax", "Lax parenting", "lax", 1.0, LOST, LOST, LOST),
-    Algorithm("conservative", "Conservative parenting", "conservative", 1.0, "0 or 1", LOST, LOST),
-)
 
 
 def _config(asked: Asked) -> Mapping[str, Any]:
@@ -63,58 +43,21 @@ def _task(one: Algorithm, span: range, asked: Asked) -> Task:
 
 
 def _report(asked: Asked, rows: Sequence[Row]) -> Report:
-    findings = [finding for one in ALGORITHMS for finding in cells(one, rows)]
-    deaths = {
-        one.title: [row["deaths"] for row in rows if row["of"] == one.name and row["finished"]]
-        for one in ALGORITHMS
-    }
+    findings = [*(finding for one in ALGORITHMS for finding in cells(one, rows)), *order(rows), born(rows)]
+    deaths = {one.title: done(one, rows, "deaths") for one in ALGORITHMS}
+    paper = {one.title: span for one in ALGORITHMS if (span := reach(one.deaths))}
     label = "deaths before the optimal policy"
-    return Report(findings, WORDS, {"deaths": lambda figure: spreads(figure, deaths, label)})
-
-
-def cells(one: Algorithm, rows: Sequence[Row]) -> list[Finding]:
-    """A row of the table: the cells that the paper has, and ours of the rows of that algorithm."""
-    mine = [row for row in rows if row["of"] == one.name]
-    done = [row for row in mine if row["finished"]]
-    left = len(mine) - len(done)
-    note = f"{left} of {len(mine)} trials unfinished, not in the mean" if left else ""
-    columns = (("deaths", one.deaths), ("guidance", one.guidance), ("preference", one.preference))
-    return [
-        _cell(one, name, paper, [row[name] for row in done], note) for name, paper in columns if paper != "-"
-    ]
-
-
-def _cell(one: Algorithm, name: str, paper: str, values: Sequence[float], note: str) -> Finding:
-    number = paper.split(" ")[0]
-    legible = float(number) if number.isdigit() and " or " not in paper else None
-    mean = sum(values) / len(values) if values else None
-    return Finding(
-        what=f"{one.title}: {name}",
-        paper=paper,
-        ours=spread(values),
-        difference="" if legible is None or mean is None else f"{mean - legible:+.1f}",
-        interval=between(values),
-        agrees=_agrees(paper, legible, mean),
-        note=note,
-    )
-
-
-def _agrees(paper: str, legible: float | None, mean: float | None) -> bool | None:
-    """Within the paper's own deviation over trials, where one is legible; "0 or 1" is a mean of at most 1."""
-    if mean is None or paper == LOST:
-        return None
-    if paper == "0 or 1":
-        return mean <= 1
-    deviation = paper.partition("+- ")[2]
-    return abs(mean - (legible or 0.0)) <= float(deviation) if deviation.isdigit() else None
+    return Report(findings, WORDS, {"deaths": lambda figure: spreads(figure, deaths, label, paper)})
 
 
 WORDS = (
     "The probabilities and the layout behind the paper's table are not legible in our copy. These are the "
     'settings of docs/paper.md, "Lost numbers", on the level `island`; so only the order of the four '
-    "algorithms can be compared. `parenting experiment calibrate` searches for settings that bring the "
-    "paper's numbers back.",
-    "In the figure a box holds the middle half of the trials, whiskers nine tenths, and a point is the mean.",
+    "algorithms can be compared, in three rows of its own. `parenting experiment calibrate` searches for "
+    "settings that bring the paper's numbers back.",
+    *AGREEMENT,
+    "In the figure a box holds the middle half of the trials, whiskers nine tenths, and a point is the mean; "
+    "grey is what the paper has.",
 )
 
 EXPERIMENT = Experiment(

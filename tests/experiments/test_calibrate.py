@@ -12,6 +12,7 @@ from envs.levels.unsafe_exploration import ISLAND_BOTTLENECK
 from experiments import calibrate
 from experiments.calibrate import EXPERIMENT, LAYOUTS, settings
 from experiments.calibrated import findings
+from experiments.calibrated_drawing import scatter
 from experiments.experiment import Asked
 from experiments.labour import do
 from experiments.matching import BY_REWARD, DEATHS, DIRECT, KNOBS, QUERIES, TRADITIONAL, distance, search
@@ -24,7 +25,8 @@ FAR = {**NEAR, "p_rec": 0.5}
 
 
 def row(of: str, finished: bool = True, **more: Any) -> Row:
-    return {"of": of, "finished": finished, "guidance": 0, "deaths": 0, "preference": 0, **more}
+    nothing = {"trial": 0, "ticks": 9, "guidance": 0, "deaths": 0, "preference": 0}
+    return {"of": of, "finished": finished, **nothing, **more}
 
 
 def tried(layout: str, deaths: int, queries: int, by_reward: int, **knobs: Any) -> list[Row]:
@@ -85,6 +87,47 @@ def test_a_miss_is_said(queries: int, said: str) -> None:
     both = found["all three numbers at once, each within the paper's deviation over trials"]
     assert (both.ours, both.agrees) == (said, said == "yes")
     assert "1 of 2 trials unfinished" in found["Traditional RL: deaths"].note
+
+
+def test_what_was_aimed_at_is_called_fitted_and_nothing_else() -> None:
+    rows = tried("narrow", deaths=40, queries=44, by_reward=2300)
+    rows += [
+        row(of, trial=trial) for of in ("traditional", "direct", "lax", "conservative") for trial in (0, 1)
+    ]
+    notes = {one.what: one.note for one in findings(rows)}
+    fitted = {what for what, note in notes.items() if note.startswith("fitted")}
+    assert fitted == {
+        "Traditional RL: deaths",
+        "Direct policy learning: deaths",
+        "Direct policy learning: preference",
+        "order: deaths by Traditional RL less those by direct policy learning",
+        "all three numbers at once, each within the paper's deviation over trials",
+    }
+    assert notes["Conservative parenting: deaths"] == "not fitted; 2 of 2 trials died at most once"
+
+
+def test_settings_that_are_out_are_drawn_apart() -> None:
+    """A full point, a hollow one, a cross where no trial finished, the paper's star and what was taken."""
+    matplotlib = pytest.importorskip("matplotlib.figure")
+    rows = [
+        *tried("narrow", deaths=40, queries=44, by_reward=2300),
+        *tried("narrow", deaths=30, queries=44, by_reward=2300, **FAR),
+        row(DIRECT, finished=False, layout="narrow", **FAR),
+        row(TRADITIONAL, finished=False, layout="narrow", entropy=0.1),
+    ]
+    figure = matplotlib.Figure()
+    scatter(figure, rows)
+    left, right = figure.axes
+    dots = {
+        tuple(one.get_offsets()[0]): len(one.get_facecolor())
+        for one in left.collections
+        if len(one.get_offsets())
+    }
+    assert dots[44, 30] == 0, "hollow"
+    assert left.collections
+    crosses = [line for line in right.lines if line.get_marker() == "x"]
+    assert [float(line.get_xdata()[0]) for line in crosses] == [0.1]
+    assert figure.legends
 
 
 def test_presets_keep_their_own_chances() -> None:

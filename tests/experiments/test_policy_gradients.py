@@ -71,6 +71,20 @@ def test_it_learns_the_optimal_way_and_dies_often() -> None:
     assert bool(ListedEvaluation(world, explore(world), config.gamma).optimal(found.live).all())
 
 
+def test_who_is_born_optimal_takes_no_step_and_leaves_the_others_alone() -> None:
+    """Trial 86 of seed 0 is born so: the parented agents of Table 1 have no deaths and no queries there."""
+    world, config = island()
+    float64 = config.model_copy(update={"dtype": "float64"})
+    born, other = (torch.tensor(some) for some in ([85, 86], [85]))
+    both, alone = (raise_by_reward(world, float64, keys(0, 87).pick(one), 2) for one in (born, other))
+    assert both.trial.tolist() == [0, 1]
+    assert both.optimal.tolist() == [False, True]
+    assert both.steps.tolist() == [2, 0]
+    assert (int(both.deaths[1]), int(both.ticks[1])) == (0, 0)
+    assert (int(both.deaths[0]), int(both.ticks[0])) == (int(alone.deaths[0]), int(alone.ticks[0]))
+    assert int(both.deaths[0]) > 0
+
+
 def test_a_trial_that_is_not_done_in_time_says_so() -> None:
     world, config = island()
     found = raise_by_reward(world, config, keys(0, 3), 2)
