@@ -51,8 +51,11 @@ def pre_parent(
     seed: int,
     given: Sequence[Row],
 ) -> list[Row]:
-    """Parent pre-trained agents, each until it is optimal in all of the first `worlds` levels set aside."""
-    began = time.process_time()
+    """Parent pre-trained agents until each is optimal in all of the first `worlds` levels set aside.
+
+    After `max_ticks` an agent is given up, and is kept as it is then.
+    """
+    began = time.thread_time()
     agents = torch.arange(*span)
     first = keys(seed, 1).pick(torch.zeros_like(agents))
     mine = first.replace(seed=first.seed + BESIDE * worlds + agents)
@@ -61,7 +64,7 @@ def pre_parent(
     nursery = Teaching(world, config, mine, Until("optimal"), weights_of(world, config))
     rows = _rows(raise_all(nursery, max_ticks))
     said = {"of": "pre-parented", "worlds": worlds, "recompare": recompare}
-    seconds = round((time.process_time() - began) / len(rows), 3)
+    seconds = round((time.thread_time() - began) / len(rows), 3)
     return [
         {**said, "agent": agent, **row, "seconds": seconds, PACKED: pack(nursery.kept[place], everything)}
         for place, (agent, row) in enumerate(zip(range(*span), rows, strict=True))
@@ -83,7 +86,7 @@ def parent_some(
     Where pre-parented agents are among the given rows, the trials go on from them by turns: with their
     policies, or with `everything` that they have learnt.
     """
-    began = time.process_time()
+    began = time.thread_time()
     trials = range(*span)
     mine = keys(seed, span[1]).pick(torch.arange(*span))
     config = config_of(pretrain, recompare)
@@ -93,7 +96,7 @@ def parent_some(
     if packed:
         nursery.state = take_along(nursery.state, packed, torch.arange(*span) % len(packed), everything)
     rows = _rows(raise_all(nursery, max_ticks))
-    seconds = round((time.process_time() - began) / len(rows), 3)  # one batch: each has its share
+    seconds = round((time.thread_time() - began) / len(rows), 3)  # one batch: each has its share
     said = {"of": "parented", "curve": curve, "recompare": recompare, "seconds": seconds}
     return [
         {**said, "trial": trial, "agent": trial % len(packed) if packed else None, **row}

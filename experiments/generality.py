@@ -2,43 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import inf, sqrt
-from statistics import fmean, median, stdev
-from typing import TYPE_CHECKING
+from math import inf
+from statistics import fmean, median
+from typing import NamedTuple
 
 from experiments.experiment import CHUNK
-from experiments.findings import SILENT, Finding, Z, spread
+from experiments.findings import LOST, SILENT, Finding, spread
 from experiments.generalising import TOGETHER
 from experiments.pieces import Row
-from experiments.ranks import fewer, independent, pairs_interval
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from experiments.ranks import fewer, independent, median_interval, pairs_interval
 
 GOAL = 10_000
 """The paper's trials of a curve."""
 CORES, GPU = 100, 50
 """A cluster's cores; and what we suppose one GPU to be worth in cores, since none was there to try it."""
-COLOURS = ("#999999", "#0072b2", "#e69f00", "#009e73")
-BINS = 40
 TWICE = ", comparing twice"
 
 
-def findings(names: Sequence[str], whole: str, rows: Sequence[Row], device: str) -> list[Finding]:
-    """Of all curves: their queries, whether each needs fewer than the one before, and what they cost."""
+def findings(taught: Mapping[str, int], whole: str, rows: Sequence[Row], device: str) -> list[Finding]:
+    """Of all curves: their queries, whether each needs fewer than those before, and what they cost.
+
+    `taught` says in how many levels the agents of each curve were pre-parented. The curves come in the
+    order in which they are to need fewer queries; `whole` is one beside them, never compared twice.
+    """
     found = _of_levels(rows)
+    names = [name for name in taught if name != whole]
     for twice in (False, True):
-        mine = {name: _trials(name, twice, rows) for name in names}
-        found += [_queries(name, twice, trials) for name, trials in mine.items()]
-        found += [_fewer(pair, twice, mine[pair[1]], mine[pair[0]]) for pair in pairwise(names)]
-    found.append(_queries(whole, False, _trials(whole, False, rows)))
+        mine = {name: _curve(name, worlds, twice, rows) for name, worlds in taught.items()}
+        found += [_queries(mine[name]) for name in names]
+        pairs = [*pairwise(names), (names[1], names[-1])]
+        if not twice:
+            found.append(_queries(mine[whole]))
+            pairs.append((names[1], whole))
+        found += [_fewer(mine[later], mine[earlier]) for earlier, later in pairs]
     found += _before([row for row in rows if row["of"] == "pre-parented"])
     return found + _projected(rows, device)
 
 
-def _trials(name: str, twice: bool, rows: Sequence[Row]) -> list[Row]:
+class Of(NamedTuple):
+    """One curve, with or without comparing twice."""
+
+    name: str
+    trials: Sequence[Row]
+    taught: int  # agents that it goes on from
+    raw: int  # those of them that were not optimal in all their levels when they were given up
+
+    @property
+    def queries(self) -> list[float]:
+        """Of every trial; an unfinished one needs more than any."""
+        return [row["queries"] if row["finished"] else inf for row in self.trials]
+
+    @property
+    def worth(self) -> float:
+        """How many independent trials these are."""
+        return independent(self.queries, [row["agent"] for row in self.trials])
+
+    @property
+    def premise(self) -> str:
+        """What is wrong with the agents that it goes on from; nothing, if they are what they should be."""
+        return f"{self.raw} of its {self.taught} pre-parented agents were not done" if self.raw else ""
+
+
+def _curve(name: str, worlds: int, twice: bool, rows: Sequence[Row]) -> Of:
+    agents = [row for row in rows if row["of"] == "pre-parented" and row["recompare"] == twice]
+    mine = [row for row in agents if row["worlds"] == worlds]
+    raw = sum(not row["finished"] for row in mine)
+    return Of(f"{name}{TWICE * twice}", trials_of(name, twice, rows), len(mine), raw)
+
+
+def trials_of(name: str, twice: bool, rows: Sequence[Row]) -> list[Row]:
+    """The rows of one curve."""
     mine = [row for row in rows if row["of"] == "parented" and row["curve"] == name]
     return [row for row in mine if row["recompare"] == twice]
 
@@ -57,47 +92,40 @@ def _of_levels(rows: Sequence[Row]) -> list[Finding]:
     ]
 
 
-def _queries(name: str, twice: bool, trials: Sequence[Row]) -> Finding:
-    done = [row for row in trials if row["finished"]]
-    queries = [row["queries"] for row in done]
-    middle = median(_censored(trials))
+def _queries(one: Of) -> Finding:
+    done = [row["queries"] for row in one.trials if row["finished"]]
+    left = len(one.trials) - len(done)
     notes = [
-        f"median {middle:g}" if middle < inf else "median: not reached",
-        f"{len(trials) - len(done)} of {len(trials)} unfinished",
-        f"{fmean(row['deaths'] for row in trials):.2f} unsafe moves",
+        f"{left} of {len(one.trials)} unfinished" if left else f"mean {spread(done)}",
+        f"{fmean(row['deaths'] for row in one.trials):.2f} unsafe moves",
+        one.premise,
     ]
-    if len(queries) > 1:
-        half = Z * stdev(queries) / sqrt(independent(*_by_agent(done)))
-        interval = f"{fmean(queries) - half:.0f} to {fmean(queries) + half:.0f}"
+    low, high = median_interval(one.queries, one.worth)
     return Finding(
-        what=f"queries, {name}{TWICE * twice}",
-        paper=SILENT,
-        ours=spread(queries),
-        interval=interval if len(queries) > 1 else "",
-        note="; ".join(notes),
+        what=f"queries at the median, {one.name}",
+        paper=LOST,
+        ours=_number(median(one.queries)),
+        interval=f"{_number(low)} to {_number(high)}",
+        note="; ".join(filter(None, notes)),
     )
 
 
-def _censored(trials: Sequence[Row]) -> list[float]:
-    """Queries of every trial; an unfinished one needs more than any."""
-    return [row["queries"] if row["finished"] else inf for row in trials]
+def _number(queries: float) -> str:
+    return f"{queries:g}" if queries < inf else "not reached"
 
 
-def _by_agent(trials: Sequence[Row]) -> tuple[list[float], list[int | None]]:
-    return _censored(trials), [row["agent"] for row in trials]
-
-
-def _fewer(pair: tuple[str, str], twice: bool, later: Sequence[Row], earlier: Sequence[Row]) -> Finding:
-    share = fewer(_censored(later), _censored(earlier))
-    low, high = pairs_interval(share, independent(*_by_agent(later)), independent(*_by_agent(earlier)))
-    agrees = None if low <= 0.5 <= high else share > 0.5
+def _fewer(later: Of, earlier: Of) -> Finding:
+    share = fewer(later.queries, earlier.queries)
+    low, high = pairs_interval(share, later.worth, earlier.worth)
+    apart = not low <= 0.5 <= high
+    premise = later.premise or earlier.premise
     return Finding(
-        what=f"{pair[1]} needs fewer queries than {pair[0]}{TWICE * twice}",
+        what=f"{later.name} needs fewer queries than {earlier.name.removesuffix(TWICE)}",
         paper="yes",
         ours=f"in {100 * share:.0f} % of pairs of trials",
         interval=f"{100 * low:.0f} to {100 * high:.0f} %",
-        agrees=agrees,
-        note="these trials do not tell them apart" if agrees is None else "",
+        agrees=share > 0.5 if apart and not premise else None,
+        note=premise or ("" if apart else "these trials do not tell them apart"),
     )
 
 
@@ -143,21 +171,3 @@ def duration(seconds: float) -> str:
     if seconds >= 7200:
         return f"{seconds / 3600:.0f} hours"
     return f"{seconds / 60:.0f} minutes" if seconds >= 120 else f"{seconds:.0f} seconds"
-
-
-def draw(figure: Figure, names: Sequence[str], rows: Sequence[Row]) -> None:
-    """Four histograms, without comparing twice and with it; what is missing to 1 is unfinished."""
-    panels = figure.subplots(2, 1, sharex=True)
-    most = max((row["queries"] for row in rows if row["of"] == "parented" and row["finished"]), default=1)
-    edges = [most * place / BINS for place in range(BINS + 1)]
-    for axes, twice in zip(panels, (False, True), strict=True):
-        for name, colour in zip(names, COLOURS, strict=True):
-            trials = _trials(name, twice, rows)
-            done = [row["queries"] for row in trials if row["finished"]]
-            label = f"{name}: {len(done)} of {len(trials)} done"
-            weights = [1 / len(trials)] * len(done)
-            axes.hist(done, edges, weights=weights, histtype="step", color=colour, label=label)
-        axes.set_title("comparing twice" if twice else "never comparing twice")
-        axes.set_ylabel("share of trials")
-        axes.legend(fontsize="small")
-    panels[-1].set_xlabel("queries until optimal in all levels for parenting")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
-from math import sqrt
+from math import floor, sqrt
 from statistics import fmean
 
 from experiments.findings import Z
@@ -29,6 +29,17 @@ def pairs_interval(share: float, m: float, n: float) -> tuple[float, float]:
         return abs(true - share) > Z * sqrt(true * (1 - true) * factor / (m * n))
 
     return _edge(outside, share, 0.0), _edge(outside, share, 1.0)
+
+
+def median_interval(values: Sequence[float], n: float) -> tuple[float, float]:
+    """The 95 % interval of a median, by the values at the ranks between which it lies; n independent ones.
+
+    A normal distribution stands in for the binomial one. Values may be infinite.
+    """
+    order = sorted(values)
+    half = Z / (2 * sqrt(n))
+    low, high = (min(max(floor((0.5 + side * half) * len(order)), 0), len(order) - 1) for side in (-1, 1))
+    return order[low], order[high]
 
 
 def _edge(outside: Callable[[float], bool], inside: float, end: float) -> float:
