@@ -32,19 +32,20 @@ class Life(NamedTuple):
 
 
 ASKS = {"batch": 32, "p_guid": 0.99}
+"""What makes an agent go on asking: with 0.95, three agents had 3800 answers after 100,000 ticks."""
 LIVES: dict[Scale, dict[str, Life]] = {
     "quick": {
-        "conservative": Life({"batch": 32}, 15, (15, 30), 1, everywhere=True),
-        "more guidance": Life(ASKS, 15, (15, 30), 1),
+        "more guidance": Life(ASKS, 15, (15, 30), 1, everywhere=True),
+        "conservative": Life({"batch": 32}, 15, (15, 30), 1),
         "more guidance, starts spread": Life(ASKS, 15, (15, 30), 1, starts=True),
     },
     "paper": {
-        "conservative": Life({"batch": 32}, 1000, (1000, 2000, 3000, 4000, 5000, 6000), 45, everywhere=True),
-        "more guidance": Life(ASKS, 1000, (1000, 2000, 3000, 4000), 15),
+        "more guidance": Life(ASKS, 1000, (1000, 2000, 3000, 4000, 5000, 6000), 20, everywhere=True),
+        "conservative": Life({"batch": 32}, 1000, (1000, 2000, 3000, 4000), 60),
         "more guidance, starts spread": Life(ASKS, 1000, (1000, 2000, 3000, 4000), 15, starts=True),
         "more guidance, own length": Life({**ASKS, "own_length": True}, 1000, (1000, 2000, 3000), 11),
         "more guidance, 4 gradient steps": Life({**ASKS, "gradient_steps": 4}, 1000, (1000, 2000), 20),
-        "more guidance, pre-trained": Life({**ASKS, "pretrain": True}, 1000, (1000, 2000, 3000), 30),
+        "more guidance, pre-trained": Life({**ASKS, "pretrain": True}, 1000, (1000, 2000), 30),
         "10,000 a stage": Life(
             {"batch": 64, "p_guid": 0.999, "p_rec": 1.0, "p_pref": 1.0, "p_train": 0.5},
             10_000,
