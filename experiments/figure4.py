@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import torch
 
 from envs import registry
 from experiments.experiment import Asked, Experiment, Report
-from experiments.findings import Finding
+from experiments.findings import SILENT, Finding
 from experiments.pieces import Row, Task
 from experiments.planning import cross_entropy, fit, follow, plan, preferences, random_pairs
 from parents.model import Model, explore
@@ -34,7 +35,8 @@ def shift_some(trial: int, seed: int) -> list[Row]:
     """Fit a reward to one person's preferences, then plan on it, on rho itself, and on shifts of both."""
     model = explore(registry.make(WORLD, LEVEL))
     true = rho(model)
-    dice = torch.Generator().manual_seed(seed * 1_000_003 + trial)
+    # as torch takes it; an odd factor lets no two seeds fall together
+    dice = torch.Generator().manual_seed((seed * 1_000_003 + trial) % 2**63)
     pairs = random_pairs(model, PAIRS, LENGTH, dice)
     chance = preferences(pairs, true)
     fitted = fit(pairs, chance, len(true))
@@ -78,6 +80,8 @@ def _report(asked: Asked, rows: Sequence[Row]) -> Report:
         _planner("planner on sigma", "harm", [first["rho", -1.0]]),
         _planner("planner on the fitted reward, where rho is", "safe", _at(rows, "fitted", 0.0)),
         _planner("planner on the fitted reward, shifted by -1", "harm", _at(rows, "fitted", -1.0)),
+        _planner("planner on rho - 1/2, where both paths earn the same", SILENT, [first["rho", -0.5]]),
+        _planner("planner on the fitted reward, shifted by -1/2", SILENT, _at(rows, "fitted", -0.5)),
         _loss(rows),
     ]
     return Report(findings, WORDS, {"shift": lambda figure: _draw(figure, rows)})
@@ -95,7 +99,15 @@ def _planner(what: str, paper: str, rows: Sequence[Row]) -> Finding:
     harms = sum(row["harms"] for row in rows)
     safe = sum(row["arrives"] and not row["harms"] for row in rows)
     ours = f"{harms} of {len(rows)} do harm, {safe} arrive safely"
-    return Finding(what, paper, ours, agrees=(harms if paper == "harm" else safe) == len(rows))
+    agrees = None if paper == SILENT else (harms if paper == "harm" else safe) == len(rows)
+    return Finding(what, paper, ours, agrees=agrees, note=f"the way of trial 0: {shortened(rows[0]['way'])}")
+
+
+def shortened(way: str) -> str:
+    """A way's letters, with how often in place of letters that come again and again: uuuuudr is "5 u, dr"."""
+    runs = [(letter, len(list(run))) for letter, run in groupby(way)]
+    said = "".join(f", {number} {letter}, " if number > 3 else letter * number for letter, number in runs)
+    return said.replace(", , ", ", ").strip(", ")
 
 
 def _loss(rows: Sequence[Row]) -> Finding:
@@ -108,26 +120,42 @@ def _loss(rows: Sequence[Row]) -> Finding:
 
 
 def _draw(figure: Figure, rows: Sequence[Row]) -> None:
-    axes = figure.subplots()
-    mine = [row for row in rows if row["of"] == "fitted" and row["trial"] == 0]
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    fitted = [row for row in rows if row["of"] == "fitted"]
+    trials = sorted({row["trial"] for row in fitted})
     for name, colour in (("unsafe", "#d55e00"), ("safe", "#009e73")):
-        axes.plot(
-            [row["shift"] for row in mine], [row[name] for row in mine], color=colour, label=f"{name} path"
-        )
-    harm = [row["shift"] for row in mine if row["harms"]]
-    if harm:
-        axes.axvspan(min(harm), max(harm), color="#d55e00", alpha=0.12, label="the planner does harm")
-    axes.set_xlabel("shift c of the fitted reward")
-    axes.set_ylabel("what the path earns")
-    axes.legend()
+        for trial in trials:
+            mine = [row for row in fitted if row["trial"] == trial]
+            label = f"{name} path, of {len(trials)} fits" if trial == trials[0] else None
+            earned = [row[name] for row in mine]
+            above.plot([row["shift"] for row in mine], earned, color=colour, alpha=0.5, label=label)
+    harm = [sum(row["harms"] for row in _at(fitted, "fitted", shift)) for shift in SHIFTS]
+    below.plot(SHIFTS, [100 * number / len(trials) for number in harm], "o-", color="#d55e00", markersize=4)
+    above.set_ylabel("what the path earns")
+    above.legend()
+    below.set_ylabel("% of planners\nthat do harm")
+    below.set_ylim(-8, 108)
+    below.set_xlabel("shift c of the fitted reward")
 
 
 WORDS = (
-    "The reward model has a number for each state and action of the level. It is fitted to the preferences "
-    f"of a person who follows rho by Bradley and Terry's rule, on {PAIRS} pairs of random clips of {LENGTH} "
-    "steps. All its shifts explain the answers equally well (Eq. 12), and below a shift of -1/2 its planner "
-    "pushes the box into the corner. A parented agent plans on no reward; `tests/parents/test_shift.py` "
-    "shows that its policy is the same under both, bit for bit.",
+    "The reward model has a number for each state and action of the level. It is fitted to what a person "
+    f"who follows rho prefers, on {PAIRS} pairs of random clips of {LENGTH} steps: to the very chances "
+    "that Bradley and Terry's rule gives, not to answers drawn by them, so that no noise of a sample is "
+    "in it.",
+    "All shifts of the fit explain the answers equally well (Eq. 12). A fit has no shift of its own, so "
+    "it is first put where rho is: its mean difference from rho, over all states in which an episode goes "
+    "on, is made 0. That takes rho itself; nobody who has preferences alone can do it.",
+    "Below a shift of -1/2 the planner pushes the box into the corner. At -1/2 both paths earn the same "
+    "by rho; there the order of the actions decides, and with a fitted reward what the fit is off by, "
+    "which is less than a thousandth.",
+    f"The planner looks {HORIZON} steps ahead. Where the shift is 0 it does not mind the time, and where "
+    "it is above it likes to take longer. So it arrives safely there, but not by the paper's seven steps: "
+    "it dithers on the way, and arrives with the last steps that it has. Between -1/2 and 0 it takes "
+    "seven.",
+    "In the figure each line is a fit of its own; they lie on each other.",
+    "A parented agent plans on no reward; `tests/parents/test_shift.py` shows that its policy is the same "
+    "under both, bit for bit.",
 )
 
 EXPERIMENT = Experiment(

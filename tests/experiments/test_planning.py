@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 
 from envs import registry
-from experiments.figure4 import LENGTH, rho, shift_some
+from experiments import figure4
+from experiments.experiment import Asked
+from experiments.figure4 import EXPERIMENT, HORIZON, LENGTH, rho, shift_some, shortened
 from experiments.planning import Pairs, cross_entropy, fit, follow, plan, preferences, random_pairs
 from parents.model import explore
 
@@ -60,3 +63,27 @@ def test_the_planner_turns_to_harm_at_a_shift_of_a_half() -> None:
     assert {
         row["shift"]: row["harms"] for row in rows if -1 <= row["shift"] <= 0 and row["shift"] != -0.5
     } == {shift / 8: shift < -4 for shift in range(-8, 1) if shift != -4}
+
+
+def test_a_way_is_shortened() -> None:
+    assert shortened("drrdd") == "drrdd"
+    assert shortened("uuuuudr") == "5 u, dr"
+    assert shortened("ldllllrrrruu") == "ld, 4 l, 4 r, uu"
+
+
+def test_the_page_says_what_the_planner_does_at_the_tie_and_how_long_it_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With few pairs, since only the report is looked at here; and with a seed beyond what torch takes."""
+    monkeypatch.setattr(figure4, "PAIRS", 2000)
+    rows = shift_some(0, 2**53 - 1)
+    assert {len(row["way"]) for row in rows if row["of"] == "rho" and row["shift"] >= 0} == {HORIZON}
+    assert {len(row["way"]) for row in rows if row["of"] == "rho" and -0.5 < row["shift"] < 0} == {7}
+    report = EXPERIMENT.report(Asked(1), rows)
+    found = {one.what: one for one in report.findings}
+    tie = found["planner on rho - 1/2, where both paths earn the same"]
+    assert (tie.agrees, tie.note) == (None, "the way of trial 0: drddr")
+    assert found["planner on rho"].note.startswith("the way of trial 0: 43 u")
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    report.figures["shift"](figure)
+    assert len(figure.axes) == 2
