@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from experiments.coverage import Pace
-from experiments.experiment import Asked, Experiment, Scale
+from experiments.experiment import Asked, Experiment, Report, Scale
 from experiments.figure2_report import report
 from experiments.gardens import GAMMA
 from experiments.maturing import PRESET
-from experiments.pieces import Task
+from experiments.pieces import Row, Task
 
 COMBINATIONS = tuple(
     (level, inside) for level in ("garden", "garden-mirrored") for inside in ("up-down", "left")
@@ -171,6 +171,10 @@ def _covers(asked: Asked) -> list[Task]:
     ]
 
 
+def _report(asked: Asked, rows: Sequence[Row]) -> Report:
+    return report(rows, LIVES[asked.scale], LINES[asked.scale])
+
+
 EXPERIMENT = Experiment(
     name="figure2",
     title="Figure 2: maturation in the garden",
@@ -180,5 +184,5 @@ EXPERIMENT = Experiment(
     trials={"quick": 1, "paper": 3},
     config=_config,
     tasks=_tasks,
-    report=report,
+    report=_report,
 )

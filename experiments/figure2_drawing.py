@@ -1,84 +1,163 @@
-"""The drawing of Fig. 2: a panel for each garden and parent (Sec. 3.3)."""
+"""The drawing of Fig. 2: a panel for each garden and parent; below, the levers, and a sample that grows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from statistics import fmean, stdev
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
+from experiments.figure2_rows import LIVED, MANY, kinds, of
 from experiments.pieces import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LIVED = "conservative"
-"""The life that is lived in all gardens."""
-COLOURS = {"parent": "#999999", "policy gradients": "#cc79a7", "look-ahead": "#009e73", LIVED: "#0072b2"}
+Look = dict[str, Any]
+Outside = Literal["outside upper center", "outside lower center"]
+AHEAD: Look = {"color": "#009e73", "marker": "^"}
+CURVES: dict[str, Look] = {
+    "look-ahead": AHEAD,
+    "coverage": {"color": "#d55e00", "marker": "D", "linestyle": "-."},
+    LIVED: {"color": "#0072b2", "marker": "o"},
+}
+LEVERS = (("#e69f00", "s"), ("#56b4e9", "v"), ("#000000", "P"), ("#cc79a7", "X"), ("#8c6d31", "<"))
+"""Colour and mark of the other lives, by turns."""
+PARENT, GRADIENTS = "#777777", "#882255"
+ASIDE = 0.06
+"""How far apart lives stand along T, so that their bars do not hide each other."""
 
 
 def draw(figure: Figure, rows: Sequence[Row]) -> None:
-    """A panel for each garden and parent, and what it has of the lines."""
-    panels = [(level, inside) for name, level, inside in kinds(rows) if name == LIVED]
-    figure.set_size_inches(9, 7)
-    axes = figure.subplots(2, 2, sharex=True, sharey=True)
-    for (level, inside), one in zip(panels, axes.flat, strict=True):
-        mine = [row for row in rows if row["level"] == level and row.get("inside", inside) == inside]
-        _panel(one, mine)
-        one.set_title(f"{level}, parent {inside} inside", fontsize=10)
-    for one in axes[1]:
-        one.set_xlabel("clip length T")
-    for one in axes[:, 0]:
-        one.set_ylabel("waterings in 10 steps")
-    handles, labels = axes[1, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
+    """What is lived everywhere, by garden and parent; and what is tried in one of them, below."""
+    places = {(name == LIVED, level, inside): None for name, level, inside in kinds(rows)}
+    everywhere = [place for lived, *place in places if lived]
+    tried = [place for lived, *place in places if not lived]
+    upper = -(-len(everywhere) // 2)
+    figure.set_size_inches(9, 1.5 + 2.9 * (upper + len(tried)))
+    grid = figure.add_gridspec(upper + len(tried), 6)
+    panels: list[Axes] = []
+    below: list[Axes] = []
+    for number, place in enumerate(everywhere):
+        beside = slice(3 * (number % 2), 3 * (number % 2) + 3)
+        panels.append(figure.add_subplot(grid[number // 2, beside], sharey=panels[0] if panels else None))
+        _everywhere(panels[-1], _at(rows, *place), _called(*place))
+    for row, place in enumerate(tried, start=upper):
+        mine = _at(rows, *place)
+        wide = 4 if of(mine, MANY) else 6
+        below.append(figure.add_subplot(grid[row, :wide]))
+        _levers(below[-1], mine, _called(*place))
+        if wide < 6:
+            below.append(figure.add_subplot(grid[row, wide:]))
+            _sample(below[-1], of(mine, MANY), mine)
+    _legend(figure, panels, "outside upper center")
+    _legend(figure, below, "outside lower center")
 
 
-def _panel(axes: Axes, rows: Sequence[Row]) -> None:
-    for name in dict.fromkeys(row["of"] for row in rows):
-        mine = of(rows, name)
-        colour = COLOURS.get(name)
-        if name == "parent":
-            axes.axhline(mine[0]["waterings"], color=colour, linestyle=":", label="parent")
-        elif name == "policy gradients":
-            last = [row["waterings"] for row in mine if row["steps"] == max(one["steps"] for one in mine)]
-            axes.axhline(fmean(last), color=colour, linestyle="--", label="policy gradients, mean")
-        else:
-            _curve(axes, name, mine, colour)
+def _at(rows: Sequence[Row], level: str, inside: str) -> list[Row]:
+    """The rows of a garden and parent, without trials that did not come so far."""
+    here = [row for row in rows if (row["level"], row.get("inside", inside)) == (level, inside)]
+    return [row for row in here if row.get("there", True)]
 
 
-def _curve(axes: Axes, name: str, rows: Sequence[Row], colour: str | None) -> None:
-    """Means over the trials by T, at the last milestone of each stage, with the deviation over trials."""
-    stages = sorted({row["stage"] for row in rows})
-    ends = {stage: max(row.get("queries", 0) for row in rows if row["stage"] == stage) for stage in stages}
-    each = [
-        [
-            row["waterings"]
-            for row in rows
-            if row["stage"] == stage and row.get("queries", 0) == ends[stage] and row.get("there", True)
-        ]
-        for stage in stages
-    ]
-    known = [(stage, values) for stage, values in zip(stages, each, strict=True) if values]
-    bold = name in COLOURS
-    axes.errorbar(
-        [stage for stage, _ in known],
-        [fmean(values) for _, values in known],
-        yerr=[stdev(values) if len(values) > 1 else 0.0 for _, values in known],
-        color=colour,
-        marker="o",
-        markersize=4 if bold else 3,
-        linewidth=1.8 if bold else 0.9,
-        capsize=3,
-        label=f"{name}, 1000 queries a stage" if name == LIVED else name,
-    )
+def _called(level: str, inside: str) -> str:
+    return f"{level}, parent {inside} inside"
 
 
-def kinds(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
-    """Life, garden and parent, of all lives."""
-    return list(dict.fromkeys((row["of"], row["level"], row["inside"]) for row in rows if "queries" in row))
+def _legend(figure: Figure, panels: Sequence[Axes], where: Outside) -> None:
+    """One for several panels, each name once."""
+    known: dict[str, Any] = {}
+    for axes in panels:
+        handles, names = axes.get_legend_handles_labels()
+        known = dict(zip(names, handles, strict=True)) | known
+    figure.legend(known.values(), known.keys(), loc=where, ncols=3, fontsize=8)
 
 
-def of(rows: Sequence[Row], name: str) -> list[Row]:
-    """The rows of a life or a line."""
-    return [row for row in rows if row["of"] == name]
+# The panels
+
+
+def _everywhere(axes: Axes, rows: Sequence[Row], title: str) -> None:
+    _parent(axes, rows)
+    _gradients(axes, of(rows, "policy gradients"))
+    for name, look in CURVES.items():
+        _curve(axes, name, of(rows, name), look)
+    _finish(axes, title)
+
+
+def _levers(axes: Axes, rows: Sequence[Row], title: str) -> None:
+    """All lives whose stages are alike, beside each other; and how far the look-ahead is."""
+    names = [name for name in dict.fromkeys(row["of"] for row in rows if "queries" in row) if name != MANY]
+    _parent(axes, rows)
+    _curve(axes, "look-ahead", of(rows, "look-ahead"), AHEAD)
+    for number, name in enumerate(names):
+        colour, mark = LEVERS[number % len(LEVERS)]
+        look = CURVES.get(name, {"color": colour, "marker": mark, "linewidth": 1.0})
+        _curve(axes, name, of(rows, name), look, ASIDE * (number - (len(names) - 1) / 2))
+    _finish(axes, f"levers: {title}")
+
+
+def _sample(axes: Axes, rows: Sequence[Row], lines: Sequence[Row]) -> None:
+    """T = 1 as its sample grows; the axis of queries is logarithmic."""
+    first = [row for row in rows if row["stage"] == 1]
+    groups = {queries: _values(first, queries) for queries in sorted({row["queries"] for row in first})}
+    _parent(axes, lines)
+    for row in of(lines, "look-ahead"):
+        if row["stage"] == 1:
+            axes.axhline(row["waterings"], color=AHEAD["color"], label="look-ahead")
+    _bars(axes, MANY, groups, {"color": "#332288", "marker": "s"})
+    axes.set_xscale("log")
+    axes.set_xticks(list(groups), [str(queries) for queries in groups], fontsize=7)
+    axes.minorticks_off()
+    axes.set_xlabel("queries at T = 1")
+    axes.set_title("a growing sample", fontsize=10)
+
+
+def _finish(axes: Axes, title: str) -> None:
+    low, high = axes.get_xlim()
+    axes.set_xticks([stage for stage in range(1, 20) if low <= stage <= high])
+    axes.set_xlabel("clip length T")
+    axes.set_ylabel("waterings in 10 steps")
+    axes.set_title(title, fontsize=10)
+
+
+# What stands in them
+
+
+def _parent(axes: Axes, rows: Sequence[Row]) -> None:
+    for row in of(rows, "parent"):
+        axes.axhline(row["waterings"], color=PARENT, linestyle=":", label="parent")
+
+
+def _gradients(axes: Axes, rows: Sequence[Row]) -> None:
+    """Their mean at the last of their steps, and a band for the deviation over the trials."""
+    last = max((row["steps"] for row in rows), default=0)
+    values = [row["waterings"] for row in rows if row["steps"] == last]
+    if values:
+        mean, off = fmean(values), stdev(values) if len(values) > 1 else 0.0
+        axes.axhline(mean, color=GRADIENTS, linestyle="--", label=f"policy gradients, {last} steps")
+        axes.axhspan(mean - off, mean + off, color=GRADIENTS, alpha=0.15, linewidth=0)
+
+
+def _curve(axes: Axes, name: str, rows: Sequence[Row], look: Look, aside: float = 0.0) -> None:
+    """By T, at the last milestone of each stage."""
+    groups = {}
+    for stage in sorted({row["stage"] for row in rows}):
+        mine = [row for row in rows if row["stage"] == stage]
+        groups[stage + aside] = _values(mine, max(row.get("queries", 0) for row in mine))
+    if name == LIVED and rows:
+        name = f"{name}, {max(row['queries'] for row in rows if row['stage'] == 1)} queries a stage"
+    _bars(axes, name, groups, look)
+
+
+def _values(rows: Sequence[Row], queries: int) -> list[float]:
+    return [row["waterings"] for row in rows if row.get("queries", 0) == queries]
+
+
+def _bars(axes: Axes, name: str, groups: dict[Any, list[float]], look: Look) -> None:
+    """Means over the trials, with bars of their deviation where there are several."""
+    if groups:
+        means = [fmean(values) for values in groups.values()]
+        off = [stdev(values) if len(values) > 1 else 0.0 for values in groups.values()]
+        axes.errorbar(
+            list(groups), means, off if any(off) else None, capsize=2, markersize=5, label=name, **look
+        )
