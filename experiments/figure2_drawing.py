@@ -12,6 +12,7 @@ from experiments.pieces import Row
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.gridspec import SubplotSpec
 
 Look = dict[str, Any]
 Outside = Literal["outside upper center", "outside lower center"]
@@ -34,24 +35,29 @@ def draw(figure: Figure, rows: Sequence[Row]) -> None:
     everywhere = [place for lived, *place in places if lived]
     tried = [place for lived, *place in places if not lived]
     upper = -(-len(everywhere) // 2)
-    figure.set_size_inches(9, 1.5 + 2.9 * (upper + len(tried)))
-    grid = figure.add_gridspec(upper + len(tried), 6)
+    figure.set_size_inches(9, 1.5 + 2.7 * upper + 3.6 * len(tried))
+    grid = figure.add_gridspec(upper + len(tried), 2, height_ratios=[3] * upper + [4] * len(tried))
     panels: list[Axes] = []
-    below: list[Axes] = []
     for number, place in enumerate(everywhere):
-        beside = slice(3 * (number % 2), 3 * (number % 2) + 3)
-        panels.append(figure.add_subplot(grid[number // 2, beside], sharey=panels[0] if panels else None))
+        room = grid[divmod(number, 2)]
+        panels.append(figure.add_subplot(room, sharey=panels[0] if panels else None))
         _everywhere(panels[-1], _at(rows, *place), _called(*place))
-    for row, place in enumerate(tried, start=upper):
-        mine = _at(rows, *place)
-        wide = 4 if of(mine, MANY) else 6
-        below.append(figure.add_subplot(grid[row, :wide]))
-        _levers(below[-1], mine, _called(*place))
-        if wide < 6:
-            below.append(figure.add_subplot(grid[row, wide:]))
-            _sample(below[-1], of(mine, MANY), mine)
     _legend(figure, panels, "outside upper center")
+    below: list[Axes] = []
+    for row, place in enumerate(tried, start=upper):
+        below += _below(figure, grid[row, :], _at(rows, *place), _called(*place))
     _legend(figure, below, "outside lower center")
+
+
+def _below(figure: Figure, room: SubplotSpec, rows: Sequence[Row], title: str) -> list[Axes]:
+    """The levers, and beside them the sample that grows, where there is one."""
+    growing, grid = of(rows, MANY), room.subgridspec(1, 3)
+    panels = [figure.add_subplot(grid[: 2 if growing else 3])]
+    _levers(panels[0], rows, title)
+    if growing:
+        panels.append(figure.add_subplot(grid[2]))
+        _sample(panels[1], growing, rows)
+    return panels
 
 
 def _at(rows: Sequence[Row], level: str, inside: str) -> list[Row]:

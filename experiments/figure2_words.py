@@ -27,10 +27,11 @@ TERMS = {
 }
 """What settings of lives mean."""
 VERDICTS = (
-    "+- is the deviation over the trials. The interval of a mean over trials is Student's, widened by the "
-    "error of the weather that they share; that of a single policy is its error over the episodes. Where an "
-    "interval holds what the number is compared with there is no *yes* and no *no*, nor is there for a "
-    "single trial. The look-ahead agrees with our first table within three standard errors of the difference."
+    "+- is the deviation over the trials, as are the bars and the bands of the figure. The interval of a "
+    "mean over trials is Student's, widened by the error of the weather that they share; that of a single "
+    "policy is its error over the episodes. Where an interval holds what the number is compared with there "
+    "is no *yes* and no *no*, nor is there for a single trial. The look-ahead agrees with our first table "
+    "within three standard errors of the difference."
 )
 AHEAD = (
     "The look-ahead searches T moves on the reward, and then the parent's own value; it sees whether the "
@@ -78,9 +79,9 @@ def _asked(lives: Mapping[str, Life]) -> str:
     begun = [f"*{name}*" for name, life in lives.items() if life.changes.get("pretrain")]
     return (
         f"Agents{others} ask {every} queries at every T, {alike}; what probabilities these had is not "
-        f"legible in our copy. Those of *{LIVED}*, which are raised in all gardens, ask for guidance more often "
-        "than the *conservative*, which come to know their garden and then hardly ask. The paper's may have been "
-        f"pre-trained: here {' and '.join(begun) if begun else 'none'} is."
+        f"legible in our copy. Those of *{LIVED}*, which are raised in all gardens, ask for guidance more "
+        "often than the *conservative*, which come to know their garden and then hardly ask. The paper's may "
+        f"have been pre-trained: here {' and '.join(begun) if begun else 'none'} is."
     )
 
 
