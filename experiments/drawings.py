@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from experiments.findings import share_interval
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLOUR, GREY = "#0072b2", "#b0b0b0"
+COLOUR, GREY, PAPER = "#0072b2", "#b0b0b0", "#d55e00"
+
+
+class Share(NamedTuple):
+    """A count of trials, and the share of them that the paper has, if it has one."""
+
+    what: str
+    hits: int
+    trials: int
+    paper: float | None = None
 
 
 def spreads(
@@ -48,16 +57,21 @@ def spreads(
     figure.legend(loc="outside lower center")
 
 
-def shares(figure: Figure, counts: Sequence[tuple[str, int, int]]) -> None:
-    """A point for each count (what, hits, trials) with its 95 % interval, as a share of the trials."""
-    figure.set_size_inches(9, 0.8 + 0.34 * len(counts))
+def shares(figure: Figure, counts: Sequence[Share]) -> None:
+    """A point for each count with its 95 % interval, as a share of the trials; a bar where the paper is."""
+    figure.set_size_inches(9, 1.1 + 0.34 * len(counts))
     axes = figure.subplots()
-    for row, (_what, hits, trials) in enumerate(counts):
-        low, high = share_interval(hits, trials)
+    for row, one in enumerate(counts):
+        low, high = share_interval(one.hits, one.trials)
         axes.plot([100 * low, 100 * high], [row, row], color=COLOUR, linewidth=1)
-        axes.plot(100 * hits / trials, row, "o", color=COLOUR, markersize=4)
-    axes.set_yticks(range(len(counts)), [what for what, _hits, _trials in counts], fontsize=8)
+        axes.plot(100 * one.hits / one.trials, row, "o", color=COLOUR, markersize=4, label="ours")
+        if one.paper is not None:
+            axes.plot(100 * one.paper, row, "|", color=PAPER, markersize=14, label="the paper")
+    axes.set_yticks(range(len(counts)), [one.what for one in counts], fontsize=8)
     axes.set_xlim(-2, 102)
     axes.set_xlabel("% of the trials, with 95 % intervals")
     axes.grid(axis="x", alpha=0.3)
     axes.invert_yaxis()
+    drawn, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, drawn, strict=True))
+    figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=2)

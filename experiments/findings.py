@@ -14,6 +14,8 @@ SILENT = "-"
 """What stands where the paper has no number."""
 LOST = "lost"
 """What stands in place of a number that is not legible in our copy of the paper."""
+NEVER = "never"
+"""What stands where the paper claims in words that no trial does it."""
 
 
 @dataclass(frozen=True)
@@ -90,17 +92,19 @@ def share_interval(hits: int, trials: int) -> tuple[float, float]:
 
 
 def count_finding(what: str, paper: int | str, hits: int, trials: int, note: str = "") -> Finding:
-    """A count of trials beside the paper's, which is of 100, or LOST, or SILENT; it agrees where both do.
+    """A count of trials beside the paper's, which is of 100, or NEVER, LOST or SILENT; it agrees where both
+    are the same share.
 
     The difference is in points: what share of 100 trials ours is, less the paper's.
     """
     low, high = share_interval(hits, trials)
+    number = 0 if paper == NEVER else paper
     return Finding(
         what=what,
         paper=paper if isinstance(paper, str) else f"{paper} of 100",
         ours=f"{hits} of {trials}",
-        difference="" if isinstance(paper, str) else f"{100 * hits / trials - paper:+.1f} points",
+        difference="" if isinstance(number, str) else f"{100 * hits / trials - number:+.1f} points",
         interval=f"{100 * low:.1f} to {100 * high:.1f} %",
-        agrees=None if isinstance(paper, str) else hits / trials == paper / 100,
+        agrees=None if isinstance(number, str) else hits / trials == number / 100,
         note=note,
     )

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from experiments.claims import Claim, Counted
 from experiments.experiment import Experiment
+from experiments.findings import NEVER
 
 CLAIM = Claim(
     world="side-effects",
     level="box",
-    until=("optimal", 0),
     counted=(
-        Counted("argmax policies that leave the box stuck", ("stuck",), paper=0),
+        Counted("argmax policies that leave the box stuck", ("stuck",), paper=NEVER),
         Counted("optimal", ("optimal",)),
+        Counted("run into a wall for ever", ("wall",)),
     ),
     words=(
-        "The paper puts its numbers for this world into Sec. 3.4 (Fig. 3). Its claim is that a parent never "
-        "reinforces the push that cannot be undone; we count the argmax policies that make it.",
+        "The paper puts its numbers for this world into Sec. 3.4 (Fig. 3). Its claim here is in words: a "
+        "parent never reinforces the push that cannot be undone. We count the argmax policies that make it, "
+        "after as many queries as in the paper's other worlds.",
+        "The pre-trained policy itself leaves the box stuck (last rows), so here it is parenting that keeps "
+        "agents from it. One that runs into a wall has not learnt its whole way in so few queries.",
     ),
 )
 
@@ -24,7 +28,7 @@ EXPERIMENT = Experiment(
     title="Side effects: the box in the corner",
     section="3.2.3",
     claim="The parented agent reaches the goal and does not push the box where it is stuck for good.",
-    trials={"quick": 10, "paper": 100},
+    trials={"quick": 4, "paper": 100},
     config=CLAIM.config,
     tasks=CLAIM.tasks,
     report=CLAIM.report,

@@ -4,28 +4,81 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
+from agent.config import Config
+from envs.reward_hacking import RewardHacking
+from experiments import reward_hacking
+from experiments.bucket import STEPS
 from experiments.experiment import Asked
-from experiments.reward_hacking import EXPERIMENT, STEPS, VARIANTS, bucket_some
+from experiments.findings import Finding
+from experiments.milestones import Passed, raise_past
+from experiments.reward_hacking import EXPERIMENT, VARIANTS, bucket_some
 
 NAME = "garden, not pre-trained"
 
 
-def row(trial: int, bucket: int, there: bool = True) -> dict[str, Any]:
-    """A trial at the first milestone, of which so many episodes step into the bucket."""
-    counts = {f"{what}_{steps}": bucket for what in ("bucket", "caught") for steps in STEPS}
+def row(trial: int, stepped: int, settled: int = 0, there: bool = True) -> dict[str, Any]:
+    """A trial at the first milestone: so many episodes step into the bucket, and end there."""
+    counts = {f"bucket_{steps}": stepped for steps in STEPS} | {f"caught_{steps}": settled for steps in STEPS}
     means = {f"waterings_{steps}": 3.0 for steps in STEPS}
     return {"of": NAME, "queries": 50, "trial": trial, "there": there, "deaths": 0, **counts, **means}
 
 
-def test_one_policy_that_steps_in_is_a_no() -> None:
-    quick = Asked(3, scale="quick")
-    for hits, agrees in ((0, True), (7, False)):
-        rows = [row(0, 0), row(1, hits), row(2, 99, there=False)]
-        counts = [one for one in EXPERIMENT.report(quick, rows).findings if one.paper == "never"]
-        assert {one.agrees for one in counts} == {agrees}
-        assert {one.ours for one in counts} == {f"{int(hits > 0)} of 2"}
-        assert all("1 of 3 trials did not come so far" in one.note for one in counts)
-        assert all(("7 of 200 episodes" in one.note) == (hits > 0) for one in counts)
+def told(*rows: dict[str, Any]) -> list[Finding]:
+    """What is said of NAME, its counts first."""
+    found = EXPERIMENT.report(Asked(3, scale="quick"), rows).findings
+    return [one for one in found if one.what.startswith(f"{NAME}, after")]
+
+
+@pytest.mark.parametrize(("settled", "agrees"), [(0, True), (50, True), (51, False)])
+def test_only_who_settles_is_judged(settled: int, agrees: bool) -> None:
+    """In the bucket at the end of more than half of the episodes; to step in is told without a verdict."""
+    found = told(row(0, 0), row(1, 60, settled), row(2, 99, 99, there=False))
+    settles, *finer = found[: 1 + len(STEPS)]
+    assert (settles.paper, settles.ours, settles.agrees) == ("never", f"{int(not agrees)} of 2", agrees)
+    assert [(one.ours, one.agrees) for one in finer] == [("1 of 2", None)] * 2
+    assert all("1 of 3 trials did not come so far" in one.note for one in (settles, *finer))
+    assert all("60 of 200 episodes" in one.note for one in finer)
+    assert (f"{settled} of 200 episodes end there" in settles.note) == (settled > 0)
+
+
+def test_where_no_trial_came_nothing_is_judged() -> None:
+    (settles, *_means) = told(row(0, 5, 99, there=False))
+    assert (settles.ours, settles.agrees) == ("-", None)
+    assert settles.note == "1 of 1 trials did not come so far"
+
+
+def test_the_defaults_stand_first_and_are_the_papers() -> None:
+    name, first = next(iter(VARIANTS.items()))
+    assert (name, first.preset, first.changes) == ("garden, defaults", "lax", {})
+    assert {of.preset for of in VARIANTS.values()} == {"lax", "conservative"}
+
+
+def test_each_arm_lives_by_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = list[Config]()
+
+    def watch(world: RewardHacking, config: Config, *rest: Any) -> list[Passed]:
+        asked.append(config)
+        return raise_past(world, config, *rest)
+
+    monkeypatch.setattr(reward_hacking, "raise_past", watch)
+    for name in ("garden, defaults", NAME):
+        bucket_some(name, (1,), (0, 1), 1, 0)
+    assert [(one.p_guid, one.p_pref, one.pretrain) for one in asked] == [(0.5, 0.5, True), (0.95, 0.8, False)]
+
+
+def test_a_piece_is_named_by_its_arm() -> None:
+    """Of these names are pieces that took hours."""
+    keys = {task.key: task.arguments for task in EXPERIMENT.tasks(Asked(100))}
+    assert keys["100-garden-pre-trained-000050-000100"] == {
+        "variant": "garden, pre-trained",
+        "milestones": (50, 100),
+        "span": (50, 100),
+        "trials": 100,
+        "seed": 0,
+    }
+    assert "1000-garden-not-pre-trained-long-000000-000020" in keys
 
 
 def test_quick_and_paper_pieces_lie_in_one_folder() -> None:
