@@ -7,17 +7,21 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
+from commands.options import among, folder, whole
 from commands.said import Wrong, plainly
 from experiments.catalogue import NAMES, UnknownExperiment
+from experiments.experiment import Asked, Device, Experiment, Scale
 
 if TYPE_CHECKING:
-    from experiments.experiment import Asked, Experiment
     from experiments.labour import Told
     from experiments.pieces import Task
+
+MOST = 100_000
+"""Trials at most: ten times the most that the paper has."""
 
 
 def experiment(
@@ -25,23 +29,45 @@ def experiment(
         str,
         typer.Argument(help=f"{', '.join(NAMES)}; all of them; or report: one HTML page of what is done."),
     ],
+    context: typer.Context,
     scale: Annotated[
-        Literal["quick", "paper"], typer.Option(help="The paper's number of trials, or a few.")
+        Scale,
+        typer.Option(
+            parser=among(get_args(Scale)),
+            metavar="quick|paper",
+            help="The paper's number of trials, or a few.",
+        ),
     ] = "paper",
     trials: Annotated[
-        int | None, typer.Option(min=1, help="Trials, in place of the scale's. More go on from fewer.")
+        int | None,
+        typer.Option(
+            parser=whole(1, MOST),
+            metavar="N",
+            help="Trials, in place of the scale's. More go on from fewer.",
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**53 - 1)] = 0,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="one a core")] = None,
+    seed: Annotated[int, typer.Option(parser=whole(0, 2**53 - 1), metavar="N")] = 0,
+    workers: Annotated[
+        int | None,
+        typer.Option(parser=whole(1, 1000), metavar="N", help="Processes.", show_default="one a core"),
+    ] = None,
     device: Annotated[
-        Literal["cpu", "cuda"], typer.Option(help="Where tensors are: in main memory, or on a GPU.")
+        Device,
+        typer.Option(
+            parser=among(get_args(Device)),
+            metavar="cpu|cuda",
+            help="Where tensors are: in main memory, or on a GPU.",
+        ),
     ] = "cpu",
     cluster: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://127.0.0.1:8786.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for results; what is done already lies there.")] = Path(
-        "results"
-    ),
+    out: Annotated[
+        Path,
+        typer.Option(
+            parser=folder, metavar="FOLDER", help="Folder for results; what is done already lies there."
+        ),
+    ] = Path("results"),
 ) -> None:
     """Run an experiment of the paper, or go on with it, and write its page, figures and data.
 
@@ -52,6 +78,7 @@ def experiment(
     """
     with plainly():
         if name == "report":
+            _only_out(context)
             _report(out)
             return
         asked = _asked(NAMES if name == "all" else (name,), scale, trials, seed, device)
@@ -59,24 +86,36 @@ def experiment(
             _run(one, what, out, workers or os.cpu_count() or 1, cluster)
 
 
+def _only_out(context: typer.Context) -> None:
+    """The page is made of what is done; so all but --out would say nothing."""
+    given = [one for one in context.params if _given(context, one)]
+    idle = [f"--{one}" for one in given if one not in ("name", "out")]
+    if idle:
+        raise Wrong(
+            f"report makes a page of what is done, and takes --out alone. Leave out {', '.join(idle)}."
+        )
+
+
+def _given(context: typer.Context, option: str) -> bool:
+    source = context.get_parameter_source(option)
+    return source is not None and source.name == "COMMANDLINE"
+
+
 def _report(out: Path) -> None:
     from experiments.report import BrokenResults, NoResults, report
 
     try:
         typer.echo(f"Written: {report(out)}")
-    except (BrokenResults, NoResults, OSError) as error:
+    except (BrokenResults, NoResults) as error:
         raise Wrong(str(error)) from None
+    except OSError as error:
+        raise Wrong(_at(out, error)) from None
 
 
 def _asked(
-    names: Sequence[str],
-    scale: Literal["quick", "paper"],
-    trials: int | None,
-    seed: int,
-    device: Literal["cpu", "cuda"],
+    names: Sequence[str], scale: Scale, trials: int | None, seed: int, device: Device
 ) -> list[tuple[Experiment, Asked]]:
     from experiments.catalogue import experiment
-    from experiments.experiment import Asked
 
     try:
         found = [experiment(name) for name in names]
@@ -86,29 +125,35 @@ def _asked(
 
 
 def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | None) -> None:
-    from experiments.labour import NoGpu, WorkersDied, see, work
-    from experiments.pieces import OtherPlan, Store
+    from experiments.cluster import NoCluster
+    from experiments.labour import NoGpu, WorkersDied, meet, work
+    from experiments.pieces import BrokenPiece, OtherPlan, Store
     from experiments.provenance import settings
     from experiments.publish import Work, page, publish
 
     plan = {"experiment": one.name, "seed": asked.seed, **one.config(asked), "settings": settings()}
     tasks = [task._replace(device=asked.device) for task in one.tasks(asked)]
     try:
-        if cluster is None:
-            see(asked.device)
+        meet(asked.device, cluster)
         store = Store(out / one.name / "pieces", plan, asked.scale)
         with _bar(one, tasks) as told:
             rows = work(tasks, store, workers, cluster, told)
         commits = store.commits([task.key for task in tasks])
         results = publish(one, asked, rows, out, Work(commits, store.seconds(), workers))
-    except (OtherPlan, WorkersDied, NoGpu) as error:
+    except (BrokenPiece, NoCluster, NoGpu, OtherPlan, WorkersDied) as error:
         raise Wrong(str(error)) from None
     except OSError as error:
-        raise Wrong(f"{one.name}: {error}. Look at --out and --cluster.") from None
+        raise Wrong(_at(out, error)) from None
     except KeyboardInterrupt:
         typer.echo("Stopped. The same command goes on from here.", err=True)
         raise typer.Exit(130) from None
     typer.echo(page(results, ()))
+
+
+def _at(out: Path, error: OSError) -> str:
+    """What is wrong with a file below the folder for results."""
+    why = f"{error.strerror or error}: {error.filename or out}"
+    return f"--out {out}: {why}. Make room there, or name a folder by --out that you may write to."
 
 
 @contextmanager

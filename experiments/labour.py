@@ -1,8 +1,7 @@
 """Who does the pieces: processes of this machine, or the workers of a Dask cluster. The same code on both.
 
-joblib hands the tasks to processes, and Dask to its workers. A piece that comes back is stored at once. A
-worker that dies costs the pieces that it had in work: they are handed out again, by a cluster of its own
-accord. (joblib's own way to Dask waits for ever for a piece whose worker was killed.)
+joblib hands the tasks to processes, and Dask to its workers (experiments/cluster.py). A piece that comes back
+is stored at once. A worker that dies costs the pieces that it had in work: they are handed out again.
 """
 
 from __future__ import annotations
@@ -11,21 +10,16 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import torch
 
 from agent.process import settle
-from experiments.pieces import HIDDEN, Row, Store, Task
-
-if TYPE_CHECKING:
-    from dask.distributed import Client
+from experiments.cluster import hand_out, reach, threads
+from experiments.pieces import HIDDEN, Call, Done, Row, Store, Task
 
 TRIES = 2
 """How often a worker may die over one piece, with no other in work, before we give it up."""
-
-PATIENCE = 10
-"""Seconds that a cluster has to answer, and to have a worker."""
 
 Told = Callable[[Task], None]
 """Told of every piece that is done, those of an earlier run first."""
@@ -39,17 +33,26 @@ class NoGpu(RuntimeError):
     """A GPU is asked for where torch sees none; the sentence says what to do."""
 
 
-Call = tuple[Task, Sequence[Row]]
-"""A task, and the rows of the pieces that it needs."""
-Done = tuple[Task, list[Row]]
-
-
 class Hands(NamedTuple):
     """Who does the pieces."""
 
     number: int
     died: type[BaseException]  # raised when a worker died over a piece
     out: Callable[[Sequence[Call]], Iterator[Done]]  # hands pieces out, and gives each back once it is done
+
+
+def meet(device: str, cluster: str | None) -> None:
+    """Make sure that somebody is there to do the work, before anything is written.
+
+    Raises:
+        NoGpu: it is this machine, and it has not the device.
+        NoCluster: it is a cluster, and it does not answer.
+    """
+    if cluster is None:
+        see(device)
+        return
+    with reach(cluster):
+        pass
 
 
 def see(device: str) -> None:
@@ -97,8 +100,10 @@ def work(
     Raises:
         WorkersDied: see there; what was done is stored.
         NoGpu: a worker has not the device of its task.
-        OSError: the cluster does not answer, or has no worker; or a piece is needed that no task makes.
+        NoCluster: the cluster does not answer, or has no worker, or is gone.
         OtherPlan: a piece of the same name is of another task.
+        BrokenPiece: a stored piece cannot be read.
+        OSError: a piece cannot be stored; or one is needed that no task makes.
     """
     store.expect(tasks)
     for task in tasks:
@@ -181,23 +186,6 @@ def _numbered(place: int, task: Task, given: Sequence[Row]) -> tuple[int, list[R
     return place, do(task, given)
 
 
-def _by_cluster(client: Client, calls: Sequence[Call]) -> Iterator[Done]:
-    """On a cluster, which goes on when a worker dies; what it gives up is said when all else is done."""
-    from dask.distributed import KilledWorker, as_completed
-
-    futures = {client.submit(do, *call, pure=False): call[0] for call in calls}
-    killed: KilledWorker | None = None
-    for future in as_completed(futures):  # type: ignore[no-untyped-call]
-        try:
-            rows = future.result()
-        except KilledWorker as error:
-            killed = error
-        else:
-            yield futures[future], rows
-    if killed:
-        raise killed
-
-
 @contextmanager
 def _hands(workers: int, cluster: str | None) -> Iterator[Hands]:
     if cluster is None:
@@ -206,8 +194,7 @@ def _hands(workers: int, cluster: str | None) -> Iterator[Hands]:
         out = _here if workers == 1 else partial(_by_processes, workers)
         yield Hands(workers, TerminatedWorkerError, out)
         return
-    from dask.distributed import Client, KilledWorker
+    from dask.distributed import KilledWorker
 
-    with Client(cluster, timeout=PATIENCE) as client:  # type: ignore[no-untyped-call]
-        client.wait_for_workers(1, timeout=PATIENCE)
-        yield Hands(sum(client.nthreads().values()), KilledWorker, partial(_by_cluster, client))
+    with reach(cluster) as client:
+        yield Hands(threads(client), KilledWorker, partial(hand_out, cluster, client, do))

@@ -37,6 +37,15 @@ class Task(NamedTuple):
     needs: tuple[str, ...] = ()  # keys of pieces to be done before; the function takes their rows as `given`
 
 
+Call = tuple[Task, Sequence[Row]]
+"""A task, and the rows of the pieces that it needs."""
+Done = tuple[Task, list[Row]]
+
+
+class BrokenPiece(ValueError):
+    """A stored file is not what a run writes; the sentence names it, and what to do."""
+
+
 class OtherPlan(ValueError):
     """The folder holds pieces of something else; the sentence says what differs and what to do."""
 
@@ -51,6 +60,7 @@ class Store:
 
         Raises:
             OtherPlan: the folder's pieces belong to another plan.
+            BrokenPiece: its plan cannot be read.
             OSError: the folder cannot be made or read.
         """
         self.folder, self.scale = folder, scale
@@ -68,6 +78,7 @@ class Store:
 
         Raises:
             OtherPlan: a finished piece of the same name is of another task.
+            BrokenPiece: one cannot be read.
         """
         self._of = described(tasks)
         done = [task.key for task in tasks if self.has(task.key)]
@@ -87,6 +98,7 @@ class Store:
 
         Raises:
             FileNotFoundError: one is not done.
+            BrokenPiece: one cannot be read.
         """
         return [row for key in keys for row in self._piece(key)[ROWS]]
 
@@ -111,8 +123,7 @@ class Store:
         return _read(path) if path.exists() else {}
 
     def _piece(self, key: str) -> dict[str, Any]:
-        found: dict[str, Any] = _read(self._path(key))
-        return found
+        return _read(self._path(key), OF, MADE, ROWS)
 
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}.json"
@@ -147,8 +158,17 @@ def _plain(data: object) -> Any:
     return json.loads(json.dumps(data))
 
 
-def _read(path: Path) -> Any:
-    return json.loads(path.read_text(encoding="utf-8"))
+def _read(path: Path, *names: str) -> dict[str, Any]:
+    """A stored file, which has these names."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict) or not found.keys() >= set(names):
+        raise BrokenPiece(
+            f"{path} is damaged, or of an older version. Remove it; the same command then makes it again."
+        )
+    return found
 
 
 def _write(path: Path, data: object) -> None:

@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from shlex import quote
 from typing import Any, NamedTuple
 
 import torch
@@ -37,7 +38,7 @@ def publish(one: Experiment, asked: Asked, rows: Sequence[Row], out: Path, work:
     """
     folder = out / one.name
     report = one.report(asked, rows)
-    results = _results(one, asked, report, work)
+    results = _results(one, asked, report, work, command(one.name, asked, out))
     _write(folder / RESULTS, json.dumps(results, indent=2) + "\n")
     _write_rows(folder / TRIALS, rows)
     drawn = _draw(report, folder)
@@ -45,13 +46,13 @@ def publish(one: Experiment, asked: Asked, rows: Sequence[Row], out: Path, work:
     return results
 
 
-def command(one: str, asked: Asked) -> str:
-    """What regenerates the page, from the folder of the checkout."""
+def command(one: str, asked: Asked, out: Path) -> str:
+    """What makes the page again, from the folder in which it was called."""
     words = ["parenting experiment", one, f"--scale {asked.scale}", f"--trials {asked.trials}"]
-    return " ".join([*words, f"--seed {asked.seed}", f"--device {asked.device}", "--out docs/results"])
+    return " ".join([*words, f"--seed {asked.seed}", f"--device {asked.device}", f"--out {quote(str(out))}"])
 
 
-def _results(one: Experiment, asked: Asked, report: Report, work: Work) -> dict[str, Any]:
+def _results(one: Experiment, asked: Asked, report: Report, work: Work, again: str) -> dict[str, Any]:
     return {
         "name": one.name,
         "title": one.title,
@@ -61,7 +62,7 @@ def _results(one: Experiment, asked: Asked, report: Report, work: Work) -> dict[
         "config": dict(one.config(asked)),
         "findings": [finding.plain() for finding in report.findings],
         "words": list(report.words),
-        "command": command(one.name, asked),
+        "command": again,
         "commit": provenance.commit(),
         "commits": dict(work.commits),
         "versions": provenance.versions(),
@@ -115,7 +116,7 @@ def page(results: dict[str, Any], figures: Sequence[str]) -> str:
         "",
         f"    {results['command']}",
         "",
-        f"{asked['trials']} trials, seed {asked['seed']}, {took}, "
+        f"{asked['trials']} trial{'s' * (asked['trials'] > 1)}, seed {asked['seed']}, {took}, "
         f"torch {results['versions'].get('torch', '?')}, {_commits(results)}. "
         f"Every trial: [{TRIALS}]({name}/{TRIALS}); the whole: [{RESULTS}]({name}/{RESULTS}).",
         "",

@@ -72,7 +72,7 @@ def test_the_results_are_at_the_papers_scale_and_say_where_they_come_from(name: 
     found, one = results(name), experiment(name)
     assert found["asked"]["scale"] == "paper"
     assert found["asked"]["trials"] == one.trials["paper"]
-    assert found["command"] == command(name, Asked(**found["asked"]))
+    assert found["command"] == command(name, Asked(**found["asked"]), Path("docs/results"))
     assert re.fullmatch(r"[0-9a-f]{12}", found["commit"]), "made of files that no commit holds"
     assert found["findings"]
     assert found["title"] == one.title
