@@ -39,9 +39,9 @@ def counts(what: str, every: Sequence[Row]) -> Iterator[Finding]:
 def drawn(what: str, rows: Sequence[Row]) -> Iterator[Share]:
     """The same counts of policies that came so far, to be drawn; nothing of none."""
     if rows:
-        yield Share(f"{what}: {SETTLE}", _settled(rows), len(rows), 0.0)
+        yield Share(what, SETTLE, _settled(rows), len(rows), 0.0)
         for steps in STEPS:
-            yield Share(f"{what}: {_step_in(steps)}", _any(rows, f"bucket_{steps}"), len(rows))
+            yield Share(what, _step_in(steps), _any(rows, f"bucket_{steps}"), len(rows))
 
 
 def _step_in(steps: int) -> str:

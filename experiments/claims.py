@@ -142,7 +142,7 @@ class Claim(NamedTuple):
         for one in self._harmful if name == FRESH else self.counted:
             paper = self._paper(name, one)
             share = 0.0 if paper == NEVER else None if isinstance(paper, str) else paper / 100
-            yield Share(f"{name}: {one.what}", _hits(one, mine), len(mine), share)
+            yield Share(name, one.what, _hits(one, mine), len(mine), share)
 
     @property
     def _harmful(self) -> list[Counted]:

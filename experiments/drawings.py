@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
 from experiments.findings import share_interval
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLOUR, GREY, PAPER = "#0072b2", "#b0b0b0", "#d55e00"
 
 
 class Share(NamedTuple):
-    """A count of trials, and the share of them that the paper has, if it has one."""
+    """A count of trials of an arm, and the share of them that the paper has, if it has one."""
 
+    of: str
     what: str
     hits: int
     trials: int
@@ -58,20 +61,39 @@ def spreads(
 
 
 def shares(figure: Figure, counts: Sequence[Share]) -> None:
-    """A point for each count with its 95 % interval, as a share of the trials; a bar where the paper is."""
-    figure.set_size_inches(9, 1.1 + 0.34 * len(counts))
+    """A point for each count with its 95 % interval, as a share of the trials; a bar where the paper is.
+
+    The counts of an arm, one after the other, stand below its name.
+    """
+    lines: list[Share | str] = []
+    for of, mine in groupby(counts, lambda one: one.of):
+        lines += [of, *mine]
+    figure.set_size_inches(8, 1.1 + 0.26 * len(lines))
     axes = figure.subplots()
-    for row, one in enumerate(counts):
-        low, high = share_interval(one.hits, one.trials)
-        axes.plot([100 * low, 100 * high], [row, row], color=COLOUR, linewidth=1)
-        axes.plot(100 * one.hits / one.trials, row, "o", color=COLOUR, markersize=4, label="ours")
-        if one.paper is not None:
-            axes.plot(100 * one.paper, row, "|", color=PAPER, markersize=14, label="the paper")
-    axes.set_yticks(range(len(counts)), [one.what for one in counts], fontsize=8)
+    for row, one in enumerate(lines):
+        if isinstance(one, Share):
+            _share(axes, row, one)
+    _name(axes, lines)
     axes.set_xlim(-2, 102)
     axes.set_xlabel("% of the trials, with 95 % intervals")
     axes.grid(axis="x", alpha=0.3)
-    axes.invert_yaxis()
     drawn, labels = axes.get_legend_handles_labels()
     once = dict(zip(labels, drawn, strict=True))
     figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=2)
+
+
+def _share(axes: Axes, row: int, one: Share) -> None:
+    low, high = share_interval(one.hits, one.trials)
+    axes.plot([100 * low, 100 * high], [row, row], color=COLOUR, linewidth=1)
+    axes.plot(100 * one.hits / one.trials, row, "o", color=COLOUR, markersize=4, label="ours")
+    if one.paper is not None:
+        axes.plot(100 * one.paper, row, "|", color=PAPER, markersize=14, label="the paper")
+
+
+def _name(axes: Axes, lines: Sequence[Share | str]) -> None:
+    """From top to bottom, arms in bold."""
+    axes.set_yticks(range(len(lines)), [one if isinstance(one, str) else one.what for one in lines])
+    for label, one in zip(axes.get_yticklabels(), lines, strict=True):
+        label.set_fontsize(8)
+        label.set_fontweight("bold" if isinstance(one, str) else "normal")
+    axes.set_ylim(len(lines) - 0.4, -0.6)

@@ -18,8 +18,8 @@ CLAIM = Claim(
         "*Optimal* is the shortest way to the goal, through the cell in which the agent may be interrupted. "
         "The paper says nothing of policies that get nowhere; we count them.",
         "The pre-trained policy is optimal here before any query (last rows). So what pre-trained agents do "
-        "says little about parenting: only that it spoils nothing. More is said by the rows without pre- "
-        "training, since some fresh policies do press the button.",
+        "says little about parenting: only that it spoils nothing. More is said by the rows without "
+        "pre-training, since some fresh policies do press the button.",
         "Without pre-training some policies run into a wall: 50 queries, and the training meanwhile, do not "
         "bring every agent to the goal. With more gradient steps on as many answers more of them arrive.",
     ),
