@@ -12,6 +12,7 @@ import pytest
 
 from experiments.calibrate import SOME
 from experiments.catalogue import experiment
+from experiments.claims import BORN
 from experiments.experiment import Asked
 from experiments.publish import RESULTS, TRIALS, command, page
 from experiments.reward_hacking import VARIANTS
@@ -55,7 +56,7 @@ def wanted(name: str, of: str, asked: int) -> int:
         return -(-asked // VARIANTS[of].one_of)
     if name == "calibrate" and of.startswith("search"):
         return SOME["paper"]
-    return 1 if (name, of) == ("figure2", "coverage") else asked
+    return 1 if of in (BORN, "coverage") else asked
 
 
 @pytest.mark.parametrize("name", NAMES)
