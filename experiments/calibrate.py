@@ -59,33 +59,25 @@ OTHER = 7_919
 def try_direct(layout: str, knobs: Mapping[str, Any], trials: int, seed: int) -> list[Row]:
     """Direct policy learning with one setting."""
     text, span = LAYOUTS[layout], (0, trials)
-    rows = parent_some(
-        DIRECT, WORLD, text, "direct", knobs, ("optimal", 0), SEARCH_TICKS, span, trials, seed + OTHER
-    )
+    rows = parent_some(DIRECT, WORLD, text, "direct", knobs, ("optimal", 0), SEARCH_TICKS, span, seed + OTHER)
     return [{**row, "layout": layout, **knobs} for row in rows]
 
 
 def try_reward(layout: str, entropy: float, trials: int, seed: int) -> list[Row]:
     """Policy gradients with one weight of their entropy."""
     span = (0, trials)
-    rows = reward_some(
-        TRADITIONAL, WORLD, LAYOUTS[layout], {}, SEARCH_STEPS, span, trials, seed + OTHER, entropy
-    )
+    rows = reward_some(TRADITIONAL, WORLD, LAYOUTS[layout], {}, SEARCH_STEPS, span, seed + OTHER, entropy)
     return [{**row, "layout": layout, "entropy": entropy} for row in rows]
 
 
-def confirm_some(
-    algorithm: str, span: tuple[int, int], trials: int, seed: int, given: Sequence[Row]
-) -> list[Row]:
+def confirm_some(algorithm: str, span: tuple[int, int], seed: int, given: Sequence[Row]) -> list[Row]:
     """Trials of one algorithm of Table 1 with what the search, whose rows are `given`, has found nearest."""
     best, *_ = search(given)
     text = LAYOUTS[best.layout]
     if algorithm == "traditional":
-        return reward_some(algorithm, WORLD, text, {}, MAX_STEPS, span, trials, seed, best.entropy)
+        return reward_some(algorithm, WORLD, text, {}, MAX_STEPS, span, seed, best.entropy)
     knobs = settings(algorithm, best.direct)
-    return parent_some(
-        algorithm, WORLD, text, algorithm, knobs, ("optimal", 0), MAX_TICKS, span, trials, seed
-    )
+    return parent_some(algorithm, WORLD, text, algorithm, knobs, ("optimal", 0), MAX_TICKS, span, seed)
 
 
 def settings(preset: str, direct: Mapping[str, Any]) -> dict[str, Any]:
@@ -140,7 +132,6 @@ def _confirming(asked: Asked) -> Iterator[Task]:
         mine = {
             "algorithm": one.name,
             "span": (span.start, span.stop),
-            "trials": asked.trials,
             "seed": asked.seed,
         }
         key = f"{asked.scale}-confirm-{one.name}-{span.start:06d}-{span.stop:06d}"

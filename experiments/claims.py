@@ -77,10 +77,10 @@ class Claim(NamedTuple):
         conservative, fresh = VARIANTS["conservative"], VARIANTS["conservative, not pre-trained"]
         every = spans(asked.trials)
         return [
-            self._task(BORN, conservative, range(1), 1, asked.seed, ticks=0),
-            *(self._task(FRESH, fresh, span, asked.trials, asked.seed, ticks=0) for span in every),
+            self._task(BORN, conservative, range(1), asked.seed, ticks=0),
+            *(self._task(FRESH, fresh, span, asked.seed, ticks=0) for span in every),
             *(
-                self._task(name, self.variants[name], span, asked.trials, asked.seed)
+                self._task(name, self.variants[name], span, asked.seed)
                 for name in self.tried(asked)
                 for span in every
             ),
@@ -90,9 +90,7 @@ class Claim(NamedTuple):
         """All variants; at the quick scale the paper's."""
         return list(self.variants)[: 1 if asked.scale == "quick" else None]
 
-    def _task(
-        self, label: str, of: Variant, span: range, trials: int, seed: int, ticks: int = MAX_TICKS
-    ) -> Task:
+    def _task(self, label: str, of: Variant, span: range, seed: int, ticks: int = MAX_TICKS) -> Task:
         key = f"{label.replace(', ', '-').replace(' ', '-')}-{span.start:06d}-{span.stop:06d}"
         mine = {
             "label": label,
@@ -103,7 +101,6 @@ class Claim(NamedTuple):
             "until": ("queries", QUERIES),
             "max_ticks": ticks,
             "span": (span.start, span.stop),
-            "trials": trials,
             "seed": seed,
         }
         share = of.share * len(span) if ticks else 0.1

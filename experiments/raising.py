@@ -33,13 +33,12 @@ def parent_some(
     until: tuple[Goal, int],
     max_ticks: int,
     span: tuple[int, int],
-    trials: int,
     seed: int,
 ) -> list[Row]:
     """Raise the trials of a span by the scripted parent; `label` names what they are of."""
     config = compose(preset, registry.defaults(world), changes, strict=True)
     weights = _weights(world, level, config)
-    plan = Plan(world, level, config, seed, trials, Until(*until), max_ticks, weights)
+    plan = Plan(world, level, config, seed, span[1], Until(*until), max_ticks, weights)
     return _rows(label, range(*span), raise_chunk(plan, range(*span)), world)
 
 
@@ -50,13 +49,12 @@ def reward_some(
     changes: Mapping[str, Any],
     max_steps: int,
     span: tuple[int, int],
-    trials: int,
     seed: int,
     entropy: float = ENTROPY,
 ) -> list[Row]:
     """Raise the trials of a span by policy gradients on the reward itself."""
     config = compose("direct", registry.defaults(world), changes, strict=True)
-    mine = keys(seed, trials).pick(torch.arange(*span))
+    mine = keys(seed, span[1]).pick(torch.arange(*span))
     found = raise_by_reward(world_of(world, level, config), config, mine, max_steps, entropy=entropy)
     columns = {one: getattr(found, one).tolist() for one in ("deaths", "ticks", "steps", "optimal")}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]

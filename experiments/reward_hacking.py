@@ -49,14 +49,12 @@ VARIANTS = {
 """By name; the first has the paper's defaults."""
 
 
-def bucket_some(
-    variant: str, milestones: Sequence[int], span: tuple[int, int], trials: int, seed: int
-) -> list[Row]:
+def bucket_some(variant: str, milestones: Sequence[int], span: tuple[int, int], seed: int) -> list[Row]:
     """Raise the trials of a span past all milestones; a row for each trial and milestone."""
     of = VARIANTS[variant]
     config = compose(of.preset, registry.defaults(WORLD), of.changes, strict=True)
     world = garden(of.level, config.time_limit)
-    mine = keys(seed, trials).pick(torch.arange(*span))
+    mine = keys(seed, span[1]).pick(torch.arange(*span))
     passed = raise_past(world, config, mine, milestones, MAX_TICKS, weights_of(world, config))
     found = zip(milestones, passed, strict=True)
     return [row for number, each in found for row in _rows(variant, of.level, span, number, each)]
@@ -110,7 +108,6 @@ def _task(name: str, span: range, asked: Asked) -> Task:
         "variant": name,
         "milestones": milestones,
         "span": (span.start, span.stop),
-        "trials": asked.trials,
         "seed": asked.seed,
     }
     return Task(key, "experiments.reward_hacking:bucket_some", mine, VARIANTS[name].share * len(span))

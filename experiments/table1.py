@@ -32,7 +32,6 @@ def _task(one: Algorithm, span: range, asked: Asked) -> Task:
         "level": LEVEL,
         "changes": {},
         "span": (span.start, span.stop),
-        "trials": asked.trials,
         "seed": asked.seed,
     }
     share = one.share * len(span)

@@ -40,7 +40,7 @@ def wait(seconds: float) -> list[Row]:
 def raised(number: int) -> Task:
     """One real piece: two agents for a few ticks."""
     mine: dict[str, Any] = {"world": "unsafe-exploration", "level": "island", "preset": "lax", "changes": {}}
-    goal = {"until": ("ticks", 5), "max_ticks": 5, "span": (2 * number, 2 * number + 2), "trials": 8}
+    goal = {"until": ("ticks", 5), "max_ticks": 5, "span": (2 * number, 2 * number + 2)}
     call = "experiments.raising:parent_some"
     return Task(f"piece-{number}", call, {"label": "some", "seed": 0, **mine, **goal})
 

@@ -19,7 +19,7 @@ from parents.model import explore
 from tests.experiments.elsewhere import NAME, Apart, elsewhere
 
 run = CliRunner().invoke
-SOME = {"label": "some", "span": (0, 2), "trials": 2, "seed": 0}
+SOME = {"label": "some", "span": (0, 2), "seed": 0}
 
 
 def raised(world: str, level: str, ticks: int, **changes: Any) -> Task:

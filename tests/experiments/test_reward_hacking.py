@@ -64,7 +64,7 @@ def test_each_arm_lives_by_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(reward_hacking, "raise_past", watch)
     for name in ("garden, defaults", NAME):
-        bucket_some(name, (1,), (0, 1), 1, 0)
+        bucket_some(name, (1,), (0, 1), 0)
     assert [(one.p_guid, one.p_pref, one.pretrain) for one in asked] == [(0.5, 0.5, True), (0.95, 0.8, False)]
 
 
@@ -75,7 +75,6 @@ def test_a_piece_is_named_by_its_arm() -> None:
         "variant": "garden, pre-trained",
         "milestones": (50, 100),
         "span": (50, 100),
-        "trials": 100,
         "seed": 0,
     }
     assert "1000-garden-not-pre-trained-long-000000-000020" in keys
@@ -94,7 +93,7 @@ def test_quick_and_paper_pieces_lie_in_one_folder() -> None:
 
 
 def test_a_life_in_small() -> None:
-    rows = bucket_some(NAME, (3, 6), (1, 2), 2, 0)
+    rows = bucket_some(NAME, (3, 6), (1, 2), 0)
     assert [(one["trial"], one["queries"], one["there"]) for one in rows] == [(1, 3, True), (1, 6, True)]
     assert [one["guidance"] + one["preference"] for one in rows] == [3, 6]
     assert all(0 <= one["caught_100"] <= one["bucket_100"] <= 100 for one in rows)

@@ -12,10 +12,13 @@ from typer.testing import CliRunner
 from commands.main import app
 from experiments.catalogue import NAMES, experiment
 from experiments.experiment import Asked, Scale, spans
+from experiments.pieces import described
 from experiments.publish import page
 
 run = CliRunner().invoke
 SCALES: tuple[Scale, Scale] = "quick", "paper"
+WHOLE = ("figure2",)
+"""All trials of a life are one batch: others are another piece."""
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -36,8 +39,15 @@ def test_both_scales_may_lie_in_one_folder(name: str) -> None:
     done = {task.key: task for task in one.tasks(quick)}
     for task in one.tasks(paper):
         if task.key in done:
-            assert done[task.key].call == task.call
-            assert {**done[task.key].arguments, "trials": 0} == {**task.arguments, "trials": 0}
+            assert done[task.key]._replace(share=0, needs=()) == task._replace(share=0, needs=())
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in WHOLE])
+def test_more_trials_go_on_from_fewer(name: str) -> None:
+    """Whole pieces of fewer trials are pieces of more, as the option's help says."""
+    one = experiment(name)
+    few, many = (described(one.tasks(Asked(trials))) for trials in (500, 1000))
+    assert [key for key in few if many.get(key) != few[key]] == []
 
 
 def test_spans_cover_every_trial_once() -> None:
