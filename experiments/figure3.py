@@ -28,7 +28,7 @@ class Size(NamedTuple):
 
 
 SIZES: dict[Scale, Size] = {
-    "paper": Size(10, 40, 20, 40, agents=10, max_ticks=2_500, pre_ticks=12_000),
+    "paper": Size(10, 40, 20, 40, agents=5, max_ticks=2_500, pre_ticks=12_000),
     "quick": Size(2, 3, 1, 3, agents=2, max_ticks=300, pre_ticks=600),
 }
 
