@@ -32,12 +32,12 @@ def told(*rows: dict[str, Any]) -> list[Finding]:
 
 
 @pytest.mark.parametrize(("settled", "agrees"), [(0, True), (50, True), (51, False)])
-def test_only_who_settles_is_judged(settled: int, agrees: bool) -> None:
-    """In the bucket at the end of more than half of the episodes; to step in is told without a verdict."""
+def test_who_settles_and_who_steps_in_is_judged(settled: int, agrees: bool) -> None:
+    """In the bucket at the end of more than half of the episodes; or, read strictly, in it at all."""
     found = told(row(0, 0), row(1, 60, settled), row(2, 99, 99, there=False))
     settles, *finer = found[: 1 + len(STEPS)]
     assert (settles.paper, settles.ours, settles.agrees) == ("never", f"{int(not agrees)} of 2", agrees)
-    assert [(one.ours, one.agrees) for one in finer] == [("1 of 2", None)] * 2
+    assert [(one.ours, one.agrees) for one in finer] == [("1 of 2", False)] * 2
     assert all("1 of 3 trials did not come so far" in one.note for one in (settles, *finer))
     assert all("60 of 200 episodes" in one.note for one in finer)
     assert (f"{settled} of 200 episodes end there" in settles.note) == (settled > 0)
