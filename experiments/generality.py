@@ -62,7 +62,7 @@ class Of(NamedTuple):
     @property
     def premise(self) -> str:
         """What is wrong with the agents that it goes on from; nothing, if they are what they should be."""
-        return f"{self.raw} of its {self.taught} pre-parented agents were not done" if self.raw else ""
+        return f"given up: {self.raw} of its {self.taught} pre-parented agents" if self.raw else ""
 
 
 def _curve(name: str, worlds: int, twice: bool, rows: Sequence[Row]) -> Of:

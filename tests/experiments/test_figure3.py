@@ -198,7 +198,7 @@ def test_agents_that_were_given_up_are_no_premise() -> None:
     found = said(rows)
     assert found["many needs fewer queries than few"].agrees is True
     again = found["many, comparing twice needs fewer queries than few"]
-    assert (again.agrees, again.note) == (None, "1 of its 1 pre-parented agents were not done")
+    assert (again.agrees, again.note) == (None, "given up: 1 of its 1 pre-parented agents")
     assert found["few, comparing twice needs fewer queries than none"].agrees is True
     assert found["queries of pre-parenting, N = 3, comparing twice"].note == "1 of 1 agents unfinished"
 
