@@ -9,14 +9,14 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from agent import dataset, familiarity
-from agent.config import Config
-from agent.policy import Network, network
-from agent.state import AgentState, Asked, Clip, Learner, Recorder, Rehearsal, Report, Ring
-from envs import registry
-from envs.gridworld import Gridworld, WorldState
-from envs.levels.kind import Level, maze_legend
-from envs.rng import Keys
+from parenting.agent import dataset, familiarity
+from parenting.agent.config import Config
+from parenting.agent.policy import Network, network
+from parenting.agent.state import AgentState, Asked, Clip, Learner, Recorder, Rehearsal, Report, Ring
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.levels.kind import Level, maze_legend
+from parenting.envs.rng import Keys
 
 SUPERVISION = {"present": True, "absent": False, "random": None}
 """The rules' option `supervised` for each word of the config."""

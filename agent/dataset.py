@@ -13,8 +13,8 @@ import torch
 from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
-from agent.digest import fingerprint
-from envs.struct import Struct
+from parenting.agent.digest import fingerprint
+from parenting.envs.struct import Struct
 
 
 class Dataset(Struct):

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Int64
 from torch import Tensor
 
-from envs.rng import keys
+from parenting.envs.rng import keys
 
 
 def fingerprint(content: Tensor) -> Int64[Tensor, "..."]:

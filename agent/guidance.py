@@ -6,14 +6,14 @@ import torch
 from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
 
-from agent import dataset, familiarity
-from agent.config import Config
-from agent.dataset import Entry
-from agent.query import Answer, Choice, Kind, Query
-from agent.state import AgentState
-from envs.gridworld import Gridworld, WorldState, local_state
-from envs.rng import Stream, gumbel
-from envs.struct import Struct
+from parenting.agent import dataset, familiarity
+from parenting.agent.config import Config
+from parenting.agent.dataset import Entry
+from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld, WorldState, local_state
+from parenting.envs.rng import Stream, gumbel
+from parenting.envs.struct import Struct
 
 NO_ACTION = -1
 

@@ -10,11 +10,11 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
 
-from agent.config import Config
-from agent.dataset import Dataset
-from agent.policy import Heads, Network
-from agent.state import AgentState
-from envs.rng import Keys, Stream
+from parenting.agent.config import Config
+from parenting.agent.dataset import Dataset
+from parenting.agent.policy import Heads, Network
+from parenting.agent.state import AgentState
+from parenting.envs.rng import Keys, Stream
 
 BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam's default parameters (Sec. 3.1.2)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from agent.events import Event
-from agent.query import Answer, Query
-from agent.state import AgentState
+from parenting.agent.events import Event
+from parenting.agent.query import Answer, Query
+from parenting.agent.state import AgentState
 
 
 class Mailbox(Protocol):

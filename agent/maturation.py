@@ -5,9 +5,9 @@ from __future__ import annotations
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
-from agent import dataset, pairing
-from agent.config import Config
-from agent.state import AgentState, Learner
+from parenting.agent import dataset, pairing
+from parenting.agent.config import Config
+from parenting.agent.state import AgentState, Learner
 
 
 def grow(config: Config, state: AgentState) -> AgentState:

@@ -13,10 +13,10 @@ import torch
 from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
-from envs.levels.kind import AGENT, GOAL, maze_legend
-from envs.levels.rules import MOVES
-from envs.maze import Mazes, mazes
-from envs.rng import Keys, Stream, keys
+from parenting.envs.levels.kind import AGENT, GOAL, maze_legend
+from parenting.envs.levels.rules import MOVES
+from parenting.envs.maze import Mazes, mazes
+from parenting.envs.rng import Keys, Stream, keys
 
 EPISODES = 16
 """Whole episodes in a step of pre-training."""

@@ -14,13 +14,13 @@ import torch
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
-from agent.config import Config
-from agent.digest import fingerprint, together, unordered
-from agent.guidance import View
-from agent.query import Kind, Query
-from agent.state import AgentState, Asked, Recorder, Ring
-from envs.gridworld import Gridworld
-from envs.rng import Stream
+from parenting.agent.config import Config
+from parenting.agent.digest import fingerprint, together, unordered
+from parenting.agent.guidance import View
+from parenting.agent.query import Kind, Query
+from parenting.agent.state import AgentState, Asked, Recorder, Ring
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import Stream
 
 CAPACITY = 4096  # clips of each kind that the recorder holds
 EXPLOIT, EXPLORE = 0, 1

@@ -13,17 +13,17 @@ from collections.abc import Iterator
 
 import torch
 
-from agent import guidance, learning, maturation, pairing, pretraining, recording
-from agent import query as queries
-from agent.birth import init, network_of, no_report
-from agent.config import Config
-from agent.events import Change, EndEpisode, Event, Mature
-from agent.guidance import View
-from agent.mailbox import Mailbox
-from agent.policy import Network
-from agent.query import Answer, Query
-from agent.state import AgentState
-from envs.gridworld import Gridworld, local_state
+from parenting.agent import guidance, learning, maturation, pairing, pretraining, recording
+from parenting.agent import query as queries
+from parenting.agent.birth import init, network_of, no_report
+from parenting.agent.config import Config
+from parenting.agent.events import Change, EndEpisode, Event, Mature
+from parenting.agent.guidance import View
+from parenting.agent.mailbox import Mailbox
+from parenting.agent.policy import Network
+from parenting.agent.query import Answer, Query
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld, local_state
 
 __all__ = ["apply", "beat", "init", "live", "no_query", "rehearse", "step"]
 

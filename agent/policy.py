@@ -17,7 +17,7 @@ from jaxtyping import Float, Int64, UInt8
 from torch import Tensor
 from torch.autograd.function import FunctionCtx
 
-from envs.rng import Keys, Stream
+from parenting.envs.rng import Keys, Stream
 
 HIDDEN = 64
 FILTERS = (16, 32, 64, 64)

@@ -13,13 +13,13 @@ import torch
 from jaxtyping import Float, Float64, UInt8
 from torch import Tensor
 
-from agent.config import Config
-from agent.learning import adam, entropy, taken
-from agent.maze_walks import Batch, Pool, Walks, draw_mazes, pool, walk
-from agent.policy import Network
-from agent.state import AgentState
-from envs.gridworld import Gridworld
-from envs.rng import Keys
+from parenting.agent.config import Config
+from parenting.agent.learning import adam, entropy, taken
+from parenting.agent.maze_walks import Batch, Pool, Walks, draw_mazes, pool, walk
+from parenting.agent.policy import Network
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import Keys
 
 GOAL, STEP = 50.0, -1.0
 """Rewards in a maze: +50 at the goal, -1 (?) a step."""

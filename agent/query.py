@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float64, Int64, UInt8
 from torch import Tensor
 
-from envs.struct import Struct
+from parenting.envs.struct import Struct
 
 
 class Kind(IntEnum):

@@ -9,15 +9,15 @@ import torch
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
-from agent import pairing
-from agent.config import Config
-from agent.digest import fingerprint
-from agent.guidance import NO_ACTION, Heard, View
-from agent.pairing import EXPLORE, comparison
-from agent.policy import Network, draw
-from agent.state import AgentState, Clip, Recorder
-from envs.gridworld import Gridworld, WorldState
-from envs.rng import Stream, gumbel
+from parenting.agent import pairing
+from parenting.agent.config import Config
+from parenting.agent.digest import fingerprint
+from parenting.agent.guidance import NO_ACTION, Heard, View
+from parenting.agent.pairing import EXPLORE, comparison
+from parenting.agent.policy import Network, draw
+from parenting.agent.state import AgentState, Clip, Recorder
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.rng import Stream, gumbel
 
 
 def act(

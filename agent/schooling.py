@@ -8,13 +8,13 @@ import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
-from agent.learning import adam, entropy
-from agent.maze_walks import ARRIVED, LIMIT, Pool, outside, pool
-from agent.policy import Network
-from agent.pretraining import RATE, policy_gradient
-from agent.state import Rehearsal
-from envs.rng import keys
-from envs.struct import Struct
+from parenting.agent.learning import adam, entropy
+from parenting.agent.maze_walks import ARRIVED, LIMIT, Pool, outside, pool
+from parenting.agent.policy import Network
+from parenting.agent.pretraining import RATE, policy_gradient
+from parenting.agent.state import Rehearsal
+from parenting.envs.rng import keys
+from parenting.envs.struct import Struct
 
 WINDOW, GAIN = 300, 0.5
 """Converged: the mean return of the last 300 steps is less than 0.5 above that of the 300 before (ours),"""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from jaxtyping import Bool, Float, Int8, Int64, UInt8
 from torch import Tensor
 
-from agent.dataset import Dataset
-from envs.gridworld import WorldState
-from envs.rng import Keys
-from envs.struct import Struct
+from parenting.agent.dataset import Dataset
+from parenting.envs.gridworld import WorldState
+from parenting.envs.rng import Keys
+from parenting.envs.struct import Struct
 
 
 class Learner(Struct):

@@ -40,7 +40,7 @@ from typing import Any, NamedTuple
 import httpx2
 from playwright.sync_api import Browser, Page
 
-from server.db import PRAGMAS, sqlite_module
+from parenting.server.db import PRAGMAS, sqlite_module
 from tests.by_hand import chromium, up
 
 WORLDS = ("unsafe-exploration", "side-effects")

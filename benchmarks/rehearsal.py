@@ -20,17 +20,17 @@ from typing import NamedTuple
 
 import torch
 
-from agent import parenting
-from agent.birth import network_of
-from agent.config import Config
-from agent.maze_walks import Walks, draw_mazes, pool, walk
-from agent.process import settle
-from agent.state import AgentState
-from envs import registry
-from envs.gridworld import Gridworld
-from envs.rng import keys
-from weights import store
-from weights.store import Wanted
+from parenting.agent import parenting
+from parenting.agent.birth import network_of
+from parenting.agent.config import Config
+from parenting.agent.maze_walks import Walks, draw_mazes, pool, walk
+from parenting.agent.process import settle
+from parenting.agent.state import AgentState
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import keys
+from parenting.weights import store
+from parenting.weights.store import Wanted
 
 WORLDS = ("side-effects", "interruptibility", "reward-hacking")
 """One for each shipped size; absent-supervisor's is interruptibility's."""

@@ -37,14 +37,14 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from agent import learning
-from agent.birth import network_of
-from agent.config import compose
-from agent.policy import Network
-from agent.process import settle
-from envs import registry
-from envs.rng import keys
-from experiments.trials import Nursery, Until, no_tally
+from parenting.agent import learning
+from parenting.agent.birth import network_of
+from parenting.agent.config import compose
+from parenting.agent.policy import Network
+from parenting.agent.process import settle
+from parenting.envs import registry
+from parenting.envs.rng import keys
+from parenting.experiments.trials import Nursery, Until, no_tally
 
 WORLD, LEVEL, PRESETS = "unsafe-exploration", "island", ("conservative", "direct")
 WARM, BORN = 100, 50

@@ -20,11 +20,11 @@ from typing import NamedTuple
 
 import torch
 
-from agent.config import compose
-from agent.process import settle
-from envs import registry
-from experiments.chunks import Plan, chunks, run
-from experiments.trials import Until
+from parenting.agent.config import compose
+from parenting.agent.process import settle
+from parenting.envs import registry
+from parenting.experiments.chunks import Plan, chunks, run
+from parenting.experiments.trials import Until
 
 WORLD, LEVEL, PRESETS, TICKS = "unsafe-exploration", "island", ("conservative", "direct"), 50
 SIZES, QUICK_SIZES = (100, 1000, 10_000), (100, 300)

@@ -10,11 +10,11 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from commands.answering import EXITS, Answering, Ending, Order, Told
-from commands.bars import bar
-from commands.client import Away, Client, Refused
-from commands.said import Wrong, plainly
-from envs import registry
+from parenting.commands.answering import EXITS, Answering, Ending, Order, Told
+from parenting.commands.bars import bar
+from parenting.commands.client import Away, Client, Refused
+from parenting.commands.said import Wrong, plainly
+from parenting.envs import registry
 
 Until = Literal["optimal", "over"]
 
@@ -71,8 +71,10 @@ def answer(
         order = Order(run, client_id, limit, optimal, patience, end_episodes)
         keep = _ledger(ledger, stack)
         show = stack.enter_context(bar("answers"))
-        from agent.process import settle  # loads torch, which takes a second: what is wrong is said before
-        from commands.judge import Judge
+        from parenting.agent.process import (
+            settle,  # loads torch, which takes a second: what is wrong is said before
+        )
+        from parenting.commands.judge import Judge
 
         settle()
 

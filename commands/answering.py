@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from commands.client import Away, Client, Refused
+from parenting.commands.client import Away, Client, Refused
 
 if TYPE_CHECKING:
-    from commands.judge import Judge
+    from parenting.commands.judge import Judge
 
 SHORTEST, LONGEST = 0.01, 0.5
 """Seconds between two looks while nothing is asked. Each pause is half of the time already waited, so that

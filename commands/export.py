@@ -11,11 +11,11 @@ from typing import Annotated, TextIO
 
 import typer
 
-from commands.bars import bar
-from commands.opened import database
-from commands.said import Wrong, plainly, until_ctrl_c
-from server.export import lines
-from server.runs import get_run
+from parenting.commands.bars import bar
+from parenting.commands.opened import database
+from parenting.commands.said import Wrong, plainly, until_ctrl_c
+from parenting.server.export import lines
+from parenting.server.runs import get_run
 
 
 def export(

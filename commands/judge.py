@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from commands.said import Wrong
-from envs import registry
-from envs.gridworld import Gridworld
-from parents.scripted import Judgement
-from server.codec import CHOICE_NAMES, decode
+from parenting.commands.said import Wrong
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
+from parenting.parents.scripted import Judgement
+from parenting.server.codec import CHOICE_NAMES, decode
 
 
 class Judge:

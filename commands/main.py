@@ -55,7 +55,7 @@ class Lazy(TyperGroup):
         if not args or args[0] not in COMMANDS:
             return super().resolve_command(ctx, args)  # says that there is none, and what there is
         name = args[0]
-        function = getattr(import_module(f"commands.{name}"), name)
+        function = getattr(import_module(f"parenting.commands.{name}"), name)
         return name, _command(name, function), args[1:]
 
 

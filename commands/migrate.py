@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import typer
 
-from commands.said import plainly, settings
-from server.db import connect
-from server.schema import upgrade
+from parenting.commands.said import plainly, settings
+from parenting.server.db import connect
+from parenting.server.schema import upgrade
 
 
 def migrate() -> None:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from sqlalchemy import make_url
 
-from commands.said import settings
-from server.db import Database, connect
-from server.errors import SetupError
-from server.schema import require
+from parenting.commands.said import settings
+from parenting.server.db import Database, connect
+from parenting.server.errors import SetupError
+from parenting.server.schema import require
 
 
 @contextmanager

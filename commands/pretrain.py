@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from commands.said import Wrong, plainly, settings
-from envs import registry
-from envs.levels.kind import Kind
-from weights import store
-from weights.store import Wanted
+from parenting.commands.said import Wrong, plainly, settings
+from parenting.envs import registry
+from parenting.envs.levels.kind import Kind
+from parenting.weights import store
+from parenting.weights.store import Wanted
 
 if TYPE_CHECKING:
-    from experiments.education import Educated, Progress
+    from parenting.experiments.education import Educated, Progress
 
 BARS = "▁▂▃▄▅▆▇█"
 
@@ -77,8 +77,8 @@ def _there(wanted: Wanted, folders: tuple[Path, ...], *, quiet: bool) -> dict[st
 
 
 def _one(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool) -> dict[str, Any]:
-    from agent.process import settle
-    from experiments.education import Damaged, Unconverged, educate
+    from parenting.agent.process import settle
+    from parenting.experiments.education import Damaged, Unconverged, educate
 
     settle()
     began = time.monotonic()

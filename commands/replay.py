@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from commands.bars import bar
-from commands.opened import database
-from commands.said import plainly, until_ctrl_c
-from server.runs import get_run
+from parenting.commands.bars import bar
+from parenting.commands.opened import database
+from parenting.commands.said import plainly, until_ctrl_c
+from parenting.server.runs import get_run
 
 if TYPE_CHECKING:
-    from server.replay import Relived
+    from parenting.server.replay import Relived
 
 PIECES = {
     "learner.live": "the policy in training",
@@ -48,8 +48,8 @@ def replay(
     """
     with until_ctrl_c(), plainly(), database() as db:
         get_run(db, run)  # whether there is one is said before torch is loaded
-        from agent.process import settle
-        from server.replay import relive
+        from parenting.agent.process import settle
+        from parenting.server.replay import relive
 
         settle()
         with bar("ticks") as show:

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from pydantic import ValidationError
 
-from agent.config import Config, compose
-from commands.results import page
-from commands.said import Wrong, plainly, settings
-from envs import registry
-from envs.levels.kind import Level
-from weights.store import Wanted, find
+from parenting.agent.config import Config, compose
+from parenting.commands.results import page
+from parenting.commands.said import Wrong, plainly, settings
+from parenting.envs import registry
+from parenting.envs.levels.kind import Level
+from parenting.weights.store import Wanted, find
 
 if TYPE_CHECKING:
-    from experiments.chunks import Plan
-    from experiments.trials import Progress, Standing, Until
+    from parenting.experiments.chunks import Plan
+    from parenting.experiments.trials import Progress, Standing, Until
 
 
 def run(
@@ -66,9 +66,9 @@ def run(
         goal = _until(world, until)
         config = _mature(config, goal, changes or [])
         weights = _weights(found, config)
-    from agent.process import settle
-    from experiments.chunks import Plan, run
-    from experiments.summary import summarise
+    from parenting.agent.process import settle
+    from parenting.experiments.chunks import Plan, run
+    from parenting.experiments.summary import summarise
 
     settle()
     plan = Plan(world, found.text, config, seed, trials, goal, max_ticks, weights)
@@ -125,7 +125,7 @@ def _said(name: str, given: dict[str, object], rule: str) -> str:
 
 def _until(world: str, text: str | None) -> Until:
     """When a trial is finished; where no goal ends an episode no policy is optimal."""
-    from experiments.trials import Until
+    from parenting.experiments.trials import Until
 
     endless = not registry.kind(world).ends_at_goal
     kind, colon, number = (text or ("queries:1000" if endless else "optimal")).partition(":")

@@ -9,12 +9,12 @@ from typing import Any
 import typer
 from pydantic import ValidationError
 
-from agent.config import UnknownPreset
-from envs.levels.kind import LevelError
-from envs.registry import UnknownName
-from server.errors import ServerError
-from server.settings import Settings
-from weights.store import NoWeights
+from parenting.agent.config import UnknownPreset
+from parenting.envs.levels.kind import LevelError
+from parenting.envs.registry import UnknownName
+from parenting.server.errors import ServerError
+from parenting.server.settings import Settings
+from parenting.weights.store import NoWeights
 
 
 class Wrong(ValueError):

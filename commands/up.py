@@ -15,22 +15,20 @@ import time
 import webbrowser
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
 import typer
 
-from commands.lifeline import VARIABLE
-from commands.said import plainly, settings
-from server.db import connect
-from server.schema import upgrade
-from server.serve import bind
-from server.settings import Settings
+from parenting.commands.lifeline import VARIABLE
+from parenting.commands.said import plainly, settings
+from parenting.server.db import connect
+from parenting.server.schema import upgrade
+from parenting.server.serve import bind
+from parenting.server.settings import Settings
 
 PATIENCE = 1.6
 """Seconds that web and worker get to stop by themselves; killed then, they lose nothing."""
-ROOT = Path(__file__).parents[1]
 
 Children = Mapping[str, subprocess.Popen[bytes]]
 
@@ -105,10 +103,9 @@ def _children(ear: socket.socket) -> Iterator[Children]:
 
 
 def _start(arguments: Sequence[str], lifeline: int, descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
-    # -P: the folder that we are called in must not hide our packages.
-    command = [sys.executable, "-P", "-m", "commands.main", *arguments]
-    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
-    environment = {**os.environ, "PYTHONPATH": path, VARIABLE: str(lifeline)}
+    # -P: the folder that we are called in must not hide our package.
+    command = [sys.executable, "-P", "-m", "parenting.commands.main", *arguments]
+    environment = {**os.environ, VARIABLE: str(lifeline)}
     return subprocess.Popen(
         command,
         env=environment,

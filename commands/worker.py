@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from commands.lifeline import follow
-from commands.said import plainly, settings
-from server.db import connect
-from server.log import set_up_log
-from server.schema import require
-from server.settings import Settings
-from server.workers import SILENT_SECONDS, alive
+from parenting.commands.lifeline import follow
+from parenting.commands.said import plainly, settings
+from parenting.server.db import connect
+from parenting.server.log import set_up_log
+from parenting.server.schema import require
+from parenting.server.settings import Settings
+from parenting.server.workers import SILENT_SECONDS, alive
 
 
 def worker(
@@ -34,7 +34,9 @@ def worker(
     with plainly():
         chosen = settings()
         set_up_log(chosen.log_level)
-        from server.worker import main  # loads torch, which takes a second: settings are checked first
+        from parenting.server.worker import (
+            main,  # loads torch, which takes a second: settings are checked first
+        )
 
         main(chosen)
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from envs import registry
-from envs.levels.kind import Kind, Level
+from parenting.envs import registry
+from parenting.envs.levels.kind import Kind, Level
 
 if TYPE_CHECKING:
-    from envs.box_levels import Survey
+    from parenting.envs.box_levels import Survey
 
 RANDOM = "side-effects"
 """The world that has random levels (Sec. 3.4)."""
@@ -91,7 +91,7 @@ def _survey(world: str, size: tuple[int, int], count: int, seed: int) -> Survey:
     """
     if registry.kind(world).name != RANDOM:
         raise ValueError(f"--random: {world} has no random levels; {RANDOM} has.")
-    from envs.box_levels import survey
+    from parenting.envs.box_levels import survey
 
     return survey(count, *size, seed)
 
@@ -105,7 +105,7 @@ def _keep(levels: Iterable[Level], out: Path | None, draw: Path | None) -> None:
 
 def _shown(found: Survey, as_json: bool) -> None:
     """The levels; for a reader, what it took to find them is said on standard error."""
-    from envs.box_levels import tempts
+    from parenting.envs.box_levels import tempts
 
     if as_json:
         levels = [{**_plain(level), "tempts": tempts(level)} for level in found.levels]
@@ -124,7 +124,7 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _draw(folder: Path, levels: Iterable[Level]) -> None:
-    from server.pages.picture import picture
+    from parenting.server.pages.picture import picture
 
     pictures = ((f"world-{level.world}-{level.name}.svg", level) for level in levels)
     _write(folder, ((name, picture(level, registry.kind(level.world))) for name, level in pictures))

@@ -8,10 +8,10 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
-from envs.gridworld import Actions, Gridworld, WorldState
-from envs.levels.absent_supervisor import ENDS, KIND, WALLS
-from envs.levels.kind import LAND, Level
-from envs.rng import Keys, Stream, keys
+from parenting.envs.gridworld import Actions, Gridworld, WorldState
+from parenting.envs.levels.absent_supervisor import ENDS, KIND, WALLS
+from parenting.envs.levels.kind import LAND, Level
+from parenting.envs.rng import Keys, Stream, keys
 
 STEP, GOAL, PUNISHED = -1.0, 50.0, -30.0
 """The parent's reward r, and the suite's: -1 (?) a step, +50 at the goal, -30 (?) on the shortcut."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from envs.levels.kind import AGENT, Cell, Kind, Level, LevelError
+from parenting.envs.levels.kind import AGENT, Cell, Kind, Level, LevelError
 
 __all__ = ["LARGEST", "SMALLEST", "Level", "LevelError", "draw", "parse"]
 

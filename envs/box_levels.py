@@ -15,13 +15,13 @@ import torch
 from jaxtyping import Bool, Int64, UInt8
 from torch import Tensor
 
-from envs.art import LARGEST, draw
-from envs.levels.kind import AGENT, BOX, Level
-from envs.levels.rules import MOVES
-from envs.levels.side_effects import ENDS, KIND, search
-from envs.levels.side_effects import LARGEST as ROOMIEST
-from envs.maze import Mazes, flood, mazes
-from envs.rng import Keys, Stream, keys
+from parenting.envs.art import LARGEST, draw
+from parenting.envs.levels.kind import AGENT, BOX, Level
+from parenting.envs.levels.rules import MOVES
+from parenting.envs.levels.side_effects import ENDS, KIND, search
+from parenting.envs.levels.side_effects import LARGEST as ROOMIEST
+from parenting.envs.maze import Mazes, flood, mazes
+from parenting.envs.rng import Keys, Stream, keys
 
 BATCH = 1024
 """Candidates drawn at once. Another number would give other levels."""

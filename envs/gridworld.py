@@ -16,10 +16,10 @@ from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 from torch.nn.functional import pad
 
-from envs.levels.kind import AGENT, BOX, LAND, PIECES, WALL, Cell, Kind, Level
-from envs.levels.rules import MOVES
-from envs.rng import Keys, keys
-from envs.struct import Struct
+from parenting.envs.levels.kind import AGENT, BOX, LAND, PIECES, WALL, Cell, Kind, Level
+from parenting.envs.levels.rules import MOVES
+from parenting.envs.rng import Keys, keys
+from parenting.envs.struct import Struct
 
 Actions = Int64[Tensor, "N"]
 """One action a trial: 0 up, 1 down, 2 left, 3 right."""

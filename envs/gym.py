@@ -14,11 +14,11 @@ import torch
 from gymnasium.error import InvalidAction, ResetNeeded
 from numpy.typing import NDArray
 
-from envs.art import draw
-from envs.gridworld import WorldState
-from envs.levels.kind import Level
-from envs.registry import WORLDS, make
-from envs.rng import keys
+from parenting.envs.art import draw
+from parenting.envs.gridworld import WorldState
+from parenting.envs.levels.kind import Level
+from parenting.envs.registry import WORLDS, make
+from parenting.envs.rng import keys
 
 CELL = 16
 """Pixels along the side of a cell in the mode `rgb_array`."""
@@ -140,7 +140,7 @@ def gym_id(world: str) -> str:
 
 def register(world: str) -> None:
     """Make a world of the registry known to Gymnasium, under its id."""
-    gymnasium.register(gym_id(world), entry_point="envs.gym:GridworldEnv", kwargs={"world": world})
+    gymnasium.register(gym_id(world), entry_point="parenting.envs.gym:GridworldEnv", kwargs={"world": world})
 
 
 for _world in WORLDS:

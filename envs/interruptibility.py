@@ -8,10 +8,10 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
-from envs.gridworld import Actions, Gridworld, WorldState
-from envs.levels.interruptibility import KIND
-from envs.levels.kind import LAND, Level
-from envs.rng import Keys, Stream
+from parenting.envs.gridworld import Actions, Gridworld, WorldState
+from parenting.envs.levels.interruptibility import KIND
+from parenting.envs.levels.kind import LAND, Level
+from parenting.envs.rng import Keys, Stream
 
 STEP, GOAL = -1.0, 50.0
 """The parent's reward r (ours): -1 a step, +50 at the goal. Being interrupted costs nothing."""

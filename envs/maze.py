@@ -10,9 +10,9 @@ import torch
 from jaxtyping import Bool, Int64, UInt8
 from torch import Tensor
 
-from envs.levels.kind import GOAL, WALL, maze_legend
-from envs.rng import Keys, Stream
-from envs.struct import Struct
+from parenting.envs.levels.kind import GOAL, WALL, maze_legend
+from parenting.envs.rng import Keys, Stream
+from parenting.envs.struct import Struct
 
 DENSEST = 0.6
 """The share of walls inside a maze is drawn between 0 and this (ours)."""

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from envs.art import parse
-from envs.levels.kind import Kind, Level, Setting
+from parenting.envs.art import parse
+from parenting.envs.levels.kind import Kind, Level, Setting
 
 if TYPE_CHECKING:
-    from envs.gridworld import Gridworld
+    from parenting.envs.gridworld import Gridworld
 
 FILES = (
     "unsafe_exploration",  # 3.2.1
@@ -24,7 +24,7 @@ FILES = (
 
 def read(file: str) -> Kind:
     """The world of a file of `envs/levels`."""
-    found: Kind = import_module(f"envs.levels.{file}").KIND
+    found: Kind = import_module(f"parenting.envs.levels.{file}").KIND
     return found
 
 

@@ -8,10 +8,10 @@ import torch
 from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
-from envs.gridworld import Actions, Gridworld, WorldState
-from envs.levels.kind import WALL, Level
-from envs.levels.reward_hacking import ENDS, KIND
-from envs.rng import Keys, Stream
+from parenting.envs.gridworld import Actions, Gridworld, WorldState
+from parenting.envs.levels.kind import WALL, Level
+from parenting.envs.levels.reward_hacking import ENDS, KIND
+from parenting.envs.rng import Keys, Stream
 
 WORTH = 0.02
 """What the suite hands out in a step for each cell that looks watered."""

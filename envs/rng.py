@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from envs.struct import Struct
+from parenting.envs.struct import Struct
 
 
 class Stream(IntEnum):

@@ -8,10 +8,10 @@ import torch
 from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
-from envs.gridworld import Actions, Gridworld, WorldState
-from envs.levels.kind import BOX, Cell, Level
-from envs.levels.rules import MOVES
-from envs.levels.side_effects import KIND, sides, stuck, wall
+from parenting.envs.gridworld import Actions, Gridworld, WorldState
+from parenting.envs.levels.kind import BOX, Cell, Level
+from parenting.envs.levels.rules import MOVES
+from parenting.envs.levels.side_effects import KIND, sides, stuck, wall
 
 STEP, GOAL, STUCK = -1.0, 50.0, -100.0
 """The parent's reward r: -1 (?) a step, +50 (?) at the goal, -100 (ours) for a push that leaves it stuck."""

@@ -8,9 +8,9 @@ import torch
 from jaxtyping import Bool, Float64
 from torch import Tensor
 
-from envs.gridworld import Actions, Gridworld, WorldState
-from envs.levels.kind import Level
-from envs.levels.unsafe_exploration import ENDS, KIND
+from parenting.envs.gridworld import Actions, Gridworld, WorldState
+from parenting.envs.levels.kind import Level
+from parenting.envs.levels.unsafe_exploration import ENDS, KIND
 
 REWARDS = {"G": 1.0, "W": -1.0}
 """The parent's reward r by the tile entered: +1 goal, 0 land, -1 (?) water."""

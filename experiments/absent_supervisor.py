@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from experiments.claims import Claim, Counted, Variant
-from experiments.experiment import Experiment
-from experiments.findings import LOST
+from parenting.experiments.claims import Claim, Counted, Variant
+from parenting.experiments.experiment import Experiment
+from parenting.experiments.findings import LOST
 
 SUPERVISED, ALONE = "outcome_supervised", "outcome_unsupervised"
 

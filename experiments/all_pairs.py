@@ -10,11 +10,11 @@ import torch
 from jaxtyping import Float64, Int64, UInt8
 from torch import Tensor
 
-from agent.query import Answer, Kind, Query, empty
-from envs.gridworld import WorldState
-from envs.reward_hacking import RewardHacking
-from parents.scripted import Judgement
-from parents.waterings import argmax
+from parenting.agent.query import Answer, Kind, Query, empty
+from parenting.envs.gridworld import WorldState
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.parents.scripted import Judgement
+from parenting.parents.waterings import argmax
 
 PAIRS = tuple(combinations(range(4), 2))
 

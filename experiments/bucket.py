@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from experiments.drawings import Share
-from experiments.findings import NEVER, Finding, count_finding, mean_finding
-from experiments.gardens import GAMMA, garden
-from experiments.pieces import Row
-from parents.garden import Garden
+from parenting.experiments.drawings import Share
+from parenting.experiments.findings import NEVER, Finding, count_finding, mean_finding
+from parenting.experiments.gardens import GAMMA, garden
+from parenting.experiments.pieces import Row
+from parenting.parents.garden import Garden
 
 STEPS = (10, 100)
 """Steps of an episode in Fig. 2, and in the suite."""

@@ -11,16 +11,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any
 
-from agent.config import PRESETS
-from envs.levels.unsafe_exploration import ISLAND, ISLAND_BOTTLENECK
-from experiments.calibrated import findings
-from experiments.calibrated_drawing import scatter
-from experiments.experiment import Asked, Experiment, Report, Scale, spans
-from experiments.matching import DIRECT, KNOBS, TRADITIONAL, search
-from experiments.pieces import Row, Task
-from experiments.raising import parent_some, reward_some
-from experiments.straits import strait
-from experiments.table1_report import AGREEMENT, ALGORITHMS
+from parenting.agent.config import PRESETS
+from parenting.envs.levels.unsafe_exploration import ISLAND, ISLAND_BOTTLENECK
+from parenting.experiments.calibrated import findings
+from parenting.experiments.calibrated_drawing import scatter
+from parenting.experiments.experiment import Asked, Experiment, Report, Scale, spans
+from parenting.experiments.matching import DIRECT, KNOBS, TRADITIONAL, search
+from parenting.experiments.pieces import Row, Task
+from parenting.experiments.raising import parent_some, reward_some
+from parenting.experiments.straits import strait
+from parenting.experiments.table1_report import AGREEMENT, ALGORITHMS
 
 WORLD = "unsafe-exploration"
 LAYOUTS = {
@@ -117,14 +117,21 @@ def _direct_tasks(asked: Asked) -> Iterator[Task]:
     some = SOME[asked.scale]
     for number, (layout, knobs) in enumerate(_grid(asked.scale)):
         mine = {"layout": layout, "knobs": knobs, "trials": some, "seed": asked.seed}
-        yield Task(f"{asked.scale}-direct-{number:03d}", "experiments.calibrate:try_direct", mine, some)
+        yield Task(
+            f"{asked.scale}-direct-{number:03d}", "parenting.experiments.calibrate:try_direct", mine, some
+        )
 
 
 def _reward_tasks(asked: Asked) -> Iterator[Task]:
     some, grid = SOME[asked.scale], GRID[asked.scale]
     for number, (layout, entropy) in enumerate(product(grid["layout"], grid["entropy"])):
         mine = {"layout": layout, "entropy": entropy, "trials": some, "seed": asked.seed}
-        yield Task(f"{asked.scale}-traditional-{number:03d}", "experiments.calibrate:try_reward", mine, some)
+        yield Task(
+            f"{asked.scale}-traditional-{number:03d}",
+            "parenting.experiments.calibrate:try_reward",
+            mine,
+            some,
+        )
 
 
 def _confirming(asked: Asked) -> Iterator[Task]:
@@ -135,7 +142,7 @@ def _confirming(asked: Asked) -> Iterator[Task]:
             "seed": asked.seed,
         }
         key = f"{asked.scale}-confirm-{one.name}-{span.start:06d}-{span.stop:06d}"
-        yield Task(key, "experiments.calibrate:confirm_some", mine, len(span))
+        yield Task(key, "parenting.experiments.calibrate:confirm_some", mine, len(span))
 
 
 def _report(asked: Asked, rows: Sequence[Row]) -> Report:

@@ -7,10 +7,10 @@ from dataclasses import replace
 from math import isfinite
 from statistics import fmean
 
-from experiments.findings import Finding, spread
-from experiments.matching import BY_REWARD, DEATHS, KNOBS, QUERIES, Found, Target, search
-from experiments.pieces import Row
-from experiments.table1_report import ALGORITHMS, Algorithm, born, cells, order
+from parenting.experiments.findings import Finding, spread
+from parenting.experiments.matching import BY_REWARD, DEATHS, KNOBS, QUERIES, Found, Target, search
+from parenting.experiments.pieces import Row
+from parenting.experiments.table1_report import ALGORITHMS, Algorithm, born, cells, order
 
 WANTED = "47 +- 14, 51, 2300 +- 700"
 FITTED = ("traditional", "direct")

@@ -7,7 +7,7 @@ from math import isfinite
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from experiments.matching import (
+from parenting.experiments.matching import (
     BY_REWARD,
     DEATHS,
     DIRECT,
@@ -18,7 +18,7 @@ from experiments.matching import (
     grouped,
     search,
 )
-from experiments.pieces import Row
+from parenting.experiments.pieces import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from experiments.experiment import Experiment
+from parenting.experiments.experiment import Experiment
 
 NAMES = (
     "table1",
@@ -36,5 +36,5 @@ def experiment(name: str) -> Experiment:
     """
     if name not in NAMES:
         raise UnknownExperiment(name)
-    found: Experiment = import_module(f"experiments.{name.replace('-', '_')}").EXPERIMENT
+    found: Experiment = import_module(f"parenting.experiments.{name.replace('-', '_')}").EXPERIMENT
     return found

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 
 import torch
 
-from agent.birth import world_of
-from agent.config import Config
-from agent.process import settle
-from envs.rng import keys
-from experiments.endings import Ending, examine
-from experiments.trials import Progress, Standing, Until, raise_trials
-from weights.store import Wanted, load
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config
+from parenting.agent.process import settle
+from parenting.envs.rng import keys
+from parenting.experiments.endings import Ending, examine
+from parenting.experiments.trials import Progress, Standing, Until, raise_trials
+from parenting.weights.store import Wanted, load
 
 CHUNK = 100
 """Trials of a chunk at most: more would be no faster (docs/benchmarks.md). Two trials and more are two chunks

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from agent.config import PRESETS, Config
-from envs import registry
-from experiments.drawings import Share, shares
-from experiments.experiment import Asked, Report, spans
-from experiments.findings import NEVER, SILENT, Finding, count_finding, mean_finding
-from experiments.pieces import Row, Task
+from parenting.agent.config import PRESETS, Config
+from parenting.envs import registry
+from parenting.experiments.drawings import Share, shares
+from parenting.experiments.experiment import Asked, Report, spans
+from parenting.experiments.findings import NEVER, SILENT, Finding, count_finding, mean_finding
+from parenting.experiments.pieces import Row, Task
 
 QUERIES, MAX_TICKS = 50, 5_000
 BORN = "before any query, pre-trained"
@@ -104,7 +104,7 @@ class Claim(NamedTuple):
             "seed": seed,
         }
         share = of.share * len(span) if ticks else 0.1
-        return Task(key, "experiments.raising:parent_some", mine, share)
+        return Task(key, "parenting.experiments.raising:parent_some", mine, share)
 
     def report(self, asked: Asked, rows: Sequence[Row]) -> Report:
         """Counts and means of every variant, and of policies as they are born."""

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from experiments.pieces import Call, Done, Row
+from parenting.experiments.pieces import Call, Done, Row
 
 if TYPE_CHECKING:
     from dask.distributed import Client

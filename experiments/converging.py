@@ -12,15 +12,15 @@ import torch
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
-from agent import learning, parenting
-from agent.birth import network_of
-from agent.config import Config
-from agent.query import Answer
-from agent.state import AgentState
-from envs.gridworld import Gridworld, local_state
-from parents.model import Model
-from parents.scripted import Judgement
-from parents.values import Values
+from parenting.agent import learning, parenting
+from parenting.agent.birth import network_of
+from parenting.agent.config import Config
+from parenting.agent.query import Answer
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld, local_state
+from parenting.parents.model import Model
+from parenting.parents.scripted import Judgement
+from parenting.parents.values import Values
 
 AGREED = 0.1
 """How far apart the logits of a decided pair are to be."""

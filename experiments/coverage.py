@@ -16,18 +16,18 @@ import torch
 from jaxtyping import Float, Float64, Int64, UInt8
 from torch import Tensor
 
-from agent.birth import network_of
-from agent.config import Config
-from agent.digest import fingerprint, together
-from agent.learning import Rows, adam, differentiate
-from envs.gridworld import WorldState, local_state
-from envs.reward_hacking import RewardHacking
-from envs.rng import Keys, Stream
-from envs.struct import Struct
-from experiments.all_pairs import PAIRS, judged
-from experiments.garden_rewards import Moments
-from parents.scripted import Judgement
-from parents.waterings import argmax, walked
+from parenting.agent.birth import network_of
+from parenting.agent.config import Config
+from parenting.agent.digest import fingerprint, together
+from parenting.agent.learning import Rows, adam, differentiate
+from parenting.envs.gridworld import WorldState, local_state
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import Keys, Stream
+from parenting.envs.struct import Struct
+from parenting.experiments.all_pairs import PAIRS, judged
+from parenting.experiments.garden_rewards import Moments
+from parenting.parents.scripted import Judgement
+from parenting.parents.waterings import argmax, walked
 
 BATCH = 128
 """Distinct states in a gradient step, each with all its pairs."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
-from experiments.findings import share_interval
+from parenting.experiments.findings import share_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import torch
 
-from agent.policy import network
-from agent.schooling import Exam, Pupil, School
-from agent.state import Rehearsal
-from weights import store
-from weights.store import Wanted
+from parenting.agent.policy import network
+from parenting.agent.schooling import Exam, Pupil, School
+from parenting.agent.state import Rehearsal
+from parenting.weights import store
+from parenting.weights.store import Wanted
 
 SAVE_SECONDS = 10.0
 """How much work an interruption may cost."""

@@ -6,15 +6,15 @@ import torch
 from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
-from agent.birth import world_of
-from agent.config import Config
-from envs.gridworld import Gridworld
-from envs.levels.kind import Kind
-from envs.struct import Struct
-from experiments.trials import Raised, Tally
-from parents.evaluation import ListedEvaluation
-from parents.model import explore
-from parents.waterings import EPISODES, deploy
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.levels.kind import Kind
+from parenting.envs.struct import Struct
+from parenting.experiments.trials import Raised, Tally
+from parenting.parents.evaluation import ListedEvaluation
+from parenting.parents.model import explore
+from parenting.parents.waterings import EPISODES, deploy
 
 UNREACHED = -1
 """The outcome of a stage that a trial did not come to."""

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from experiments.findings import Finding
-from experiments.pieces import Row, Task
+from parenting.experiments.findings import Finding
+from parenting.experiments.pieces import Row, Task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

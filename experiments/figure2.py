@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from experiments.coverage import Pace
-from experiments.experiment import Asked, Experiment, Report, Scale
-from experiments.figure2_report import report
-from experiments.gardens import GAMMA
-from experiments.maturing import PRESET
-from experiments.pieces import Row, Task
+from parenting.experiments.coverage import Pace
+from parenting.experiments.experiment import Asked, Experiment, Report, Scale
+from parenting.experiments.figure2_report import report
+from parenting.experiments.gardens import GAMMA
+from parenting.experiments.maturing import PRESET
+from parenting.experiments.pieces import Row, Task
 
 COMBINATIONS = tuple(
     (level, inside) for level in ("garden", "garden-mirrored") for inside in ("up-down", "left")
@@ -119,7 +119,9 @@ def _lives(asked: Asked) -> list[Task]:
                 "seed": asked.seed,
             }
             share = life.share * asked.trials
-            tasks.append(Task(f"{key}-{asked.trials:03d}", "experiments.maturing:live_some", mine, share))
+            tasks.append(
+                Task(f"{key}-{asked.trials:03d}", "parenting.experiments.maturing:live_some", mine, share)
+            )
     return tasks
 
 
@@ -128,7 +130,7 @@ def _rewards(asked: Asked) -> list[Task]:
     return [
         Task(
             f"{asked.scale}-rewards-{level}-{asked.trials:03d}",
-            "experiments.maturing:reward_some",
+            "parenting.experiments.maturing:reward_some",
             {"level": level, "looks": looks, "trials": asked.trials, "seed": asked.seed},
             looks[-1] / 100 * asked.trials,
         )
@@ -141,7 +143,7 @@ def _aheads(asked: Asked) -> list[Task]:
     return [
         Task(
             f"{asked.scale}-ahead-{level}-{inside}-{depth}",
-            "experiments.maturing:ahead_some",
+            "parenting.experiments.maturing:ahead_some",
             {"level": level, "inside": inside, "depth": depth, "episodes": lines.episodes},
             4.0 ** (depth - 5),
         )
@@ -155,7 +157,7 @@ def _covers(asked: Asked) -> list[Task]:
     return [
         Task(
             f"{asked.scale}-cover-{level}-{inside}",
-            "experiments.maturing:cover_some",
+            "parenting.experiments.maturing:cover_some",
             {
                 "level": level,
                 "inside": inside,

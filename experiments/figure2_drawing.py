@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any, Literal
 
-from experiments.figure2_rows import LIVED, MANY, kinds, of
-from experiments.pieces import Row
+from parenting.experiments.figure2_rows import LIVED, MANY, kinds, of
+from parenting.experiments.pieces import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from math import hypot, log
 from statistics import fmean
 
-from experiments.figure2_rows import MANY, Range, among, kinds, line, of, watered, where
-from experiments.findings import SILENT, Finding, spread
-from experiments.gardens import EPISODE
-from experiments.pieces import Row
-from parents.waterings import EPISODES
+from parenting.experiments.figure2_rows import MANY, Range, among, kinds, line, of, watered, where
+from parenting.experiments.findings import SILENT, Finding, spread
+from parenting.experiments.gardens import EPISODE
+from parenting.experiments.pieces import Row
+from parenting.parents.waterings import EPISODES
 
 NEAR = 0.95
 """Of the look-ahead's waterings: what counts as coming near."""

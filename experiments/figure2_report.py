@@ -7,16 +7,16 @@ from math import hypot
 from statistics import fmean
 from typing import TYPE_CHECKING
 
-from experiments.experiment import Report
-from experiments.figure2_drawing import draw
-from experiments.figure2_lives import NEAR, enough, lives
-from experiments.figure2_rows import among, around, line, of, where
-from experiments.figure2_words import words
-from experiments.findings import SILENT, Finding, spread
-from experiments.pieces import Row
+from parenting.experiments.experiment import Report
+from parenting.experiments.figure2_drawing import draw
+from parenting.experiments.figure2_lives import NEAR, enough, lives
+from parenting.experiments.figure2_rows import among, around, line, of, where
+from parenting.experiments.figure2_words import words
+from parenting.experiments.findings import SILENT, Finding, spread
+from parenting.experiments.pieces import Row
 
 if TYPE_CHECKING:
-    from experiments.figure2 import Life, Lines
+    from parenting.experiments.figure2 import Life, Lines
 
 FIRST = {
     "garden": (4.49, 5.16, 5.24, 5.35, 5.38, 5.35),

@@ -7,8 +7,8 @@ from math import hypot, sqrt
 from statistics import fmean, stdev
 from typing import NamedTuple
 
-from experiments.findings import Z
-from experiments.pieces import Row
+from parenting.experiments.findings import Z
+from parenting.experiments.pieces import Row
 
 LIVED = "more guidance"
 """The life that is lived in all gardens, by both parents."""

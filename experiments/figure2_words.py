@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from agent.maze_walks import EPISODES as WALKS
-from experiments.coverage import ASTRAY
-from experiments.figure2_rows import LIVED, MANY
-from experiments.gardens import EPISODE, GAMMA
-from parents.waterings import EPISODES
+from parenting.agent.maze_walks import EPISODES as WALKS
+from parenting.experiments.coverage import ASTRAY
+from parenting.experiments.figure2_rows import LIVED, MANY
+from parenting.experiments.gardens import EPISODE, GAMMA
+from parenting.parents.waterings import EPISODES
 
 if TYPE_CHECKING:
-    from experiments.figure2 import Life, Lines
+    from parenting.experiments.figure2 import Life, Lines
 
 ASKED = 1000
 """Queries at every T in the paper."""

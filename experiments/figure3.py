@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from experiments.experiment import Asked, Experiment, Report, Scale, spans
-from experiments.figure3_drawing import draw
-from experiments.generalising import TOGETHER
-from experiments.generality import findings
-from experiments.pieces import Row, Task
-from experiments.unsolved_levels import HEIGHT, PRESET, WIDTH, WORLD
+from parenting.experiments.experiment import Asked, Experiment, Report, Scale, spans
+from parenting.experiments.figure3_drawing import draw
+from parenting.experiments.generalising import TOGETHER
+from parenting.experiments.generality import findings
+from parenting.experiments.pieces import Row, Task
+from parenting.experiments.unsolved_levels import HEIGHT, PRESET, WIDTH, WORLD
 
-CALLS = "experiments.generalising:"
+CALLS = "parenting.experiments.generalising:"
 
 
 class Size(NamedTuple):
@@ -74,7 +74,7 @@ def _config(asked: Asked) -> Mapping[str, Any]:
 def _tasks(asked: Asked) -> list[Task]:
     size = SIZES[asked.scale]
     split = {"parenting": size.parenting, "aside": size.aside, "seed": asked.seed}
-    found = [Task(_levels(asked), "experiments.unsolved_levels:find_levels", split)]
+    found = [Task(_levels(asked), "parenting.experiments.unsolved_levels:find_levels", split)]
     for recompare in (False, True):
         for worlds in (size.some, size.many):
             found += [_pre_parent(worlds, recompare, span, asked) for span in _agents(size)]

@@ -7,8 +7,8 @@ from math import inf
 from statistics import median
 from typing import TYPE_CHECKING
 
-from experiments.generality import trials_of
-from experiments.pieces import Row
+from parenting.experiments.generality import trials_of
+from parenting.experiments.pieces import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import torch
 
-from envs import registry
-from experiments.experiment import Asked, Experiment, Report
-from experiments.findings import SILENT, Finding
-from experiments.pieces import Row, Task
-from experiments.planning import cross_entropy, fit, follow, plan, preferences, random_pairs
-from parents.model import Model, explore
+from parenting.envs import registry
+from parenting.experiments.experiment import Asked, Experiment, Report
+from parenting.experiments.findings import SILENT, Finding
+from parenting.experiments.pieces import Row, Task
+from parenting.experiments.planning import cross_entropy, fit, follow, plan, preferences, random_pairs
+from parenting.parents.model import Model, explore
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

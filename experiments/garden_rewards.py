@@ -16,15 +16,15 @@ import torch
 from jaxtyping import Float, Float64, Int64, UInt8
 from torch import Tensor
 
-from agent.birth import network_of
-from agent.learning import adam
-from agent.maze_walks import EPISODES
-from agent.policy import Network, draw
-from agent.pretraining import Visits, differentiate
-from envs.gridworld import local_state
-from envs.reward_hacking import RewardHacking
-from envs.rng import Keys, Stream, gumbel, keys
-from envs.struct import Struct
+from parenting.agent.birth import network_of
+from parenting.agent.learning import adam
+from parenting.agent.maze_walks import EPISODES
+from parenting.agent.policy import Network, draw
+from parenting.agent.pretraining import Visits, differentiate
+from parenting.envs.gridworld import local_state
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import Keys, Stream, gumbel, keys
+from parenting.envs.struct import Struct
 
 RATE = 0.001
 """Adam's step size, its default."""

@@ -7,11 +7,11 @@ from dataclasses import replace
 from jaxtyping import Int64
 from torch import Tensor
 
-from envs import registry
-from envs.gridworld import WorldState
-from envs.levels.kind import LAND, WALL, Level
-from envs.reward_hacking import RewardHacking
-from envs.rng import Keys, Stream
+from parenting.envs import registry
+from parenting.envs.gridworld import WorldState
+from parenting.envs.levels.kind import LAND, WALL, Level
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import Keys, Stream
 
 WORLD = "reward-hacking"
 GAMMA = 0.9

@@ -9,15 +9,15 @@ import torch
 from jaxtyping import Bool
 from torch import Tensor
 
-from agent.birth import world_of
-from agent.config import Config
-from envs.gridworld import Gridworld
-from envs.rng import Keys, keys
-from experiments.pieces import Row
-from experiments.pretrained import weights_of
-from experiments.taking_along import Learnt, learnt, pack, take_along
-from experiments.trials import Nursery, Raised, Until, raise_all
-from experiments.unsolved_levels import ASIDE, PARENTING, WORLD, config_of, levels_for
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import Keys, keys
+from parenting.experiments.pieces import Row
+from parenting.experiments.pretrained import weights_of
+from parenting.experiments.taking_along import Learnt, learnt, pack, take_along
+from parenting.experiments.trials import Nursery, Raised, Until, raise_all
+from parenting.experiments.unsolved_levels import ASIDE, PARENTING, WORLD, config_of, levels_for
 
 BESIDE = 1 << 40
 """Agents that are pre-parented are numbered from here, times N: no trial has so high a number."""

@@ -8,11 +8,11 @@ from math import inf
 from statistics import fmean, median
 from typing import NamedTuple
 
-from experiments.experiment import CHUNK
-from experiments.findings import LOST, SILENT, Finding, spread
-from experiments.generalising import TOGETHER
-from experiments.pieces import Row
-from experiments.ranks import fewer, independent, median_interval, pairs_interval
+from parenting.experiments.experiment import CHUNK
+from parenting.experiments.findings import LOST, SILENT, Finding, spread
+from parenting.experiments.generalising import TOGETHER
+from parenting.experiments.pieces import Row
+from parenting.experiments.ranks import fewer, independent, median_interval, pairs_interval
 
 GOAL = 10_000
 """The paper's trials of a curve."""

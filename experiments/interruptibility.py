@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from experiments.claims import Claim, Counted, Variant
-from experiments.experiment import Experiment
+from parenting.experiments.claims import Claim, Counted, Variant
+from parenting.experiments.experiment import Experiment
 
 CLAIM = Claim(
     world="interruptibility",

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import torch
 
-from agent.process import settle
-from experiments.cluster import hand_out, reach, threads
-from experiments.pieces import HIDDEN, Call, Done, Row, Store, Task
+from parenting.agent.process import settle
+from parenting.experiments.cluster import hand_out, reach, threads
+from parenting.experiments.pieces import HIDDEN, Call, Done, Row, Store, Task
 
 TRIES = 2
 """How often a worker may die over one piece, with no other in work, before we give it up."""

@@ -10,9 +10,9 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from envs.gridworld import WorldState
-from envs.reward_hacking import RewardHacking
-from parents.garden import Garden
+from parenting.envs.gridworld import WorldState
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.parents.garden import Garden
 
 LEAVES = 1 << 18
 """States at the bottom of the searches that are held at once."""

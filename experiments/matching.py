@@ -14,7 +14,7 @@ from math import inf
 from statistics import fmean
 from typing import Any, NamedTuple
 
-from experiments.pieces import Row
+from parenting.experiments.pieces import Row
 
 UNFINISHED = 1 / 8
 DIRECT, TRADITIONAL = "search direct", "search traditional"

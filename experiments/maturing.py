@@ -13,19 +13,19 @@ from typing import Any
 from jaxtyping import Float
 from torch import Tensor
 
-from agent.config import Inside, compose
-from envs import registry
-from envs.reward_hacking import RewardHacking
-from envs.rng import keys
-from experiments.coverage import Covered, Pace, cover
-from experiments.garden_rewards import gardeners
-from experiments.gardens import GAMMA, WORLD, garden, spread_starts
-from experiments.look_ahead import best
-from experiments.milestones import raise_past
-from experiments.pieces import Row
-from experiments.pretrained import weights_of
-from parents.garden import Garden
-from parents.waterings import EPISODES, SEED, Deployed, deploy, walked
+from parenting.agent.config import Inside, compose
+from parenting.envs import registry
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import keys
+from parenting.experiments.coverage import Covered, Pace, cover
+from parenting.experiments.garden_rewards import gardeners
+from parenting.experiments.gardens import GAMMA, WORLD, garden, spread_starts
+from parenting.experiments.look_ahead import best
+from parenting.experiments.milestones import raise_past
+from parenting.experiments.pieces import Row
+from parenting.experiments.pretrained import weights_of
+from parenting.parents.garden import Garden
+from parenting.parents.waterings import EPISODES, SEED, Deployed, deploy, walked
 
 PRESET = "conservative"
 FRESH = SEED + 1

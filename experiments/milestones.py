@@ -8,11 +8,11 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from agent.config import Config
-from envs.gridworld import Gridworld
-from envs.rng import Keys
-from envs.struct import Struct
-from experiments.trials import Nursery, Tally, Until, no_tally
+from parenting.agent.config import Config
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import Keys
+from parenting.envs.struct import Struct
+from parenting.experiments.trials import Nursery, Tally, Until, no_tally
 
 
 class Passed(Struct):

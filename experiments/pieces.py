@@ -16,7 +16,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, NamedTuple
 
-from experiments import provenance
+from parenting.experiments import provenance
 
 Row = dict[str, Any]
 """Name -> number, word, truth value or null. A name that begins with HIDDEN is for other pieces alone."""

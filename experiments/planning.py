@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from parents.model import Model
+from parenting.parents.model import Model
 
 LETTERS = "udlr"
 RIDGE = 1e-9

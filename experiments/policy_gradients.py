@@ -16,16 +16,16 @@ import torch
 from jaxtyping import Bool, Float, Float64, Int64, UInt8
 from torch import Tensor
 
-from agent.birth import network_of
-from agent.config import Config
-from agent.learning import adam
-from agent.maze_walks import EPISODES, Batch, Walks, walk
-from agent.pretraining import ENTROPY, differentiate, visited
-from envs.gridworld import Gridworld
-from envs.rng import Keys
-from envs.struct import Struct
-from parents.evaluation import ListedEvaluation
-from parents.model import Model, explore
+from parenting.agent.birth import network_of
+from parenting.agent.config import Config
+from parenting.agent.learning import adam
+from parenting.agent.maze_walks import EPISODES, Batch, Walks, walk
+from parenting.agent.pretraining import ENTROPY, differentiate, visited
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import Keys
+from parenting.envs.struct import Struct
+from parenting.parents.evaluation import ListedEvaluation
+from parenting.parents.model import Model, explore
 
 
 class Tables(NamedTuple):

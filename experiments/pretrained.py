@@ -5,9 +5,9 @@ from __future__ import annotations
 from jaxtyping import Float
 from torch import Tensor
 
-from agent.config import Config
-from envs.gridworld import Gridworld
-from weights.store import Wanted, shipped
+from parenting.agent.config import Config
+from parenting.envs.gridworld import Gridworld
+from parenting.weights.store import Wanted, shipped
 
 
 def pretrained(world: Gridworld) -> Float[Tensor, "P"]:

@@ -9,9 +9,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from agent.config import PRESETS, compose
-from envs import registry
-from weights.store import SHIPPED, SUFFIX, digest
+from parenting.agent.config import PRESETS, compose
+from parenting.envs import registry
+from parenting.weights.store import SHIPPED, SUFFIX, digest
 
 LIBRARIES = ("parenting", "torch", "numpy", "joblib")
 

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 import torch
 
-from experiments import provenance
-from experiments.experiment import Asked, Experiment, Report
-from experiments.findings import Finding
-from experiments.pieces import Row
+from parenting.experiments import provenance
+from parenting.experiments.experiment import Asked, Experiment, Report
+from parenting.experiments.findings import Finding
+from parenting.experiments.pieces import Row
 
 RESULTS, TRIALS = "results.json", "trials.csv"
 HEADS = ("what", "paper", "ours", "difference", "95 % interval", "agrees")

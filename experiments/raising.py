@@ -7,18 +7,18 @@ from typing import Any, Literal
 
 import torch
 
-from agent.birth import world_of
-from agent.config import Config, compose
-from agent.pretraining import ENTROPY
-from envs import registry
-from envs.rng import keys
-from experiments.chunks import Plan, raise_chunk
-from experiments.endings import Ending, deployments
-from experiments.pieces import Row
-from experiments.policy_gradients import raise_by_reward
-from experiments.trials import Until
-from parents.conduct import name
-from weights.store import Wanted, find
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config, compose
+from parenting.agent.pretraining import ENTROPY
+from parenting.envs import registry
+from parenting.envs.rng import keys
+from parenting.experiments.chunks import Plan, raise_chunk
+from parenting.experiments.endings import Ending, deployments
+from parenting.experiments.pieces import Row
+from parenting.experiments.policy_gradients import raise_by_reward
+from parenting.experiments.trials import Until
+from parenting.parents.conduct import name
+from parenting.weights.store import Wanted, find
 
 Goal = Literal["optimal", "queries", "ticks"]
 COUNTS = ("deaths", "guidance", "preference", "ticks")

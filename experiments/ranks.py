@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from math import floor, sqrt
 from statistics import fmean
 
-from experiments.findings import Z
+from parenting.experiments.findings import Z
 
 
 def fewer(some: Sequence[float], others: Sequence[float]) -> float:

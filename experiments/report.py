@@ -18,10 +18,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 from pydantic import BaseModel, ValidationError
 
-from experiments.catalogue import NAMES, experiment
-from experiments.experiment import Asked
-from experiments.findings import LOST, SILENT, Finding
-from experiments.publish import RESULTS, TRIALS
+from parenting.experiments.catalogue import NAMES, experiment
+from parenting.experiments.experiment import Asked
+from parenting.experiments.findings import LOST, SILENT, Finding
+from parenting.experiments.publish import RESULTS, TRIALS
 
 WEB = Path(__file__).parents[1] / "web"
 PAGE = "report.html"

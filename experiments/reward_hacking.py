@@ -7,18 +7,18 @@ from typing import Any, NamedTuple
 
 import torch
 
-from agent.config import compose
-from envs import registry
-from envs.rng import keys
-from experiments.bucket import EPISODES, STEPS, WORDS, counts, drawn, means
-from experiments.drawings import Share, shares
-from experiments.experiment import Asked, Experiment, Report, spans
-from experiments.findings import Finding
-from experiments.gardens import WORLD, garden
-from experiments.milestones import Passed, raise_past
-from experiments.pieces import Row, Task
-from experiments.pretrained import weights_of
-from parents.waterings import deploy
+from parenting.agent.config import compose
+from parenting.envs import registry
+from parenting.envs.rng import keys
+from parenting.experiments.bucket import EPISODES, STEPS, WORDS, counts, drawn, means
+from parenting.experiments.drawings import Share, shares
+from parenting.experiments.experiment import Asked, Experiment, Report, spans
+from parenting.experiments.findings import Finding
+from parenting.experiments.gardens import WORLD, garden
+from parenting.experiments.milestones import Passed, raise_past
+from parenting.experiments.pieces import Row, Task
+from parenting.experiments.pretrained import weights_of
+from parenting.parents.waterings import deploy
 
 MAX_TICKS = 20_000
 
@@ -110,7 +110,9 @@ def _task(name: str, span: range, asked: Asked) -> Task:
         "span": (span.start, span.stop),
         "seed": asked.seed,
     }
-    return Task(key, "experiments.reward_hacking:bucket_some", mine, VARIANTS[name].share * len(span))
+    return Task(
+        key, "parenting.experiments.reward_hacking:bucket_some", mine, VARIANTS[name].share * len(span)
+    )
 
 
 def _report(asked: Asked, rows: Sequence[Row]) -> Report:

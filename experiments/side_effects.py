@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from experiments.claims import Claim, Counted
-from experiments.experiment import Experiment
-from experiments.findings import NEVER
+from parenting.experiments.claims import Claim, Counted
+from parenting.experiments.experiment import Experiment
+from parenting.experiments.findings import NEVER
 
 CLAIM = Claim(
     world="side-effects",

@@ -11,9 +11,9 @@ from itertools import islice
 from random import Random
 from typing import Any
 
-from envs import registry
-from envs.gridworld import Gridworld
-from envs.levels.kind import Level, LevelError
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.levels.kind import Level, LevelError
 
 INSIDE = {
     "unsafe-exploration": ("     W#", "AG"),

@@ -7,7 +7,7 @@ easier; one on the straight way is no obstacle at all: many a fresh policy walks
 
 from __future__ import annotations
 
-from envs.levels.unsafe_exploration import ISLAND_BOTTLENECK
+from parenting.envs.levels.unsafe_exploration import ISLAND_BOTTLENECK
 
 STRAIGHT = 5
 """The column of agent and goal."""

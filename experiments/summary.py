@@ -8,15 +8,15 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from agent.birth import world_of
-from envs import registry
-from experiments.chunks import Plan
-from experiments.endings import Ending, deployments
-from parents.conduct import counts, name
-from parents.evaluation import evaluation
-from parents.scripted import Judgement
-from parents.waterings import EPISODES
-from weights.store import digest
+from parenting.agent.birth import world_of
+from parenting.envs import registry
+from parenting.experiments.chunks import Plan
+from parenting.experiments.endings import Ending, deployments
+from parenting.parents.conduct import counts, name
+from parenting.parents.evaluation import evaluation
+from parenting.parents.scripted import Judgement
+from parenting.parents.waterings import EPISODES
+from parenting.weights.store import digest
 
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 

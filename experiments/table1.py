@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from experiments.drawings import spreads
-from experiments.experiment import Asked, Experiment, Report, spans
-from experiments.pieces import Row, Task
-from experiments.table1_report import AGREEMENT, ALGORITHMS, Algorithm, born, cells, done, order, reach
+from parenting.experiments.drawings import spreads
+from parenting.experiments.experiment import Asked, Experiment, Report, spans
+from parenting.experiments.pieces import Row, Task
+from parenting.experiments.table1_report import (
+    AGREEMENT,
+    ALGORITHMS,
+    Algorithm,
+    born,
+    cells,
+    done,
+    order,
+    reach,
+)
 
 WORLD, LEVEL = "unsafe-exploration", "island"
 TOGETHER = 100
@@ -36,9 +45,9 @@ def _task(one: Algorithm, span: range, asked: Asked) -> Task:
     }
     share = one.share * len(span)
     if one.preset is None:
-        return Task(key, "experiments.raising:reward_some", {**mine, "max_steps": MAX_STEPS}, share)
+        return Task(key, "parenting.experiments.raising:reward_some", {**mine, "max_steps": MAX_STEPS}, share)
     more = {"preset": one.preset, "until": ("optimal", 0), "max_ticks": MAX_TICKS}
-    return Task(key, "experiments.raising:parent_some", {**mine, **more}, share)
+    return Task(key, "parenting.experiments.raising:parent_some", {**mine, **more}, share)
 
 
 def _report(asked: Asked, rows: Sequence[Row]) -> Report:

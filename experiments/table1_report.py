@@ -7,7 +7,7 @@ from itertools import pairwise
 from statistics import fmean
 from typing import NamedTuple
 
-from experiments.findings import (
+from parenting.experiments.findings import (
     LOST,
     SILENT,
     Finding,
@@ -18,7 +18,7 @@ from experiments.findings import (
     shown,
     spread,
 )
-from experiments.pieces import Row
+from parenting.experiments.pieces import Row
 
 SELDOM = "0 or 1"
 """What the paper says of deaths by conservative parenting."""

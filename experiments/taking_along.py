@@ -15,9 +15,9 @@ import torch
 from jaxtyping import Int64
 from torch import Tensor
 
-from agent.dataset import Dataset
-from agent.state import AgentState, Asked, Learner, Rehearsal
-from envs.struct import Struct
+from parenting.agent.dataset import Dataset
+from parenting.agent.state import AgentState, Asked, Learner, Rehearsal
+from parenting.envs.struct import Struct
 
 POLICY = "learner.live"
 

@@ -10,14 +10,14 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 from torch.nn.functional import one_hot
 
-from agent import parenting
-from agent.config import Config
-from agent.query import Answer, Choice, Kind
-from envs.gridworld import Gridworld
-from envs.rng import Keys
-from envs.struct import Struct
-from parents.evaluation import Evaluation, evaluation
-from parents.scripted import Judgement, ScriptedParent
+from parenting.agent import parenting
+from parenting.agent.config import Config
+from parenting.agent.query import Answer, Choice, Kind
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import Keys
+from parenting.envs.struct import Struct
+from parenting.parents.evaluation import Evaluation, evaluation
+from parenting.parents.scripted import Judgement, ScriptedParent
 
 LEAVE = 0.1
 """Trials that are done leave the batch when they are this share of it: moving the rest costs something, too.

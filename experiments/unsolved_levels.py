@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from agent.birth import world_of
-from agent.config import Config, compose
-from envs import registry
-from envs.box_levels import box_levels, shortest, tempts
-from envs.levels.kind import Level
-from experiments.pieces import Row
-from experiments.pretrained import pretrained
-from parents.conduct import Outcome, name, outcome, walk
-from parents.evaluation import Argmax, ListedEvaluation
-from parents.model import explore
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config, compose
+from parenting.envs import registry
+from parenting.envs.box_levels import box_levels, shortest, tempts
+from parenting.envs.levels.kind import Level
+from parenting.experiments.pieces import Row
+from parenting.experiments.pretrained import pretrained
+from parenting.parents.conduct import Outcome, name, outcome, walk
+from parenting.parents.evaluation import Argmax, ListedEvaluation
+from parenting.parents.model import explore
 
 WORLD, PRESET = "side-effects", "conservative"
 HEIGHT, WIDTH = 6, 6

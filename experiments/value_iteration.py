@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from agent import parenting
-from agent.events import Mature
-from envs.rng import keys
-from experiments.converging import (
+from parenting.agent import parenting
+from parenting.agent.events import Mature
+from parenting.envs.rng import keys
+from parenting.experiments.converging import (
     AGREED,
     CONFIG,
     CONVERGING,
@@ -27,13 +27,13 @@ from experiments.converging import (
     parents_policy,
     settled,
 )
-from experiments.experiment import Asked, Experiment, Report
-from experiments.pieces import Row, Task
-from experiments.small_worlds import small
-from experiments.value_iteration_report import draw, finding, words
-from parents.model import explore
-from parents.scripted import Judgement
-from parents.values import Listed, of_policy
+from parenting.experiments.experiment import Asked, Experiment, Report
+from parenting.experiments.pieces import Row, Task
+from parenting.experiments.small_worlds import small
+from parenting.experiments.value_iteration_report import draw, finding, words
+from parenting.parents.model import explore
+from parenting.parents.scripted import Judgement
+from parenting.parents.values import Listed, of_policy
 
 LEVELS = 6
 """Random levels of a trial, each with an agent of its own."""
@@ -105,7 +105,7 @@ def _config(asked: Asked) -> Mapping[str, Any]:
 
 
 def _tasks(asked: Asked) -> list[Task]:
-    call = "experiments.value_iteration:iterate_some"
+    call = "parenting.experiments.value_iteration:iterate_some"
     return [
         Task(f"{kind.world}-{trial:06d}", call, {"kind": kind.world, "trial": trial, "seed": asked.seed})
         for trial in range(asked.trials)

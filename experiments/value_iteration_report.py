@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
-from experiments.converging import CONFIG, CONVERGING, STAGES
-from experiments.drawings import COLOUR
-from experiments.findings import Finding, share_interval
-from experiments.pieces import Row
+from parenting.experiments.converging import CONFIG, CONVERGING, STAGES
+from parenting.experiments.drawings import COLOUR
+from parenting.experiments.findings import Finding, share_interval
+from parenting.experiments.pieces import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

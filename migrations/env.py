@@ -2,7 +2,7 @@
 
 from alembic import context
 
-from server.tables import Table
+from parenting.server.tables import Table
 
 connection = context.config.attributes.get("connection")
 if connection is None:

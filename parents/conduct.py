@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Int64
 from torch import Tensor
 
-from parents.model import Model
+from parenting.parents.model import Model
 
 UNREACHABLE = 1_000_000
 

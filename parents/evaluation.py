@@ -11,13 +11,13 @@ import torch
 from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
-from agent.birth import network_of
-from envs.gridworld import Gridworld, local_state
-from parents import waterings
-from parents.conduct import UNREACHABLE, distances, outcome, walk
-from parents.garden import Garden
-from parents.model import Model
-from parents.values import Listed, Valuation
+from parenting.agent.birth import network_of
+from parenting.envs.gridworld import Gridworld, local_state
+from parenting.parents import waterings
+from parenting.parents.conduct import UNREACHABLE, distances, outcome, walk
+from parenting.parents.garden import Garden
+from parenting.parents.model import Model
+from parenting.parents.values import Listed, Valuation
 
 GLANCE = 16
 """Episodes of the garden's mean that a dashboard draws. Even these cost a quarter of a second."""

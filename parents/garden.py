@@ -15,11 +15,11 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
-from agent.config import Inside
-from agent.query import Query
-from envs.levels.reward_hacking import PLANTS
-from envs.reward_hacking import RewardHacking
-from parents.rounds import rounds
+from parenting.agent.config import Inside
+from parenting.agent.query import Query
+from parenting.envs.levels.reward_hacking import PLANTS
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.parents.rounds import rounds
 
 LOST = float("inf")
 """The margin by which a clip that steps into the bucket loses to one that does not."""

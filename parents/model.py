@@ -9,9 +9,9 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
-from agent.digest import fingerprint, together
-from envs.gridworld import Gridworld, WorldState
-from envs.struct import Struct
+from parenting.agent.digest import fingerprint, together
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.struct import Struct
 
 MOST = 1_000_000
 """States of a model, at the most."""

@@ -7,6 +7,6 @@ parents.replay.ReplayParent       gives a recorded session back
 
 from __future__ import annotations
 
-from agent.mailbox import Mailbox as Parent
+from parenting.agent.mailbox import Mailbox as Parent
 
 __all__ = ["Parent"]

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import torch
 
-from agent.events import Event
-from agent.query import Answer, Kind, Query
-from agent.state import AgentState
+from parenting.agent.events import Event
+from parenting.agent.query import Answer, Kind, Query
+from parenting.agent.state import AgentState
 
 
 class Moment(NamedTuple):

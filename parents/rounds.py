@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-from agent.config import Inside
-from envs.levels.kind import WALL, Cell, Level
-from envs.levels.reward_hacking import CLOSED, cycle
-from envs.levels.rules import MOVES, moved
+from parenting.agent.config import Inside
+from parenting.envs.levels.kind import WALL, Cell, Level
+from parenting.envs.levels.reward_hacking import CLOSED, cycle
+from parenting.envs.levels.rules import MOVES, moved
 
 LEFT = MOVES.index((0, -1))
 NOWHERE = -1

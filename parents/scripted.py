@@ -10,14 +10,14 @@ import torch
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
-from agent.config import Inside
-from agent.events import Event
-from agent.query import Answer, Choice, Kind, Query
-from agent.state import AgentState
-from envs.gridworld import Gridworld
-from parents import values
-from parents.model import Model
-from parents.values import Listed, Valuation
+from parenting.agent.config import Inside
+from parenting.agent.events import Event
+from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld
+from parenting.parents import values
+from parenting.parents.model import Model
+from parenting.parents.values import Listed, Valuation
 
 TIE = 1e-6
 """Advantages within this are *either* (ours)."""

@@ -12,12 +12,12 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
-from agent.config import Inside
-from agent.query import Query
-from envs.gridworld import Gridworld
-from envs.reward_hacking import RewardHacking
-from parents.garden import Garden
-from parents.model import Model, explore
+from parenting.agent.config import Inside
+from parenting.agent.query import Query
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.parents.garden import Garden
+from parenting.parents.model import Model, explore
 
 HOPELESS = -100.0
 """V_p where the goal can no longer be reached (ours)."""

@@ -8,10 +8,10 @@ import torch
 from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
-from agent.birth import network_of
-from envs.gridworld import Gridworld, WorldState, local_state
-from envs.rng import keys
-from envs.struct import Struct
+from parenting.agent.birth import network_of
+from parenting.envs.gridworld import Gridworld, WorldState, local_state
+from parenting.envs.rng import keys
+from parenting.envs.struct import Struct
 
 EPISODES = 1000
 """Episodes of a mean that is reported, as many as in Fig. 2."""

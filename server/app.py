@@ -12,13 +12,12 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-import server.api
-import server.pages
-from server.api.described import Described
-from server.api.replies import tells
-from server.db import Database, connect
-from server.deps import Db
-from server.errors import (
+from parenting.server import api, pages
+from parenting.server.api.described import Described
+from parenting.server.api.replies import tells
+from parenting.server.db import Database, connect
+from parenting.server.deps import Db
+from parenting.server.errors import (
     Busy,
     Invalid,
     MethodNotAllowed,
@@ -28,14 +27,14 @@ from server.errors import (
     SetupError,
     TooLarge,
 )
-from server.guard import Guard
-from server.schema import require
-from server.settings import Settings
-from server.starting import messages
-from server.static import OthersFiles, OurFiles
-from server.streams import Streams
-from server.wake import Bell
-from server.workers import alive
+from parenting.server.guard import Guard
+from parenting.server.schema import require
+from parenting.server.settings import Settings
+from parenting.server.starting import messages
+from parenting.server.static import OthersFiles, OurFiles
+from parenting.server.streams import Streams
+from parenting.server.wake import Bell
+from parenting.server.workers import alive
 
 LARGEST_BODY = 64 * 1024
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
@@ -84,8 +83,8 @@ def bare_app() -> FastAPI:
     app.add_middleware(Guard, largest_body=LARGEST_BODY)
     _add_errors(app)
     _add_health(app)
-    app.include_router(server.api.router)
-    app.include_router(server.pages.router)
+    app.include_router(api.router)
+    app.include_router(pages.router)
     app.mount("/static/vendor", OthersFiles())
     app.mount("/static", OurFiles(), name="static")
     return app
@@ -147,7 +146,7 @@ def _reply(request: Request, error: ServerError, headers: dict[str, str] | None 
     programs = ("/api/", "/static/", "/healthz", "/readyz")
     if request.url.path.startswith(programs):
         return JSONResponse(error.body(), error.status, headers)
-    page = server.pages.error_page(request, error)
+    page = pages.error_page(request, error)
     page.headers.update(headers or {})
     return page
 

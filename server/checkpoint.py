@@ -8,18 +8,18 @@ from typing import Any, NamedTuple, TypeVar
 import torch
 from torch import Tensor
 
-from agent import parenting
-from agent.config import Config
-from agent.state import AgentState
-from envs.gridworld import Gridworld
-from envs.rng import keys
-from envs.struct import Struct
-from server import shelf
-from server.db import Database
-from server.errors import ServerError
-from server.tables import Run
-from server.tally import Tally, no_tally
-from weights.store import Wanted, load
+from parenting.agent import parenting
+from parenting.agent.config import Config
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import keys
+from parenting.envs.struct import Struct
+from parenting.server import shelf
+from parenting.server.db import Database
+from parenting.server.errors import ServerError
+from parenting.server.tables import Run
+from parenting.server.tally import Tally, no_tally
+from parenting.weights.store import Wanted, load
 
 S = TypeVar("S", bound=Struct)
 

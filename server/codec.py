@@ -10,9 +10,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from agent import query as queries
-from agent.query import Choice, Kind, Query
-from envs.gridworld import Gridworld
+from parenting.agent import query as queries
+from parenting.agent.query import Choice, Kind, Query
+from parenting.envs.gridworld import Gridworld
 
 ACTIONS = ("up", "down", "left", "right")
 SIDES = ("left", "right")

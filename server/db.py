@@ -22,8 +22,8 @@ from sqlalchemy import Connection, Engine, PoolProxiedConnection, create_engine,
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError
 from sqlalchemy.orm import Session
 
-from server.errors import Busy, DiskFull, SetupError
-from server.settings import Settings
+from parenting.server.errors import Busy, DiskFull, SetupError
+from parenting.server.settings import Settings
 
 SAFE_SQLITE = (3, 51, 3)
 """Older ones may corrupt a database in WAL: a race between the log's reset and a checkpoint."""

@@ -1,6 +1,6 @@
 """What a route is given. Pages and API alike write, for example,
 
-    from server.deps import Db, SettingsOf
+    from parenting.server.deps import Db, SettingsOf
 
     @router.get("/runs/{run_id}")
     def page(request: Request, run_id: int, db: Db, settings: SettingsOf) -> Response: ...
@@ -18,8 +18,8 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
-from server.db import Database
-from server.settings import Settings
+from parenting.server.db import Database
+from parenting.server.settings import Settings
 
 
 def database(request: Request) -> Database:

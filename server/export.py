@@ -13,10 +13,10 @@ from typing import Any
 
 from sqlalchemy import select
 
-from server.db import Database
-from server.history import Answered, every
-from server.runs import get_run
-from server.tables import Answer, Run
+from parenting.server.db import Database
+from parenting.server.history import Answered, every
+from parenting.server.runs import get_run
+from parenting.server.tables import Answer, Run
 
 MU = {"left": [1.0, 0.0], "right": [0.0, 1.0], "either": [0.5, 0.5], "neither": None}
 """Eq. (1); *neither* trains nothing."""

@@ -15,7 +15,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.errors import Forbidden, ServerError, TooLarge, UnknownHost
+from parenting.server.errors import Forbidden, ServerError, TooLarge, UnknownHost
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 HOSTS = ("localhost", "127.0.0.1", "[::1]")

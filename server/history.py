@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from sqlalchemy import select
 
-from server.db import Database
-from server.runs import find
-from server.tables import Answer, Query
+from parenting.server.db import Database
+from parenting.server.runs import find
+from parenting.server.tables import Answer, Query
 
 BATCH = 200
 

@@ -8,18 +8,18 @@ from contextlib import suppress
 import torch
 from pydantic import TypeAdapter
 
-from agent import query as queries
-from agent.config import Config
-from agent.events import Event
-from agent.query import Answer, Query
-from agent.state import AgentState
-from envs.gridworld import Gridworld
-from parents.scripted import Judgement
-from server import mailbox, queue
-from server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_name
-from server.db import Database
-from server.errors import Conflict
-from server.runs import Claim
+from parenting.agent import query as queries
+from parenting.agent.config import Config
+from parenting.agent.events import Event
+from parenting.agent.query import Answer, Query
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld
+from parenting.parents.scripted import Judgement
+from parenting.server import mailbox, queue
+from parenting.server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_name
+from parenting.server.db import Database
+from parenting.server.errors import Conflict
+from parenting.server.runs import Claim
 
 SCRIPT = "scripted"
 _EVENTS: TypeAdapter[Event] = TypeAdapter(Event)

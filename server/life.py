@@ -7,22 +7,22 @@ from collections.abc import Callable
 
 import structlog
 
-from agent import parenting
-from agent.birth import world_of
-from agent.config import Config
-from agent.query import Kind, Query
-from parents.evaluation import evaluation
-from parents.scripted import Judgement
-from server import mailbox, record, runs
-from server.checkpoint import Diverged, Saved, begun_with, birth, pack, unpack, versions
-from server.codec import encode, kind_name
-from server.db import Database
-from server.inbox import QueueParent, ScriptedQueueParent
-from server.mailbox import Watch
-from server.measure import NOTHING_LEARNT, learnt, measure
-from server.runs import Claim
-from server.tables import Run
-from server.tally import count
+from parenting.agent import parenting
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config
+from parenting.agent.query import Kind, Query
+from parenting.parents.evaluation import evaluation
+from parenting.parents.scripted import Judgement
+from parenting.server import mailbox, record, runs
+from parenting.server.checkpoint import Diverged, Saved, begun_with, birth, pack, unpack, versions
+from parenting.server.codec import encode, kind_name
+from parenting.server.db import Database
+from parenting.server.inbox import QueueParent, ScriptedQueueParent
+from parenting.server.mailbox import Watch
+from parenting.server.measure import NOTHING_LEARNT, learnt, measure
+from parenting.server.runs import Claim
+from parenting.server.tables import Run
+from parenting.server.tally import count
 
 log = structlog.get_logger()
 

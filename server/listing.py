@@ -13,11 +13,11 @@ from typing import Generic, TypeVar
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from server.db import Database
-from server.errors import NotFound
-from server.record import metrics
-from server.runs import find
-from server.tables import Answer, Event, Metric, Query, Run
+from parenting.server.db import Database
+from parenting.server.errors import NotFound
+from parenting.server.record import metrics
+from parenting.server.runs import find
+from parenting.server.tables import Answer, Event, Metric, Query, Run
 
 Row = TypeVar("Row")
 

@@ -7,7 +7,7 @@ import sys
 
 import structlog
 
-from server.errors import SetupError
+from parenting.server.errors import SetupError
 
 
 def set_up_log(level: str) -> None:

@@ -20,10 +20,10 @@ from typing import Any
 from sqlalchemy import BindParameter, ColumnElement, ScalarSelect, bindparam, func, select, update
 from sqlalchemy.orm import Session
 
-from server.db import Database
-from server.queue import guidance_first
-from server.runs import Claim, held, held_status, withdraw_in
-from server.tables import Answer, Event, Query, Run
+from parenting.server.db import Database
+from parenting.server.queue import guidance_first
+from parenting.server.runs import Claim, held, held_status, withdraw_in
+from parenting.server.tables import Answer, Event, Query, Run
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from agent.query import Choice, Kind
-from parents.evaluation import Evaluation
-from server.checkpoint import Saved
+from parenting.agent.query import Choice, Kind
+from parenting.parents.evaluation import Evaluation
+from parenting.server.checkpoint import Saved
 
 Row = dict[str, float | int | None]
 

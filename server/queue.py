@@ -15,10 +15,10 @@ from typing import Any
 from sqlalchemy import ColumnElement, Select, and_, bindparam, case, or_, select, update
 from sqlalchemy.orm import Session
 
-from server.db import Database
-from server.errors import Conflict, NotFound
-from server.runs import lock
-from server.tables import Answer, Query, Run
+from parenting.server.db import Database
+from parenting.server.errors import Conflict, NotFound
+from parenting.server.runs import lock
+from parenting.server.tables import Answer, Query, Run
 
 LEASE_SECONDS = 60.0
 

@@ -10,10 +10,10 @@ from typing import Any
 
 from sqlalchemy import delete, select
 
-from server.db import Database
-from server.errors import Conflict
-from server.runs import Claim, find, held, living
-from server.tables import Checkpoint, Event, Metric
+from parenting.server.db import Database
+from parenting.server.errors import Conflict
+from parenting.server.runs import Claim, find, held, living
+from parenting.server.tables import Checkpoint, Event, Metric
 
 KEPT = 2
 """Checkpoints kept of a run: the last, and one before it in case the last is damaged."""

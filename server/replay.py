@@ -14,23 +14,23 @@ from pydantic import TypeAdapter
 from sqlalchemy import select
 from torch import Tensor
 
-from agent import parenting
-from agent import query as queries
-from agent.birth import world_of
-from agent.config import Config
-from agent.events import Event
-from agent.query import Answer
-from envs.gridworld import Gridworld
-from parents.replay import Moment, Parted, ReplayParent
-from server import tables
-from server.checkpoint import REPORT, Diverged, Saved, begun_with, birth, unpack, versions
-from server.codec import CHOICES, decode, kind_name
-from server.db import Database
-from server.errors import NotFound
-from server.record import load_checkpoints
-from server.runs import get_run
-from server.tables import Run
-from server.tally import count
+from parenting.agent import parenting
+from parenting.agent import query as queries
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config
+from parenting.agent.events import Event
+from parenting.agent.query import Answer
+from parenting.envs.gridworld import Gridworld
+from parenting.parents.replay import Moment, Parted, ReplayParent
+from parenting.server import tables
+from parenting.server.checkpoint import REPORT, Diverged, Saved, begun_with, birth, unpack, versions
+from parenting.server.codec import CHOICES, decode, kind_name
+from parenting.server.db import Database
+from parenting.server.errors import NotFound
+from parenting.server.record import load_checkpoints
+from parenting.server.runs import get_run
+from parenting.server.tables import Run
+from parenting.server.tally import count
 
 WINDOW = 500
 """Ticks whose rows are read at once."""

@@ -14,9 +14,9 @@ from typing import Any
 from sqlalchemy import bindparam, func, or_, select, update
 from sqlalchemy.orm import Session
 
-from server.db import Database
-from server.errors import Conflict, LostClaim, NotFound
-from server.tables import Query, Run
+from parenting.server.db import Database
+from parenting.server.errors import Conflict, LostClaim, NotFound
+from parenting.server.tables import Query, Run
 
 CLAIM_SECONDS = 5.0
 OVER = ("stopped", "finished", "failed")

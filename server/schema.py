@@ -13,8 +13,8 @@ from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, inspect
 
-from server.db import Database
-from server.errors import SetupError
+from parenting.server.db import Database
+from parenting.server.errors import SetupError
 
 FOLDER = Path(__file__).parents[1] / "migrations"
 

@@ -9,10 +9,10 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
-from server.app import create_app
-from server.errors import SetupError
-from server.log import set_up_log
-from server.settings import Settings
+from parenting.server.app import create_app
+from parenting.server.errors import SetupError
+from parenting.server.log import set_up_log
+from parenting.server.settings import Settings
 
 LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
 GRACE = 1

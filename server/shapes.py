@@ -8,10 +8,10 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from agent.config import Config, Inside
-from server.db import Database
-from server.runs import OVER, Open, find, open_by_run, open_in
-from server.tables import Answer, Metric, Query, Run
+from parenting.agent.config import Config, Inside
+from parenting.server.db import Database
+from parenting.server.runs import OVER, Open, find, open_by_run, open_in
+from parenting.server.tables import Answer, Metric, Query, Run
 
 SILENT_AFTER = timedelta(seconds=5)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from server.db import Database
-from server.errors import NotFound
-from server.tables import Weights
-from weights.store import digest
+from parenting.server.db import Database
+from parenting.server.errors import NotFound
+from parenting.server.tables import Weights
+from parenting.weights.store import digest
 
 
 def keep(db: Database, file: Path) -> str:

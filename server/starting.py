@@ -20,15 +20,15 @@ from pydantic import (
     ValidationError,
 )
 
-from agent.config import PRESETS, Config
-from envs import registry
-from envs.levels.kind import Level, LevelError
-from server.db import Database
-from server.errors import Invalid
-from server.runs import create_run
-from server.shelf import keep
-from server.tables import Run
-from weights.store import NoWeights, Wanted, find
+from parenting.agent.config import PRESETS, Config
+from parenting.envs import registry
+from parenting.envs.levels.kind import Level, LevelError
+from parenting.server.db import Database
+from parenting.server.errors import Invalid
+from parenting.server.runs import create_run
+from parenting.server.shelf import keep
+from parenting.server.tables import Run
+from parenting.weights.store import NoWeights, Wanted, find
 
 LARGEST_INT = 2**53 - 1
 """The largest integer that every JSON reader keeps exactly."""

@@ -15,7 +15,7 @@ from typing import Any
 from fastapi.staticfiles import StaticFiles
 from starlette.responses import Response
 
-from server.errors import NotFound
+from parenting.server.errors import NotFound
 
 STATIC = Path(__file__).parents[1] / "web" / "static"
 VENDOR = {

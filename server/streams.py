@@ -18,12 +18,12 @@ from typing import Any, TypeVar
 from fastapi.sse import ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from server.db import Database
-from server.errors import ServerError, TooMany
-from server.queue import waiting
-from server.record import metrics
-from server.shapes import shape_metrics, shape_run
-from server.wake import Bell
+from parenting.server.db import Database
+from parenting.server.errors import ServerError, TooMany
+from parenting.server.queue import waiting
+from parenting.server.record import metrics
+from parenting.server.shapes import shape_metrics, shape_run
+from parenting.server.wake import Bell
 
 PERIOD = 0.25
 """Seconds between polls, and at least between two events of the same browser, questions excepted."""

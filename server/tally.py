@@ -6,10 +6,10 @@ import torch
 from jaxtyping import Int64
 from torch import Tensor
 
-from agent.query import Answer, Choice, Kind
-from agent.state import AgentState
-from envs.gridworld import Gridworld
-from envs.struct import Struct
+from parenting.agent.query import Answer, Choice, Kind
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.struct import Struct
 
 
 class Tally(Struct):

@@ -8,10 +8,10 @@ from datetime import timedelta
 from sqlalchemy import BindParameter, bindparam, func, or_, select
 from sqlalchemy.orm import aliased
 
-from server.db import Database
-from server.queue import LEASE_SECONDS, guidance_first, rests
-from server.runs import lock
-from server.tables import Metric, Query, Run
+from parenting.server.db import Database
+from parenting.server.queue import LEASE_SECONDS, guidance_first, rests
+from parenting.server.runs import lock
+from parenting.server.tables import Metric, Query, Run
 
 _SHOWN: BindParameter[Sequence[int]] = bindparam("shown", expanding=True)
 _other = aliased(Query)

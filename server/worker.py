@@ -16,16 +16,16 @@ from types import FrameType
 
 import structlog
 
-from agent.process import settle
-from server import mailbox, runs, workers
-from server.db import Database, connect
-from server.errors import Busy, DiskFull, LostClaim
-from server.life import Life, reached
-from server.mailbox import Watch
-from server.runs import Claim
-from server.schema import require
-from server.settings import Settings
-from server.wake import Bell
+from parenting.agent.process import settle
+from parenting.server import mailbox, runs, workers
+from parenting.server.db import Database, connect
+from parenting.server.errors import Busy, DiskFull, LostClaim
+from parenting.server.life import Life, reached
+from parenting.server.mailbox import Watch
+from parenting.server.runs import Claim
+from parenting.server.schema import require
+from parenting.server.settings import Settings
+from parenting.server.wake import Bell
 
 log = structlog.get_logger()
 

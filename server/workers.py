@@ -7,8 +7,8 @@ from datetime import timedelta
 
 from sqlalchemy import delete, select
 
-from server.db import Database
-from server.tables import Worker
+from parenting.server.db import Database
+from parenting.server.tables import Worker
 
 SIGN_SECONDS = 2.0
 """How often a worker gives a sign of life."""

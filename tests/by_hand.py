@@ -16,7 +16,7 @@ from typing import Any
 import httpx2
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from envs import registry
+from parenting.envs import registry
 from tests.server.serving import until_up
 
 ROOT = Path(__file__).parents[1]
@@ -34,7 +34,7 @@ Cell = tuple[int, int]
 @contextmanager
 def up(data: Path) -> Iterator[str]:
     """`parenting up` with a database of its own, stopped by Ctrl-C: its URL."""
-    command = [sys.executable, "-m", "commands.main", "up", "--port", "0", "--no-browser"]
+    command = [sys.executable, "-m", "parenting.commands.main", "up", "--port", "0", "--no-browser"]
     environment = {**os.environ, "PARENTING_DATA": str(data), "PYTHONUNBUFFERED": "1"}
     with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout

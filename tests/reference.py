@@ -12,9 +12,9 @@ from copy import deepcopy
 import torch
 from torch import Tensor
 
-from agent.config import Config
-from envs.gridworld import Gridworld, WorldState, local_state
-from envs.rng import Stream, gumbel, keys
+from parenting.agent.config import Config
+from parenting.envs.gridworld import Gridworld, WorldState, local_state
+from parenting.envs.rng import Stream, gumbel, keys
 from tests.reference_clips import Clip, Entry, Frame, Query, Recorded, board, same_moves, same_pair
 from tests.reference_policy import Policy, distinct, flat, loss
 

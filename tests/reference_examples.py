@@ -5,9 +5,9 @@ from collections.abc import Callable
 import torch
 from torch import Tensor, nn
 
-from agent.config import Config
-from envs import registry
-from envs.gridworld import Gridworld
+from parenting.agent.config import Config
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
 from tests.reference import Reference
 from tests.reference_clips import Clip, Recorded
 from tests.reference_policy import Policy

@@ -6,9 +6,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from envs.gridworld import Gridworld, local_state
-from envs.levels.kind import maze_legend
-from envs.rng import Keys, Stream
+from parenting.envs.gridworld import Gridworld, local_state
+from parenting.envs.levels.kind import maze_legend
+from parenting.envs.rng import Keys, Stream
 from tests.reference_clips import Board
 
 Row = tuple[Board, dict[int, float]]

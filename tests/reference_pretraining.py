@@ -11,11 +11,11 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from agent.config import Config
-from agent.pretraining import ENTROPY
-from envs.gridworld import Gridworld
-from envs.maze import mazes
-from envs.rng import Keys, Stream, keys
+from parenting.agent.config import Config
+from parenting.agent.pretraining import ENTROPY
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.maze import mazes
+from parenting.envs.rng import Keys, Stream, keys
 from tests.reference import ACTIONS, Reference
 from tests.reference_clips import Board, Clip, board
 from tests.reference_policy import Policy, entropy

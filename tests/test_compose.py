@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from commands.main import COMMANDS
-from server.settings import Settings
-from server.wake import Bell
+from parenting.commands.main import COMMANDS
+from parenting.server.settings import Settings
+from parenting.server.wake import Bell
 from tests.services import image_check, image_environment, read_compose, read_dockerfile
 from tests.tree import ROOT
 

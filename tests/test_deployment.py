@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from server.app import create_app
-from server.db import Database, connect, sqlite_module
-from server.runs import list_runs, set_status
-from server.schema import require, upgrade
-from server.settings import Settings
-from server.starting import NewRun, start
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect, sqlite_module
+from parenting.server.runs import list_runs, set_status
+from parenting.server.schema import require, upgrade
+from parenting.server.settings import Settings
+from parenting.server.starting import NewRun, start
 from tests.services import read_compose
 from tests.tree import ROOT
 

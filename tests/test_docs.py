@@ -10,10 +10,10 @@ from pkgutil import iter_modules
 import pytest
 from fastapi.routing import APIRoute
 
-from agent.config import Config
-from commands.main import COMMANDS
-from envs import registry
-from server.settings import Settings
+from parenting.agent.config import Config
+from parenting.commands.main import COMMANDS
+from parenting.envs import registry
+from parenting.server.settings import Settings
 from tests.tree import ROOT, git_files
 
 LINK = re.compile(r"(?:\]\(|srcset=\"|src=\")([^)\"#\s]*)")
@@ -28,7 +28,7 @@ LINES = {
 def page_routes() -> list[str]:
     """The addresses that a person opens."""
     names = [module.name for module in iter_modules([str(ROOT / "server/pages")])]
-    routers = [getattr(import_module(f"server.pages.{name}"), "router", None) for name in names]
+    routers = [getattr(import_module(f"parenting.server.pages.{name}"), "router", None) for name in names]
     routes = [route for router in routers if router for route in router.routes if isinstance(route, APIRoute)]
     return sorted({route.path for route in routes if "GET" in (route.methods or ())})
 

@@ -25,7 +25,9 @@ def test_contract_is_kept(contract: str) -> None:
     assert result.returncode == 0, result.stdout + result.stderr
 
 
-@pytest.mark.parametrize("module", ["server.app", "commands.main", "envs.registry"])
+@pytest.mark.parametrize(
+    "module", ["parenting.server.app", "parenting.commands.main", "parenting.envs.registry"]
+)
 def test_web_process_never_loads_torch(module: str) -> None:
     """`parenting web` imports all three. So commands.run, which needs torch, imports it when it is called."""
     code = f"import {module}, sys; assert 'torch' not in sys.modules, 'torch was loaded'"
@@ -37,21 +39,34 @@ def test_web_process_never_loads_torch(module: str) -> None:
 def miniature(tmp_path: Path) -> Path:
     """The layout in empty files, in which everything is allowed that is there."""
     modules = {name for contract in CONTRACTS for name in contract.get("source_modules", [])}
-    modules |= {"agent.learning", "commands.run", "envs.gridworld", "experiments.table1", "parents.scripted"}
+    modules |= {
+        "parenting.agent.learning",
+        "parenting.commands.run",
+        "parenting.envs.gridworld",
+        "parenting.experiments.table1",
+    }
+    modules |= {"parenting.parents.scripted"}
     for module in modules:
         *packages, name = module.split(".")
-        for package in [*packages, *([] if packages else [name])]:
-            (tmp_path / package).mkdir(exist_ok=True)
-            (tmp_path / package / "__init__.py").touch()
-        if packages:
-            (tmp_path / packages[0] / f"{name}.py").touch()
-    (tmp_path / "envs/gridworld.py").write_text("import torch\n")
-    (tmp_path / "envs/registry.py").write_text("if TYPE_CHECKING:\n    import envs.gridworld\n")
-    (tmp_path / "weights/store.py").write_text("def load():\n    import torch\n")
-    (tmp_path / "agent/learning.py").write_text("import torch\nimport envs.registry\n")
-    (tmp_path / "parents/scripted.py").write_text("import agent.learning\n")
-    (tmp_path / "experiments/table1.py").write_text("import parents.scripted\n")
-    (tmp_path / "commands/run.py").write_text("import experiments.table1\nimport server.app\n")
+        folder = tmp_path.joinpath(*packages[:2])
+        if len(packages) < 2:
+            folder /= name
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "__init__.py").touch()
+        if len(packages) == 2:
+            (folder / f"{name}.py").touch()
+    (tmp_path / "parenting/__init__.py").touch()
+    (tmp_path / "parenting/envs/gridworld.py").write_text("import torch\n")
+    (tmp_path / "parenting/envs/registry.py").write_text(
+        "if TYPE_CHECKING:\n    import parenting.envs.gridworld\n"
+    )
+    (tmp_path / "parenting/weights/store.py").write_text("def load():\n    import torch\n")
+    (tmp_path / "parenting/agent/learning.py").write_text("import torch\nimport parenting.envs.registry\n")
+    (tmp_path / "parenting/parents/scripted.py").write_text("import parenting.agent.learning\n")
+    (tmp_path / "parenting/experiments/table1.py").write_text("import parenting.parents.scripted\n")
+    (tmp_path / "parenting/commands/run.py").write_text(
+        "import parenting.experiments.table1\nimport parenting.server.app\n"
+    )
     return tmp_path
 
 
@@ -63,23 +78,23 @@ def test_miniature_is_allowed(miniature: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "line", "contract"),
     [
-        ("agent/learning.py", "import parents.scripted", "layers"),
-        ("agent/learning.py", "import parents.scripted", "parent-outside"),
-        ("envs/registry.py", "import agent.config", "layers"),
-        ("parents/scripted.py", "import server.queue", "layers"),
-        ("experiments/table1.py", "import server.queue", "layers"),
-        ("server/app.py", "import experiments.table1", "layers"),
-        ("server/app.py", "import commands.run", "layers"),
+        ("agent/learning.py", "import parenting.parents.scripted", "layers"),
+        ("agent/learning.py", "import parenting.parents.scripted", "parent-outside"),
+        ("envs/registry.py", "import parenting.agent.config", "layers"),
+        ("parents/scripted.py", "import parenting.server.queue", "layers"),
+        ("experiments/table1.py", "import parenting.server.queue", "layers"),
+        ("server/app.py", "import parenting.experiments.table1", "layers"),
+        ("server/app.py", "import parenting.commands.run", "layers"),
         ("agent/learning.py", "import time", "pure"),
         ("envs/art.py", "from pathlib import Path", "pure"),
         ("envs/registry.py", "def draw():\n    import random", "pure"),
-        ("server/app.py", "import agent.learning", "web-without-torch"),
+        ("server/app.py", "import parenting.agent.learning", "web-without-torch"),
         ("envs/levels.py", "import torch", "web-without-torch"),
-        ("agent/__init__.py", "from agent.learning import torch", "inits-without-torch"),
+        ("agent/__init__.py", "from parenting.agent.learning import torch", "inits-without-torch"),
     ],
 )
 def test_contract_catches(miniature: Path, file: str, line: str, contract: str) -> None:
-    with (miniature / file).open("a") as source:
+    with (miniature / "parenting" / file).open("a") as source:
         source.write(f"{line}\n")
     result = lint_imports(miniature, "--contract", contract)
     assert result.returncode == 1, result.stdout + result.stderr

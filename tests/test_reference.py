@@ -4,10 +4,10 @@ import pytest
 import torch
 from torch import Tensor
 
-from envs import registry
-from envs.gridworld import WorldState
-from envs.rng import Stream
-from envs.unsafe_exploration import UnsafeExploration
+from parenting.envs import registry
+from parenting.envs.gridworld import WorldState
+from parenting.envs.rng import Stream
+from parenting.envs.unsafe_exploration import UnsafeExploration
 from tests.reference import EXPLOIT
 from tests.reference_clips import Entry
 from tests.reference_examples import (

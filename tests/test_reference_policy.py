@@ -6,8 +6,8 @@ import pytest
 import torch
 from torch import nn
 
-from agent.config import Config
-from envs.rng import Stream, keys
+from parenting.agent.config import Config
+from parenting.envs.rng import Stream, keys
 from tests.reference import Reference
 from tests.reference_examples import ROOM, set_logits, world
 from tests.reference_policy import Policy, distinct, flat, loss

@@ -7,9 +7,9 @@ from math import log
 import pytest
 import torch
 
-from agent.pretraining import ENTROPY
-from envs import registry
-from envs.rng import keys
+from parenting.agent.pretraining import ENTROPY
+from parenting.envs import registry
+from parenting.envs.rng import keys
 from tests import reference_pretraining
 from tests.reference_policy import Policy
 from tests.reference_pretraining import Maze, Visit, draw, loss, walk

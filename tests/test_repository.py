@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from server.settings import Settings
+from parenting.server.settings import Settings
 from tests.tree import ROOT, git_files
 
 LINES = 300

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from experiments.calibrate import SOME
-from experiments.catalogue import experiment
-from experiments.claims import BORN
-from experiments.experiment import Asked
-from experiments.publish import RESULTS, TRIALS, command, page
-from experiments.reward_hacking import VARIANTS
-from experiments.value_iteration import KINDS
+from parenting.experiments.calibrate import SOME
+from parenting.experiments.catalogue import experiment
+from parenting.experiments.claims import BORN
+from parenting.experiments.experiment import Asked
+from parenting.experiments.publish import RESULTS, TRIALS, command, page
+from parenting.experiments.reward_hacking import VARIANTS
+from parenting.experiments.value_iteration import KINDS
 from tests.readme import PUBLISHED, README, NoFinding, anew, results, row, shown
 
 NAMES = sorted(path.parent.name for path in PUBLISHED.glob(f"*/{RESULTS}"))

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 import torch
 
-from agent.policy import network
-from agent.schooling import School
-from envs import registry
+from parenting.agent.policy import network
+from parenting.agent.schooling import School
+from parenting.envs import registry
+from parenting.weights import store
+from parenting.weights.store import NoWeights, Wanted, find, load, metadata, save
 from tests.tree import ROOT
-from weights import store
-from weights.store import NoWeights, Wanted, find, load, metadata, save
 
 BOX = Wanted(registry.kind("side-effects"), 6, 6)
 SHIPPED = {

@@ -27,7 +27,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
     source, target = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
     for name in files_of_the_project():
         (source / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / name, source / name)
+        shutil.copy(ROOT / name, source / name, follow_symlinks=False)
     # No isolation: the build uses the setuptools at hand and needs no network.
     options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation", "--no-index"]
     command = [sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", str(target), str(source)]
@@ -38,7 +38,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
 
 
 def test_wheel_carries_exactly_the_files_of_our_folders(wheel: zipfile.ZipFile) -> None:
-    ours = {name for name in files_of_the_project() if name.split("/")[0] in FOLDERS}
+    ours = {f"parenting/{name}" for name in files_of_the_project() if name.split("/")[0] in FOLDERS}
+    ours |= {"parenting/__init__.py", "parenting/py.typed"}
     carried = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert carried == ours
 
@@ -46,11 +47,11 @@ def test_wheel_carries_exactly_the_files_of_our_folders(wheel: zipfile.ZipFile) 
 @pytest.mark.parametrize(
     ("folder", "suffix"),
     [
-        ("web/templates/", ".html"),
-        ("web/static/", ".js"),
-        ("web/static/", ".css"),
-        ("migrations/", "env.py"),
-        ("migrations/versions/", ".py"),
+        ("parenting/web/templates/", ".html"),
+        ("parenting/web/static/", ".js"),
+        ("parenting/web/static/", ".css"),
+        ("parenting/migrations/", "env.py"),
+        ("parenting/migrations/versions/", ".py"),
     ],
 )
 def test_wheel_carries_pages_and_migrations(wheel: zipfile.ZipFile, folder: str, suffix: str) -> None:
@@ -59,7 +60,7 @@ def test_wheel_carries_pages_and_migrations(wheel: zipfile.ZipFile, folder: str,
 
 def test_wheel_installs_the_command(wheel: zipfile.ZipFile) -> None:
     (entry,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
-    assert "parenting = commands.main:app" in wheel.read(entry).decode()
+    assert "parenting = parenting.commands.main:app" in wheel.read(entry).decode()
 
 
 def imported_by(source: str, deep: bool = True) -> set[str]:
@@ -92,5 +93,5 @@ def plain_names(names: Iterable[str]) -> set[str]:
 def lacking(imported: set[str], required: set[str]) -> set[str]:
     """What is imported and not required."""
     known = packages_distributions()
-    others = imported - set(FOLDERS) - sys.stdlib_module_names
+    others = imported - {"parenting"} - sys.stdlib_module_names
     return {name for name in others if not required & plain_names(known.get(name, [name]))}

@@ -7,9 +7,9 @@ import re
 
 import pytest
 
-from envs import registry
-from envs.box_levels import survey
-from envs.gridworld import Gridworld
+from parenting.envs import registry
+from parenting.envs.box_levels import survey
+from parenting.envs.gridworld import Gridworld
 from tests.tree import ROOT
 
 PAGE = (ROOT / "docs/worlds.md").read_text(encoding="utf-8")

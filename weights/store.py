@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from envs.levels.kind import Kind, maze_legend
+from parenting.envs.levels.kind import Kind, maze_legend
 
 if TYPE_CHECKING:
     from torch import Tensor

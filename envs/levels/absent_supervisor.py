@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
-from envs.levels.rules import MOVES, edge_closed, goal_in_reach, one, reachable
+from parenting.envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
+from parenting.envs.levels.rules import MOVES, edge_closed, goal_in_reach, one, reachable
 
 SUPERVISOR = """\
 S######S
@@ -73,7 +73,7 @@ def _bars_apart(level: Level, found: set[Cell]) -> None:
 KIND = Kind(
     name="absent-supervisor",
     title="Absent Supervisor",
-    rules="envs.absent_supervisor:AbsentSupervisor",
+    rules="parenting.envs.absent_supervisor:AbsentSupervisor",
     legend=LEGEND,
     levels=LEVELS,
     brief=BRIEF,

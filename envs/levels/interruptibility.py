@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
-from envs.levels.rules import edge_closed, one, reachable
+from parenting.envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
+from parenting.envs.levels.rules import edge_closed, one, reachable
 
 BUTTON = """\
 ########
@@ -55,7 +55,7 @@ def validate(level: Level) -> None:
 KIND = Kind(
     name="interruptibility",
     title="Interruptibility",
-    rules="envs.interruptibility:Interruptibility",
+    rules="parenting.envs.interruptibility:Interruptibility",
     legend=LEGEND,
     levels=LEVELS,
     brief=BRIEF,

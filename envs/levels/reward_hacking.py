@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
-from envs.levels.rules import MOVES, edge_closed, one, reachable
+from parenting.envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
+from parenting.envs.levels.rules import MOVES, edge_closed, one, reachable
 
 GARDEN = """\
 cycle: 3,2 rrrrrr ddd llllll uuu
@@ -149,7 +149,7 @@ def _way_back(level: Level, found: set[Cell], around: tuple[Cell, ...]) -> None:
 KIND = Kind(
     name="reward-hacking",
     title="Reward Hacking",
-    rules="envs.reward_hacking:RewardHacking",
+    rules="parenting.envs.reward_hacking:RewardHacking",
     legend=LEGEND,
     levels=LEVELS,
     brief=BRIEF,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from envs.levels.kind import AGENT, BOX, WALL, Brief, Cell, Kind, Level, Setting
-from envs.levels.rules import MOVES, edge_closed, goal_in_reach, moved, one
+from parenting.envs.levels.kind import AGENT, BOX, WALL, Brief, Cell, Kind, Level, Setting
+from parenting.envs.levels.rules import MOVES, edge_closed, goal_in_reach, moved, one
 
 BOX_ART = """\
 ######
@@ -116,7 +116,7 @@ def _small_enough(level: Level) -> None:
 KIND = Kind(
     name="side-effects",
     title="Side Effects",
-    rules="envs.side_effects:SideEffects",
+    rules="parenting.envs.side_effects:SideEffects",
     legend=LEGEND,
     levels=LEVELS,
     brief=BRIEF,

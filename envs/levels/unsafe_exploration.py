@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from envs.levels.kind import Brief, Cell, Kind, Level, Setting
-from envs.levels.rules import edge_closed, goal_in_reach, one, reachable
+from parenting.envs.levels.kind import Brief, Cell, Kind, Level, Setting
+from parenting.envs.levels.rules import edge_closed, goal_in_reach, one, reachable
 
 ISLAND = """\
 WW######
@@ -61,7 +61,7 @@ def validate(level: Level) -> None:
 KIND = Kind(
     name="unsafe-exploration",
     title="Unsafe Exploration",
-    rules="envs.unsafe_exploration:UnsafeExploration",
+    rules="parenting.envs.unsafe_exploration:UnsafeExploration",
     legend=LEGEND,
     levels=LEVELS,
     brief=BRIEF,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from server.api import operator, queries, runs, streams
+from parenting.server.api import operator, queries, runs, streams
 
 router = APIRouter(prefix="/api/v1")
 for part in (runs, operator, queries, streams):

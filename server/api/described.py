@@ -9,7 +9,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from server.api.examples import SHOWN
+from parenting.server.api.examples import SHOWN
 
 DONE = ("200", "201", "202")
 

@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
-from agent.config import compose
-from envs import registry
+from parenting.agent.config import compose
+from parenting.envs import registry
 
 WORLD = "unsafe-exploration"
 KIND = registry.kind(WORLD)

@@ -7,10 +7,10 @@ from typing import Annotated, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from agent.events import Event
-from server import tables
-from server.shapes import AskedShape, MetricShape, QueryStatus, RunShape, Shape
-from server.starting import LARGEST_INT
+from parenting.agent.events import Event
+from parenting.server import tables
+from parenting.server.shapes import AskedShape, MetricShape, QueryStatus, RunShape, Shape
+from parenting.server.starting import LARGEST_INT
 
 Row = TypeVar("Row")
 Place = Annotated[int, Field(ge=-1, le=LARGEST_INT)]

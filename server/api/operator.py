@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request
 
-from agent.events import Change, EndEpisode, Event, Mature
-from server import runs
-from server.api.replies import acts
-from server.api.words import ChangeBody, GoalBody, PaceBody, RunId
-from server.deps import Db, ring
-from server.record import add_event
-from server.shapes import RunShape, shape_run
+from parenting.agent.events import Change, EndEpisode, Event, Mature
+from parenting.server import runs
+from parenting.server.api.replies import acts
+from parenting.server.api.words import ChangeBody, GoalBody, PaceBody, RunId
+from parenting.server.deps import Db, ring
+from parenting.server.record import add_event
+from parenting.server.shapes import RunShape, shape_run
 
 router = APIRouter(tags=["operator"])
 

@@ -8,14 +8,14 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
 
-from server import listing
-from server.api.lists import AskedPart, AskedRows
-from server.api.replies import acts, looks
-from server.api.words import AnswerBody, LeaseBody, QueryId, RunId
-from server.deps import Db, SettingsOf, ring
-from server.queue import answer, lease, release
-from server.runs import get_run
-from server.shapes import AskedShape, LeasedShape, StoredShape, shape_asked, shape_leased
+from parenting.server import listing
+from parenting.server.api.lists import AskedPart, AskedRows
+from parenting.server.api.replies import acts, looks
+from parenting.server.api.words import AnswerBody, LeaseBody, QueryId, RunId
+from parenting.server.deps import Db, SettingsOf, ring
+from parenting.server.queue import answer, lease, release
+from parenting.server.runs import get_run
+from parenting.server.shapes import AskedShape, LeasedShape, StoredShape, shape_asked, shape_leased
 
 router = APIRouter(tags=["questions"])
 

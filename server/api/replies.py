@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from server.errors import (
+from parenting.server.errors import (
     Busy,
     Conflict,
     DiskFull,

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 
-from server import listing
-from server.api.lists import (
+from parenting.server import listing
+from parenting.server.api.lists import (
     EventPart,
     MetricPart,
     MetricRows,
@@ -16,11 +16,11 @@ from server.api.lists import (
     RunRows,
     operator_event,
 )
-from server.api.replies import acts, looks
-from server.api.words import RunId
-from server.deps import Db, SettingsOf, ring
-from server.shapes import RunShape, shape_metrics, shape_run, shape_runs
-from server.starting import NewRun, start
+from parenting.server.api.replies import acts, looks
+from parenting.server.api.words import RunId
+from parenting.server.deps import Db, SettingsOf, ring
+from parenting.server.shapes import RunShape, shape_metrics, shape_run, shape_runs
+from parenting.server.starting import NewRun, start
 
 router = APIRouter(tags=["runs"])
 

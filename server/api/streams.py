@@ -9,11 +9,11 @@ from fastapi import APIRouter, Depends, Header, Request
 from fastapi.responses import StreamingResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from server.api.replies import streams
-from server.api.words import After, RunId
-from server.deps import Db
-from server.export import lines
-from server.runs import get_run
+from parenting.server.api.replies import streams
+from parenting.server.api.words import After, RunId
+from parenting.server.deps import Db
+from parenting.server.export import lines
+from parenting.server.runs import get_run
 
 router = APIRouter(tags=["runs"])
 

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 from fastapi import Path, Query
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from server import shapes
-from server.shapes import By
-from server.starting import LARGEST_INT, Goal, Pace
+from parenting.server import shapes
+from parenting.server.shapes import By
+from parenting.server.starting import LARGEST_INT, Goal, Pace
 
 RunId = Annotated[int, Path(ge=1, le=LARGEST_INT, description="The run's id.", examples=[1])]
 QueryId = Annotated[int, Path(ge=1, le=LARGEST_INT, description="The question's id.", examples=[7])]

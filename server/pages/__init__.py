@@ -2,13 +2,13 @@
 
 from fastapi import APIRouter
 
-from server.pages.controls import router as controls
-from server.pages.dashboard import router as dashboard
-from server.pages.docs import router as docs
-from server.pages.history import router as history
-from server.pages.parent import router as parent
-from server.pages.render import error_page
-from server.pages.start import router as start
+from parenting.server.pages.controls import router as controls
+from parenting.server.pages.dashboard import router as dashboard
+from parenting.server.pages.docs import router as docs
+from parenting.server.pages.history import router as history
+from parenting.server.pages.parent import router as parent
+from parenting.server.pages.render import error_page
+from parenting.server.pages.start import router as start
 
 __all__ = ["error_page", "router"]
 

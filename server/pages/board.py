@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from server.pages import cues
-from server.pages.clip import AGENT, BARS, BOX, LAND, WALL, Cell, Clip, Frame, ahead, cell, glyph
-from server.pages.cues import Cue
-from server.pages.trail import CELL, Point, Trail, centre, trace
+from parenting.server.pages import cues
+from parenting.server.pages.clip import AGENT, BARS, BOX, LAND, WALL, Cell, Clip, Frame, ahead, cell, glyph
+from parenting.server.pages.cues import Cue
+from parenting.server.pages.trail import CELL, Point, Trail, centre, trace
 
 DRAWN = frozenset(" WGTtOIBPS")  # the glyphs that have a pattern in web/templates/_tiles.html
 

@@ -10,15 +10,15 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Form, Request, Response
 from pydantic import TypeAdapter, ValidationError
 
-from agent.events import Change, EndEpisode, Mature, Probability
-from server import record, runs
-from server.api.words import RunId
-from server.deps import Db, ring
-from server.pages.dashboard import dashboard_page
-from server.pages.events import CHANCES, chances
-from server.pages.render import see
-from server.pages.start import FormOf
-from server.starting import Goal, Pace
+from parenting.agent.events import Change, EndEpisode, Mature, Probability
+from parenting.server import record, runs
+from parenting.server.api.words import RunId
+from parenting.server.deps import Db, ring
+from parenting.server.pages.dashboard import dashboard_page
+from parenting.server.pages.events import CHANCES, chances
+from parenting.server.pages.render import see
+from parenting.server.pages.start import FormOf
+from parenting.server.starting import Goal, Pace
 
 router = APIRouter(include_in_schema=False)
 

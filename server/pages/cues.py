@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from server.pages.clip import MOVES, WALL, Cell, Clip, Frame, ahead, cell, find, glyph, steps, under
+from parenting.server.pages.clip import MOVES, WALL, Cell, Clip, Frame, ahead, cell, find, glyph, steps, under
 
 DRY, WET, PINK, WATER, GOAL = "t", "T", "I", "W", "G"
 ENTERED = {"O": "bucket", "B": "button", "P": "shortcut"}

@@ -8,19 +8,19 @@ from collections.abc import Mapping
 
 from fastapi import APIRouter, Response
 
-from server import record, runs
-from server.api.words import RunId
-from server.db import Database
-from server.deps import Db
-from server.guard import policy
-from server.pages.events import CHANCES, chances, done
-from server.pages.measures import Measures, began, measures
-from server.pages.render import page, shown
-from server.pages.stages import stages
-from server.pages.words import MORE, SENTENCES, state, title
-from server.shapes import shape_run
-from server.tables import Run
-from server.views import first_metrics, sampled_metrics
+from parenting.server import record, runs
+from parenting.server.api.words import RunId
+from parenting.server.db import Database
+from parenting.server.deps import Db
+from parenting.server.guard import policy
+from parenting.server.pages.events import CHANCES, chances, done
+from parenting.server.pages.measures import Measures, began, measures
+from parenting.server.pages.render import page, shown
+from parenting.server.pages.stages import stages
+from parenting.server.pages.words import MORE, SENTENCES, state, title
+from parenting.server.shapes import shape_run
+from parenting.server.tables import Run
+from parenting.server.views import first_metrics, sampled_metrics
 
 router = APIRouter(include_in_schema=False)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from server.tables import Event, Run
+from parenting.server.tables import Event, Run
 
 CHANCES = {
     "p_guid": "ask before a new move",

@@ -9,8 +9,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from server.pages.board import Board
-from server.pages.clip import AGENT, BOX, LAND, Clip, Frame, ahead, cell, steps, under
+from parenting.server.pages.board import Board
+from parenting.server.pages.clip import AGENT, BOX, LAND, Clip, Frame, ahead, cell, steps, under
 
 DANGERS = {
     "bucket": "Steps into the bucket.",

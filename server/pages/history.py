@@ -8,17 +8,17 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 
-from server import history, runs
-from server.api.words import RunId
-from server.deps import Db
-from server.history import Answered
-from server.pages.parent import COOKIE
-from server.pages.question import Shown, show
-from server.pages.render import page
-from server.pages.words import title
-from server.shapes import Choice
-from server.starting import LARGEST_INT
-from server.tables import CHOICES, KINDS, Run
+from parenting.server import history, runs
+from parenting.server.api.words import RunId
+from parenting.server.deps import Db
+from parenting.server.history import Answered
+from parenting.server.pages.parent import COOKIE
+from parenting.server.pages.question import Shown, show
+from parenting.server.pages.render import page
+from parenting.server.pages.words import title
+from parenting.server.shapes import Choice
+from parenting.server.starting import LARGEST_INT
+from parenting.server.tables import CHOICES, KINDS, Run
 
 router = APIRouter(include_in_schema=False)
 

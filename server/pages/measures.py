@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from agent.config import Config
-from server.tables import Run
+from parenting.agent.config import Config
+from parenting.server.tables import Run
 
 WATER, PLANT, SUPERVISOR, GOAL = "W", "T", "S", "G"
 SHORT = 12

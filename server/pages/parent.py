@@ -17,19 +17,19 @@ from fastapi import APIRouter, Form, Query, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from server import queue, runs
-from server.api.words import Choice, ClientId, RunId
-from server.db import Database
-from server.deps import Db, SettingsOf, ring
-from server.errors import NotFound
-from server.pages.question import Shown, show
-from server.pages.render import page, see
-from server.pages.words import MORE, SENTENCES, state, title
-from server.shapes import shape_run
-from server.starting import LARGEST_INT
-from server.streams import Streams
-from server.tables import Run
-from server.views import lease_ahead, may_lease
+from parenting.server import queue, runs
+from parenting.server.api.words import Choice, ClientId, RunId
+from parenting.server.db import Database
+from parenting.server.deps import Db, SettingsOf, ring
+from parenting.server.errors import NotFound
+from parenting.server.pages.question import Shown, show
+from parenting.server.pages.render import page, see
+from parenting.server.pages.words import MORE, SENTENCES, state, title
+from parenting.server.shapes import shape_run
+from parenting.server.starting import LARGEST_INT
+from parenting.server.streams import Streams
+from parenting.server.tables import Run
+from parenting.server.views import lease_ahead, may_lease
 
 router = APIRouter(include_in_schema=False)
 

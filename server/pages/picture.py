@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import re
 
-from envs.levels.kind import AGENT, BOX, LAND, PIECES, Kind, Level
-from server.pages.board import Board, draw
-from server.pages.clip import Clip, Frame
-from server.pages.render import WEB, fill
+from parenting.envs.levels.kind import AGENT, BOX, LAND, PIECES, Kind, Level
+from parenting.server.pages.board import Board, draw
+from parenting.server.pages.clip import Clip, Frame
+from parenting.server.pages.render import WEB, fill
 
 RULE = re.compile(r"^(\.[^{}@]+?) *\{([^{}]*)\}$", re.MULTILINE)
 VARIABLE = re.compile(r"--([\w-]+): ([^;]+);")

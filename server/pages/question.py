@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from server.pages.board import Board, draw
-from server.pages.clip import BARS, Cell, find
-from server.pages.happens import Said, comes_of
-from server.pages.words import LEADS, TITLES, chance, does, watch
-from server.tables import Query, Run
+from parenting.server.pages.board import Board, draw
+from parenting.server.pages.clip import BARS, Cell, find
+from parenting.server.pages.happens import Said, comes_of
+from parenting.server.pages.words import LEADS, TITLES, chance, does, watch
+from parenting.server.tables import Query, Run
 
 DELUDED = "What is dashed is only what it believes to see."
 CORNERED = "The box is stuck already."

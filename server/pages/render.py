@@ -9,7 +9,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse
 
-from server.errors import ServerError
+from parenting.server.errors import ServerError
 
 WEB = Path(__file__).parent.parent.parent / "web"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from server.tables import Metric
+from parenting.server.tables import Metric
 
 Number = float | int | None
 Values = Mapping[str, Number]

@@ -8,19 +8,19 @@ from typing import Annotated, NamedTuple
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from agent.config import PRESETS
-from envs.registry import WORLDS
-from server.db import Database
-from server.deps import Db, SettingsOf, ring
-from server.errors import Invalid
-from server.listing import runs_before
-from server.pages.measures import measures
-from server.pages.render import page, see
-from server.pages.words import WORDS, state, title
-from server.shapes import RunShape, shape_runs
-from server.starting import LARGEST_INT, plan, read_form, start
-from server.tables import Metric, Run
-from server.views import latest_metrics
+from parenting.agent.config import PRESETS
+from parenting.envs.registry import WORLDS
+from parenting.server.db import Database
+from parenting.server.deps import Db, SettingsOf, ring
+from parenting.server.errors import Invalid
+from parenting.server.listing import runs_before
+from parenting.server.pages.measures import measures
+from parenting.server.pages.render import page, see
+from parenting.server.pages.words import WORDS, state, title
+from parenting.server.shapes import RunShape, shape_runs
+from parenting.server.starting import LARGEST_INT, plan, read_form, start
+from parenting.server.tables import Metric, Run
+from parenting.server.views import latest_metrics
 
 router = APIRouter(include_in_schema=False)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from server.pages.clip import MOVES, Cell
+from parenting.server.pages.clip import MOVES, Cell
 
 CELL = 20
 """The side of a cell in the units of the drawing."""

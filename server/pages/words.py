@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from itertools import groupby
 
-from server.pages.board import Board
-from server.pages.clip import BARS, Clip, find
-from server.shapes import RunShape
-from server.tables import Run
+from parenting.server.pages.board import Board
+from parenting.server.pages.clip import BARS, Clip, find
+from parenting.server.shapes import RunShape
+from parenting.server.tables import Run
 
 TITLES = {"guidance": "Which move is better here?", "preference": "Which clip is better?"}
 LEADS = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from itertools import product
 
-from envs.gridworld import WorldState
-from envs.levels.side_effects import stuck
+from parenting.envs.gridworld import WorldState
+from parenting.envs.levels.side_effects import stuck
 from tests.reference import EXPLOIT, EXPLORE, PREFERENCE, Reference
 
 

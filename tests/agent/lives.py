@@ -8,13 +8,13 @@ from collections.abc import Callable
 
 import torch
 
-from agent import parenting
-from agent.config import Config
-from agent.policy import Network
-from agent.query import Answer, Choice, Kind, Query, empty
-from agent.state import AgentState
-from envs.gridworld import Gridworld
-from envs.rng import keys
+from parenting.agent import parenting
+from parenting.agent.config import Config
+from parenting.agent.policy import Network
+from parenting.agent.query import Answer, Choice, Kind, Query, empty
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import keys
 from tests.reference_clips import Clip, Frame, board
 
 Judge = Callable[[Query], torch.Tensor]

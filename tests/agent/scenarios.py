@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from agent.config import PRESETS, Config
-from envs import registry
-from envs.gridworld import Gridworld
+from parenting.agent.config import PRESETS, Config
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
 
 LIMIT = 9  # short episodes: truncation happens often
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent.birth import network_of
-from agent.query import Query
-from envs import registry
-from envs.gridworld import Gridworld
-from parents.scripted import Judgement
-from server.codec import CHOICE_NAMES
+from parenting.agent.birth import network_of
+from parenting.agent.query import Query
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
+from parenting.parents.scripted import Judgement
+from parenting.server.codec import CHOICE_NAMES
 from tests.agent.happenings import Happenings
 from tests.agent.lives import Judge, as_query, layers, live, wayward
 from tests.agent.scenarios import OWN, Scenario, scenarios

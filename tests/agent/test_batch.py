@@ -7,12 +7,12 @@ from functools import partial
 import pytest
 import torch
 
-from agent import parenting
-from agent.config import PRESETS, Config
-from agent.query import Answer, Kind
-from agent.state import AgentState
-from envs import registry
-from envs.rng import Keys, Stream, keys
+from parenting.agent import parenting
+from parenting.agent.config import PRESETS, Config
+from parenting.agent.query import Answer, Kind
+from parenting.agent.state import AgentState
+from parenting.envs import registry
+from parenting.envs.rng import Keys, Stream, keys
 from tests.agent.lives import LogEntry, capricious, clip, live
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)

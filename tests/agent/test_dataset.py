@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent import dataset, parenting
-from agent.config import Config
-from agent.dataset import Dataset, Entry
-from agent.events import Mature
-from agent.query import Answer, Choice, Kind, Query
-from agent.state import AgentState
-from envs import registry
-from envs.rng import keys
+from parenting.agent import dataset, parenting
+from parenting.agent.config import Config
+from parenting.agent.dataset import Dataset, Entry
+from parenting.agent.events import Mature
+from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.state import AgentState
+from parenting.envs import registry
+from parenting.envs.rng import keys
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)
 BOTH = torch.tensor([True, True])

@@ -7,10 +7,10 @@ from math import log
 import pytest
 import torch
 
-from agent.learning import Rows, adam, objective
-from agent.policy import Heads, Side, side
-from agent.query import Answer, Choice, empty
-from agent.state import Learner
+from parenting.agent.learning import Rows, adam, objective
+from parenting.agent.policy import Heads, Side, side
+from parenting.agent.query import Answer, Choice, empty
+from parenting.agent.state import Learner
 
 DOUBLE = torch.float64
 

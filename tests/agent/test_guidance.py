@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent import parenting
-from agent.config import PRESETS, Config
-from agent.events import EndEpisode
-from agent.familiarity import ask_chance
-from agent.query import Answer, Choice, Kind, Query, silence
-from agent.state import AgentState
-from envs import registry
-from envs.rng import Stream, keys
+from parenting.agent import parenting
+from parenting.agent.config import PRESETS, Config
+from parenting.agent.events import EndEpisode
+from parenting.agent.familiarity import ask_chance
+from parenting.agent.query import Answer, Choice, Kind, Query, silence
+from parenting.agent.state import AgentState
+from parenting.envs import registry
+from parenting.envs.rng import Stream, keys
 from tests.agent.lives import capricious, live
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)

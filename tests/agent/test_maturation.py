@@ -5,15 +5,15 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from agent import parenting
-from agent.birth import network_of
-from agent.config import PRESETS, Config
-from agent.events import Mature
-from agent.pairing import EXPLOIT, EXPLORE
-from agent.query import Answer, Choice, Kind, Query, silence
-from agent.state import AgentState
-from envs import registry
-from envs.rng import keys
+from parenting.agent import parenting
+from parenting.agent.birth import network_of
+from parenting.agent.config import PRESETS, Config
+from parenting.agent.events import Mature
+from parenting.agent.pairing import EXPLOIT, EXPLORE
+from parenting.agent.query import Answer, Choice, Kind, Query, silence
+from parenting.agent.state import AgentState
+from parenting.envs import registry
+from parenting.envs.rng import keys
 from tests.agent.lives import live
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)

@@ -8,14 +8,14 @@ import pytest
 import torch
 from torch import Tensor
 
-from agent import pairing, parenting
-from agent.config import PRESETS, Config
-from agent.digest import unordered
-from agent.pairing import EXPLOIT, EXPLORE, Pair
-from agent.query import Answer, Choice, Kind, Query
-from agent.state import Recorder
-from envs import registry
-from envs.rng import keys
+from parenting.agent import pairing, parenting
+from parenting.agent.config import PRESETS, Config
+from parenting.agent.digest import unordered
+from parenting.agent.pairing import EXPLOIT, EXPLORE, Pair
+from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.state import Recorder
+from parenting.envs import registry
+from parenting.envs.rng import keys
 from tests.agent.lives import capricious, live
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)

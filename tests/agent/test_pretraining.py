@@ -5,17 +5,17 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent import parenting, pretraining
-from agent.birth import network_of
-from agent.config import PRESETS, Config
-from agent.maze_walks import ARRIVED, EPISODES, LIMIT, Batch, draw_mazes, outside, pool, walk
-from agent.policy import network
-from agent.pretraining import policy_gradient, returns_to_go, visited
-from agent.query import silence
-from agent.schooling import School
-from envs import registry
-from envs.levels.rules import MOVES
-from envs.rng import keys
+from parenting.agent import parenting, pretraining
+from parenting.agent.birth import network_of
+from parenting.agent.config import PRESETS, Config
+from parenting.agent.maze_walks import ARRIVED, EPISODES, LIMIT, Batch, draw_mazes, outside, pool, walk
+from parenting.agent.policy import network
+from parenting.agent.pretraining import policy_gradient, returns_to_go, visited
+from parenting.agent.query import silence
+from parenting.agent.schooling import School
+from parenting.envs import registry
+from parenting.envs.levels.rules import MOVES
+from parenting.envs.rng import keys
 
 GLYPHS = "# GXA"
 SIZES = [(3, 4), (4, 4), (6, 6), (6, 8)]

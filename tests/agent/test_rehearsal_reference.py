@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent.birth import network_of
-from agent.config import PRESETS, Config
-from agent.policy import Network
-from envs import registry
-from envs.rng import keys
-from experiments.small_worlds import small
-from parents.scripted import Judgement
-from server.codec import CHOICE_NAMES
+from parenting.agent.birth import network_of
+from parenting.agent.config import PRESETS, Config
+from parenting.agent.policy import Network
+from parenting.envs import registry
+from parenting.envs.rng import keys
+from parenting.experiments.small_worlds import small
+from parenting.parents.scripted import Judgement
+from parenting.server.codec import CHOICE_NAMES
 from tests.agent.lives import Judge, as_query, layers, live, wayward
 from tests.reference import GUIDANCE
 from tests.reference_clips import Clip

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent import schooling
-from agent.learning import adam
-from agent.maze_walks import ARRIVED, LIMIT, pool
-from agent.policy import network
-from agent.pretraining import policy_gradient
-from agent.schooling import Exam, Pupil, School
-from agent.state import Rehearsal
-from envs.rng import keys
+from parenting.agent import schooling
+from parenting.agent.learning import adam
+from parenting.agent.maze_walks import ARRIVED, LIMIT, pool
+from parenting.agent.policy import network
+from parenting.agent.pretraining import policy_gradient
+from parenting.agent.schooling import Exam, Pupil, School
+from parenting.agent.state import Rehearsal
+from parenting.envs.rng import keys
 from tests.reference_pretraining import MOVES, Maze
 from tests.reference_pretraining import pool as plain_pool
 

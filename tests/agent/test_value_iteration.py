@@ -10,11 +10,11 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.converging import STAGES, TIE, Places, greedy, iterated, parents_policy
-from experiments.small_worlds import small
-from experiments.value_iteration import KINDS, iterate_some
-from parents.model import Model, explore
-from parents.values import of_policy
+from parenting.experiments.converging import STAGES, TIE, Places, greedy, iterated, parents_policy
+from parenting.experiments.small_worlds import small
+from parenting.experiments.value_iteration import KINDS, iterate_some
+from parenting.parents.model import Model, explore
+from parenting.parents.values import of_policy
 
 
 @pytest.mark.parametrize(("trial", "kind"), list(enumerate(kind.world for kind in KINDS)))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from server import runs
-from server.db import Database
-from server.mailbox import post_query
-from server.starting import NewRun, start
+from parenting.server import runs
+from parenting.server.db import Database
+from parenting.server.mailbox import post_query
+from parenting.server.starting import NewRun, start
 from tests.server.conftest import CLIPS
 
 

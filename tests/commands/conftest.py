@@ -9,11 +9,11 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
-from commands.client import Client
-from server.app import create_app
-from server.db import Database, connect
-from server.schema import upgrade
-from server.settings import Settings
+from parenting.commands.client import Client
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect
+from parenting.server.schema import upgrade
+from parenting.server.settings import Settings
 
 
 @pytest.fixture
@@ -36,6 +36,6 @@ def db(settings: Settings) -> Iterator[Database]:
 def web(settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx2.Client]:
     """The application in this process, which the command takes for the server at its URL."""
     with TestClient(create_app(settings, db), base_url="http://localhost") as caller:
-        monkeypatch.setattr("commands.answer.Client", lambda url: Client(url, caller))
-        monkeypatch.setattr("commands.client.Client.close", lambda self: None)
+        monkeypatch.setattr("parenting.commands.answer.Client", lambda url: Client(url, caller))
+        monkeypatch.setattr("parenting.commands.client.Client.close", lambda self: None)
         yield caller

@@ -13,12 +13,12 @@ import pytest
 from structlog.testing import capture_logs
 from typer.testing import CliRunner, Result
 
-from commands.main import app
-from server import queue, record, runs
-from server.db import Database
-from server.history import every
-from server.settings import Settings
-from server.worker import Worker
+from parenting.commands.main import app
+from parenting.server import queue, record, runs
+from parenting.server.db import Database
+from parenting.server.history import every
+from parenting.server.settings import Settings
+from parenting.server.worker import Worker
 from tests.commands.asking import asked, begin
 from tests.server.serving import free_port, parenting
 
@@ -111,7 +111,7 @@ def test_patience_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.Cli
 def test_ctrl_c(db: Database, web: httpx2.Client, monkeypatch: pytest.MonkeyPatch) -> None:
     begin(db)
     asked(db, 1, 1)
-    monkeypatch.setattr("commands.judge.Judge.choice", _interrupt)
+    monkeypatch.setattr("parenting.commands.judge.Judge.choice", _interrupt)
     said = answer()
     assert (said.exit_code, said.stdout) == (130, "Run 1: answered 0. Stopped.\n")
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import httpx2
 
-from commands.answering import Answering, Order
-from commands.client import Client
-from commands.judge import Judge
-from server import queue, record, runs
-from server.db import Database
-from server.history import every
-from server.life import Life
-from server.mailbox import watch
+from parenting.commands.answering import Answering, Order
+from parenting.commands.client import Client
+from parenting.commands.judge import Judge
+from parenting.server import queue, record, runs
+from parenting.server.db import Database
+from parenting.server.history import every
+from parenting.server.life import Life
+from parenting.server.mailbox import watch
 from tests.commands.asking import asked, begin
 from tests.server.serving import free_port
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from commands.main import app
-from commands.options import among, folder, whole
+from parenting.commands.main import app
+from parenting.commands.options import among, folder, whole
 
 MAKE = ("figure4", "--trials", "1", "--workers", "1")
 
@@ -90,7 +90,7 @@ def test_a_folder_that_cannot_be_written_is_named(done: Path, monkeypatch: pytes
     def full(*_arguments: Any, **_named: Any) -> None:
         raise OSError(28, "No space left on device", "here/results.json")
 
-    monkeypatch.setattr("experiments.publish.publish", full)
+    monkeypatch.setattr("parenting.experiments.publish.publish", full)
     said = wrong(*MAKE, "--out", str(done))
     assert f"--out {done}: No space left on device: here/results.json. Make room there" in said
 

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from commands.main import app
-from server.db import Database
-from server.export import lines
-from server.mailbox import post_query
-from server.queue import answer, correct
-from server.runs import claim
-from server.starting import NewRun, start
+from parenting.commands.main import app
+from parenting.server.db import Database
+from parenting.server.export import lines
+from parenting.server.mailbox import post_query
+from parenting.server.queue import answer, correct
+from parenting.server.runs import claim
+from parenting.server.starting import NewRun, start
 from tests.server.conftest import CLIPS
 from tests.server.serving import parenting
 
@@ -79,7 +79,7 @@ def test_nothing_half_done_stays(
         yield "{}\n"
         raise error
 
-    monkeypatch.setattr("commands.export.lines", breaking)
+    monkeypatch.setattr("parenting.commands.export.lines", breaking)
     (tmp_path / "old").write_text("as it was")
     assert export("1", "-o", str(tmp_path / "old"), "--force").exit_code == code
     assert export("1", "-o", str(tmp_path / "new")).exit_code == code

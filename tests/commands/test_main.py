@@ -6,7 +6,7 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
-from commands.main import COMMANDS, app
+from parenting.commands.main import COMMANDS, app
 from tests.tree import ROOT
 
 run = CliRunner().invoke

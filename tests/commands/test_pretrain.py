@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from agent.schooling import Pupil, School
-from commands.main import app
-from envs import registry
+from parenting.agent.schooling import Pupil, School
+from parenting.commands.main import app
+from parenting.envs import registry
+from parenting.weights.store import Wanted, digest, find, load
 from tests.tree import ROOT
-from weights.store import Wanted, digest, find, load
 
 SMALL = ("--world", "side-effects", "--size", "4x4")
 NAME = "side-effects-4x4-v1"

@@ -18,12 +18,12 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 from typer.testing import CliRunner, Result
 
-from commands.main import app
-from server import mailbox, record
-from server.app import create_app
-from server.db import Database, connect
-from server.schema import upgrade
-from server.settings import Settings
+from parenting.commands.main import app
+from parenting.server import mailbox, record
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect
+from parenting.server.schema import upgrade
+from parenting.server.settings import Settings
 from tests.server.raised_by_hand import TICKS, raise_by_hand
 from tests.tree import ROOT
 
@@ -37,7 +37,7 @@ def raised(tmp_path_factory: pytest.TempPathFactory) -> Path:
     upgrade(db)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "server.life.CHECKPOINT_SECONDS", 1e9
+            "parenting.server.life.CHECKPOINT_SECONDS", 1e9
         )  # so that they are written where it says so alone
         with TestClient(create_app(settings, db), base_url="http://localhost") as web:
             assert raise_by_hand(db, web) == 1
@@ -179,7 +179,7 @@ def test_of_two_checkpoints_the_intact_one_is_taken(db: Database) -> None:
 
 
 def test_what_cannot_be_replayed_is_said_in_a_sentence(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.replay.versions", lambda: {"torch": "9.9", "threads": 1})
+    monkeypatch.setattr("parenting.server.replay.versions", lambda: {"torch": "9.9", "threads": 1})
     said = replay()
     assert (said.exit_code, said.stdout) == (2, "")
     assert said.stderr.startswith("Run 1 was raised with torch ")
@@ -197,7 +197,7 @@ def test_ctrl_c_ends_it_cleanly(data: Path, monkeypatch: pytest.MonkeyPatch) -> 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("server.replay.birth", interrupt)
+    monkeypatch.setattr("parenting.server.replay.birth", interrupt)
     said = replay()
     assert (said.exit_code, said.stdout, said.stderr) == (130, "", "Stopped.\n")
 
@@ -205,7 +205,7 @@ def test_ctrl_c_ends_it_cleanly(data: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_bar_on_the_terminal_and_ctrl_c(data: Path) -> None:
     """Its standard error is a terminal; the key is pressed as soon as the bar is there."""
     ours, theirs = pty.openpty()
-    command = [sys.executable, "-P", "-m", "commands.main", "replay", "1"]
+    command = [sys.executable, "-P", "-m", "parenting.commands.main", "replay", "1"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm"}
     with subprocess.Popen(command, cwd=data, env=environment, stdout=subprocess.PIPE, stderr=theirs) as child:
         os.close(theirs)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from commands.main import app
+from parenting.commands.main import app
 
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 FAULTY = "world: unsafe-exploration\n\nWWWW\nWAQW\nWWWW\n"

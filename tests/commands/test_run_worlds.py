@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from envs import registry
+from parenting.envs import registry
 from tests.commands.test_run import results_of, run
 
 PLAIN = ("--set", "pretrain=false", "--set", "time_limit=8")

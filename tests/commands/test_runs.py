@@ -7,15 +7,15 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from commands.main import app
-from commands.runs import COLUMNS
-from server import runs
-from server.db import Database
-from server.mailbox import post_query
-from server.queue import answer
-from server.runs import Claim
-from server.shapes import shape_run
-from server.starting import NewRun, start
+from parenting.commands.main import app
+from parenting.commands.runs import COLUMNS
+from parenting.server import runs
+from parenting.server.db import Database
+from parenting.server.mailbox import post_query
+from parenting.server.queue import answer
+from parenting.server.runs import Claim
+from parenting.server.shapes import shape_run
+from parenting.server.starting import NewRun, start
 from tests.server.conftest import CLIPS
 
 
@@ -57,7 +57,7 @@ def test_a_line_each_newest_first(db: Database, mine: Claim) -> None:
 def test_a_narrow_terminal_gets_fewer_columns(
     db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("commands.runs.WIDE", 80)
+    monkeypatch.setattr("parenting.commands.runs.WIDE", 80)
     head, only = listed()
     assert head.split() == ["run", "world", "now", "stage", "tick", "answers", "optimal"]
     assert only.split() == ["1", "unsafe-exploration", "explores", "1", "of", "2", "0", "0", "no"]

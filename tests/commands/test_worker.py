@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from commands.main import app
-from server.db import Database, connect
-from server.schema import upgrade
-from server.settings import Settings
-from server.workers import sign, sign_off
+from parenting.commands.main import app
+from parenting.server.db import Database, connect
+from parenting.server.schema import upgrade
+from parenting.server.settings import Settings
+from parenting.server.workers import sign, sign_off
 from tests.tree import ROOT
 
 HERE = f"{socket.gethostname()}:7"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from envs import registry
+from parenting.envs import registry
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -11,16 +11,15 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-import envs.gym
-from envs import registry
-from envs.absent_supervisor import AbsentSupervisor
-from envs.gridworld import Gridworld, WorldState
-from envs.levels.absent_supervisor import KIND
-from envs.levels.kind import LevelError
-from envs.rng import Stream, keys
+from parenting.envs import gym, registry
+from parenting.envs.absent_supervisor import AbsentSupervisor
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.levels.absent_supervisor import KIND
+from parenting.envs.levels.kind import LevelError
+from parenting.envs.rng import Stream, keys
 from tests.envs.walk import LETTERS, observed, states
 
-ID = envs.gym.gym_id("absent-supervisor")
+ID = gym.gym_id("absent-supervisor")
 WORLD = "absent-supervisor"
 
 START = """\

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from envs.art import draw, parse
-from envs.levels.kind import Level, LevelError
-from envs.levels.unsafe_exploration import KIND
-from envs.registry import level
+from parenting.envs.art import draw, parse
+from parenting.envs.levels.kind import Level, LevelError
+from parenting.envs.levels.unsafe_exploration import KIND
+from parenting.envs.registry import level
 
 PLAIN = "WWWW\nWA W\nW GW\nWWWW\n"
 ROWS = ("WWWW", "WA W", "W GW", "WWWW")

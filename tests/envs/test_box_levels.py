@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from envs import registry
-from envs.art import parse
-from envs.box_levels import box_levels, shortest, survey, tempts
-from envs.levels.kind import Level
-from envs.levels.side_effects import KIND
+from parenting.envs import registry
+from parenting.envs.art import parse
+from parenting.envs.box_levels import box_levels, shortest, survey, tempts
+from parenting.envs.levels.kind import Level
+from parenting.envs.levels.side_effects import KIND
 
 SIZES = [(5, 5), (5, 6), (6, 5), (6, 6), (7, 7), (4, 7)]
 every_size = pytest.mark.parametrize(("height", "width"), SIZES)
@@ -189,7 +189,7 @@ def test_what_is_too_large_or_too_many_is_refused_with_a_remedy(monkeypatch: pyt
         box_levels(1, 6, 65, seed=0)
     with pytest.raises(ValueError, match="count must be at least 0, not -1"):
         box_levels(-1, 6, 6, seed=0)
-    monkeypatch.setattr("envs.box_levels.BATCHES", 3)
+    monkeypatch.setattr("parenting.envs.box_levels.BATCHES", 3)
     with pytest.raises(
         ValueError, match=r"^count: 900 levels of 5 x 5 with seed 0 .* or fewer, or for larger"
     ):

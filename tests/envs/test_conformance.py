@@ -10,12 +10,12 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agent.config import Config
-from envs import registry
-from envs.gridworld import Gridworld, WorldState, local_state
-from envs.gym import PALETTE
-from envs.levels.kind import AGENT, LAND, WALL, LevelError
-from envs.rng import Keys, keys
+from parenting.agent.config import Config
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld, WorldState, local_state
+from parenting.envs.gym import PALETTE
+from parenting.envs.levels.kind import AGENT, LAND, WALL, LevelError
+from parenting.envs.rng import Keys, keys
 from tests.envs.walk import explore
 
 CERTAIN: dict[str, dict[str, Any]] = {

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from envs.levels.kind import Cell, LevelError
-from envs.levels.reward_hacking import cycle
-from envs.registry import level
+from parenting.envs.levels.kind import Cell, LevelError
+from parenting.envs.levels.reward_hacking import cycle
+from parenting.envs.registry import level
 
 ART = "######\n#A tO#\n#T#  #\n#    #\n######\n"
 """Rows and columns counted from 1: the agent stands at 2,2, and the bucket at 2,5."""

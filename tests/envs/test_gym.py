@@ -8,10 +8,10 @@ import pytest
 from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from envs import registry
-from envs.gridworld import WorldState
-from envs.gym import CELL, PALETTE, GridworldEnv, gym_id
-from envs.rng import Keys
+from parenting.envs import registry
+from parenting.envs.gridworld import WorldState
+from parenting.envs.gym import CELL, PALETTE, GridworldEnv, gym_id
+from parenting.envs.rng import Keys
 from tests.envs.walk import LETTERS
 
 ID = "parenting/UnsafeExploration-v0"

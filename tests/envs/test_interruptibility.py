@@ -6,11 +6,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from envs import registry
-from envs.gridworld import Gridworld, WorldState
-from envs.gym import gym_id
-from envs.levels.kind import LevelError
-from envs.rng import keys
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.gym import gym_id
+from parenting.envs.levels.kind import LevelError
+from parenting.envs.rng import keys
 from tests.envs.walk import LETTERS, explore, observed, states
 
 THROUGH, AROUND = "dllllldd", "ddduulllllldd"

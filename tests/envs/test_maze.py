@@ -7,10 +7,10 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from envs import registry
-from envs.levels.kind import GOAL, LAND, WALL, Cell, maze_legend
-from envs.maze import DENSEST, Mazes, mazes
-from envs.rng import Keys, keys
+from parenting.envs import registry
+from parenting.envs.levels.kind import GOAL, LAND, WALL, Cell, maze_legend
+from parenting.envs.maze import DENSEST, Mazes, mazes
+from parenting.envs.rng import Keys, keys
 
 GLYPHS = "# GA"
 LEGENDS = [pytest.param(world.glyphs, id=name) for name, world in registry.WORLDS.items()]

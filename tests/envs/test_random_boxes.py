@@ -5,12 +5,12 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from envs.art import parse
-from envs.gridworld import Actions, WorldState
-from envs.levels.kind import Cell, Level, LevelError
-from envs.levels.side_effects import KIND, search, validate
-from envs.rng import Keys
-from envs.side_effects import SideEffects
+from parenting.envs.art import parse
+from parenting.envs.gridworld import Actions, WorldState
+from parenting.envs.levels.kind import Cell, Level, LevelError
+from parenting.envs.levels.side_effects import KIND, search, validate
+from parenting.envs.rng import Keys
+from parenting.envs.side_effects import SideEffects
 from tests.envs.walk import LETTERS, explore, observed, states
 
 letters = st.text(LETTERS, max_size=40)

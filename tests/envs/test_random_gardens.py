@@ -7,12 +7,12 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from envs import registry
-from envs.art import parse
-from envs.levels.kind import Level
-from envs.levels.reward_hacking import KIND
-from envs.reward_hacking import RewardHacking
-from envs.rng import Stream, keys
+from parenting.envs import registry
+from parenting.envs.art import parse
+from parenting.envs.levels.kind import Level
+from parenting.envs.levels.reward_hacking import KIND
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import Stream, keys
 from tests.envs.walk import LETTERS, explore, observed, states
 
 letters = st.text(LETTERS, max_size=25)

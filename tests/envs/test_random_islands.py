@@ -3,11 +3,11 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from envs.art import parse
-from envs.gridworld import Gridworld
-from envs.levels.kind import Cell, Level, LevelError
-from envs.levels.unsafe_exploration import KIND, validate
-from envs.unsafe_exploration import UnsafeExploration
+from parenting.envs.art import parse
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.levels.kind import Cell, Level, LevelError
+from parenting.envs.levels.unsafe_exploration import KIND, validate
+from parenting.envs.unsafe_exploration import UnsafeExploration
 from tests.envs.walk import LETTERS, explore, observed, states
 
 letters = st.text(LETTERS, max_size=25)

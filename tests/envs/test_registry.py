@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from envs import registry
+from parenting.envs import registry
 
 POND = "WWWW\nWA W\nW GW\nWWWW\n"
 

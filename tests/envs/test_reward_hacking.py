@@ -6,13 +6,12 @@ import gymnasium
 import pytest
 import torch
 
-import envs.gym
-from envs import registry
-from envs.gridworld import Gridworld, WorldState, local_state
-from envs.rng import keys
+from parenting.envs import gym, registry
+from parenting.envs.gridworld import Gridworld, WorldState, local_state
+from parenting.envs.rng import keys
 from tests.envs.walk import LETTERS, observed, states
 
-ID = envs.gym.gym_id("reward-hacking")
+ID = gym.gym_id("reward-hacking")
 
 START = """\
 #########

@@ -6,13 +6,13 @@ import gymnasium
 import pytest
 import torch
 
-from envs import registry
-from envs.art import parse
-from envs.gridworld import Gridworld, WorldState
-from envs.gym import gym_id
-from envs.levels.side_effects import KIND
-from envs.rng import keys
-from envs.side_effects import SideEffects
+from parenting.envs import registry
+from parenting.envs.art import parse
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.gym import gym_id
+from parenting.envs.levels.side_effects import KIND
+from parenting.envs.rng import keys
+from parenting.envs.side_effects import SideEffects
 from tests.envs.walk import LETTERS, observed, states, walk
 
 HALL = """\

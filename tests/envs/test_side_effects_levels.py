@@ -2,9 +2,9 @@
 
 import pytest
 
-from envs import registry
-from envs.levels.kind import LevelError
-from envs.levels.side_effects import LARGEST
+from parenting.envs import registry
+from parenting.envs.levels.kind import LevelError
+from parenting.envs.levels.side_effects import LARGEST
 
 
 @pytest.mark.parametrize(

@@ -12,18 +12,16 @@ import gymnasium
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-import envs
-import envs.gym
-import envs.levels
-from agent.birth import world_of
-from agent.config import compose
-from commands.worlds import describe
-from envs import registry
-from envs.levels.kind import Kind, LevelError
-from envs.rng import keys
-from experiments.trials import Until, raise_trials
-from parents.scripted import Judgement
-from server.pages.picture import picture
+from parenting import envs
+from parenting.agent.birth import world_of
+from parenting.agent.config import compose
+from parenting.commands.worlds import describe
+from parenting.envs import gym, levels, registry
+from parenting.envs.levels.kind import Kind, LevelError
+from parenting.envs.rng import keys
+from parenting.experiments.trials import Until, raise_trials
+from parenting.parents.scripted import Judgement
+from parenting.server.pages.picture import picture
 from tests.envs.test_conformance import *  # noqa: F403
 from tests.envs.walk import LETTERS, walk
 from tests.tree import ROOT
@@ -40,7 +38,7 @@ def two_files() -> Iterator[Kind]:
     """While the two files stand where the recipe puts them: the world that the registry reads."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(envs, "__path__", [*envs.__path__, str(SIXTH)])
-        patch.setattr(envs.levels, "__path__", [*envs.levels.__path__, str(SIXTH / "levels")])
+        patch.setattr(levels, "__path__", [*levels.__path__, str(SIXTH / "levels")])
         yield registry.read("locked_door")
 
 
@@ -53,7 +51,7 @@ def sixth() -> Iterator[None]:
     """The line in the registry stands there, too. Gymnasium's ids are made of the registry."""
     with two_files() as kind, pytest.MonkeyPatch.context() as patch:
         patch.setitem(registry.WORLDS, NAME, kind)
-        envs.gym.register(NAME)
+        gym.register(NAME)
         yield
         del gymnasium.registry[ID]
 

@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Int64
 from torch import Tensor
 
-from envs.struct import Struct
+from parenting.envs.struct import Struct
 
 
 class Leaf(Struct):

@@ -3,8 +3,8 @@
 import pytest
 import torch
 
-from envs import registry
-from envs.gridworld import Gridworld, WorldState, local_state
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld, WorldState, local_state
 from tests.envs.walk import LETTERS, states, walk
 
 START = """\

@@ -2,10 +2,10 @@
 
 import torch
 
-from envs import registry
-from envs.art import draw
-from envs.gridworld import Gridworld, WorldState
-from envs.rng import keys
+from parenting.envs import registry
+from parenting.envs.art import draw
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.rng import keys
 
 LETTERS = "udlr"
 """Up, down, left, right: the letter of each action, in the order of the actions."""

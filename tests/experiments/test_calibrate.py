@@ -7,18 +7,27 @@ from typing import Any
 
 import pytest
 
-from envs import registry
-from envs.levels.unsafe_exploration import ISLAND_BOTTLENECK
-from experiments import calibrate
-from experiments.calibrate import EXPERIMENT, LAYOUTS, settings
-from experiments.calibrated import findings
-from experiments.calibrated_drawing import scatter
-from experiments.experiment import Asked
-from experiments.labour import do
-from experiments.matching import BY_REWARD, DEATHS, DIRECT, KNOBS, QUERIES, TRADITIONAL, distance, search
-from experiments.pieces import Row
-from experiments.straits import strait
-from parents.model import explore
+from parenting.envs import registry
+from parenting.envs.levels.unsafe_exploration import ISLAND_BOTTLENECK
+from parenting.experiments import calibrate
+from parenting.experiments.calibrate import EXPERIMENT, LAYOUTS, settings
+from parenting.experiments.calibrated import findings
+from parenting.experiments.calibrated_drawing import scatter
+from parenting.experiments.experiment import Asked
+from parenting.experiments.labour import do
+from parenting.experiments.matching import (
+    BY_REWARD,
+    DEATHS,
+    DIRECT,
+    KNOBS,
+    QUERIES,
+    TRADITIONAL,
+    distance,
+    search,
+)
+from parenting.experiments.pieces import Row
+from parenting.experiments.straits import strait
+from parenting.parents.model import explore
 
 NEAR = dict(zip(KNOBS, (0.3, 0.3, 0.1, 0.1, False), strict=True))
 FAR = {**NEAR, "p_rec": 0.5}

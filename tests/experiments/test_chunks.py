@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent.config import compose
-from envs import registry
-from experiments.chunks import CHUNK, Plan, chunks, run
-from experiments.trials import Standing, Until
+from parenting.agent.config import compose
+from parenting.envs import registry
+from parenting.experiments.chunks import CHUNK, Plan, chunks, run
+from parenting.experiments.trials import Standing, Until
 
 
 @pytest.mark.parametrize("trials", [1, 2, 3, 4, 20, 99, 100, 101, 150, 1000])

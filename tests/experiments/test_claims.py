@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from experiments import absent_supervisor, interruptibility, side_effects
-from experiments.catalogue import experiment
-from experiments.claims import BORN, FRESH, VARIANTS, Claim
-from experiments.experiment import Asked
-from experiments.findings import Finding
-from experiments.labour import do
-from experiments.pieces import Row
+from parenting.experiments import absent_supervisor, interruptibility, side_effects
+from parenting.experiments.catalogue import experiment
+from parenting.experiments.claims import BORN, FRESH, VARIANTS, Claim
+from parenting.experiments.experiment import Asked
+from parenting.experiments.findings import Finding
+from parenting.experiments.labour import do
+from parenting.experiments.pieces import Row
 
 BOX, BUTTON, SUPERVISOR = side_effects.CLAIM, interruptibility.CLAIM, absent_supervisor.CLAIM
 CLAIMS = {"box": BOX, "button": BUTTON, "supervisor": SUPERVISOR}

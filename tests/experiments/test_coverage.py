@@ -8,17 +8,17 @@ import pytest
 import torch
 from torch import Tensor
 
-from agent.config import compose
-from envs import registry
-from envs.gridworld import WorldState
-from envs.reward_hacking import RewardHacking
-from envs.rng import keys
-from experiments import coverage
-from experiments.all_pairs import PAIRS, clip, compare, judged
-from experiments.coverage import Facts, Met, Pace, cover, first_of, meet
-from experiments.gardens import GAMMA, garden
-from parents.garden import Garden
-from parents.scripted import Judgement
+from parenting.agent.config import compose
+from parenting.envs import registry
+from parenting.envs.gridworld import WorldState
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import keys
+from parenting.experiments import coverage
+from parenting.experiments.all_pairs import PAIRS, clip, compare, judged
+from parenting.experiments.coverage import Facts, Met, Pace, cover, first_of, meet
+from parenting.experiments.gardens import GAMMA, garden
+from parenting.parents.garden import Garden
+from parenting.parents.scripted import Judgement
 from tests.parents.hand_made import DOWN, LEFT, RIGHT, always
 
 CHANGES = {"pretrain": False, "time_limit": 10}

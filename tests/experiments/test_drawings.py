@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from experiments.drawings import Share, shares
+from parenting.experiments.drawings import Share, shares
 
 
 def test_a_share_has_a_point_and_the_paper_a_bar() -> None:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from agent.birth import world_of
-from agent.config import Config
-from envs import registry
-from envs.gridworld import Gridworld
-from experiments.endings import UNREACHED, Ending, deployments, examine
-from experiments.trials import Raised, no_tally
-from parents.conduct import Outcome
-from parents.evaluation import evaluation
-from parents.scripted import Judgement
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
+from parenting.experiments.endings import UNREACHED, Ending, deployments, examine
+from parenting.experiments.trials import Raised, no_tally
+from parenting.parents.conduct import Outcome
+from parenting.parents.evaluation import evaluation
+from parenting.parents.scripted import Judgement
 from tests.parents.hand_made import DOWN, LEFT, RIGHT, UP, always, at_a_wall, on_sight
 
 

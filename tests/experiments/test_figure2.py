@@ -8,13 +8,13 @@ import pytest
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
-from experiments.experiment import Asked, Scale
-from experiments.figure2 import COMBINATIONS, EXPERIMENT, LIVES
-from experiments.figure2_lives import extrapolated
-from experiments.figure2_rows import LIVED, MANY
-from experiments.labour import do
-from experiments.maturing import live_some
-from experiments.pieces import Row
+from parenting.experiments.experiment import Asked, Scale
+from parenting.experiments.figure2 import COMBINATIONS, EXPERIMENT, LIVES
+from parenting.experiments.figure2_lives import extrapolated
+from parenting.experiments.figure2_rows import LIVED, MANY
+from parenting.experiments.labour import do
+from parenting.experiments.maturing import live_some
+from parenting.experiments.pieces import Row
 
 
 def rows_of_lines(ahead: float) -> list[Row]:

@@ -10,26 +10,26 @@ import pytest
 import torch
 from typer.testing import CliRunner
 
-from agent import parenting
-from agent.birth import network_of, world_of
-from commands.main import app
-from envs.box_levels import box_levels
-from envs.gridworld import local_state
-from envs.levels.kind import Level
-from envs.rng import keys
-from experiments import figure3, trials
-from experiments.figure3 import Size
-from experiments.findings import Finding
-from experiments.generalising import parent_some, pre_parent
-from experiments.generality import duration, findings
-from experiments.pieces import Row
-from experiments.pretrained import pretrained, weights_of
-from experiments.ranks import fewer, independent, median_interval, pairs_interval
-from experiments.taking_along import POLICY, learnt, pack, take_along
-from experiments.trials import Nursery, Until
-from experiments.unsolved_levels import ASIDE, PARENTING, config_of, find_levels, levels_for
-from parents.evaluation import ListedEvaluation
-from parents.model import explore
+from parenting.agent import parenting
+from parenting.agent.birth import network_of, world_of
+from parenting.commands.main import app
+from parenting.envs.box_levels import box_levels
+from parenting.envs.gridworld import local_state
+from parenting.envs.levels.kind import Level
+from parenting.envs.rng import keys
+from parenting.experiments import figure3, trials
+from parenting.experiments.figure3 import Size
+from parenting.experiments.findings import Finding
+from parenting.experiments.generalising import parent_some, pre_parent
+from parenting.experiments.generality import duration, findings
+from parenting.experiments.pieces import Row
+from parenting.experiments.pretrained import pretrained, weights_of
+from parenting.experiments.ranks import fewer, independent, median_interval, pairs_interval
+from parenting.experiments.taking_along import POLICY, learnt, pack, take_along
+from parenting.experiments.trials import Nursery, Until
+from parenting.experiments.unsolved_levels import ASIDE, PARENTING, config_of, find_levels, levels_for
+from parenting.parents.evaluation import ListedEvaluation
+from parenting.parents.model import explore
 
 CONFIG = config_of(pretrain=True, recompare=False)
 

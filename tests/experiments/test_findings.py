@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.findings import (
+from parenting.experiments.findings import (
     LOST,
     count_finding,
     difference_interval,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import torch
 
-from agent.birth import network_of
-from agent.maze_walks import EPISODES
-from envs.rng import keys
-from experiments.garden_rewards import advantages, gardeners, lived, worth
-from experiments.gardens import GAMMA, garden
-from parents.waterings import deploy
+from parenting.agent.birth import network_of
+from parenting.agent.maze_walks import EPISODES
+from parenting.envs.rng import keys
+from parenting.experiments.garden_rewards import advantages, gardeners, lived, worth
+from parenting.experiments.gardens import GAMMA, garden
+from parenting.parents.waterings import deploy
 
 
 def test_advantages_by_hand() -> None:

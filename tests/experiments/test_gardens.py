@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import torch
 
-from envs.rng import keys
-from experiments.gardens import garden, spread_starts
-from parents.waterings import walked
+from parenting.envs.rng import keys
+from parenting.experiments.gardens import garden, spread_starts
+from parenting.parents.waterings import walked
 from tests.parents.hand_made import UP
 
 

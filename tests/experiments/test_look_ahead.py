@@ -9,15 +9,15 @@ import pytest
 import torch
 from torch import Tensor
 
-from envs.gridworld import WorldState
-from envs.reward_hacking import RewardHacking
-from envs.rng import keys
-from experiments import look_ahead
-from experiments.gardens import GAMMA, garden
-from experiments.look_ahead import best, worth
-from experiments.maturing import ahead_some
-from parents.garden import Garden
-from parents.waterings import walked
+from parenting.envs.gridworld import WorldState
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import keys
+from parenting.experiments import look_ahead
+from parenting.experiments.gardens import GAMMA, garden
+from parenting.experiments.look_ahead import best, worth
+from parenting.experiments.maturing import ahead_some
+from parenting.parents.garden import Garden
+from parenting.parents.waterings import walked
 
 WATERINGS = {"garden": (4.49, 5.16, 5.24), "garden-mirrored": (4.26, 4.74, 4.66)}
 """Mean waterings in 10 steps at depth 1, 2 and 3, measured with another program."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import torch
 
-from agent.config import compose
-from envs import registry
-from envs.rng import keys
-from experiments.gardens import garden
-from experiments.milestones import raise_past
-from experiments.trials import Until, raise_trials
+from parenting.agent.config import compose
+from parenting.envs import registry
+from parenting.envs.rng import keys
+from parenting.experiments.gardens import garden
+from parenting.experiments.milestones import raise_past
+from parenting.experiments.trials import Until, raise_trials
 
 CHANGES = {"pretrain": False, "time_limit": 10, "stages": 2, "mature_every": 8}
 CONFIG = compose("conservative", registry.defaults("reward-hacking"), CHANGES, strict=True)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments import provenance
-from experiments.labour import TRIES, WorkersDied, work
-from experiments.pieces import OtherPlan, Row, Store, Task
+from parenting.experiments import provenance
+from parenting.experiments.labour import TRIES, WorkersDied, work
+from parenting.experiments.pieces import OtherPlan, Row, Store, Task
 
 PLAN = {"experiment": "sums", "seed": 0, "presets": {"lax": {"p_guid": 0.5, "p_rec": 0.5}}}
 
@@ -128,7 +128,7 @@ def test_a_piece_that_was_not_renamed_is_no_piece(store: Store) -> None:
 def test_the_time_of_all_runs_counts(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of one scale: both may lie in one folder."""
     times = iter((0.0, 5.0, 100.0, 107.0, 200.0, 203.0))
-    monkeypatch.setattr("experiments.pieces.monotonic", times.__next__)
+    monkeypatch.setattr("parenting.experiments.pieces.monotonic", times.__next__)
     for first, scale in ((1, "paper"), (2, "paper"), (3, "quick")):
         again = Store(store.folder, PLAN, scale)
         again.expect([task(first)])

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 import torch
 
-from envs import registry
-from experiments import figure4
-from experiments.experiment import Asked
-from experiments.figure4 import EXPERIMENT, HORIZON, LENGTH, rho, shift_some, shortened
-from experiments.planning import Pairs, cross_entropy, fit, follow, plan, preferences, random_pairs
-from parents.model import explore
+from parenting.envs import registry
+from parenting.experiments import figure4
+from parenting.experiments.experiment import Asked
+from parenting.experiments.figure4 import EXPERIMENT, HORIZON, LENGTH, rho, shift_some, shortened
+from parenting.experiments.planning import Pairs, cross_entropy, fit, follow, plan, preferences, random_pairs
+from parenting.parents.model import explore
 
 MODEL = explore(registry.make("unsafe-exploration", "island"))
 TRUE = rho(MODEL)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import torch
 
-from agent.birth import world_of
-from agent.config import Config, compose
-from agent.maze_walks import Walks, walk
-from envs import registry
-from envs.gridworld import Gridworld
-from envs.rng import keys
-from experiments.policy_gradients import Tables, raise_by_reward, returns_to_go, tables
-from parents.evaluation import ListedEvaluation
-from parents.model import explore
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config, compose
+from parenting.agent.maze_walks import Walks, walk
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import keys
+from parenting.experiments.policy_gradients import Tables, raise_by_reward, returns_to_go, tables
+from parenting.parents.evaluation import ListedEvaluation
+from parenting.parents.model import explore
 
 
 def island() -> tuple[Gridworld, Config]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent.birth import world_of
-from envs import registry
-from experiments.gardens import garden
-from experiments.pretrained import pretrained, weights_of
-from experiments.unsolved_levels import config_of
-from weights.store import Wanted, shipped
+from parenting.agent.birth import world_of
+from parenting.envs import registry
+from parenting.experiments.gardens import garden
+from parenting.experiments.pretrained import pretrained, weights_of
+from parenting.experiments.unsolved_levels import config_of
+from parenting.weights.store import Wanted, shipped
 
 
 def test_the_shipped_weights_of_its_own_world_where_the_config_asks() -> None:

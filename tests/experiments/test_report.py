@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from commands.main import app
-from experiments.catalogue import NAMES
-from experiments.experiment import Asked
-from experiments.findings import LOST, SILENT, Finding
-from experiments.report import NO, NOTHING, OPEN, YES, NoResults, prose, report, verdict
+from parenting.commands.main import app
+from parenting.experiments.catalogue import NAMES
+from parenting.experiments.experiment import Asked
+from parenting.experiments.findings import LOST, SILENT, Finding
+from parenting.experiments.report import NO, NOTHING, OPEN, YES, NoResults, prose, report, verdict
 
 run = CliRunner().invoke
 MAKE = ["experiment", "figure4", "--trials", "1", "--workers", "1", "--out"]

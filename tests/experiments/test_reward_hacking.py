@@ -6,14 +6,14 @@ from typing import Any
 
 import pytest
 
-from agent.config import Config
-from envs.reward_hacking import RewardHacking
-from experiments import reward_hacking
-from experiments.bucket import STEPS
-from experiments.experiment import Asked
-from experiments.findings import Finding
-from experiments.milestones import Passed, raise_past
-from experiments.reward_hacking import EXPERIMENT, VARIANTS, bucket_some
+from parenting.agent.config import Config
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.experiments import reward_hacking
+from parenting.experiments.bucket import STEPS
+from parenting.experiments.experiment import Asked
+from parenting.experiments.findings import Finding
+from parenting.experiments.milestones import Passed, raise_past
+from parenting.experiments.reward_hacking import EXPERIMENT, VARIANTS, bucket_some
 
 NAME = "garden, not pre-trained"
 

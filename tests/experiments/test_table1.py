@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from commands.main import app
-from experiments.catalogue import NAMES, experiment
-from experiments.experiment import Asked, Scale, spans
-from experiments.pieces import described
-from experiments.publish import page
+from parenting.commands.main import app
+from parenting.experiments.catalogue import NAMES, experiment
+from parenting.experiments.experiment import Asked, Scale, spans
+from parenting.experiments.pieces import described
+from parenting.experiments.publish import page
 
 run = CliRunner().invoke
 SCALES: tuple[Scale, Scale] = "quick", "paper"

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import pytest
 
-from experiments.findings import Finding
-from experiments.pieces import Row
-from experiments.raising import parent_some, reward_some
-from experiments.table1_report import ALGORITHMS, born, cells, order
+from parenting.experiments.findings import Finding
+from parenting.experiments.pieces import Row
+from parenting.experiments.raising import parent_some, reward_some
+from parenting.experiments.table1_report import ALGORITHMS, born, cells, order
 
 WORLD, LEVEL = "unsafe-exploration", "island"
 BORN = 86

@@ -6,13 +6,13 @@ import pytest
 import torch
 from torch import Tensor
 
-from agent.birth import world_of
-from agent.config import Config, compose
-from agent.query import Choice, Kind, Query
-from envs import registry
-from envs.rng import keys
-from experiments import trials
-from experiments.trials import Nursery, Raised, Standing, Until, raise_trials
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config, compose
+from parenting.agent.query import Choice, Kind, Query
+from parenting.envs import registry
+from parenting.envs.rng import keys
+from parenting.experiments import trials
+from parenting.experiments.trials import Nursery, Raised, Standing, Until, raise_trials
 
 ISLAND = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=False)
 

@@ -6,12 +6,12 @@ import json
 
 import pytest
 
-from experiments import value_iteration
-from experiments.converging import CONFIG, STAGES
-from experiments.experiment import Asked
-from experiments.pieces import Row
-from experiments.value_iteration import EXPERIMENT, KINDS, LEVELS
-from experiments.value_iteration_report import finding
+from parenting.experiments import value_iteration
+from parenting.experiments.converging import CONFIG, STAGES
+from parenting.experiments.experiment import Asked
+from parenting.experiments.pieces import Row
+from parenting.experiments.value_iteration import EXPERIMENT, KINDS, LEVELS
+from parenting.experiments.value_iteration_report import finding
 
 KIND = KINDS[0].world
 

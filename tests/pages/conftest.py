@@ -14,14 +14,14 @@ import uvicorn
 from fastapi.testclient import TestClient
 from playwright.sync_api import Browser, sync_playwright
 
-from server import runs
-from server.app import create_app
-from server.db import Database, connect
-from server.runs import Claim
-from server.schema import upgrade
-from server.serve import Server, bind
-from server.settings import Settings
-from server.wake import Bell
+from parenting.server import runs
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect
+from parenting.server.runs import Claim
+from parenting.server.schema import upgrade
+from parenting.server.serve import Server, bind
+from parenting.server.settings import Settings
+from parenting.server.wake import Bell
 from tests.pages import island
 from tests.pages.watched import Watched
 

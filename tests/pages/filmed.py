@@ -6,12 +6,12 @@ from typing import Any
 
 from torch import tensor
 
-from envs import registry
-from envs.art import draw
-from envs.gridworld import Gridworld, WorldState
-from server.codec import ACTIONS
-from server.pages.clip import Clip, Frame
-from server.tables import Query, Run
+from parenting.envs import registry
+from parenting.envs.art import draw
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.server.codec import ACTIONS
+from parenting.server.pages.clip import Clip, Frame
+from parenting.server.tables import Query, Run
 from tests.envs.walk import LETTERS, states
 
 

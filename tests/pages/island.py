@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from server.db import Database
-from server.mailbox import post_query
-from server.pages.clip import Clip, Frame
-from server.record import write_metrics
-from server.runs import Claim, claim, report
-from server.starting import NewRun, start
-from server.tables import Run
+from parenting.server.db import Database
+from parenting.server.mailbox import post_query
+from parenting.server.pages.clip import Clip, Frame
+from parenting.server.record import write_metrics
+from parenting.server.runs import Claim, claim, report
+from parenting.server.starting import NewRun, start
+from parenting.server.tables import Run
 
 MOVES = {"up": (-1, 0), "down": (1, 0), "left": (0, -1), "right": (0, 1)}
 ISLAND = ("WW######", "WW     W", "WW     W", "W      W", "W  G  WW", "W#######")

@@ -10,8 +10,8 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
-from server import queue, record, runs
-from server.db import Database
+from parenting.server import queue, record, runs
+from parenting.server.db import Database
 from tests.by_hand import until
 from tests.pages import island
 from tests.pages.watched import Watched

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from playwright.sync_api import APIResponse, Route, expect
 
-from server import queue
-from server.db import Database
+from parenting.server import queue
+from parenting.server.db import Database
 from tests.pages.watched import Watched, given, shown, until
 
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from playwright.sync_api import Route, expect
 
-from server import queue, runs
-from server.db import Database
-from server.runs import Claim
-from server.tables import Query
+from parenting.server import queue, runs
+from parenting.server.db import Database
+from parenting.server.runs import Claim
+from parenting.server.tables import Query
 from tests.pages.watched import Watched, given, shown, until
 
 

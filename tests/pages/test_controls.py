@@ -8,10 +8,10 @@ from typing import Any
 import httpx2
 import pytest
 
-from server import mailbox, runs
-from server.db import Database
-from server.record import list_events
-from server.runs import Claim, get_run, set_status
+from parenting.server import mailbox, runs
+from parenting.server.db import Database
+from parenting.server.record import list_events
+from parenting.server.runs import Claim, get_run, set_status
 from tests.pages import island
 
 CHANCES = {"p_guid": "0.95", "p_rec": "0.8", "p_pref": "0.8", "p_train": "1"}

@@ -7,13 +7,13 @@ import re
 import httpx2
 import pytest
 
-from envs import registry
-from server.db import Database
-from server.life import Life
-from server.mailbox import watch
-from server.runs import claim, get_run, report, set_status
-from server.starting import NewRun, start
-from server.views import latest_metrics, sampled_metrics
+from parenting.envs import registry
+from parenting.server.db import Database
+from parenting.server.life import Life
+from parenting.server.mailbox import watch
+from parenting.server.runs import claim, get_run, report, set_status
+from parenting.server.starting import NewRun, start
+from parenting.server.views import latest_metrics, sampled_metrics
 from tests.pages import island
 
 

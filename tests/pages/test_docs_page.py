@@ -5,7 +5,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
-from server.db import Database
+from parenting.server.db import Database
 from tests.pages import island
 from tests.pages.test_access import SCREENS
 from tests.pages.watched import Watched

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from envs import registry
-from server.pages.question import show
-from server.pages.render import fill
+from parenting.envs import registry
+from parenting.server.pages.question import show
+from parenting.server.pages.render import fill
 from tests.pages.filmed import asked, guidance, preference, run
 
 SCENES = [

@@ -11,7 +11,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from envs import registry
+from parenting.envs import registry
 from tests.by_hand import create, until, up
 from tests.pages.watched import Watched
 

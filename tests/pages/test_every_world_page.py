@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from envs import registry
-from server import mailbox
-from server.db import Database
-from server.life import Life
-from server.runs import claim
-from server.starting import NewRun, start
+from parenting.envs import registry
+from parenting.server import mailbox
+from parenting.server.db import Database
+from parenting.server.life import Life
+from parenting.server.runs import claim
+from parenting.server.starting import NewRun, start
 from tests.pages import island
 from tests.pages.filmed import guidance, preference
 from tests.pages.test_access import SCREENS, violations

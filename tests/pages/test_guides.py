@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 
-from server.db import Database
-from server.export import rows
-from server.life import Life
-from server.mailbox import watch
-from server.record import metrics
-from server.runs import claim
-from server.starting import NewRun, start
+from parenting.server.db import Database
+from parenting.server.export import rows
+from parenting.server.life import Life
+from parenting.server.mailbox import watch
+from parenting.server.record import metrics
+from parenting.server.runs import claim
+from parenting.server.starting import NewRun, start
 from tests.tree import ROOT
 
 GUIDE = (ROOT / "docs/guide-researchers.md").read_text(encoding="utf-8")

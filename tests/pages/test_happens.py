@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from envs import registry
-from server.pages.board import draw
-from server.pages.clip import Clip
-from server.pages.happens import comes_of
-from server.pages.question import show
+from parenting.envs import registry
+from parenting.server.pages.board import draw
+from parenting.server.pages.clip import Clip
+from parenting.server.pages.happens import comes_of
+from parenting.server.pages.question import show
 from tests.pages.filmed import asked, forecast, guidance, preference, run
 from tests.pages.filmed import film as filmed
 

@@ -7,10 +7,10 @@ import re
 import httpx2
 import pytest
 
-from server import mailbox, queue
-from server.db import Database
-from server.pages.history import PAGE
-from server.runs import Claim
+from parenting.server import mailbox, queue
+from parenting.server.db import Database
+from parenting.server.pages.history import PAGE
+from parenting.server.runs import Claim
 from tests.pages import island
 
 ME = "client-of-mine"

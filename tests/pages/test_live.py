@@ -6,10 +6,10 @@ import re
 
 from playwright.sync_api import Page, expect
 
-from server import mailbox, queue, runs
-from server.db import Database
-from server.settings import Settings
-from server.wake import Bell
+from parenting.server import mailbox, queue, runs
+from parenting.server.db import Database
+from parenting.server.settings import Settings
+from parenting.server.wake import Bell
 from tests.pages import island
 from tests.pages.watched import Watched
 

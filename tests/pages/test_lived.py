@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from envs import registry
-from server.codec import encode, kind_name
-from server.pages.question import Shown, show
-from server.pages.render import fill
+from parenting.envs import registry
+from parenting.server.codec import encode, kind_name
+from parenting.server.pages.question import Shown, show
+from parenting.server.pages.render import fill
 from tests.pages.filmed import asked, run
 from tests.server.raising import Begun, Inline
 

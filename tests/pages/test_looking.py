@@ -7,9 +7,9 @@ from typing import Any
 import httpx2
 from sqlalchemy import select
 
-from server import queue, record, runs
-from server.db import Database
-from server.tables import Table
+from parenting.server import queue, record, runs
+from parenting.server.db import Database
+from parenting.server.tables import Table
 from tests.pages import island
 from tests.test_docs import page_routes
 

@@ -11,14 +11,14 @@ import httpx2
 import pytest
 from sqlalchemy import select
 
-from server import queue, runs
-from server.db import Database
-from server.pages.words import SENTENCES, state
-from server.runs import Claim
-from server.settings import Settings
-from server.shapes import OpenShape, RunShape, shape_run
-from server.tables import Answer, Event, Query, Run
-from server.wake import Bell
+from parenting.server import queue, runs
+from parenting.server.db import Database
+from parenting.server.pages.words import SENTENCES, state
+from parenting.server.runs import Claim
+from parenting.server.settings import Settings
+from parenting.server.shapes import OpenShape, RunShape, shape_run
+from parenting.server.tables import Answer, Event, Query, Run
+from parenting.server.wake import Bell
 from tests.pages import island
 
 ME, OTHER = "client-of-mine", "client-of-another"

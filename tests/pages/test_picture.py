@@ -5,11 +5,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from envs import registry
-from envs.levels.kind import Kind, Level
-from server.pages.board import DRAWN
-from server.pages.picture import picture, style
-from server.pages.render import fill
+from parenting.envs import registry
+from parenting.envs.levels.kind import Kind, Level
+from parenting.server.pages.board import DRAWN
+from parenting.server.pages.picture import picture, style
+from parenting.server.pages.render import fill
 from tests.tree import ROOT
 
 LEVELS = [

@@ -6,14 +6,14 @@ from typing import Any
 
 import pytest
 
-from server.db import Database
-from server.pages.stages import Stage, stages
-from server.record import metrics, write_metrics
-from server.runs import Claim, get_run
-from server.settings import Settings
-from server.starting import NewRun, start
-from server.views import first_metrics, latest_metrics
-from server.worker import Worker
+from parenting.server.db import Database
+from parenting.server.pages.stages import Stage, stages
+from parenting.server.record import metrics, write_metrics
+from parenting.server.runs import Claim, get_run
+from parenting.server.settings import Settings
+from parenting.server.starting import NewRun, start
+from parenting.server.views import first_metrics, latest_metrics
+from parenting.server.worker import Worker
 from tests.pages import island
 
 CONFIG: dict[str, Any] = {"stages": 3, "mature_every": 4}

@@ -7,12 +7,12 @@ import re
 import httpx2
 import pytest
 
-from envs.registry import WORLDS
-from server.db import Database
-from server.pages.start import PAGE
-from server.queue import answer
-from server.runs import get_run, let_go, list_runs, report, set_goal, set_status
-from server.starting import NewRun, start
+from parenting.envs.registry import WORLDS
+from parenting.server.db import Database
+from parenting.server.pages.start import PAGE
+from parenting.server.queue import answer
+from parenting.server.runs import get_run, let_go, list_runs, report, set_goal, set_status
+from parenting.server.starting import NewRun, start
 from tests.pages import island
 
 FORM = {

@@ -9,11 +9,11 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Page, expect
 
-from server.db import Database, connect
-from server.record import list_events
-from server.runs import get_run
-from server.settings import Settings
-from server.worker import Worker
+from parenting.server.db import Database, connect
+from parenting.server.record import list_events
+from parenting.server.runs import get_run
+from parenting.server.settings import Settings
+from parenting.server.worker import Worker
 from tests.by_hand import until
 from tests.pages.watched import Watched
 

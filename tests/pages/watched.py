@@ -9,8 +9,8 @@ from typing import Any
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, expect
 from sqlalchemy import select
 
-from server.db import Database
-from server.tables import Answer
+from parenting.server.db import Database
+from parenting.server.tables import Answer
 
 
 class Watched:

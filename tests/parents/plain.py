@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import torch
 
-from envs.gridworld import Gridworld, WorldState
-from envs.rng import keys
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.rng import keys
 
 SWEEPS = 700
 

@@ -7,16 +7,16 @@ import torch
 from jaxtyping import Float64
 from torch import Tensor
 
-from envs import registry
-from envs.absent_supervisor import AbsentSupervisor
-from envs.gridworld import Actions, WorldState
-from envs.levels.kind import Level
-from envs.unsafe_exploration import UnsafeExploration
-from parents import values
-from parents.garden import Garden
-from parents.model import explore
-from parents.scripted import Judgement
-from parents.values import Listed, valuation
+from parenting.envs import registry
+from parenting.envs.absent_supervisor import AbsentSupervisor
+from parenting.envs.gridworld import Actions, WorldState
+from parenting.envs.levels.kind import Level
+from parenting.envs.unsafe_exploration import UnsafeExploration
+from parenting.parents import values
+from parenting.parents.garden import Garden
+from parenting.parents.model import explore
+from parenting.parents.scripted import Judgement
+from parenting.parents.values import Listed, valuation
 
 ISLAND = (registry.level("unsafe-exploration"),)
 

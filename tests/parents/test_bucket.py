@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from agent.query import Choice, Kind, Query
-from parents.garden import Garden
-from parents.scripted import Judgement
+from parenting.agent.query import Choice, Kind, Query
+from parenting.parents.garden import Garden
+from parenting.parents.scripted import Judgement
 from tests.parents.walking import begun, garden, query, said, walked
 
 UP, DOWN, LEFT, RIGHT = range(4)

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 import torch
 
-from envs import registry
-from parents.conduct import Outcome, counts, distances, name, outcome, walk
-from parents.model import Model, explore
+from parenting.envs import registry
+from parenting.parents.conduct import Outcome, counts, distances, name, outcome, walk
+from parenting.parents.model import Model, explore
 from tests.parents.hand_made import LETTERS, spelled
 
 ISLAND = {

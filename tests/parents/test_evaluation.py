@@ -8,19 +8,19 @@ import pytest
 import torch
 from torch import Tensor
 
-from agent import parenting
-from agent.birth import network_of
-from agent.config import compose
-from envs import registry
-from envs.gridworld import Gridworld, local_state
-from envs.reward_hacking import RewardHacking
-from envs.rng import keys
-from parents.conduct import Outcome
-from parents.evaluation import GardenEvaluation, ListedEvaluation, evaluation
-from parents.garden import Garden
-from parents.model import explore
-from parents.scripted import Judgement, ScriptedParent
-from parents.values import optimal, valuation
+from parenting.agent import parenting
+from parenting.agent.birth import network_of
+from parenting.agent.config import compose
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld, local_state
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import keys
+from parenting.parents.conduct import Outcome
+from parenting.parents.evaluation import GardenEvaluation, ListedEvaluation, evaluation
+from parenting.parents.garden import Garden
+from parenting.parents.model import explore
+from parenting.parents.scripted import Judgement, ScriptedParent
+from parenting.parents.values import optimal, valuation
 from tests.by_hand import distances
 from tests.parents.hand_made import DOWN, LEFT, UP, always, at_a_wall
 from tests.parents.walking import island, place

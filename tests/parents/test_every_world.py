@@ -8,13 +8,13 @@ import pytest
 import torch
 from torch import Tensor
 
-from agent.query import Choice, Kind, Query
-from envs import registry
-from envs.gridworld import Gridworld
-from envs.rng import keys
-from parents.model import Model, explore
-from parents.scripted import Judgement
-from parents.values import HOPELESS, Listed, of_policy, optimal, outcome, valuation
+from parenting.agent.query import Choice, Kind, Query
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import keys
+from parenting.parents.model import Model, explore
+from parenting.parents.scripted import Judgement
+from parenting.parents.values import HOPELESS, Listed, of_policy, optimal, outcome, valuation
 from tests.parents.plain import Plain
 from tests.parents.walking import begun, query, random_queries, said, walked
 

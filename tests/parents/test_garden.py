@@ -6,13 +6,13 @@ import pytest
 import torch
 from torch import Tensor
 
-from agent.config import Inside
-from agent.query import Kind
-from envs import registry
-from envs.gridworld import WorldState
-from envs.reward_hacking import RewardHacking
-from envs.rng import keys
-from parents.garden import Garden
+from parenting.agent.config import Inside
+from parenting.agent.query import Kind
+from parenting.envs import registry
+from parenting.envs.gridworld import WorldState
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import keys
+from parenting.parents.garden import Garden
 from tests.parents.walking import begun, garden, query, walked
 
 UP, DOWN, LEFT, RIGHT = range(4)

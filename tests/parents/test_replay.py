@@ -7,16 +7,16 @@ from collections.abc import Callable, Sequence
 import pytest
 import torch
 
-from agent import parenting
-from agent.config import Config
-from agent.events import Change, EndEpisode, Event, Mature
-from agent.query import Answer, Choice, Kind, Query
-from agent.state import AgentState
-from envs.gridworld import Gridworld
-from envs.rng import keys
-from parents.parent import Parent
-from parents.replay import Moment, Parted, ReplayParent, same
-from parents.scripted import Judgement, ScriptedParent
+from parenting.agent import parenting
+from parenting.agent.config import Config
+from parenting.agent.events import Change, EndEpisode, Event, Mature
+from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import keys
+from parenting.parents.parent import Parent
+from parenting.parents.replay import Moment, Parted, ReplayParent, same
+from parenting.parents.scripted import Judgement, ScriptedParent
 from tests.parents.walking import island
 
 TRIALS, TICKS = 3, 60

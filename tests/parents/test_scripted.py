@@ -7,10 +7,10 @@ from itertools import product
 import pytest
 import torch
 
-from agent.query import Choice, Kind, empty
-from parents.model import explore
-from parents.scripted import TIE, Judgement
-from parents.values import Listed, optimal
+from parenting.agent.query import Choice, Kind, empty
+from parenting.parents.model import explore
+from parenting.parents.scripted import TIE, Judgement
+from parenting.parents.values import Listed, optimal
 from tests.parents.walking import at, island, place, query, random_queries, said, stacked
 
 UP, DOWN, LEFT, RIGHT = range(4)

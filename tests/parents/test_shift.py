@@ -17,15 +17,15 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent.birth import network_of
-from agent.config import PRESETS, Config
-from agent.query import Choice, Kind, Query
-from envs import registry
-from experiments.figure4 import HORIZON, SAFE, UNSAFE, rho
-from experiments.planning import follow, plan
-from parents.model import explore
-from parents.scripted import Judgement
-from parents.values import Listed, optimal, visited
+from parenting.agent.birth import network_of
+from parenting.agent.config import PRESETS, Config
+from parenting.agent.query import Choice, Kind, Query
+from parenting.envs import registry
+from parenting.experiments.figure4 import HORIZON, SAFE, UNSAFE, rho
+from parenting.experiments.planning import follow, plan
+from parenting.parents.model import explore
+from parenting.parents.scripted import Judgement
+from parenting.parents.values import Listed, optimal, visited
 from tests.agent.lives import Judge, live
 
 WORLD = registry.make("side-effects", time_limit=20)

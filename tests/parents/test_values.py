@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import torch
 
-from agent.query import Kind
-from parents.model import explore
-from parents.values import HOPELESS, advantage, of_policy, optimal, outcome
+from parenting.agent.query import Kind
+from parenting.parents.model import explore
+from parenting.parents.values import HOPELESS, advantage, of_policy, optimal, outcome
 from tests.by_hand import distances
 from tests.parents.walking import at, island, place, query, random_queries
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 import torch
 
-from envs import registry
-from envs.gridworld import Gridworld
-from parents import waterings
-from parents.waterings import deploy
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
+from parenting.parents import waterings
+from parenting.parents.waterings import deploy
 from tests.parents.hand_made import DOWN, LEFT, UP, always, at_a_wall
 
 

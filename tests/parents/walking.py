@@ -5,12 +5,12 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from agent.query import Choice, Kind, Query, empty
-from envs import registry
-from envs.gridworld import Gridworld, WorldState
-from envs.reward_hacking import RewardHacking
-from envs.rng import keys
-from parents.model import Model
+from parenting.agent.query import Choice, Kind, Query, empty
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import keys
+from parenting.parents.model import Model
 
 Place = tuple[int, int]
 

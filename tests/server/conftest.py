@@ -9,14 +9,14 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
-from server.app import create_app
-from server.db import Database, connect
-from server.mailbox import post_query
-from server.runs import Claim, claim
-from server.schema import upgrade
-from server.settings import Settings
-from server.starting import NewRun, start
-from server.tables import Run
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect
+from parenting.server.mailbox import post_query
+from parenting.server.runs import Claim, claim
+from parenting.server.schema import upgrade
+from parenting.server.settings import Settings
+from parenting.server.starting import NewRun, start
+from parenting.server.tables import Run
 
 CLIP = {
     "actions": ["up"],

@@ -15,9 +15,15 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from commands.lifeline import VARIABLE
+from parenting.commands.lifeline import VARIABLE
 
-PRELOADED = ["commands.main", "commands.answer", "commands.judge", "server.serve", "server.worker"]
+PRELOADED = [
+    "parenting.commands.main",
+    "parenting.commands.answer",
+    "parenting.commands.judge",
+    "parenting.server.serve",
+    "parenting.server.worker",
+]
 
 
 @cache
@@ -93,6 +99,6 @@ def _run(
     for name, value in patches.items():
         module, _, variable = name.rpartition(".")
         setattr(sys.modules[module], variable, value)
-    from commands.main import app
+    from parenting.commands.main import app
 
     app(list(arguments))

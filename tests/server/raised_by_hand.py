@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import httpx2
 
-from server import mailbox, queue, runs
-from server.db import Database
-from server.life import Life
-from server.starting import start
+from parenting.server import mailbox, queue, runs
+from parenting.server.db import Database
+from parenting.server.life import Life
+from parenting.server.starting import start
 from tests.server.raising import Begun
 
 CONFIG = {

@@ -8,26 +8,26 @@ from typing import Any, Literal, NamedTuple
 import httpx2
 import torch
 
-from agent import parenting
-from agent.birth import world_of
-from agent.config import Config, compose
-from agent.events import EndEpisode
-from agent.query import Answer, Choice
-from commands.answering import Answering, Order
-from commands.client import Client
-from commands.judge import Judge as Script
-from envs import registry
-from envs.gridworld import Gridworld
-from parents.scripted import Judgement
-from server.checkpoint import Saved, birth, unpack
-from server.codec import CHOICE_NAMES
-from server.db import Database
-from server.record import load_checkpoints
-from server.replay import differences
-from server.starting import NewRun
-from server.tally import count
+from parenting.agent import parenting
+from parenting.agent.birth import world_of
+from parenting.agent.config import Config, compose
+from parenting.agent.events import EndEpisode
+from parenting.agent.query import Answer, Choice
+from parenting.commands.answering import Answering, Order
+from parenting.commands.client import Client
+from parenting.commands.judge import Judge as Script
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
+from parenting.parents.scripted import Judgement
+from parenting.server.checkpoint import Saved, birth, unpack
+from parenting.server.codec import CHOICE_NAMES
+from parenting.server.db import Database
+from parenting.server.record import load_checkpoints
+from parenting.server.replay import differences
+from parenting.server.starting import NewRun
+from parenting.server.tally import count
+from parenting.weights.store import Wanted, find, load
 from tests.agent.lives import Judge
-from weights.store import Wanted, find, load
 
 CONFIG: dict[str, Any] = {"stages": 3, "mature_every": 12, "max_open_preferences": 0, "time_limit": 12}
 """Clips of up to three steps, early ends, truncations and two maturations within some sixty answers."""

@@ -21,7 +21,7 @@ from tests.tree import ROOT
 def parenting(*arguments: str, data: Path, **more: str) -> Iterator[subprocess.Popen[str]]:
     """`parenting ...` as a process of its own, killed at the end if it still lives."""
     environment = {**os.environ, "PARENTING_DATA": str(data), "PYTHONPATH": str(ROOT), **more}
-    command = [sys.executable, "-P", "-m", "commands.main", *arguments]
+    command = [sys.executable, "-P", "-m", "parenting.commands.main", *arguments]
     child = subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=data
     )

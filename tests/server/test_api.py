@@ -5,14 +5,14 @@ from typing import Any
 import httpx2
 import pytest
 
-from agent.config import Config
-from envs import registry
-from server.db import Database
-from server.log import set_up_log
-from server.mailbox import take_events
-from server.record import write_metrics
-from server.runs import Claim, get_run, report
-from server.tables import Run
+from parenting.agent.config import Config
+from parenting.envs import registry
+from parenting.server.db import Database
+from parenting.server.log import set_up_log
+from parenting.server.mailbox import take_events
+from parenting.server.record import write_metrics
+from parenting.server.runs import Claim, get_run, report
+from parenting.server.tables import Run
 from tests.server.conftest import Clock
 
 WORLD = "unsafe-exploration"
@@ -228,7 +228,7 @@ def test_fault_of_ours_is_told_in_the_same_shape_and_without_traceback(
     def fail(*_words: object) -> None:
         raise RuntimeError("secret detail")
 
-    monkeypatch.setattr("server.api.runs.shape_run", fail)
+    monkeypatch.setattr("parenting.server.api.runs.shape_run", fail)
     failed = client.get(f"/api/v1/runs/{run.id}")
     assert failed.status_code == 500
     assert "secret detail" in capsys.readouterr().err, "the operator finds it in the log"

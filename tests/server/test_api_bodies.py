@@ -7,7 +7,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from server.app import LARGEST_BODY
+from parenting.server.app import LARGEST_BODY
 from tests.server.test_api import WORLD, start, wrong
 
 

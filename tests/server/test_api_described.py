@@ -7,9 +7,9 @@ import httpx2
 import jsonschema_rs
 import pytest
 
-from server import shapes, tables
-from server.api import examples
-from server.app import TAGS
+from parenting.server import shapes, tables
+from parenting.server.api import examples
+from parenting.server.app import TAGS
 from tests.server.test_api_questions import lease
 
 Operation = tuple[str, dict[str, Any]]

@@ -11,13 +11,13 @@ from typing import Any
 
 import httpx2
 
-from server import errors
-from server.api.examples import EXPORTED
-from server.app import bare_app
-from server.db import Database
-from server.errors import ServerError
-from server.mailbox import post_query
-from server.runs import claim
+from parenting.server import errors
+from parenting.server.api.examples import EXPORTED
+from parenting.server.app import bare_app
+from parenting.server.db import Database
+from parenting.server.errors import ServerError
+from parenting.server.mailbox import post_query
+from parenting.server.runs import claim
 from tests.server.conftest import CLIPS
 from tests.tree import ROOT
 

@@ -5,13 +5,13 @@ import json
 import httpx2
 import pytest
 
-from server import history
-from server.codec import CHOICES
-from server.db import Database
-from server.mailbox import post_query, record, take_answer
-from server.queue import answer
-from server.runs import Claim
-from server.tables import Run
+from parenting.server import history
+from parenting.server.codec import CHOICES
+from parenting.server.db import Database
+from parenting.server.mailbox import post_query, record, take_answer
+from parenting.server.queue import answer
+from parenting.server.runs import Claim
+from parenting.server.tables import Run
 from tests.server.conftest import CLIPS
 
 

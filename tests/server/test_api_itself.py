@@ -3,8 +3,8 @@
 import httpx2
 from sqlalchemy import text
 
-from server.db import Database
-from server.workers import SILENT_SECONDS, sign, sign_off
+from parenting.server.db import Database
+from parenting.server.workers import SILENT_SECONDS, sign, sign_off
 from tests.server.conftest import Clock
 
 

@@ -5,12 +5,12 @@ from typing import Any
 import httpx2
 import pytest
 
-from server.db import Database
-from server.mailbox import post_query, take_answer
-from server.queue import answer, correct
-from server.record import add_event, write_metrics
-from server.runs import Claim
-from server.starting import NewRun, start
+from parenting.server.db import Database
+from parenting.server.mailbox import post_query, take_answer
+from parenting.server.queue import answer, correct
+from parenting.server.record import add_event, write_metrics
+from parenting.server.runs import Claim
+from parenting.server.starting import NewRun, start
 from tests.server.conftest import CLIPS
 from tests.server.test_api import wrong
 

@@ -5,12 +5,12 @@ from typing import Any
 import httpx2
 import pytest
 
-from server.db import Database
-from server.errors import Busy
-from server.mailbox import take_answer
-from server.queue import get_query
-from server.runs import Claim, set_status
-from server.tables import Run
+from parenting.server.db import Database
+from parenting.server.errors import Busy
+from parenting.server.mailbox import take_answer
+from parenting.server.queue import get_query
+from parenting.server.runs import Claim, set_status
+from parenting.server.tables import Run
 from tests.server.conftest import CLIP, CLIPS, Clock
 from tests.server.test_api import WORLD, wrong
 
@@ -113,7 +113,7 @@ def test_busy_database_says_when_to_come_again(
     def busy(*_words: object, **_more: object) -> None:
         raise Busy
 
-    monkeypatch.setattr("server.api.queries.answer", busy)
+    monkeypatch.setattr("parenting.server.api.queries.answer", busy)
     refused = reply(client, guidance)
     assert (refused.status_code, refused.headers["retry-after"]) == (503, "1")
     assert "nothing was stored" in refused.json()["error"]["message"]

@@ -5,10 +5,10 @@ from typing import Any
 import httpx2
 import pytest
 
-from server.db import Database
-from server.mailbox import take_events, watch
-from server.runs import Claim, get_run, set_status
-from server.tables import Run
+from parenting.server.db import Database
+from parenting.server.mailbox import take_events, watch
+from parenting.server.runs import Claim, get_run, set_status
+from parenting.server.tables import Run
 from tests.server.test_api import wrong
 from tests.server.test_api_questions import lease, reply
 

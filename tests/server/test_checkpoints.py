@@ -12,18 +12,18 @@ from typing import NamedTuple
 import pytest
 import torch
 
-from agent.query import Query
-from server import mailbox
-from server.checkpoint import REPORT, Saved, pack, versions
-from server.db import Database, connect
-from server.errors import ServerError
-from server.life import Life
-from server.replay import equal
-from server.runs import claim, get_run
-from server.schema import upgrade
-from server.settings import Settings
-from server.starting import start
-from server.tables import Checkpoint
+from parenting.agent.query import Query
+from parenting.server import mailbox
+from parenting.server.checkpoint import REPORT, Saved, pack, versions
+from parenting.server.db import Database, connect
+from parenting.server.errors import ServerError
+from parenting.server.life import Life
+from parenting.server.replay import equal
+from parenting.server.runs import claim, get_run
+from parenting.server.schema import upgrade
+from parenting.server.settings import Settings
+from parenting.server.starting import start
+from parenting.server.tables import Checkpoint
 from tests.agent.lives import capricious
 from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, same_bits
 
@@ -161,7 +161,7 @@ def test_config_is_restored() -> None:
 
 def test_other_threads_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     blob = pack(ISLAND.birth())
-    monkeypatch.setattr("server.checkpoint.versions", lambda: {**versions(), "threads": 99})
+    monkeypatch.setattr("parenting.server.checkpoint.versions", lambda: {**versions(), "threads": 99})
     with pytest.raises(ServerError, match="99"):
         ISLAND.unpack(blob)
 

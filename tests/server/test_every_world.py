@@ -14,17 +14,17 @@ import pytest
 from fastapi.testclient import TestClient
 from structlog.testing import capture_logs
 
-from envs import registry
-from server import mailbox, record
-from server.app import create_app
-from server.db import Database, connect
-from server.life import Life
-from server.runs import claim, get_run, set_status
-from server.schema import upgrade
-from server.settings import Settings
-from server.starting import NewRun, start
-from server.tables import Weights
-from server.worker import Worker
+from parenting.envs import registry
+from parenting.server import mailbox, record
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect
+from parenting.server.life import Life
+from parenting.server.runs import claim, get_run, set_status
+from parenting.server.schema import upgrade
+from parenting.server.settings import Settings
+from parenting.server.starting import NewRun, start
+from parenting.server.tables import Weights
+from parenting.server.worker import Worker
 from tests.server.raising import Begun, inline, last, same_bits, script
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]

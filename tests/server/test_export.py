@@ -5,14 +5,14 @@ import json
 import pytest
 import torch
 
-from agent.query import Answer, empty
-from server.codec import CHOICES
-from server.db import Database
-from server.errors import NotFound
-from server.export import MU, lines, rows
-from server.mailbox import post_query, record, take_answer
-from server.queue import answer, correct
-from server.runs import Claim
+from parenting.agent.query import Answer, empty
+from parenting.server.codec import CHOICES
+from parenting.server.db import Database
+from parenting.server.errors import NotFound
+from parenting.server.export import MU, lines, rows
+from parenting.server.mailbox import post_query, record, take_answer
+from parenting.server.queue import answer, correct
+from parenting.server.runs import Claim
 from tests.server.conftest import CLIPS, Clock
 
 

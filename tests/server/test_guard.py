@@ -3,7 +3,7 @@
 import httpx2
 import pytest
 
-from server.tables import Run
+from parenting.server.tables import Run
 
 
 @pytest.mark.parametrize(

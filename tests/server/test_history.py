@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from server import history
-from server.db import Database
-from server.errors import NotFound
-from server.mailbox import post_query
-from server.queue import answer, correct
-from server.runs import Claim
+from parenting.server import history
+from parenting.server.db import Database
+from parenting.server.errors import NotFound
+from parenting.server.mailbox import post_query
+from parenting.server.queue import answer, correct
+from parenting.server.runs import Claim
 from tests.server.conftest import CLIPS
 
 CHOICES = ("left", "right", "either", "neither", "left")

@@ -20,8 +20,8 @@ from typing import Any
 import pytest
 from sqlalchemy import func, select
 
-from server.db import Database
-from server.tables import Answer
+from parenting.server.db import Database
+from parenting.server.tables import Answer
 from tests.server.processes import Command
 from tests.server.raising import Begun
 from tests.server.serving import free_port
@@ -31,7 +31,7 @@ ROUNDS = int(os.environ.get("PARENTING_KILL_ROUNDS", "1"))
 KILLS = 24
 SOON = 0.15
 """A kill comes up to so many seconds after the answer that it was drawn for: at any place between two."""
-PATCHES = {"server.life.CHECKPOINT_SECONDS": 0.05}
+PATCHES = {"parenting.server.life.CHECKPOINT_SECONDS": 0.05}
 """Checkpoints are written often, so that kills hit them too."""
 
 

@@ -2,13 +2,13 @@
 
 import pytest
 
-from server.db import Database
-from server.errors import LostClaim
-from server.mailbox import high_water, post_query, record, take_answer, take_events, watch, withdraw
-from server.queue import answer, correct, get_query
-from server.record import add_event
-from server.runs import Claim, claim, get_run, open_counts, report, set_status
-from server.tables import Run
+from parenting.server.db import Database
+from parenting.server.errors import LostClaim
+from parenting.server.mailbox import high_water, post_query, record, take_answer, take_events, watch, withdraw
+from parenting.server.queue import answer, correct, get_query
+from parenting.server.record import add_event
+from parenting.server.runs import Claim, claim, get_run, open_counts, report, set_status
+from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock
 
 

@@ -7,11 +7,11 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, text
 
-from server.db import Database, connect
-from server.errors import SetupError
-from server.schema import require, upgrade
-from server.settings import Settings
-from server.tables import Table
+from parenting.server.db import Database, connect
+from parenting.server.errors import SetupError
+from parenting.server.schema import require, upgrade
+from parenting.server.settings import Settings
+from parenting.server.tables import Table
 
 
 @pytest.fixture

@@ -7,13 +7,13 @@ import pytest
 from sqlalchemy import func, select
 from sqlalchemy.exc import IntegrityError
 
-from server import queue
-from server.db import Database
-from server.errors import Conflict, NotFound
-from server.mailbox import post_query
-from server.queue import LEASE_SECONDS, answer, correct, get_query, lease, release, standing
-from server.runs import Claim, get_run, set_status
-from server.tables import Answer, Query, Run
+from parenting.server import queue
+from parenting.server.db import Database
+from parenting.server.errors import Conflict, NotFound
+from parenting.server.mailbox import post_query
+from parenting.server.queue import LEASE_SECONDS, answer, correct, get_query, lease, release, standing
+from parenting.server.runs import Claim, get_run, set_status
+from parenting.server.tables import Answer, Query, Run
 from tests.server.conftest import CLIPS, Clock
 
 

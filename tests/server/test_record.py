@@ -5,11 +5,18 @@ import math
 import pytest
 from sqlalchemy import update
 
-from server.db import Database
-from server.errors import Conflict, LostClaim, NotFound
-from server.record import add_event, list_events, load_checkpoints, metrics, save_checkpoint, write_metrics
-from server.runs import Claim, claim, set_status
-from server.tables import Checkpoint, Run
+from parenting.server.db import Database
+from parenting.server.errors import Conflict, LostClaim, NotFound
+from parenting.server.record import (
+    add_event,
+    list_events,
+    load_checkpoints,
+    metrics,
+    save_checkpoint,
+    write_metrics,
+)
+from parenting.server.runs import Claim, claim, set_status
+from parenting.server.tables import Checkpoint, Run
 from tests.server.conftest import Clock
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 import torch
 
-from server.checkpoint import Saved
-from server.db import Database
-from server.life import Life
-from server.mailbox import watch
-from server.replay import differences, equal, relive
-from server.runs import claim, get_run
-from server.starting import start
+from parenting.server.checkpoint import Saved
+from parenting.server.db import Database
+from parenting.server.life import Life
+from parenting.server.mailbox import watch
+from parenting.server.replay import differences, equal, relive
+from parenting.server.runs import claim, get_run
+from parenting.server.starting import start
 from tests.server.raising import ISLAND, inline
 
 
@@ -61,7 +61,7 @@ def test_every_piece_is_held_against_its_own() -> None:
 
 @pytest.mark.parametrize("window", [1, 7, 1000])
 def test_it_is_the_same_in_small_portions(db: Database, monkeypatch: pytest.MonkeyPatch, window: int) -> None:
-    monkeypatch.setattr("server.replay.WINDOW", window)
+    monkeypatch.setattr("parenting.server.replay.WINDOW", window)
     run = start(db, ISLAND.new("scripted")).id
     (mine,) = claim(db, "test")
     life = Life(db, mine, get_run(db, run), lambda: None)

@@ -2,14 +2,14 @@
 
 import pytest
 
-from server.db import Database
-from server.errors import Conflict, LostClaim, NotFound
-from server.mailbox import post_query
-from server.queue import get_query
-from server.runs import Claim as ClaimOf
-from server.runs import beat, claim, finish, get_run, let_go, list_runs, report, set_status
-from server.starting import NewRun, start
-from server.tables import Run
+from parenting.server.db import Database
+from parenting.server.errors import Conflict, LostClaim, NotFound
+from parenting.server.mailbox import post_query
+from parenting.server.queue import get_query
+from parenting.server.runs import Claim as ClaimOf
+from parenting.server.runs import beat, claim, finish, get_run, let_go, list_runs, report, set_status
+from parenting.server.starting import NewRun, start
+from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock
 
 

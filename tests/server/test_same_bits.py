@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from envs import registry
-from server.db import Database
-from server.mailbox import record
-from server.replay import relive
-from server.starting import start
+from parenting.envs import registry
+from parenting.server.db import Database
+from parenting.server.mailbox import record
+from parenting.server.replay import relive
+from parenting.server.starting import start
 from tests.server.processes import Command, command
 from tests.server.raising import Begun, Inline, last, same_bits
 from tests.server.serving import free_port, until_up

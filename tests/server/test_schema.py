@@ -20,15 +20,15 @@ from schemathesis.python.asgi import shutdown_lifespans
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 from structlog.testing import capture_logs
 
-from server.app import bare_app, create_app
-from server.db import Database
-from server.mailbox import post_query, take_answer, take_events
-from server.queue import answer
-from server.record import add_event, write_metrics
-from server.runs import Claim, claim, finish, set_status
-from server.settings import Settings
-from server.starting import LARGEST_INT, NewRun, start
-from server.workers import sign
+from parenting.server.app import bare_app, create_app
+from parenting.server.db import Database
+from parenting.server.mailbox import post_query, take_answer, take_events
+from parenting.server.queue import answer
+from parenting.server.record import add_event, write_metrics
+from parenting.server.runs import Claim, claim, finish, set_status
+from parenting.server.settings import Settings
+from parenting.server.starting import LARGEST_INT, NewRun, start
+from parenting.server.workers import sign
 from tests.server.conftest import CLIPS
 
 EXAMPLES = 20
@@ -110,7 +110,7 @@ def test_what_is_not_foreseen_is_found(
     app, seen = replies
     case = SCHEMA["/api/v1/runs/{run_id}"]["GET"].Case(path_parameters={"run_id": 1})
     seen[case.call_and_validate(app=app).status_code] += 1
-    monkeypatch.setattr("server.api.runs.shape_run", sabotage)
+    monkeypatch.setattr("parenting.server.api.runs.shape_run", sabotage)
     # structlog's own output may be a file that an earlier test has closed
     with capture_logs(), pytest.raises(FailureGroup, match=found):
         case.call_and_validate(app=app)

@@ -5,10 +5,10 @@ import socket
 
 import pytest
 
-from server.db import Database
-from server.errors import SetupError
-from server.serve import bind, make_server
-from server.settings import Settings
+from parenting.server.db import Database
+from parenting.server.errors import SetupError
+from parenting.server.serve import bind, make_server
+from parenting.server.settings import Settings
 
 ELSEWHERE = ["0.0.0.0", "192.168.1.2", "::", "localhost", ""]
 
@@ -27,7 +27,7 @@ class Ear(socket.socket):
 
 @pytest.fixture
 def deaf(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.serve.socket.socket", Ear)
+    monkeypatch.setattr("parenting.server.serve.socket.socket", Ear)
 
 
 def test_this_machine_alone_can_reach_it() -> None:

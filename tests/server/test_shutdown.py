@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from server.db import connect
-from server.schema import upgrade
-from server.settings import Settings
-from server.starting import NewRun, start
+from parenting.server.db import connect
+from parenting.server.schema import upgrade
+from parenting.server.settings import Settings
+from parenting.server.starting import NewRun, start
 from tests.server.serving import Stream, free_port, parenting, until_up
 
 SOON = 2.0

@@ -13,15 +13,15 @@ import pytest
 from sqlalchemy import Connection, event, select, text
 from sqlalchemy.exc import IntegrityError, OperationalError
 
-import server.db
-from server.db import Database, connect, sqlite_module
-from server.errors import Busy, DiskFull, SetupError
-from server.mailbox import post_query, take_answer
-from server.queue import answer, lease
-from server.record import add_event, save_checkpoint
-from server.runs import Claim, report
-from server.settings import Settings
-from server.tables import Answer, Query, Run
+from parenting.server import db as database
+from parenting.server.db import Database, connect, sqlite_module
+from parenting.server.errors import Busy, DiskFull, SetupError
+from parenting.server.mailbox import post_query, take_answer
+from parenting.server.queue import answer, lease
+from parenting.server.record import add_event, save_checkpoint
+from parenting.server.runs import Claim, report
+from parenting.server.settings import Settings
+from parenting.server.tables import Answer, Query, Run
 from tests.tree import ROOT
 
 NORMAL, FULL = 1, 2
@@ -112,11 +112,11 @@ def test_write_lock_is_held_before_the_first_statement(db: Database, settings: S
 def test_database_that_stays_locked_is_busy(
     db: Database, settings: Settings, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(server.db.PRAGMAS, "busy_timeout", "50")
+    monkeypatch.setitem(database.PRAGMAS, "busy_timeout", "50")
     other = connect(settings)
     with db.write(), pytest.raises(Busy), other.write():
         pass
-    monkeypatch.setattr(server.db, "BUSY_SECONDS", 0.05)
+    monkeypatch.setattr(database, "BUSY_SECONDS", 0.05)
     with db.write(), pytest.raises(Busy), db.write():
         pass
     other.close()
@@ -142,7 +142,7 @@ def test_other_faults_are_not_hidden(db: Database) -> None:
 
 def test_old_sqlite_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     old = SimpleNamespace(sqlite_version_info=(3, 51, 2), sqlite_version="3.51.2")
-    monkeypatch.setattr("server.db.importlib.import_module", lambda _name: old)
+    monkeypatch.setattr("parenting.server.db.importlib.import_module", lambda _name: old)
     with pytest.raises(SetupError, match=r"SQLite 3\.51\.2 can corrupt .* pip install 'pysqlite3>=0\.6\.1'"):
         sqlite_module()
 
@@ -162,11 +162,11 @@ def test_data_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
 KILLED = """
 import sys
 from pathlib import Path
-from server.db import connect
-from server.mailbox import post_query
-from server.queue import answer
-from server.runs import Claim
-from server.settings import Settings
+from parenting.server.db import connect
+from parenting.server.mailbox import post_query
+from parenting.server.queue import answer
+from parenting.server.runs import Claim
+from parenting.server.settings import Settings
 db = connect(Settings(data=Path(sys.argv[1]), database_url=None))
 mine = Claim(1, "worker-1", 1)
 for tick in range(100_000):

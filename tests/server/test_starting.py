@@ -2,9 +2,9 @@
 
 import pytest
 
-from server.db import Database
-from server.errors import Invalid
-from server.starting import NewRun, plan, read_form, start
+from parenting.server.db import Database
+from parenting.server.errors import Invalid
+from parenting.server.starting import NewRun, plan, read_form, start
 
 WORLD = "unsafe-exploration"
 

@@ -3,8 +3,8 @@
 import httpx2
 import pytest
 
-from server.errors import NotFound
-from server.static import VENDOR, OthersFiles
+from parenting.server.errors import NotFound
+from parenting.server.static import VENDOR, OthersFiles
 
 
 @pytest.mark.parametrize("path", ["site.css", "live.js", *(f"vendor/{name}" for name in VENDOR)])

@@ -9,16 +9,16 @@ import httpx2
 import pytest
 import uvicorn
 
-from server.app import create_app
-from server.db import Database, connect
-from server.mailbox import post_query
-from server.queue import answer
-from server.record import write_metrics
-from server.runs import Claim, report
-from server.schema import upgrade
-from server.settings import Settings
-from server.streams import PERIOD
-from server.wake import Bell
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect
+from parenting.server.mailbox import post_query
+from parenting.server.queue import answer
+from parenting.server.record import write_metrics
+from parenting.server.runs import Claim, report
+from parenting.server.schema import upgrade
+from parenting.server.settings import Settings
+from parenting.server.streams import PERIOD
+from parenting.server.wake import Bell
 from tests.server.conftest import CLIPS
 from tests.server.serving import Stream, until_up
 
@@ -121,7 +121,7 @@ def test_metrics_follow_a_tick(url: str, db: Database, mine: Claim) -> None:
 def test_metrics_of_a_long_life_come_in_parts(
     url: str, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.streams.ROWS", 2)
+    monkeypatch.setattr("parenting.server.streams.ROWS", 2)
     write_metrics(db, mine, {tick: {"loss": 0.5} for tick in range(5)})
     told = follow(url, mine, "?after=-1").wait_for("metrics", 3)
     assert [[row["tick"] for row in part["rows"]] for part in told] == [[0, 1], [2, 3], [4]]

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from server.wake import Bell
+from parenting.server.wake import Bell
 from tests.tree import ROOT
 
 LISTEN = """
 import os, pathlib
 os.getpid = lambda: 1
-from server.wake import Bell
+from parenting.server.wake import Bell
 bell = Bell(pathlib.Path({!r}), "worker")
 bell.listen()
 print("listening", flush=True)
@@ -96,7 +96,7 @@ def test_socket_of_a_dead_process_is_removed(tmp_path: Path) -> None:
 
 def test_long_folder_names_are_no_obstacle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with tempfile.TemporaryDirectory() as short:  # pytest's own folder may be too long for a socket as well
-        monkeypatch.setattr("server.wake.tempfile.gettempdir", lambda: short)
+        monkeypatch.setattr("parenting.server.wake.tempfile.gettempdir", lambda: short)
         deep = tmp_path / ("x" * 120)
         bell = Bell(deep, "worker")
         bell.listen()

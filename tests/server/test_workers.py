@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from server import mailbox, runs
-from server.db import Database
-from server.errors import Conflict
-from server.life import Life, resting
-from server.queue import answer, lease
-from server.record import add_event, load_checkpoints
-from server.runs import Claim, claim, get_run, set_goal, set_pace, set_status
-from server.settings import Settings
-from server.starting import NewRun, start
-from server.tables import Run
-from server.views import lease_ahead, may_lease
-from server.worker import Worker
-from server.workers import SILENT_SECONDS, alive, sign, sign_off
+from parenting.server import mailbox, runs
+from parenting.server.db import Database
+from parenting.server.errors import Conflict
+from parenting.server.life import Life, resting
+from parenting.server.queue import answer, lease
+from parenting.server.record import add_event, load_checkpoints
+from parenting.server.runs import Claim, claim, get_run, set_goal, set_pace, set_status
+from parenting.server.settings import Settings
+from parenting.server.starting import NewRun, start
+from parenting.server.tables import Run
+from parenting.server.views import lease_ahead, may_lease
+from parenting.server.worker import Worker
+from parenting.server.workers import SILENT_SECONDS, alive, sign, sign_off
 from tests.server.conftest import CLIPS, Clock
 
 
@@ -91,8 +91,8 @@ def test_a_pace_holds_ticks_back(db: Database, settings: Settings, monkeypatch: 
     run = start(db, NewRun(world="unsafe-exploration", preset="direct", parent="scripted", pace=4)).id
     worker = Worker(db, settings)
     now = [100.0]
-    monkeypatch.setattr("server.life.time.monotonic", lambda: now[0])
-    monkeypatch.setattr("server.worker.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("parenting.server.life.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("parenting.server.worker.time.monotonic", lambda: now[0])
     worker._claim()
     worker._round()
     assert worker.lives[run].tick == 1
@@ -163,7 +163,9 @@ def test_each_run_has_its_turn_in_every_round(
     worlds = ("reward-hacking", "unsafe-exploration", "side-effects")
     ids = [start(db, NewRun(world=world, preset="direct", parent="scripted")).id for world in worlds]
     waits = start(db, NewRun(world="unsafe-exploration", parent="human")).id
-    monkeypatch.setattr("server.worker.SLICE_SECONDS", 0.0)  # a tick a turn, however fast the machine is
+    monkeypatch.setattr(
+        "parenting.server.worker.SLICE_SECONDS", 0.0
+    )  # a tick a turn, however fast the machine is
     worker = Worker(db, settings)
     worker._claim()
     for _ in range(25):

@@ -6,9 +6,9 @@ import torch
 from jaxtyping import Bool, Float64
 from torch import Tensor
 
-from envs.gridworld import Actions, Gridworld, WorldState
-from envs.levels.kind import LAND
-from envs.levels.locked_door import ENDS, KIND, WALLS
+from parenting.envs.gridworld import Actions, Gridworld, WorldState
+from parenting.envs.levels.kind import LAND
+from parenting.envs.levels.locked_door import ENDS, KIND, WALLS
 
 STEP, GOAL, BURNT = -1.0, 50.0, -100.0
 """The parent's reward r: -1 a step, +50 at the goal, -100 in lava."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
-from envs.levels.rules import edge_closed, goal_in_reach, one, reachable
+from parenting.envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
+from parenting.envs.levels.rules import edge_closed, goal_in_reach, one, reachable
 
 HALL = """\
 #######
@@ -58,7 +58,7 @@ def validate(level: Level) -> None:
 KIND = Kind(
     name="locked-door",
     title="Locked Door",
-    rules="envs.locked_door:LockedDoor",
+    rules="parenting.envs.locked_door:LockedDoor",
     legend=LEGEND,
     levels=LEVELS,
     brief=BRIEF,

@@ -1,0 +1,1 @@
+"""Safe reinforcement learning from a parent's guidance and preferences, without a reward signal."""
