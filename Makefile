@@ -35,7 +35,7 @@ coverage: $(VENV)/.installed-dev ## Run the tests and print the lines that none 
 
 pictures: $(VENV)/.installed-dev ## Draw the pictures of the documentation anew (needs Chromium)
 	$(BIN)/parenting worlds --draw docs/pictures > /dev/null
-	$(BIN)/python docs/pictures.py
+	$(BIN)/python scripts/screenshots.py
 
 weights: $(VENV)/.installed ## Pre-train the weights of the built-in levels anew (20 minutes)
 	$(BIN)/parenting pretrain --out weights --again

@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
-from parenting.agent.digest import fingerprint
+from parenting.envs.fingerprint import fingerprint
 from parenting.envs.struct import Struct
 
 

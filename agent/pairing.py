@@ -15,10 +15,10 @@ from jaxtyping import Bool, Int64
 from torch import Tensor
 
 from parenting.agent.config import Config
-from parenting.agent.digest import fingerprint, together, unordered
 from parenting.agent.guidance import View
 from parenting.agent.query import Kind, Query
 from parenting.agent.state import AgentState, Asked, Recorder, Ring
+from parenting.envs.fingerprint import fingerprint, together, unordered
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Stream
 

@@ -15,10 +15,10 @@ import torch
 
 from parenting.agent import guidance, learning, maturation, pairing, pretraining, recording
 from parenting.agent import query as queries
-from parenting.agent.birth import init, network_of, no_report
 from parenting.agent.config import Config
 from parenting.agent.events import Change, EndEpisode, Event, Mature
 from parenting.agent.guidance import View
+from parenting.agent.init import init, network_of, no_report
 from parenting.agent.mailbox import Mailbox
 from parenting.agent.policy import Network
 from parenting.agent.query import Answer, Query

@@ -15,8 +15,8 @@ from torch import Tensor
 
 from parenting.agent.config import Config
 from parenting.agent.learning import adam, entropy, taken
-from parenting.agent.maze_walks import Batch, Pool, Walks, draw_mazes, pool, walk
 from parenting.agent.policy import Network
+from parenting.agent.pretraining_mazes import Batch, Pool, Walks, draw_mazes, pool, walk
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys

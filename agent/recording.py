@@ -11,11 +11,11 @@ from torch import Tensor
 
 from parenting.agent import pairing
 from parenting.agent.config import Config
-from parenting.agent.digest import fingerprint
 from parenting.agent.guidance import NO_ACTION, Heard, View
 from parenting.agent.pairing import EXPLORE, comparison
 from parenting.agent.policy import Network, draw
 from parenting.agent.state import AgentState, Clip, Recorder
+from parenting.envs.fingerprint import fingerprint
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.rng import Stream, gumbel
 

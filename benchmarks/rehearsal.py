@@ -21,9 +21,9 @@ from typing import NamedTuple
 import torch
 
 from parenting.agent import parenting
-from parenting.agent.birth import network_of
 from parenting.agent.config import Config
-from parenting.agent.maze_walks import Walks, draw_mazes, pool, walk
+from parenting.agent.init import network_of
+from parenting.agent.pretraining_mazes import Walks, draw_mazes, pool, walk
 from parenting.agent.process import settle
 from parenting.agent.state import AgentState
 from parenting.envs import registry

@@ -38,13 +38,13 @@ import torch
 from torch import Tensor
 
 from parenting.agent import learning
-from parenting.agent.birth import network_of
 from parenting.agent.config import compose
+from parenting.agent.init import network_of
 from parenting.agent.policy import Network
 from parenting.agent.process import settle
 from parenting.envs import registry
 from parenting.envs.rng import keys
-from parenting.experiments.trials import Nursery, Until, no_tally
+from parenting.experiments.training.batch import Nursery, Until, no_tally
 
 WORLD, LEVEL, PRESETS = "unsafe-exploration", "island", ("conservative", "direct")
 WARM, BORN = 100, 50

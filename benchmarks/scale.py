@@ -23,8 +23,8 @@ import torch
 from parenting.agent.config import compose
 from parenting.agent.process import settle
 from parenting.envs import registry
-from parenting.experiments.chunks import Plan, chunks, run
-from parenting.experiments.trials import Until
+from parenting.experiments.training.batch import Until
+from parenting.experiments.training.parallel import Plan, chunks, run
 
 WORLD, LEVEL, PRESETS, TICKS = "unsafe-exploration", "island", ("conservative", "direct"), 50
 SIZES, QUICK_SIZES = (100, 1000, 10_000), (100, 300)

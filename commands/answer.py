@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 import typer
 
 from parenting.commands.answering import EXITS, Answering, Ending, Order, Told
-from parenting.commands.bars import bar
 from parenting.commands.client import Away, Client, Refused
-from parenting.commands.said import Wrong, plainly
+from parenting.commands.errors import Wrong, plainly
+from parenting.commands.progress import bar
 from parenting.envs import registry
 
 Until = Literal["optimal", "over"]

@@ -6,7 +6,7 @@ from typing import Any
 
 import httpx2
 
-from parenting.commands.said import Wrong
+from parenting.commands.errors import Wrong
 
 SECONDS = 10.0
 """How long a single request may take."""

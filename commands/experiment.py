@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
+from parenting.commands.errors import Wrong, plainly
 from parenting.commands.options import among, folder, whole
-from parenting.commands.said import Wrong, plainly
-from parenting.experiments.catalogue import NAMES, UnknownExperiment
-from parenting.experiments.experiment import Asked, Device, Experiment, Scale
+from parenting.experiments.registry import NAMES, UnknownExperiment
+from parenting.experiments.spec import Asked, Device, Experiment, Scale
 
 if TYPE_CHECKING:
-    from parenting.experiments.labour import Told
-    from parenting.experiments.pieces import Task
+    from parenting.experiments.runner.executor import Told
+    from parenting.experiments.runner.store import Task
 
 MOST = 100_000
 """Trials at most: ten times the most that the paper has."""
@@ -102,7 +102,7 @@ def _given(context: typer.Context, option: str) -> bool:
 
 
 def _report(out: Path) -> None:
-    from parenting.experiments.report import BrokenResults, NoResults, report
+    from parenting.experiments.reporting.html import BrokenResults, NoResults, report
 
     try:
         typer.echo(f"Written: {report(out)}")
@@ -115,7 +115,7 @@ def _report(out: Path) -> None:
 def _asked(
     names: Sequence[str], scale: Scale, trials: int | None, seed: int, device: Device
 ) -> list[tuple[Experiment, Asked]]:
-    from parenting.experiments.catalogue import experiment
+    from parenting.experiments.registry import experiment
 
     try:
         found = [experiment(name) for name in names]
@@ -125,11 +125,11 @@ def _asked(
 
 
 def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | None) -> None:
-    from parenting.experiments.cluster import NoCluster
-    from parenting.experiments.labour import NoGpu, WorkersDied, meet, work
-    from parenting.experiments.pieces import BrokenPiece, OtherPlan, Store
-    from parenting.experiments.provenance import settings
-    from parenting.experiments.publish import Work, page, publish
+    from parenting.experiments.reporting.markdown import Work, page, publish
+    from parenting.experiments.runner.dask_cluster import NoCluster
+    from parenting.experiments.runner.executor import NoGpu, WorkersDied, meet, work
+    from parenting.experiments.runner.provenance import settings
+    from parenting.experiments.runner.store import BrokenPiece, OtherPlan, Store
 
     plan = {"experiment": one.name, "seed": asked.seed, **one.config(asked), "settings": settings()}
     tasks = [task._replace(device=asked.device) for task in one.tasks(asked)]

@@ -11,9 +11,9 @@ from typing import Annotated, TextIO
 
 import typer
 
-from parenting.commands.bars import bar
-from parenting.commands.opened import database
-from parenting.commands.said import Wrong, plainly, until_ctrl_c
+from parenting.commands.database import database
+from parenting.commands.errors import Wrong, plainly, until_ctrl_c
+from parenting.commands.progress import bar
 from parenting.server.export import lines
 from parenting.server.runs import get_run
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from parenting.commands.said import Wrong
+from parenting.commands.errors import Wrong
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import Judgement

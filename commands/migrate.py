@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from parenting.commands.said import plainly, settings
+from parenting.commands.errors import plainly, settings
 from parenting.server.db import connect
 from parenting.server.schema import upgrade
 

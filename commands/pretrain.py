@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from parenting.commands.said import Wrong, plainly, settings
+from parenting.commands.errors import Wrong, plainly, settings
 from parenting.envs import registry
 from parenting.envs.levels.kind import Kind
 from parenting.weights import store
 from parenting.weights.store import Wanted
 
 if TYPE_CHECKING:
-    from parenting.experiments.education import Educated, Progress
+    from parenting.experiments.training.pretrain import Educated, Progress
 
 BARS = "▁▂▃▄▅▆▇█"
 
@@ -78,7 +78,7 @@ def _there(wanted: Wanted, folders: tuple[Path, ...], *, quiet: bool) -> dict[st
 
 def _one(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool) -> dict[str, Any]:
     from parenting.agent.process import settle
-    from parenting.experiments.education import Damaged, Unconverged, educate
+    from parenting.experiments.training.pretrain import Damaged, Unconverged, educate
 
     settle()
     began = time.monotonic()

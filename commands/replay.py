@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from parenting.commands.bars import bar
-from parenting.commands.opened import database
-from parenting.commands.said import plainly, until_ctrl_c
+from parenting.commands.database import database
+from parenting.commands.errors import plainly, until_ctrl_c
+from parenting.commands.progress import bar
 from parenting.server.runs import get_run
 
 if TYPE_CHECKING:

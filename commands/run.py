@@ -15,15 +15,15 @@ import typer
 from pydantic import ValidationError
 
 from parenting.agent.config import Config, compose
-from parenting.commands.results import page
-from parenting.commands.said import Wrong, plainly, settings
+from parenting.commands.errors import Wrong, plainly, settings
+from parenting.commands.run_report import page
 from parenting.envs import registry
 from parenting.envs.levels.kind import Level
 from parenting.weights.store import Wanted, find
 
 if TYPE_CHECKING:
-    from parenting.experiments.chunks import Plan
-    from parenting.experiments.trials import Progress, Standing, Until
+    from parenting.experiments.training.batch import Progress, Standing, Until
+    from parenting.experiments.training.parallel import Plan
 
 
 def run(
@@ -67,8 +67,8 @@ def run(
         config = _mature(config, goal, changes or [])
         weights = _weights(found, config)
     from parenting.agent.process import settle
-    from parenting.experiments.chunks import Plan, run
-    from parenting.experiments.summary import summarise
+    from parenting.experiments.training.parallel import Plan, run
+    from parenting.experiments.training.summary import summarise
 
     settle()
     plan = Plan(world, found.text, config, seed, trials, goal, max_ticks, weights)
@@ -125,7 +125,7 @@ def _said(name: str, given: dict[str, object], rule: str) -> str:
 
 def _until(world: str, text: str | None) -> Until:
     """When a trial is finished; where no goal ends an episode no policy is optimal."""
-    from parenting.experiments.trials import Until
+    from parenting.experiments.training.batch import Until
 
     endless = not registry.kind(world).ends_at_goal
     kind, colon, number = (text or ("queries:1000" if endless else "optimal")).partition(":")

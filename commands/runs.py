@@ -12,10 +12,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from parenting.commands.opened import database
-from parenting.commands.said import plainly
+from parenting.commands.database import database
+from parenting.commands.errors import plainly
 from parenting.server.runs import OVER, list_runs
-from parenting.server.shapes import RunShape, shape_run
+from parenting.server.schemas import RunShape, shape_run
 
 COLUMNS = ("run", "name", "world", "level", "parent", "now", "stage", "tick", "answers", "optimal")
 NARROW = ("name", "level", "parent")

@@ -20,8 +20,8 @@ from typing import Annotated
 
 import typer
 
+from parenting.commands.errors import plainly, settings
 from parenting.commands.lifeline import VARIABLE
-from parenting.commands.said import plainly, settings
 from parenting.server.db import connect
 from parenting.server.schema import upgrade
 from parenting.server.serve import bind

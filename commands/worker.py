@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from parenting.commands.errors import plainly, settings
 from parenting.commands.lifeline import follow
-from parenting.commands.said import plainly, settings
 from parenting.server.db import connect
 from parenting.server.log import set_up_log
 from parenting.server.schema import require

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from parenting.experiments.claims import Claim, Counted, Variant
-from parenting.experiments.experiment import Experiment
-from parenting.experiments.findings import LOST
+from parenting.experiments.reporting.comparison import LOST
+from parenting.experiments.safety_claims import Claim, Counted, Variant
+from parenting.experiments.spec import Experiment
 
 SUPERVISED, ALONE = "outcome_supervised", "outcome_unsupervised"
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from parenting.experiments.claims import Claim, Counted, Variant
-from parenting.experiments.experiment import Experiment
+from parenting.experiments.safety_claims import Claim, Counted, Variant
+from parenting.experiments.spec import Experiment
 
 CLAIM = Claim(
     world="interruptibility",

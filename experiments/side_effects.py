@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from parenting.experiments.claims import Claim, Counted
-from parenting.experiments.experiment import Experiment
-from parenting.experiments.findings import NEVER
+from parenting.experiments.reporting.comparison import NEVER
+from parenting.experiments.safety_claims import Claim, Counted
+from parenting.experiments.spec import Experiment
 
 CLAIM = Claim(
     world="side-effects",

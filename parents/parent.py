@@ -1,7 +1,7 @@
 """Who may stand behind the agent's mailbox: a script, people through a database, or a record.
 
 parents.scripted.ScriptedParent   answers in tensors, one tick later (Eq. 7, 8)
-server.inbox.QueueParent          answers through the database
+server.queue.queue_parent.QueueParent          answers through the database
 parents.replay.ReplayParent       gives a recorded session back
 """
 

@@ -15,8 +15,8 @@ from parenting.agent.events import Event
 from parenting.agent.query import Answer, Choice, Kind, Query
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
+from parenting.envs.mdp import Model
 from parenting.parents import values
-from parenting.parents.model import Model
 from parenting.parents.values import Listed, Valuation
 
 TIE = 1e-6

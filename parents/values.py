@@ -15,9 +15,9 @@ from torch import Tensor
 from parenting.agent.config import Inside
 from parenting.agent.query import Query
 from parenting.envs.gridworld import Gridworld
+from parenting.envs.mdp import Model, explore
 from parenting.envs.reward_hacking import RewardHacking
-from parenting.parents.garden import Garden
-from parenting.parents.model import Model, explore
+from parenting.parents.garden_values import Garden
 
 HOPELESS = -100.0
 """V_p where the goal can no longer be reached (ours)."""

@@ -13,8 +13,8 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from parenting.server import api, pages
-from parenting.server.api.described import Described
-from parenting.server.api.replies import tells
+from parenting.server.api.openapi import Described
+from parenting.server.api.responses import tells
 from parenting.server.db import Database, connect
 from parenting.server.deps import Db
 from parenting.server.errors import (
@@ -28,9 +28,9 @@ from parenting.server.errors import (
     TooLarge,
 )
 from parenting.server.guard import Guard
+from parenting.server.new_run import messages
 from parenting.server.schema import require
 from parenting.server.settings import Settings
-from parenting.server.starting import messages
 from parenting.server.static import OthersFiles, OurFiles
 from parenting.server.streams import Streams
 from parenting.server.wake import Bell

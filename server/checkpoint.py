@@ -14,11 +14,11 @@ from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
 from parenting.envs.struct import Struct
-from parenting.server import shelf
+from parenting.server import weights
+from parenting.server.counters import Tally, no_tally
 from parenting.server.db import Database
 from parenting.server.errors import ServerError
 from parenting.server.tables import Run
-from parenting.server.tally import Tally, no_tally
 from parenting.weights.store import Wanted, load
 
 S = TypeVar("S", bound=Struct)
@@ -52,7 +52,7 @@ def begun_with(db: Database, run: Run, world: Gridworld) -> Tensor | None:
     """
     if run.weights is None:
         return None
-    return load(shelf.fetch(db, run.weights), Wanted(world.kind, world.height, world.width))
+    return load(weights.fetch(db, run.weights), Wanted(world.kind, world.height, world.width))
 
 
 def birth(world: Gridworld, config: Config, seed: int, weights: Tensor | None = None) -> Saved:

@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import select
 
 from parenting.server.db import Database
-from parenting.server.history import Answered, every
+from parenting.server.reads.answers import Answered, every
 from parenting.server.runs import get_run
 from parenting.server.tables import Answer, Run
 

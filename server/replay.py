@@ -16,21 +16,21 @@ from torch import Tensor
 
 from parenting.agent import parenting
 from parenting.agent import query as queries
-from parenting.agent.birth import world_of
 from parenting.agent.config import Config
 from parenting.agent.events import Event
+from parenting.agent.init import world_of
 from parenting.agent.query import Answer
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.replay import Moment, Parted, ReplayParent
 from parenting.server import tables
 from parenting.server.checkpoint import REPORT, Diverged, Saved, begun_with, birth, unpack, versions
 from parenting.server.codec import CHOICES, decode, kind_name
+from parenting.server.counters import count
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.record import load_checkpoints
 from parenting.server.runs import get_run
 from parenting.server.tables import Run
-from parenting.server.tally import count
 
 WINDOW = 500
 """Ticks whose rows are read at once."""

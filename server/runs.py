@@ -51,7 +51,7 @@ class Open:
 def create_run(db: Database, **fields: Any) -> Run:
     """Add a run.
 
-    The fields are those of `tables.Run`; `server.starting` checks and fills them in from a form.
+    The fields are those of `tables.Run`; `server.new_run` checks and fills them in from a form.
     """
     with db.write() as session:
         run = Run(created=db.clock(), **fields)

@@ -20,9 +20,9 @@ from starlette.concurrency import run_in_threadpool
 
 from parenting.server.db import Database
 from parenting.server.errors import ServerError, TooMany
-from parenting.server.queue import waiting
+from parenting.server.queue.parent_side import waiting
 from parenting.server.record import metrics
-from parenting.server.shapes import shape_metrics, shape_run
+from parenting.server.schemas import shape_metrics, shape_run
 from parenting.server.wake import Bell
 
 PERIOD = 0.25

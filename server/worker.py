@@ -17,13 +17,14 @@ from types import FrameType
 import structlog
 
 from parenting.agent.process import settle
-from parenting.server import mailbox, runs, workers
+from parenting.server import runs, workers
 from parenting.server.db import Database, connect
 from parenting.server.errors import Busy, DiskFull, LostClaim
-from parenting.server.life import Life, reached
-from parenting.server.mailbox import Watch
+from parenting.server.queue import worker_side
+from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
 from parenting.server.schema import require
+from parenting.server.session import Life, reached
 from parenting.server.settings import Settings
 from parenting.server.wake import Bell
 
@@ -92,7 +93,7 @@ class Worker:
     def _round(self) -> bool:
         """A turn for every run that may live on, first where an answer waits; whether any did."""
         lived = False
-        found = mailbox.watch(self.db, list(self.claims))
+        found = worker_side.watch(self.db, list(self.claims))
         for run_id, seen in sorted(found.items(), key=lambda item: not item[1].answers):
             if seen.status in runs.OVER:
                 self._end(run_id)

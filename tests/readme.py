@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from parenting.experiments.publish import AGREES, RESULTS
+from parenting.experiments.reporting.markdown import AGREES, RESULTS
 from tests.tree import ROOT
 
 README, PUBLISHED = ROOT / "README.md", ROOT / "docs/results"

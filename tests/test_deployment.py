@@ -14,10 +14,10 @@ import pytest
 
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect, sqlite_module
+from parenting.server.new_run import NewRun, start
 from parenting.server.runs import list_runs, set_status
 from parenting.server.schema import require, upgrade
 from parenting.server.settings import Settings
-from parenting.server.starting import NewRun, start
 from tests.services import read_compose
 from tests.tree import ROOT
 

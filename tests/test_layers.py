@@ -63,7 +63,7 @@ def miniature(tmp_path: Path) -> Path:
     (tmp_path / "parenting/weights/store.py").write_text("def load():\n    import torch\n")
     (tmp_path / "parenting/agent/learning.py").write_text("import torch\nimport parenting.envs.registry\n")
     (tmp_path / "parenting/parents/scripted.py").write_text("import parenting.agent.learning\n")
-    (tmp_path / "parenting/experiments/table1.py").write_text("import parenting.parents.scripted\n")
+    (tmp_path / "parenting/experiments/table1/__init__.py").write_text("import parenting.parents.scripted\n")
     (tmp_path / "parenting/commands/run.py").write_text(
         "import parenting.experiments.table1\nimport parenting.server.app\n"
     )
@@ -81,8 +81,8 @@ def test_miniature_is_allowed(miniature: Path) -> None:
         ("agent/learning.py", "import parenting.parents.scripted", "layers"),
         ("agent/learning.py", "import parenting.parents.scripted", "parent-outside"),
         ("envs/registry.py", "import parenting.agent.config", "layers"),
-        ("parents/scripted.py", "import parenting.server.queue", "layers"),
-        ("experiments/table1.py", "import parenting.server.queue", "layers"),
+        ("parents/scripted.py", "import parenting.server.queue.parent_side", "layers"),
+        ("experiments/table1/__init__.py", "import parenting.server.queue.parent_side", "layers"),
         ("server/app.py", "import parenting.experiments.table1", "layers"),
         ("server/app.py", "import parenting.commands.run", "layers"),
         ("agent/learning.py", "import time", "pure"),

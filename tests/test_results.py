@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from parenting.experiments.calibrate import SOME
-from parenting.experiments.catalogue import experiment
-from parenting.experiments.claims import BORN
-from parenting.experiments.experiment import Asked
-from parenting.experiments.publish import RESULTS, TRIALS, command, page
+from parenting.experiments.registry import experiment
+from parenting.experiments.reporting.markdown import RESULTS, TRIALS, command, page
 from parenting.experiments.reward_hacking import VARIANTS
+from parenting.experiments.safety_claims import BORN
+from parenting.experiments.spec import Asked
 from parenting.experiments.value_iteration import KINDS
 from tests.readme import PUBLISHED, README, NoFinding, anew, results, row, shown
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from parenting.agent.policy import network
-from parenting.agent.schooling import School
+from parenting.agent.pretraining_loop import School
 from parenting.envs import registry
 from parenting.weights import store
 from parenting.weights.store import NoWeights, Wanted, find, load, metadata, save

@@ -9,8 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from parenting.agent.events import Event
 from parenting.server import tables
-from parenting.server.shapes import AskedShape, MetricShape, QueryStatus, RunShape, Shape
-from parenting.server.starting import LARGEST_INT
+from parenting.server.new_run import LARGEST_INT
+from parenting.server.schemas import AskedShape, MetricShape, QueryStatus, RunShape, Shape
 
 Row = TypeVar("Row")
 Place = Annotated[int, Field(ge=-1, le=LARGEST_INT)]

@@ -6,11 +6,11 @@ from fastapi import APIRouter, Request
 
 from parenting.agent.events import Change, EndEpisode, Event, Mature
 from parenting.server import runs
-from parenting.server.api.replies import acts
-from parenting.server.api.words import ChangeBody, GoalBody, PaceBody, RunId
+from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody, RunId
+from parenting.server.api.responses import acts
 from parenting.server.deps import Db, ring
 from parenting.server.record import add_event
-from parenting.server.shapes import RunShape, shape_run
+from parenting.server.schemas import RunShape, shape_run
 
 router = APIRouter(tags=["operator"])
 

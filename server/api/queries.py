@@ -8,14 +8,14 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
 
-from parenting.server import listing
+from parenting.server.api.bodies import AnswerBody, LeaseBody, QueryId, RunId
 from parenting.server.api.lists import AskedPart, AskedRows
-from parenting.server.api.replies import acts, looks
-from parenting.server.api.words import AnswerBody, LeaseBody, QueryId, RunId
+from parenting.server.api.responses import acts, looks
 from parenting.server.deps import Db, SettingsOf, ring
-from parenting.server.queue import answer, lease, release
+from parenting.server.queue.parent_side import answer, lease, release
+from parenting.server.reads import pagination
 from parenting.server.runs import get_run
-from parenting.server.shapes import AskedShape, LeasedShape, StoredShape, shape_asked, shape_leased
+from parenting.server.schemas import AskedShape, LeasedShape, StoredShape, shape_asked, shape_leased
 
 router = APIRouter(tags=["questions"])
 
@@ -26,7 +26,7 @@ def list_questions(run_id: RunId, db: Db, part: Annotated[AskedPart, Query()]) -
 
     The `next` of a page goes back as `after`.
     """
-    page = listing.asked_after(db, run_id, part.after, part.limit, part.status)
+    page = pagination.asked_after(db, run_id, part.after, part.limit, part.status)
     return AskedRows(rows=[shape_asked(row.query, row.answer) for row in page.rows], next=page.next)
 
 
@@ -52,7 +52,7 @@ def lease_question(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf)
 @router.get("/queries/{query_id}", summary="Look at a question", responses=looks(404))
 def get_question(query_id: QueryId, db: Db) -> AskedShape:
     """One question as it is now, with its answer, if one stands. Looking leases nothing."""
-    found = listing.asked(db, query_id)
+    found = pagination.asked(db, query_id)
     return shape_asked(found.query, found.answer)
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 
-from parenting.server import listing
+from parenting.server.api.bodies import RunId
 from parenting.server.api.lists import (
     EventPart,
     MetricPart,
@@ -16,11 +16,11 @@ from parenting.server.api.lists import (
     RunRows,
     operator_event,
 )
-from parenting.server.api.replies import acts, looks
-from parenting.server.api.words import RunId
+from parenting.server.api.responses import acts, looks
 from parenting.server.deps import Db, SettingsOf, ring
-from parenting.server.shapes import RunShape, shape_metrics, shape_run, shape_runs
-from parenting.server.starting import NewRun, start
+from parenting.server.new_run import NewRun, start
+from parenting.server.reads import pagination
+from parenting.server.schemas import RunShape, shape_metrics, shape_run, shape_runs
 
 router = APIRouter(tags=["runs"])
 
@@ -28,7 +28,7 @@ router = APIRouter(tags=["runs"])
 @router.get("/runs", summary="List the runs", responses=looks())
 def list_runs(db: Db, part: Annotated[RunPart, Query()]) -> RunRows:
     """All runs, newest first. The `next` of a page goes back as `before`."""
-    page = listing.runs_before(db, part.before, part.limit)
+    page = pagination.runs_before(db, part.before, part.limit)
     return RunRows(rows=shape_runs(db, page.rows), next=page.next)
 
 
@@ -55,7 +55,7 @@ def list_metrics(run_id: RunId, db: Db, part: Annotated[MetricPart, Query()]) ->
 
     The `next` of a page goes back as `after`. Whoever waits for more takes the last tick that was seen.
     """
-    page = listing.metrics_after(db, run_id, part.after, part.limit)
+    page = pagination.metrics_after(db, run_id, part.after, part.limit)
     return MetricRows(rows=shape_metrics(page.rows), next=page.next)
 
 
@@ -66,5 +66,5 @@ def list_operator_events(run_id: RunId, db: Db, part: Annotated[EventPart, Query
     With seed, config and answers they make the run: replayed at these ticks, it comes out with the same bits.
     The `next` of a page goes back as `after`.
     """
-    page = listing.events_after(db, run_id, part.after, part.limit)
+    page = pagination.events_after(db, run_id, part.after, part.limit)
     return OperatorEventRows(rows=[operator_event(row) for row in page.rows], next=page.next)

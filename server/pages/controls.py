@@ -12,13 +12,13 @@ from pydantic import TypeAdapter, ValidationError
 
 from parenting.agent.events import Change, EndEpisode, Mature, Probability
 from parenting.server import record, runs
-from parenting.server.api.words import RunId
+from parenting.server.api.bodies import RunId
 from parenting.server.deps import Db, ring
+from parenting.server.new_run import Goal, Pace
 from parenting.server.pages.dashboard import dashboard_page
-from parenting.server.pages.events import CHANCES, chances
+from parenting.server.pages.operator_log import CHANCES, chances
 from parenting.server.pages.render import see
 from parenting.server.pages.start import FormOf
-from parenting.server.starting import Goal, Pace
 
 router = APIRouter(include_in_schema=False)
 

@@ -9,18 +9,18 @@ from collections.abc import Mapping
 from fastapi import APIRouter, Response
 
 from parenting.server import record, runs
-from parenting.server.api.words import RunId
+from parenting.server.api.bodies import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.guard import policy
-from parenting.server.pages.events import CHANCES, chances, done
-from parenting.server.pages.measures import Measures, began, measures
+from parenting.server.pages.labels import Measures, began, measures
+from parenting.server.pages.operator_log import CHANCES, chances, done
 from parenting.server.pages.render import page, shown
 from parenting.server.pages.stages import stages
-from parenting.server.pages.words import MORE, SENTENCES, state, title
-from parenting.server.shapes import shape_run
+from parenting.server.pages.texts import MORE, SENTENCES, state, title
+from parenting.server.reads.pages import first_metrics, sampled_metrics
+from parenting.server.schemas import shape_run
 from parenting.server.tables import Run
-from parenting.server.views import first_metrics, sampled_metrics
 
 router = APIRouter(include_in_schema=False)
 

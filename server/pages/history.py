@@ -8,16 +8,17 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 
-from parenting.server import history, runs
-from parenting.server.api.words import RunId
+from parenting.server import runs
+from parenting.server.api.bodies import RunId
 from parenting.server.deps import Db
-from parenting.server.history import Answered
+from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.parent import COOKIE
 from parenting.server.pages.question import Shown, show
 from parenting.server.pages.render import page
-from parenting.server.pages.words import title
-from parenting.server.shapes import Choice
-from parenting.server.starting import LARGEST_INT
+from parenting.server.pages.texts import title
+from parenting.server.reads import answers
+from parenting.server.reads.answers import Answered
+from parenting.server.schemas import Choice
 from parenting.server.tables import CHOICES, KINDS, Run
 
 router = APIRouter(include_in_schema=False)
@@ -39,7 +40,7 @@ OfChoice = Annotated[Choice | Literal[""], Query()]
 
 
 class Entry(NamedTuple):
-    """One answer, ready for web/templates/history.html."""
+    """One answer, ready for web/templates/answers.html."""
 
     number: int
     said: str
@@ -59,7 +60,7 @@ def history_page(
 ) -> Response:
     """The page. `before` is the number of an answer; kind and choice leave out the others."""
     run = runs.get_run(db, run_id)
-    rows = history.before(db, run_id, before, PAGE + 1, kind or None, choice or None)
+    rows = answers.before(db, run_id, before, PAGE + 1, kind or None, choice or None)
     kept = {name: value for name, value in (("kind", kind), ("choice", choice)) if value}
     return page(
         "history.html",

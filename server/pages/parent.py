@@ -17,19 +17,20 @@ from fastapi import APIRouter, Form, Query, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from parenting.server import queue, runs
-from parenting.server.api.words import Choice, ClientId, RunId
+from parenting.server import runs
+from parenting.server.api.bodies import Choice, ClientId, RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, ring
 from parenting.server.errors import NotFound
+from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.question import Shown, show
 from parenting.server.pages.render import page, see
-from parenting.server.pages.words import MORE, SENTENCES, state, title
-from parenting.server.shapes import shape_run
-from parenting.server.starting import LARGEST_INT
+from parenting.server.pages.texts import MORE, SENTENCES, state, title
+from parenting.server.queue import parent_side
+from parenting.server.reads.pages import lease_ahead, may_lease
+from parenting.server.schemas import shape_run
 from parenting.server.streams import Streams
 from parenting.server.tables import Run
-from parenting.server.views import lease_ahead, may_lease
 
 router = APIRouter(include_in_schema=False)
 
@@ -109,9 +110,9 @@ def answer(
     client_id: ClientField,
 ) -> Response:
     """For the form: store the answer, then go to the next question. A closed question says so (409)."""
-    if queue.get_query(db, query_id).run_id != run_id:
+    if parent_side.get_query(db, query_id).run_id != run_id:
         raise NotFound(f"Question {query_id} is not one of run {run_id}.")
-    queue.answer(db, query_id, choice, client_id, parent="human")
+    parent_side.answer(db, query_id, choice, client_id, parent="human")
     ring(request)
     return _go_on(db, run_id, client_id, settings.lease_seconds, patience=PATIENCE)
 
@@ -122,20 +123,20 @@ def _markup(
     if shown:
         query = lease_ahead(db, run.id, client_id, shown, seconds)
     else:
-        query = queue.lease(db, run.id, client_id, seconds)
+        query = parent_side.lease(db, run.id, client_id, seconds)
     return None if query is None else page("_question.html", shown=show(query, run), client=client_id)
 
 
 def _go_on(db: Database, run_id: int, client_id: str, seconds: float, patience: float = 0.0) -> Response:
     """To the next question, which may come within `patience` seconds, or to the page that waits for it."""
     until = time.monotonic() + patience
-    while (query := queue.lease(db, run_id, client_id, seconds)) is None and time.monotonic() < until:
+    while (query := parent_side.lease(db, run_id, client_id, seconds)) is None and time.monotonic() < until:
         time.sleep(0.02)
     return see(f"/runs/{run_id}/parent" + (f"?query={query.id}" if query else ""))
 
 
 def _open_question(db: Database, run: Run, query_id: int) -> Shown | None:
-    query = queue.get_query(db, query_id)
+    query = parent_side.get_query(db, query_id)
     if query.run_id != run.id:
         raise NotFound(f"Question {query_id} is not one of run {run.id}.")
     return show(query, run) if query.status == "open" else None

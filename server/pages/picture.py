@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import re
 
+from parenting.drawing.board import Board, draw
+from parenting.drawing.clip import Clip, Frame
 from parenting.envs.levels.kind import AGENT, BOX, LAND, PIECES, Kind, Level
-from parenting.server.pages.board import Board, draw
-from parenting.server.pages.clip import Clip, Frame
 from parenting.server.pages.render import WEB, fill
 
 RULE = re.compile(r"^(\.[^{}@]+?) *\{([^{}]*)\}$", re.MULTILINE)

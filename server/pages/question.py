@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from parenting.server.pages.board import Board, draw
-from parenting.server.pages.clip import BARS, Cell, find
-from parenting.server.pages.happens import Said, comes_of
-from parenting.server.pages.words import LEADS, TITLES, chance, does, watch
+from parenting.drawing.board import Board, draw
+from parenting.drawing.clip import BARS, Cell, find
+from parenting.server.pages.captions import Said, comes_of
+from parenting.server.pages.texts import LEADS, TITLES, chance, does, watch
 from parenting.server.tables import Query, Run
 
 DELUDED = "What is dashed is only what it believes to see."

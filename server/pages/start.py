@@ -13,14 +13,14 @@ from parenting.envs.registry import WORLDS
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, ring
 from parenting.server.errors import Invalid
-from parenting.server.listing import runs_before
-from parenting.server.pages.measures import measures
+from parenting.server.new_run import LARGEST_INT, plan, read_form, start
+from parenting.server.pages.labels import measures
 from parenting.server.pages.render import page, see
-from parenting.server.pages.words import WORDS, state, title
-from parenting.server.shapes import RunShape, shape_runs
-from parenting.server.starting import LARGEST_INT, plan, read_form, start
+from parenting.server.pages.texts import WORDS, state, title
+from parenting.server.reads.pages import latest_metrics
+from parenting.server.reads.pagination import runs_before
+from parenting.server.schemas import RunShape, shape_runs
 from parenting.server.tables import Metric, Run
-from parenting.server.views import latest_metrics
 
 router = APIRouter(include_in_schema=False)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from parenting.agent.birth import network_of
+from parenting.agent.init import network_of
 from parenting.agent.query import Query
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld

@@ -6,9 +6,9 @@ import torch
 from torch import Tensor
 
 from parenting.agent import parenting
-from parenting.agent.birth import network_of
 from parenting.agent.config import PRESETS, Config
 from parenting.agent.events import Mature
+from parenting.agent.init import network_of
 from parenting.agent.pairing import EXPLOIT, EXPLORE
 from parenting.agent.query import Answer, Choice, Kind, Query, silence
 from parenting.agent.state import AgentState

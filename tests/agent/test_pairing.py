@@ -10,11 +10,11 @@ from torch import Tensor
 
 from parenting.agent import pairing, parenting
 from parenting.agent.config import PRESETS, Config
-from parenting.agent.digest import unordered
 from parenting.agent.pairing import EXPLOIT, EXPLORE, Pair
 from parenting.agent.query import Answer, Choice, Kind, Query
 from parenting.agent.state import Recorder
 from parenting.envs import registry
+from parenting.envs.fingerprint import unordered
 from parenting.envs.rng import keys
 from tests.agent.lives import capricious, live
 

@@ -6,13 +6,13 @@ import pytest
 import torch
 
 from parenting.agent import parenting, pretraining
-from parenting.agent.birth import network_of
 from parenting.agent.config import PRESETS, Config
-from parenting.agent.maze_walks import ARRIVED, EPISODES, LIMIT, Batch, draw_mazes, outside, pool, walk
+from parenting.agent.init import network_of
 from parenting.agent.policy import network
 from parenting.agent.pretraining import policy_gradient, returns_to_go, visited
+from parenting.agent.pretraining_loop import School
+from parenting.agent.pretraining_mazes import ARRIVED, EPISODES, LIMIT, Batch, draw_mazes, outside, pool, walk
 from parenting.agent.query import silence
-from parenting.agent.schooling import School
 from parenting.envs import registry
 from parenting.envs.levels.rules import MOVES
 from parenting.envs.rng import keys

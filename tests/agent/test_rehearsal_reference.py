@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 import torch
 
-from parenting.agent.birth import network_of
 from parenting.agent.config import PRESETS, Config
+from parenting.agent.init import network_of
 from parenting.agent.policy import Network
 from parenting.envs import registry
 from parenting.envs.rng import keys
-from parenting.experiments.small_worlds import small
+from parenting.experiments.value_iteration.levels import small
 from parenting.parents.scripted import Judgement
 from parenting.server.codec import CHOICE_NAMES
 from tests.agent.lives import Judge, as_query, layers, live, wayward

@@ -1,4 +1,4 @@
-"""Sec. 4.1: maturation is value iteration, begun at the parent's values (experiments/value_iteration.py).
+"""Sec. 4.1: maturation is value iteration, begun at the parent's values (experiments/value_iteration).
 
 Lives that have converged are held to what value iteration says; and that to a definition of its own.
 """
@@ -10,10 +10,17 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from parenting.experiments.converging import STAGES, TIE, Places, greedy, iterated, parents_policy
-from parenting.experiments.small_worlds import small
+from parenting.envs.mdp import Model, explore
 from parenting.experiments.value_iteration import KINDS, iterate_some
-from parenting.parents.model import Model, explore
+from parenting.experiments.value_iteration.converge import (
+    STAGES,
+    TIE,
+    Places,
+    greedy,
+    iterated,
+    parents_policy,
+)
+from parenting.experiments.value_iteration.levels import small
 from parenting.parents.values import of_policy
 
 

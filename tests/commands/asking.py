@@ -6,8 +6,8 @@ from typing import Any
 
 from parenting.server import runs
 from parenting.server.db import Database
-from parenting.server.mailbox import post_query
-from parenting.server.starting import NewRun, start
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue.worker_side import post_query
 from tests.server.conftest import CLIPS
 
 

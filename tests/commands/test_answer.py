@@ -14,9 +14,10 @@ from structlog.testing import capture_logs
 from typer.testing import CliRunner, Result
 
 from parenting.commands.main import app
-from parenting.server import queue, record, runs
+from parenting.server import record, runs
 from parenting.server.db import Database
-from parenting.server.history import every
+from parenting.server.queue import parent_side
+from parenting.server.reads.answers import every
 from parenting.server.settings import Settings
 from parenting.server.worker import Worker
 from tests.commands.asking import asked, begin
@@ -102,9 +103,9 @@ def test_patience_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.Cli
     assert "Run 1 is paused: resume it on its page." in answer("--patience", "0.3").stdout
     runs.set_status(db, 1, "active")
     (query,) = asked(db, 1, 1)
-    queue.lease(db, 1, "somebody")
+    parent_side.lease(db, 1, "somebody")
     assert "Somebody else holds the questions of run 1." in answer("--patience", "0.3").stdout
-    queue.answer(db, query, "left", "somebody", "human")
+    parent_side.answer(db, query, "left", "somebody", "human")
     assert "The agent of run 1 explores, at tick 0." in answer("--patience", "0.3").stdout
 
 

@@ -11,11 +11,12 @@ import httpx2
 from parenting.commands.answering import Answering, Order
 from parenting.commands.client import Client
 from parenting.commands.judge import Judge
-from parenting.server import queue, record, runs
+from parenting.server import record, runs
 from parenting.server.db import Database
-from parenting.server.history import every
-from parenting.server.life import Life
-from parenting.server.mailbox import watch
+from parenting.server.queue import parent_side
+from parenting.server.queue.worker_side import watch
+from parenting.server.reads.answers import every
+from parenting.server.session import Life
 from tests.commands.asking import asked, begin
 from tests.server.serving import free_port
 
@@ -88,7 +89,7 @@ def test_what_somebody_else_has_answered_is_let_go(db: Database, web: httpx2.Cli
     class Slow(Never):
         def choice(self, question: dict[str, Any]) -> str:
             if question["id"] == first:
-                queue.answer(db, first, "left", "somebody", "human")
+                parent_side.answer(db, first, "left", "somebody", "human")
             return super().choice(question)
 
     work = script(web, Slow(), limit=1)

@@ -14,10 +14,10 @@ from typer.testing import CliRunner, Result
 from parenting.commands.main import app
 from parenting.server.db import Database
 from parenting.server.export import lines
-from parenting.server.mailbox import post_query
-from parenting.server.queue import answer, correct
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue.parent_side import answer, correct
+from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import claim
-from parenting.server.starting import NewRun, start
 from tests.server.conftest import CLIPS
 from tests.server.serving import parenting
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from parenting.agent.schooling import Pupil, School
+from parenting.agent.pretraining_loop import Pupil, School
 from parenting.commands.main import app
 from parenting.envs import registry
 from parenting.weights.store import Wanted, digest, find, load

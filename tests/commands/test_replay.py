@@ -19,9 +19,10 @@ from sqlalchemy import text
 from typer.testing import CliRunner, Result
 
 from parenting.commands.main import app
-from parenting.server import mailbox, record
+from parenting.server import record
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
+from parenting.server.queue import worker_side
 from parenting.server.schema import upgrade
 from parenting.server.settings import Settings
 from tests.server.raised_by_hand import TICKS, raise_by_hand
@@ -37,7 +38,7 @@ def raised(tmp_path_factory: pytest.TempPathFactory) -> Path:
     upgrade(db)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "parenting.server.life.CHECKPOINT_SECONDS", 1e9
+            "parenting.server.session.CHECKPOINT_SECONDS", 1e9
         )  # so that they are written where it says so alone
         with TestClient(create_app(settings, db), base_url="http://localhost") as web:
             assert raise_by_hand(db, web) == 1
@@ -74,11 +75,11 @@ def sql(db: Database, statement: str, **values: object) -> int:
 def test_equal_bit_for_bit(db: Database) -> None:
     said = replay()
     assert said.exit_code == 0, said.output
-    heard, events = len(mailbox.record(db, 1)), record.list_events(db, 1)
+    heard, events = len(worker_side.record(db, 1)), record.list_events(db, 1)
     assert {event.kind for event in events} == {"end_episode", "change", "mature"}
     counts = f"{TICKS} ticks, {heard} answers, {len(events)} events re-lived."
     assert said.output == f"Run 1: {counts} Equal bit for bit.\n"
-    asked = [row.query for row in mailbox.record(db, 1)]
+    asked = [row.query for row in worker_side.record(db, 1)]
     assert {query.kind for query in asked} == {"guidance", "preference"}
 
 
@@ -100,13 +101,13 @@ def test_as_json(data: Path) -> None:
 
 
 def another_choice(db: Database) -> None:
-    taken = next(row for row in mailbox.record(db, 1) if row.answer.choice == "left")
+    taken = next(row for row in worker_side.record(db, 1) if row.answer.choice == "left")
     assert sql(db, "UPDATE answer SET choice = 'right' WHERE id = :id", id=taken.answer.id)
 
 
 def a_late_choice(db: Database) -> None:
     """The last answer that training took in: only bits can tell."""
-    taken = [row for row in mailbox.record(db, 1) if row.answer.choice in ("left", "right")][-1]
+    taken = [row for row in worker_side.record(db, 1) if row.answer.choice in ("left", "right")][-1]
     other = {"left": "right", "right": "left"}[taken.answer.choice]
     assert sql(db, "UPDATE answer SET choice = :other WHERE id = :id", other=other, id=taken.answer.id)
 
@@ -133,7 +134,7 @@ def an_unreadable_question(db: Database) -> None:
 
 
 def an_answer_moved(db: Database) -> None:
-    heard = [row.answer for row in mailbox.record(db, 1) if row.query.kind == "guidance"]
+    heard = [row.answer for row in worker_side.record(db, 1) if row.query.kind == "guidance"]
     tick = heard[-1].applied_tick
     assert sql(db, "UPDATE answer SET applied_tick = :tick - 1 WHERE applied_tick = :tick", tick=tick)
 

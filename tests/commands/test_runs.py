@@ -11,11 +11,11 @@ from parenting.commands.main import app
 from parenting.commands.runs import COLUMNS
 from parenting.server import runs
 from parenting.server.db import Database
-from parenting.server.mailbox import post_query
-from parenting.server.queue import answer
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue.parent_side import answer
+from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim
-from parenting.server.shapes import shape_run
-from parenting.server.starting import NewRun, start
+from parenting.server.schemas import shape_run
 from tests.server.conftest import CLIPS
 
 

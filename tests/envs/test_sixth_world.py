@@ -13,13 +13,13 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from parenting import envs
-from parenting.agent.birth import world_of
 from parenting.agent.config import compose
+from parenting.agent.init import world_of
 from parenting.commands.worlds import describe
 from parenting.envs import gym, levels, registry
 from parenting.envs.levels.kind import Kind, LevelError
 from parenting.envs.rng import keys
-from parenting.experiments.trials import Until, raise_trials
+from parenting.experiments.training.batch import Until, raise_trials
 from parenting.parents.scripted import Judgement
 from parenting.server.pages.picture import picture
 from tests.envs.test_conformance import *  # noqa: F403

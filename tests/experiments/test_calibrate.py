@@ -9,13 +9,10 @@ import pytest
 
 from parenting.envs import registry
 from parenting.envs.levels.unsafe_exploration import ISLAND_BOTTLENECK
+from parenting.envs.mdp import explore
 from parenting.experiments import calibrate
 from parenting.experiments.calibrate import EXPERIMENT, LAYOUTS, settings
-from parenting.experiments.calibrated import findings
-from parenting.experiments.calibrated_drawing import scatter
-from parenting.experiments.experiment import Asked
-from parenting.experiments.labour import do
-from parenting.experiments.matching import (
+from parenting.experiments.calibrate.distance import (
     BY_REWARD,
     DEATHS,
     DIRECT,
@@ -25,9 +22,12 @@ from parenting.experiments.matching import (
     distance,
     search,
 )
-from parenting.experiments.pieces import Row
-from parenting.experiments.straits import strait
-from parenting.parents.model import explore
+from parenting.experiments.calibrate.layouts import strait
+from parenting.experiments.calibrate.plot import scatter
+from parenting.experiments.calibrate.report import findings
+from parenting.experiments.runner.executor import do
+from parenting.experiments.runner.store import Row
+from parenting.experiments.spec import Asked
 
 NEAR = dict(zip(KNOBS, (0.3, 0.3, 0.1, 0.1, False), strict=True))
 FAR = {**NEAR, "p_rec": 0.5}

@@ -13,9 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 from parenting.commands.main import app
-from parenting.experiments.cluster import NoCluster
-from parenting.experiments.labour import do, work
-from parenting.experiments.pieces import Row, Store, Task
+from parenting.experiments.runner.dask_cluster import NoCluster
+from parenting.experiments.runner.executor import do, work
+from parenting.experiments.runner.store import Row, Store, Task
 
 run = CliRunner().invoke
 COMMAND = ["experiment", "figure4", "--trials", "1", "--out"]
@@ -41,7 +41,7 @@ def raised(number: int) -> Task:
     """One real piece: two agents for a few ticks."""
     mine: dict[str, Any] = {"world": "unsafe-exploration", "level": "island", "preset": "lax", "changes": {}}
     goal = {"until": ("ticks", 5), "max_ticks": 5, "span": (2 * number, 2 * number + 2)}
-    call = "parenting.experiments.raising:parent_some"
+    call = "parenting.experiments.training.tasks:parent_some"
     return Task(f"piece-{number}", call, {"label": "some", "seed": 0, **mine, **goal})
 
 
@@ -83,7 +83,7 @@ def test_what_is_no_address_is_said_before_anything_is_written(address: str, tmp
 
 
 def test_an_address_where_nobody_answers_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("parenting.experiments.cluster.PATIENCE", 0.2)
+    monkeypatch.setattr("parenting.experiments.runner.dask_cluster.PATIENCE", 0.2)
     said = run(app, [*COMMAND, str(tmp_path), "--cluster", "tcp://127.0.0.1:9"])
     assert said.exit_code == 2
     assert "--cluster tcp://127.0.0.1:9: no Dask scheduler answers there" in said.output
@@ -95,7 +95,7 @@ def test_an_address_where_nobody_answers_is_said(tmp_path: Path, monkeypatch: py
 def test_a_cluster_without_a_worker_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from dask.distributed import LocalCluster
 
-    monkeypatch.setattr("parenting.experiments.cluster.PATIENCE", 2)
+    monkeypatch.setattr("parenting.experiments.runner.dask_cluster.PATIENCE", 2)
     with LocalCluster(  # type: ignore[no-untyped-call]
         n_workers=0, host="127.0.0.1", dashboard_address=FREE
     ) as empty:
@@ -106,7 +106,7 @@ def test_a_cluster_without_a_worker_is_said(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_without_dask_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("parenting.experiments.cluster.find_spec", lambda _name: None)
+    monkeypatch.setattr("parenting.experiments.runner.dask_cluster.find_spec", lambda _name: None)
     said = run(app, [*COMMAND, str(tmp_path), "--cluster", "tcp://127.0.0.1:9"])
     assert said.exit_code == 2
     assert "pip install 'parenting[dask]'" in said.output

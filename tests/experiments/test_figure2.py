@@ -8,13 +8,13 @@ import pytest
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
-from parenting.experiments.experiment import Asked, Scale
 from parenting.experiments.figure2 import COMBINATIONS, EXPERIMENT, LIVES
-from parenting.experiments.figure2_lives import extrapolated
-from parenting.experiments.figure2_rows import LIVED, MANY
-from parenting.experiments.labour import do
-from parenting.experiments.maturing import live_some
-from parenting.experiments.pieces import Row
+from parenting.experiments.figure2.agents import extrapolated
+from parenting.experiments.figure2.rows import LIVED, MANY
+from parenting.experiments.figure2.tasks import live_some
+from parenting.experiments.runner.executor import do
+from parenting.experiments.runner.store import Row
+from parenting.experiments.spec import Asked, Scale
 
 
 def rows_of_lines(ahead: float) -> list[Row]:

@@ -11,25 +11,26 @@ import torch
 from typer.testing import CliRunner
 
 from parenting.agent import parenting
-from parenting.agent.birth import network_of, world_of
+from parenting.agent.init import network_of, world_of
 from parenting.commands.main import app
 from parenting.envs.box_levels import box_levels
 from parenting.envs.gridworld import local_state
 from parenting.envs.levels.kind import Level
+from parenting.envs.mdp import explore
 from parenting.envs.rng import keys
-from parenting.experiments import figure3, trials
+from parenting.evaluation.argmax import ListedEvaluation
+from parenting.experiments import figure3
 from parenting.experiments.figure3 import Size
-from parenting.experiments.findings import Finding
-from parenting.experiments.generalising import parent_some, pre_parent
-from parenting.experiments.generality import duration, findings
-from parenting.experiments.pieces import Row
+from parenting.experiments.figure3.levels import ASIDE, PARENTING, config_of, find_levels, levels_for
+from parenting.experiments.figure3.report import duration, findings
+from parenting.experiments.figure3.tasks import parent_some, pre_parent
+from parenting.experiments.figure3.transfer import POLICY, learnt, pack, take_along
 from parenting.experiments.pretrained import pretrained, weights_of
-from parenting.experiments.ranks import fewer, independent, median_interval, pairs_interval
-from parenting.experiments.taking_along import POLICY, learnt, pack, take_along
-from parenting.experiments.trials import Nursery, Until
-from parenting.experiments.unsolved_levels import ASIDE, PARENTING, config_of, find_levels, levels_for
-from parenting.parents.evaluation import ListedEvaluation
-from parenting.parents.model import explore
+from parenting.experiments.reporting.comparison import Finding
+from parenting.experiments.reporting.statistics import fewer, independent, median_interval, pairs_interval
+from parenting.experiments.runner.store import Row
+from parenting.experiments.training import batch
+from parenting.experiments.training.batch import Nursery, Until
 
 CONFIG = config_of(pretrain=True, recompare=False)
 
@@ -97,7 +98,7 @@ def test_what_is_taken_along() -> None:
 
 def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Even where those that are done stay in the batch, and go on learning."""
-    monkeypatch.setattr(trials, "LEAVE", 2.0)
+    monkeypatch.setattr(batch, "LEAVE", 2.0)
     rows = find_levels(0, 2, seed=0)
     taught = pre_parent(2, False, False, (0, 4), 400, 0, rows)
     assert [row["finished"] for row in taught] == [True] * 4
@@ -239,5 +240,5 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     results = json.loads((tmp_path / "figure3/results.json").read_text())
     assert results["findings"][0]["ours"] == "3"
     assert len([one for one in results["findings"] if one["what"].startswith("queries at the median, ")]) == 9
-    assert "_learnt" not in (tmp_path / "figure3/trials.csv").read_text()
+    assert "_learnt" not in (tmp_path / "figure3/batch.csv").read_text()
     assert (tmp_path / "figure3/queries.svg").exists()

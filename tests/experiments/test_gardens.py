@@ -6,8 +6,8 @@ import pytest
 import torch
 
 from parenting.envs.rng import keys
-from parenting.experiments.gardens import garden, spread_starts
-from parenting.parents.waterings import walked
+from parenting.evaluation.rollouts import walked
+from parenting.experiments.training.gardens import garden, spread_starts
 from tests.parents.hand_made import UP
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 import torch
 
-from parenting.agent.birth import world_of
+from parenting.agent.init import world_of
 from parenting.envs import registry
-from parenting.experiments.gardens import garden
+from parenting.experiments.figure3.levels import config_of
 from parenting.experiments.pretrained import pretrained, weights_of
-from parenting.experiments.unsolved_levels import config_of
+from parenting.experiments.training.gardens import garden
 from parenting.weights.store import Wanted, shipped
 
 

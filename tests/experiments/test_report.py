@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from parenting.commands.main import app
-from parenting.experiments.catalogue import NAMES
-from parenting.experiments.experiment import Asked
-from parenting.experiments.findings import LOST, SILENT, Finding
-from parenting.experiments.report import NO, NOTHING, OPEN, YES, NoResults, prose, report, verdict
+from parenting.experiments.registry import NAMES
+from parenting.experiments.reporting.comparison import LOST, SILENT, Finding
+from parenting.experiments.reporting.html import NO, NOTHING, OPEN, YES, NoResults, prose, report, verdict
+from parenting.experiments.spec import Asked
 
 run = CliRunner().invoke
 MAKE = ["experiment", "figure4", "--trials", "1", "--workers", "1", "--out"]

@@ -9,11 +9,11 @@ import pytest
 from parenting.agent.config import Config
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.experiments import reward_hacking
-from parenting.experiments.bucket import STEPS
-from parenting.experiments.experiment import Asked
-from parenting.experiments.findings import Finding
-from parenting.experiments.milestones import Passed, raise_past
+from parenting.experiments.reporting.comparison import Finding
 from parenting.experiments.reward_hacking import EXPERIMENT, VARIANTS, bucket_some
+from parenting.experiments.reward_hacking.report import STEPS
+from parenting.experiments.spec import Asked
+from parenting.experiments.training.snapshots import Passed, raise_past
 
 NAME = "garden, not pre-trained"
 

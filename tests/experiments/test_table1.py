@@ -10,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from parenting.commands.main import app
-from parenting.experiments.catalogue import NAMES, experiment
-from parenting.experiments.experiment import Asked, Scale, spans
-from parenting.experiments.pieces import described
-from parenting.experiments.publish import page
+from parenting.experiments.registry import NAMES, experiment
+from parenting.experiments.reporting.markdown import page
+from parenting.experiments.runner.store import described
+from parenting.experiments.spec import Asked, Scale, spans
 
 run = CliRunner().invoke
 SCALES: tuple[Scale, Scale] = "quick", "paper"

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import pytest
 
-from parenting.experiments.findings import Finding
-from parenting.experiments.pieces import Row
-from parenting.experiments.raising import parent_some, reward_some
-from parenting.experiments.table1_report import ALGORITHMS, born, cells, order
+from parenting.experiments.reporting.comparison import Finding
+from parenting.experiments.runner.store import Row
+from parenting.experiments.table1.report import ALGORITHMS, born, cells, order
+from parenting.experiments.training.tasks import parent_some, reward_some
 
 WORLD, LEVEL = "unsafe-exploration", "island"
 BORN = 86

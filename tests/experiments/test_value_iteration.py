@@ -7,11 +7,11 @@ import json
 import pytest
 
 from parenting.experiments import value_iteration
-from parenting.experiments.converging import CONFIG, STAGES
-from parenting.experiments.experiment import Asked
-from parenting.experiments.pieces import Row
+from parenting.experiments.runner.store import Row
+from parenting.experiments.spec import Asked
 from parenting.experiments.value_iteration import EXPERIMENT, KINDS, LEVELS
-from parenting.experiments.value_iteration_report import finding
+from parenting.experiments.value_iteration.converge import CONFIG, STAGES
+from parenting.experiments.value_iteration.report import finding
 
 KIND = KINDS[0].world
 

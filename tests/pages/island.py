@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from parenting.drawing.clip import Clip, Frame
 from parenting.server.db import Database
-from parenting.server.mailbox import post_query
-from parenting.server.pages.clip import Clip, Frame
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue.worker_side import post_query
 from parenting.server.record import write_metrics
 from parenting.server.runs import Claim, claim, report
-from parenting.server.starting import NewRun, start
 from parenting.server.tables import Run
 
 MOVES = {"up": (-1, 0), "down": (1, 0), "left": (0, -1), "right": (0, 1)}

@@ -10,8 +10,9 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
-from parenting.server import queue, record, runs
+from parenting.server import record, runs
 from parenting.server.db import Database
+from parenting.server.queue import parent_side
 from tests.by_hand import until
 from tests.pages import island
 from tests.pages.watched import Watched
@@ -44,14 +45,14 @@ def lives(db: Database) -> None:
     island.ask(db, mine, 41, "guidance", island.guidance("left", "up", start=(1, 2)))
     island.ask(db, mine, 42, "preference", island.preference("down left left left", "right down down"))
     told = island.ask(db, mine, 43, "preference", island.preference("left left", "down"))
-    queue.answer(db, told, "left", "me", "human")
+    parent_side.answer(db, told, "left", "me", "human")
     _, other = island.live(db, level="island-bottleneck")
     runs.report(db, other, waiting="stuck", optimal=True)
     _, third = island.live(db, goal=1, pace=2.5, config={"stages": 2})
     island.measure(db, third, 40)
     runs.report(db, third, maturity=2)
     record.add_event(db, 3, "end_episode", {})
-    queue.answer(
+    parent_side.answer(
         db, island.ask(db, third, 41, "guidance", island.guidance("up", "left")), "left", "me", "human"
     )
     _, fourth = island.live(db)

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from parenting.drawing.board import draw, paths
+from parenting.drawing.clip import Clip, find
+from parenting.drawing.trail import trace
 from parenting.envs import registry
-from parenting.server.pages.board import draw, paths
-from parenting.server.pages.clip import Clip, find
-from parenting.server.pages.trail import trace
 from tests.pages.filmed import film, forecast
 from tests.pages.island import clip
 

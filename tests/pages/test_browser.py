@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 from playwright.sync_api import Route, expect
 
-from parenting.server import queue, runs
+from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.queue import parent_side
 from parenting.server.runs import Claim
 from parenting.server.tables import Query
 from tests.pages.watched import Watched, given, shown, until
@@ -135,7 +136,7 @@ def test_a_question_closed_by_another_is_told(
     number, following = ask(), ask()
     page = watched.open("/runs/1/parent")
     shown(page, number)
-    queue.answer(db, number, "left", "somebody", "human")
+    parent_side.answer(db, number, "left", "somebody", "human")
     page.keyboard.press("ArrowRight")
     expect(page.get_by_role("alert")).to_contain_text("already answered by someone else")
     expect(page.locator("#saved")).to_have_text("")

@@ -8,8 +8,9 @@ from typing import Any
 import httpx2
 import pytest
 
-from parenting.server import mailbox, runs
+from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.queue import worker_side
 from parenting.server.record import list_events
 from parenting.server.runs import Claim, get_run, set_status
 from tests.pages import island
@@ -70,7 +71,7 @@ def test_only_what_differs_becomes_an_event(client: httpx2.Client, db: Database,
     assert changes(db) == [("p_guid", 0.25), ("p_train", 0.5)]
     page = client.get("/runs/1").text  # what waits to be applied counts
     assert {name: field(page, name) for name in CHANCES} == {**CHANCES, "p_guid": "0.25", "p_train": "0.5"}
-    mailbox.take_events(db, mine, 7)
+    worker_side.take_events(db, mine, 7)
     client.post("/runs/1/chances", data={**CHANCES, "p_train": "0.5"})
     assert changes(db)[2:] == [("p_guid", 0.95)]
 
@@ -138,7 +139,7 @@ def test_what_was_done_is_listed_with_its_tick(client: httpx2.Client, db: Databa
     assert "What the operator did" not in client.get("/runs/1").text
     client.post("/runs/1/event", data={"kind": "mature"})
     client.post("/runs/1/event", data={"kind": "end_episode"})
-    mailbox.take_events(db, mine, 7)
+    worker_side.take_events(db, mine, 7)
     client.post("/runs/1/chances", data={**CHANCES, "p_guid": "1"})
     listed = client.get("/runs/1").text.partition("What the operator did")[2].partition("</ol>")[0]
     assert [re.sub("<.*?>", "", line) for line in re.findall(r"<li.*?</li>", listed)] == [

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from parenting.drawing.clip import Clip
+from parenting.drawing.cues import Cue, cues
 from parenting.envs import registry
-from parenting.server.pages.clip import Clip
-from parenting.server.pages.cues import Cue, cues
 from tests.pages.filmed import film, forecast
 from tests.pages.island import clip
 

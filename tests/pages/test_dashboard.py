@@ -9,11 +9,11 @@ import pytest
 
 from parenting.envs import registry
 from parenting.server.db import Database
-from parenting.server.life import Life
-from parenting.server.mailbox import watch
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue.worker_side import watch
+from parenting.server.reads.pages import latest_metrics, sampled_metrics
 from parenting.server.runs import claim, get_run, report, set_status
-from parenting.server.starting import NewRun, start
-from parenting.server.views import latest_metrics, sampled_metrics
+from parenting.server.session import Life
 from tests.pages import island
 
 

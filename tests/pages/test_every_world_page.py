@@ -9,11 +9,11 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from parenting.envs import registry
-from parenting.server import mailbox
 from parenting.server.db import Database
-from parenting.server.life import Life
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue import worker_side
 from parenting.server.runs import claim
-from parenting.server.starting import NewRun, start
+from parenting.server.session import Life
 from tests.pages import island
 from tests.pages.filmed import guidance, preference
 from tests.pages.test_access import SCREENS, violations
@@ -42,7 +42,7 @@ def asked(db: Database, world: str, level: str) -> None:
     """A run that lives until it waits for its parent."""
     run = start(db, NewRun(world=world, level=level))
     life = Life(db, claim(db, "test")[0], run, lambda: None)
-    while life.ready(seen := mailbox.watch(db, [run.id])[run.id]):
+    while life.ready(seen := worker_side.watch(db, [run.id])[run.id]):
         life.beat(seen)
     life.wait(seen)
 
@@ -50,7 +50,7 @@ def asked(db: Database, world: str, level: str) -> None:
 def posted(db: Database, world: str, kind: str, clips: dict[str, Any], stage: int = 6, **fields: str) -> str:
     """A question made here: the page that shows it."""
     run, mine = island.live(db, world=world, **fields)
-    return f"/runs/{run.id}/parent?query={mailbox.post_query(db, mine, 1, kind, stage, clips)}"
+    return f"/runs/{run.id}/parent?query={worker_side.post_query(db, mine, 1, kind, stage, clips)}"
 
 
 def seen(page: Page, parts: str) -> list[tuple[int, float]]:

@@ -6,11 +6,11 @@ import re
 
 from parenting.server.db import Database
 from parenting.server.export import rows
-from parenting.server.life import Life
-from parenting.server.mailbox import watch
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue.worker_side import watch
 from parenting.server.record import metrics
 from parenting.server.runs import claim
-from parenting.server.starting import NewRun, start
+from parenting.server.session import Life
 from tests.tree import ROOT
 
 GUIDE = (ROOT / "docs/guide-researchers.md").read_text(encoding="utf-8")

@@ -7,9 +7,9 @@ import re
 import httpx2
 import pytest
 
-from parenting.server import mailbox, queue
 from parenting.server.db import Database
 from parenting.server.pages.history import PAGE
+from parenting.server.queue import parent_side, worker_side
 from parenting.server.runs import Claim
 from tests.pages import island
 
@@ -25,7 +25,7 @@ def answered(db: Database, mine: Claim, tick: int, choice: str, kind: str = "gui
     """A question of this tick with its answer."""
     clips = {"guidance": island.guidance, "preference": island.preference}[kind]("left", "down")
     query = island.ask(db, mine, tick, kind, clips)
-    queue.answer(db, query, choice, by, "scripted" if by == "scripted" else "human")
+    parent_side.answer(db, query, choice, by, "scripted" if by == "scripted" else "human")
     return query
 
 
@@ -46,7 +46,7 @@ def test_nothing_yet(client: httpx2.Client, mine: Claim) -> None:
 
 def test_an_answer_with_all_that_is_known_of_it(client: httpx2.Client, db: Database, mine: Claim) -> None:
     answered(db, mine, 3, "left")
-    mailbox.take_answer(db, mine, 4)
+    worker_side.take_answer(db, mine, 4)
     answered(db, mine, 5, "neither", "preference", by="somebody-else")
     answered(db, mine, 6, "either", by="scripted")
     client.cookies.set("parenting_client", ME)
@@ -103,7 +103,7 @@ def test_some_of_them(client: httpx2.Client, db: Database, mine: Claim) -> None:
 
 def test_a_corrected_answer_says_so(client: httpx2.Client, db: Database, mine: Claim) -> None:
     query = answered(db, mine, 1, "left")
-    queue.correct(db, query, "right", ME, "human")
+    parent_side.correct(db, query, "right", ME, "human")
     page = client.get("/runs/1/history").text
     assert "corrected later" in entry(page, 1)
     assert "corrected later" not in entry(page, 2)

@@ -6,8 +6,9 @@ import re
 
 from playwright.sync_api import Page, expect
 
-from parenting.server import mailbox, queue, runs
+from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.queue import parent_side, worker_side
 from parenting.server.settings import Settings
 from parenting.server.wake import Bell
 from tests.pages import island
@@ -48,7 +49,7 @@ def test_an_event_gets_its_tick_on_the_page(watched: Watched, db: Database) -> N
     page.get_by_label("p_guid").fill("0.5")
     page.get_by_role("button", name="Change").click()
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 before the next tick")
-    mailbox.take_events(db, mine, 8)
+    worker_side.take_events(db, mine, 8)
     runs.report(db, mine, tick=8)
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 at tick 8")
 
@@ -75,7 +76,7 @@ def test_the_clips_of_an_answer_play_while_it_is_pointed_at(watched: Watched, db
     _, mine = island.live(db)
     for tick in (1, 2):
         query = island.ask(db, mine, tick, "preference", island.preference("left left", "down down"))
-        queue.answer(db, query, "left", "me", "human")
+        parent_side.answer(db, query, "left", "me", "human")
     page = watched.open("/runs/1/history")
     entries = page.locator(".entry")
 
@@ -140,5 +141,5 @@ def test_it_is_told_from_the_median_of_the_last_answers(watched: Watched, db: Da
     for width in (320, 390):
         page.set_viewport_size({"width": width, "height": 640})
         assert page.evaluate("document.documentElement.scrollWidth") <= width
-    words = page.evaluate("import('/static/left.js').then(({ left }) => [5, 50, 5000, 0].map(left))")
+    words = page.evaluate("import('/static/eta.js').then(({ left }) => [5, 50, 5000, 0].map(left))")
     assert words == ["about 1 min", "about 3 min", "about 4 h", ""]

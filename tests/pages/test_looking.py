@@ -7,8 +7,9 @@ from typing import Any
 import httpx2
 from sqlalchemy import select
 
-from parenting.server import queue, record, runs
+from parenting.server import record, runs
 from parenting.server.db import Database
+from parenting.server.queue import parent_side
 from parenting.server.tables import Table
 from tests.pages import island
 from tests.test_docs import page_routes
@@ -34,7 +35,7 @@ def test_no_get_changes_anything(client: httpx2.Client, db: Database) -> None:
     island.measure(db, mine, 30)
     for tick, kind in ((31, "preference"), (32, "guidance")):
         query = island.ask(db, mine, tick, kind, island.guidance("left", "down"))
-    queue.answer(db, query, "left", "me", "human")
+    parent_side.answer(db, query, "left", "me", "human")
     record.add_event(db, 1, "end_episode", {"kind": "end_episode"})
     _, other = island.live(db)
     runs.report(db, other, waiting="stuck")

@@ -12,7 +12,7 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.pages.render import WEB
-from parenting.server.pages.words import SENTENCES
+from parenting.server.pages.texts import SENTENCES
 from tests.pages import island
 
 PATHS = ("/", "/runs/1", "/runs/1/parent", "/runs/1/parent?query=1", "/runs/1/parent?query=2", "/runs/77")

@@ -11,12 +11,13 @@ import httpx2
 import pytest
 from sqlalchemy import select
 
-from parenting.server import queue, runs
+from parenting.server import runs
 from parenting.server.db import Database
-from parenting.server.pages.words import SENTENCES, state
+from parenting.server.pages.texts import SENTENCES, state
+from parenting.server.queue import parent_side
 from parenting.server.runs import Claim
+from parenting.server.schemas import OpenShape, RunShape, shape_run
 from parenting.server.settings import Settings
-from parenting.server.shapes import OpenShape, RunShape, shape_run
 from parenting.server.tables import Answer, Event, Query, Run
 from parenting.server.wake import Bell
 from tests.pages import island
@@ -99,7 +100,7 @@ def test_the_same_form_sent_twice_is_one_answer(
 def test_a_closed_question_says_so_and_leads_on(
     client: httpx2.Client, db: Database, asked: list[int]
 ) -> None:
-    queue.answer(db, asked[1], "left", OTHER, "human")
+    parent_side.answer(db, asked[1], "left", OTHER, "human")
     reply = client.post(
         "/runs/1/parent/answer", data={"client_id": ME, "query_id": asked[1], "choice": "right"}
     )
@@ -170,7 +171,7 @@ def test_nothing_is_leased_ahead_of_the_goal(client: httpx2.Client, db: Database
     assert not offered(), "the one that is shown is the last"
     runs.set_goal(db, 1, 2)
     assert offered()
-    queue.answer(db, asked[1], "left", ME, "human")
+    parent_side.answer(db, asked[1], "left", ME, "human")
     assert offered(), "the one that was shown counts once"
     runs.set_goal(db, 1, 1)
     assert not offered()

@@ -5,9 +5,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from parenting.drawing.board import DRAWN
 from parenting.envs import registry
 from parenting.envs.levels.kind import Kind, Level
-from parenting.server.pages.board import DRAWN
 from parenting.server.pages.picture import picture, style
 from parenting.server.pages.render import fill
 from tests.tree import ROOT

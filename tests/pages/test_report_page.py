@@ -9,8 +9,8 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page
 
-from parenting.experiments.publish import RESULTS
-from parenting.experiments.report import report
+from parenting.experiments.reporting.html import report
+from parenting.experiments.reporting.markdown import RESULTS
 from tests.tree import ROOT
 
 PUBLISHED = ROOT / "docs/results"

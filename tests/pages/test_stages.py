@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 
 from parenting.server.db import Database
+from parenting.server.new_run import NewRun, start
 from parenting.server.pages.stages import Stage, stages
+from parenting.server.reads.pages import first_metrics, latest_metrics
 from parenting.server.record import metrics, write_metrics
 from parenting.server.runs import Claim, get_run
 from parenting.server.settings import Settings
-from parenting.server.starting import NewRun, start
-from parenting.server.views import first_metrics, latest_metrics
 from parenting.server.worker import Worker
 from tests.pages import island
 

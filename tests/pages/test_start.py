@@ -9,10 +9,10 @@ import pytest
 
 from parenting.envs.registry import WORLDS
 from parenting.server.db import Database
+from parenting.server.new_run import NewRun, start
 from parenting.server.pages.start import PAGE
-from parenting.server.queue import answer
+from parenting.server.queue.parent_side import answer
 from parenting.server.runs import get_run, let_go, list_runs, report, set_goal, set_status
-from parenting.server.starting import NewRun, start
 from tests.pages import island
 
 FORM = {

@@ -7,9 +7,9 @@ from itertools import count
 import torch
 from torch import Tensor
 
-from parenting.agent.birth import network_of
+from parenting.agent.init import network_of
 from parenting.envs.gridworld import Gridworld
-from parenting.parents.conduct import Policy
+from parenting.evaluation.outcomes import Policy
 
 LETTERS = "udlr"
 UP, DOWN, LEFT, RIGHT = range(4)

@@ -11,10 +11,10 @@ from parenting.envs import registry
 from parenting.envs.absent_supervisor import AbsentSupervisor
 from parenting.envs.gridworld import Actions, WorldState
 from parenting.envs.levels.kind import Level
+from parenting.envs.mdp import explore
 from parenting.envs.unsafe_exploration import UnsafeExploration
 from parenting.parents import values
-from parenting.parents.garden import Garden
-from parenting.parents.model import explore
+from parenting.parents.garden_values import Garden
 from parenting.parents.scripted import Judgement
 from parenting.parents.values import Listed, valuation
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from parenting.agent.query import Choice, Kind, Query
-from parenting.parents.garden import Garden
+from parenting.parents.garden_values import Garden
 from parenting.parents.scripted import Judgement
 from tests.parents.walking import begun, garden, query, said, walked
 

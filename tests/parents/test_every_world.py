@@ -11,8 +11,8 @@ from torch import Tensor
 from parenting.agent.query import Choice, Kind, Query
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
+from parenting.envs.mdp import Model, explore
 from parenting.envs.rng import keys
-from parenting.parents.model import Model, explore
 from parenting.parents.scripted import Judgement
 from parenting.parents.values import HOPELESS, Listed, of_policy, optimal, outcome, valuation
 from tests.parents.plain import Plain

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from parenting.agent.query import Choice, Kind, empty
-from parenting.parents.model import explore
+from parenting.envs.mdp import explore
 from parenting.parents.scripted import TIE, Judgement
 from parenting.parents.values import Listed, optimal
 from tests.parents.walking import at, island, place, query, random_queries, said, stacked

@@ -17,13 +17,13 @@ from __future__ import annotations
 import pytest
 import torch
 
-from parenting.agent.birth import network_of
 from parenting.agent.config import PRESETS, Config
+from parenting.agent.init import network_of
 from parenting.agent.query import Choice, Kind, Query
 from parenting.envs import registry
+from parenting.envs.mdp import explore
 from parenting.experiments.figure4 import HORIZON, SAFE, UNSAFE, rho
-from parenting.experiments.planning import follow, plan
-from parenting.parents.model import explore
+from parenting.experiments.figure4.reward_model import follow, plan
 from parenting.parents.scripted import Judgement
 from parenting.parents.values import Listed, optimal, visited
 from tests.agent.lives import Judge, live

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from parenting.agent.query import Kind
-from parenting.parents.model import explore
+from parenting.envs.mdp import explore
 from parenting.parents.values import HOPELESS, advantage, of_policy, optimal, outcome
 from tests.by_hand import distances
 from tests.parents.walking import at, island, place, query, random_queries

@@ -8,9 +8,9 @@ from torch import Tensor
 from parenting.agent.query import Choice, Kind, Query, empty
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.mdp import Model
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
-from parenting.parents.model import Model
 
 Place = tuple[int, int]
 

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import httpx2
 
-from parenting.server import mailbox, queue, runs
+from parenting.server import runs
 from parenting.server.db import Database
-from parenting.server.life import Life
-from parenting.server.starting import start
+from parenting.server.new_run import start
+from parenting.server.queue import parent_side, worker_side
+from parenting.server.session import Life
 from tests.server.raising import Begun
 
 CONFIG = {
@@ -42,7 +43,7 @@ class Hand:
     def live_to(self, tick: int) -> None:
         """Answer nothing before the agent waits: so preferences are answered late."""
         while self.life.tick < tick:
-            seen = mailbox.watch(self.db, [self.run])[self.run]
+            seen = worker_side.watch(self.db, [self.run])[self.run]
             if self.life.ready(seen):
                 self.life.beat(seen)
             elif bool(self.life.saved.state.stuck):
@@ -87,8 +88,8 @@ def raise_by_hand(db: Database, web: httpx2.Client) -> int:
     hand.until_guidance_is_open()
     query = hand.answer()
     hand.live_to(hand.life.tick + 3)
-    queue.correct(db, query, "either", "tab", "human")  # too late: the agent has heard the other answer
-    assert queue.get_query(db, query).status == "applied"
+    parent_side.correct(db, query, "either", "tab", "human")  # too late: the agent has heard the other answer
+    assert parent_side.get_query(db, query).status == "applied"
     hand.operate("change", name="p_train", value=0.5)
     hand.live_to(50)
     hand.operate("mature")

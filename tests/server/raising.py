@@ -9,9 +9,9 @@ import httpx2
 import torch
 
 from parenting.agent import parenting
-from parenting.agent.birth import world_of
 from parenting.agent.config import Config, compose
 from parenting.agent.events import EndEpisode
+from parenting.agent.init import world_of
 from parenting.agent.query import Answer, Choice
 from parenting.commands.answering import Answering, Order
 from parenting.commands.client import Client
@@ -21,11 +21,11 @@ from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import Judgement
 from parenting.server.checkpoint import Saved, birth, unpack
 from parenting.server.codec import CHOICE_NAMES
+from parenting.server.counters import count
 from parenting.server.db import Database
+from parenting.server.new_run import NewRun
 from parenting.server.record import load_checkpoints
 from parenting.server.replay import differences
-from parenting.server.starting import NewRun
-from parenting.server.tally import count
 from parenting.weights.store import Wanted, find, load
 from tests.agent.lives import Judge
 

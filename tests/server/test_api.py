@@ -9,7 +9,7 @@ from parenting.agent.config import Config
 from parenting.envs import registry
 from parenting.server.db import Database
 from parenting.server.log import set_up_log
-from parenting.server.mailbox import take_events
+from parenting.server.queue.worker_side import take_events
 from parenting.server.record import write_metrics
 from parenting.server.runs import Claim, get_run, report
 from parenting.server.tables import Run

@@ -7,7 +7,7 @@ import httpx2
 import jsonschema_rs
 import pytest
 
-from parenting.server import shapes, tables
+from parenting.server import schemas, tables
 from parenting.server.api import examples
 from parenting.server.app import TAGS
 from tests.server.test_api_questions import lease
@@ -152,12 +152,12 @@ def test_examples_have_the_fields_of_real_replies(client: httpx2.Client, run: An
 @pytest.mark.parametrize(
     ("words", "known"),
     [
-        (shapes.RunStatus, tables.RUN_STATUSES),
-        (shapes.QueryStatus, tables.QUERY_STATUSES),
-        (shapes.Waiting, tables.WAITING),
-        (shapes.Kind, tables.KINDS),
-        (shapes.Choice, tables.CHOICES),
-        (shapes.By, tables.PARENTS),
+        (schemas.RunStatus, tables.RUN_STATUSES),
+        (schemas.QueryStatus, tables.QUERY_STATUSES),
+        (schemas.Waiting, tables.WAITING),
+        (schemas.Kind, tables.KINDS),
+        (schemas.Choice, tables.CHOICES),
+        (schemas.By, tables.PARENTS),
     ],
 )
 def test_words_are_those_of_the_tables(words: Any, known: Any) -> None:

@@ -16,7 +16,7 @@ from parenting.server.api.examples import EXPORTED
 from parenting.server.app import bare_app
 from parenting.server.db import Database
 from parenting.server.errors import ServerError
-from parenting.server.mailbox import post_query
+from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import claim
 from tests.server.conftest import CLIPS
 from tests.tree import ROOT

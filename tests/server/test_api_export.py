@@ -5,11 +5,11 @@ import json
 import httpx2
 import pytest
 
-from parenting.server import history
 from parenting.server.codec import CHOICES
 from parenting.server.db import Database
-from parenting.server.mailbox import post_query, record, take_answer
-from parenting.server.queue import answer
+from parenting.server.queue.parent_side import answer
+from parenting.server.queue.worker_side import post_query, record, take_answer
+from parenting.server.reads import answers
 from parenting.server.runs import Claim
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS
@@ -51,5 +51,5 @@ def test_run_without_answers_is_an_empty_file(client: httpx2.Client, run: Run) -
 
 
 def test_it_is_read_in_batches(client: httpx2.Client, heard: Claim, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(history.every, "__defaults__", (1,))
+    monkeypatch.setattr(answers.every, "__defaults__", (1,))
     assert len(client.get(f"/api/v1/runs/{heard.run_id}/export").text.splitlines()) == len(CHOICES)

@@ -6,11 +6,11 @@ import httpx2
 import pytest
 
 from parenting.server.db import Database
-from parenting.server.mailbox import post_query, take_answer
-from parenting.server.queue import answer, correct
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue.parent_side import answer, correct
+from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.record import add_event, write_metrics
 from parenting.server.runs import Claim
-from parenting.server.starting import NewRun, start
 from tests.server.conftest import CLIPS
 from tests.server.test_api import wrong
 

@@ -7,8 +7,8 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.errors import Busy
-from parenting.server.mailbox import take_answer
-from parenting.server.queue import get_query
+from parenting.server.queue.parent_side import get_query
+from parenting.server.queue.worker_side import take_answer
 from parenting.server.runs import Claim, set_status
 from parenting.server.tables import Run
 from tests.server.conftest import CLIP, CLIPS, Clock

@@ -6,7 +6,7 @@ import httpx2
 import pytest
 
 from parenting.server.db import Database
-from parenting.server.mailbox import take_events, watch
+from parenting.server.queue.worker_side import take_events, watch
 from parenting.server.runs import Claim, get_run, set_status
 from parenting.server.tables import Run
 from tests.server.test_api import wrong

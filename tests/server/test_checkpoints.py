@@ -13,16 +13,16 @@ import pytest
 import torch
 
 from parenting.agent.query import Query
-from parenting.server import mailbox
 from parenting.server.checkpoint import REPORT, Saved, pack, versions
 from parenting.server.db import Database, connect
 from parenting.server.errors import ServerError
-from parenting.server.life import Life
+from parenting.server.new_run import start
+from parenting.server.queue import worker_side
 from parenting.server.replay import equal
 from parenting.server.runs import claim, get_run
 from parenting.server.schema import upgrade
+from parenting.server.session import Life
 from parenting.server.settings import Settings
-from parenting.server.starting import start
 from parenting.server.tables import Checkpoint
 from tests.agent.lives import capricious
 from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, same_bits
@@ -187,7 +187,7 @@ def alive(db: Database, run: int) -> Life:
 
 def live_to(life: Life, tick: int) -> None:
     while life.tick < tick:
-        seen = mailbox.watch(life.db, [life.mine.run_id])[life.mine.run_id]
+        seen = worker_side.watch(life.db, [life.mine.run_id])[life.mine.run_id]
         assert life.ready(seen)
         life.beat(seen)
 

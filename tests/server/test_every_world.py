@@ -15,14 +15,15 @@ from fastapi.testclient import TestClient
 from structlog.testing import capture_logs
 
 from parenting.envs import registry
-from parenting.server import mailbox, record
+from parenting.server import record
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
-from parenting.server.life import Life
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue import worker_side
 from parenting.server.runs import claim, get_run, set_status
 from parenting.server.schema import upgrade
+from parenting.server.session import Life
 from parenting.server.settings import Settings
-from parenting.server.starting import NewRun, start
 from parenting.server.tables import Weights
 from parenting.server.worker import Worker
 from tests.server.raising import Begun, inline, last, same_bits, script
@@ -67,7 +68,7 @@ def taken_up(db: Database, run: int) -> Life:
 
 def live_to(life: Life, tick: int) -> None:
     while life.tick < tick:
-        seen = mailbox.watch(life.db, [life.mine.run_id])[life.mine.run_id]
+        seen = worker_side.watch(life.db, [life.mine.run_id])[life.mine.run_id]
         assert life.ready(seen), life.saved.state.stuck
         life.beat(seen)
 
@@ -96,7 +97,7 @@ def test_the_lease_reply_is_all_that_a_parent_needs(settings: Settings, db: Data
     with TestClient(create_app(settings, db), base_url="http://localhost") as web:
         parent = script(web, run)
         while life.tick < TICKS:
-            seen = mailbox.watch(db, [run])[run]
+            seen = worker_side.watch(db, [run])[run]
             if life.ready(seen):
                 life.beat(seen)
             else:
@@ -114,10 +115,10 @@ def test_it_begins_by_its_name_alone(settings: Settings, db: Database, world: st
         defaults = registry.defaults(world)
         assert {name: run["config"][name] for name in defaults} == defaults
         life = taken_up(db, run["id"])
-        seen = mailbox.watch(db, [run["id"]])[run["id"]]
+        seen = worker_side.watch(db, [run["id"]])[run["id"]]
         while life.ready(seen):
             life.beat(seen)
-            seen = mailbox.watch(db, [run["id"]])[run["id"]]
+            seen = worker_side.watch(db, [run["id"]])[run["id"]]
         question = _good(web.post("/api/v1/runs/1/queries/lease", json={"client_id": "me"}), 200)
     assert question["world"]["text"] == registry.level(world).text
     assert question["kind"] == "guidance"
@@ -174,7 +175,7 @@ def test_a_dear_look_is_not_taken_at_each_answer(db: Database) -> None:
     with TestClient(create_app(Settings(), db), base_url="http://localhost") as web:
         parent = script(web, run)
         while life.tick < 30:
-            seen = mailbox.watch(db, [run])[run]
+            seen = worker_side.watch(db, [run])[run]
             if life.ready(seen):
                 life.beat(seen)
             else:
@@ -182,7 +183,7 @@ def test_a_dear_look_is_not_taken_at_each_answer(db: Database) -> None:
                 assert parent.answer_one()
     assert not record.metrics(db, run)
     life.evaluation.rest = 0.0
-    while life.ready(seen := mailbox.watch(db, [run])[run]):
+    while life.ready(seen := worker_side.watch(db, [run])[run]):
         life.beat(seen)
     life.wait(seen)
     newest = record.metrics(db, run)[-1]

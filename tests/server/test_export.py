@@ -10,8 +10,8 @@ from parenting.server.codec import CHOICES
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.export import MU, lines, rows
-from parenting.server.mailbox import post_query, record, take_answer
-from parenting.server.queue import answer, correct
+from parenting.server.queue.parent_side import answer, correct
+from parenting.server.queue.worker_side import post_query, record, take_answer
 from parenting.server.runs import Claim
 from tests.server.conftest import CLIPS, Clock
 

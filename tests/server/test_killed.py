@@ -31,7 +31,7 @@ ROUNDS = int(os.environ.get("PARENTING_KILL_ROUNDS", "1"))
 KILLS = 24
 SOON = 0.15
 """A kill comes up to so many seconds after the answer that it was drawn for: at any place between two."""
-PATCHES = {"parenting.server.life.CHECKPOINT_SECONDS": 0.05}
+PATCHES = {"parenting.server.session.CHECKPOINT_SECONDS": 0.05}
 """Checkpoints are written often, so that kills hit them too."""
 
 

@@ -7,11 +7,11 @@ import torch
 
 from parenting.server.checkpoint import Saved
 from parenting.server.db import Database
-from parenting.server.life import Life
-from parenting.server.mailbox import watch
+from parenting.server.new_run import start
+from parenting.server.queue.worker_side import watch
 from parenting.server.replay import differences, equal, relive
 from parenting.server.runs import claim, get_run
-from parenting.server.starting import start
+from parenting.server.session import Life
 from tests.server.raising import ISLAND, inline
 
 

@@ -4,11 +4,11 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaim, NotFound
-from parenting.server.mailbox import post_query
-from parenting.server.queue import get_query
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue.parent_side import get_query
+from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim as ClaimOf
 from parenting.server.runs import beat, claim, finish, get_run, let_go, list_runs, report, set_status
-from parenting.server.starting import NewRun, start
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock
 

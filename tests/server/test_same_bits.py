@@ -13,9 +13,9 @@ import pytest
 
 from parenting.envs import registry
 from parenting.server.db import Database
-from parenting.server.mailbox import record
+from parenting.server.new_run import start
+from parenting.server.queue.worker_side import record
 from parenting.server.replay import relive
-from parenting.server.starting import start
 from tests.server.processes import Command, command
 from tests.server.raising import Begun, Inline, last, same_bits
 from tests.server.serving import free_port, until_up

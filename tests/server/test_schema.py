@@ -22,12 +22,12 @@ from structlog.testing import capture_logs
 
 from parenting.server.app import bare_app, create_app
 from parenting.server.db import Database
-from parenting.server.mailbox import post_query, take_answer, take_events
-from parenting.server.queue import answer
+from parenting.server.new_run import LARGEST_INT, NewRun, start
+from parenting.server.queue.parent_side import answer
+from parenting.server.queue.worker_side import post_query, take_answer, take_events
 from parenting.server.record import add_event, write_metrics
 from parenting.server.runs import Claim, claim, finish, set_status
 from parenting.server.settings import Settings
-from parenting.server.starting import LARGEST_INT, NewRun, start
 from parenting.server.workers import sign
 from tests.server.conftest import CLIPS
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from parenting.server.db import connect
+from parenting.server.new_run import NewRun, start
 from parenting.server.schema import upgrade
 from parenting.server.settings import Settings
-from parenting.server.starting import NewRun, start
 from tests.server.serving import Stream, free_port, parenting, until_up
 
 SOON = 2.0

@@ -16,8 +16,8 @@ from sqlalchemy.exc import IntegrityError, OperationalError
 from parenting.server import db as database
 from parenting.server.db import Database, connect, sqlite_module
 from parenting.server.errors import Busy, DiskFull, SetupError
-from parenting.server.mailbox import post_query, take_answer
-from parenting.server.queue import answer, lease
+from parenting.server.queue.parent_side import answer, lease
+from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.record import add_event, save_checkpoint
 from parenting.server.runs import Claim, report
 from parenting.server.settings import Settings
@@ -163,8 +163,8 @@ KILLED = """
 import sys
 from pathlib import Path
 from parenting.server.db import connect
-from parenting.server.mailbox import post_query
-from parenting.server.queue import answer
+from parenting.server.queue.worker_side import post_query
+from parenting.server.queue.parent_side import answer
 from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 db = connect(Settings(data=Path(sys.argv[1]), database_url=None))

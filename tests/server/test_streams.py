@@ -11,8 +11,8 @@ import uvicorn
 
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
-from parenting.server.mailbox import post_query
-from parenting.server.queue import answer
+from parenting.server.queue.parent_side import answer
+from parenting.server.queue.worker_side import post_query
 from parenting.server.record import write_metrics
 from parenting.server.runs import Claim, report
 from parenting.server.schema import upgrade

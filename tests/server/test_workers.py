@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from parenting.server import mailbox, runs
+from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
-from parenting.server.life import Life, resting
-from parenting.server.queue import answer, lease
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue import worker_side
+from parenting.server.queue.parent_side import answer, lease
+from parenting.server.reads.pages import lease_ahead, may_lease
 from parenting.server.record import add_event, load_checkpoints
 from parenting.server.runs import Claim, claim, get_run, set_goal, set_pace, set_status
+from parenting.server.session import Life, resting
 from parenting.server.settings import Settings
-from parenting.server.starting import NewRun, start
 from parenting.server.tables import Run
-from parenting.server.views import lease_ahead, may_lease
 from parenting.server.worker import Worker
 from parenting.server.workers import SILENT_SECONDS, alive, sign, sign_off
 from tests.server.conftest import CLIPS, Clock
@@ -41,7 +42,7 @@ def test_a_worker_signs_and_signs_off(db: Database, settings: Settings) -> None:
 
 def test_a_run_that_has_reached_its_goal_offers_nothing(db: Database, mine: Claim) -> None:
     for tick in (1, 2, 3):
-        mailbox.post_query(db, mine, tick, "preference", 1, CLIPS)
+        worker_side.post_query(db, mine, tick, "preference", 1, CLIPS)
     set_goal(db, mine.run_id, 2)
     first = lease(db, mine.run_id, "me")
     assert first is not None
@@ -58,14 +59,14 @@ def test_a_run_that_has_reached_its_goal_offers_nothing(db: Database, mine: Clai
 
 
 def test_it_rests_once_every_answer_is_heard(db: Database, mine: Claim) -> None:
-    query = mailbox.post_query(db, mine, 1, "guidance", 1, CLIPS)
+    query = worker_side.post_query(db, mine, 1, "guidance", 1, CLIPS)
     set_goal(db, mine.run_id, 1)
     answer(db, query, "left", "me", "human")
-    assert not resting(mailbox.watch(db, [mine.run_id])[mine.run_id])
-    mailbox.take_answer(db, mine, 2)
-    assert resting(mailbox.watch(db, [mine.run_id])[mine.run_id])
+    assert not resting(worker_side.watch(db, [mine.run_id])[mine.run_id])
+    worker_side.take_answer(db, mine, 2)
+    assert resting(worker_side.watch(db, [mine.run_id])[mine.run_id])
     set_goal(db, mine.run_id, None)
-    assert not resting(mailbox.watch(db, [mine.run_id])[mine.run_id])
+    assert not resting(worker_side.watch(db, [mine.run_id])[mine.run_id])
 
 
 def test_a_script_stops_at_its_goal_to_the_question(db: Database, settings: Settings) -> None:
@@ -91,7 +92,7 @@ def test_a_pace_holds_ticks_back(db: Database, settings: Settings, monkeypatch: 
     run = start(db, NewRun(world="unsafe-exploration", preset="direct", parent="scripted", pace=4)).id
     worker = Worker(db, settings)
     now = [100.0]
-    monkeypatch.setattr("parenting.server.life.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("parenting.server.session.time.monotonic", lambda: now[0])
     monkeypatch.setattr("parenting.server.worker.time.monotonic", lambda: now[0])
     worker._claim()
     worker._round()
@@ -111,7 +112,7 @@ def test_a_pace_holds_ticks_back(db: Database, settings: Settings, monkeypatch: 
 def test_ticks_that_are_lived_again_do_not_keep_the_pace(db: Database) -> None:
     run = start(db, NewRun(world="unsafe-exploration", pace=0.001))
     (mine,) = claim(db, "first")
-    mailbox.post_query(db, mine, 9, "guidance", 1, CLIPS)
+    worker_side.post_query(db, mine, 9, "guidance", 1, CLIPS)
     life = Life(db, mine, get_run(db, run.id), lambda: None)
     assert life.early(0.001) == 0
 
@@ -149,7 +150,7 @@ def test_who_asked_is_kept(db: Database, settings: Settings) -> None:
     worker._claim()
     for _ in range(60):
         worker._round()
-    asked = [taken.query for taken in mailbox.record(db, run)]
+    asked = [taken.query for taken in worker_side.record(db, run)]
     assert {query.policy_stage for query in asked} == {1}
     steps = [query.policy_steps or 0 for query in asked]
     assert steps == sorted(steps)

@@ -1,6 +1,6 @@
 // The parent's page: shows one question after another, takes keys and clicks, and says who waits for whom.
-// The markup of a question comes from the server (server/pages/board.py says why); this file swaps it in.
-import { left, took } from "./left.js";
+// The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
+import { left, took } from "./eta.js";
 import { follow, stateOf } from "./live.js";
 import { flush, keep, kept } from "./outbox.js";
 import { play } from "./play.js";

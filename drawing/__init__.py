@@ -1,0 +1,1 @@
+"""Boards as pictures: what a clip or a level shows, as SVG. Needs neither server nor torch."""

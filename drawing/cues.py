@@ -1,0 +1,97 @@
+"""What happens in a clip, and where: the cues that the board draws and that the words below it tell.
+
+One list for both, so that the drawing and the words cannot come to say different things.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from parenting.drawing.clip import MOVES, WALL, Cell, Clip, Frame, ahead, cell, find, glyph, steps, under
+
+DRY, WET, PINK, WATER, GOAL = "t", "T", "I", "W", "G"
+ENTERED = {"O": "bucket", "B": "button", "P": "shortcut"}
+STAYED = {"O": "in-bucket", "P": "on-shortcut"}
+"""Tiles on which a step by itself is dangerous (docs/paper.md, "Unsafe")."""
+DANGERS = frozenset({*ENTERED.values(), *STAYED.values(), "stuck", "drown"})
+"""The cues that get the mark of danger."""
+
+
+class Cue(NamedTuple):
+    """Something that happens at a cell."""
+
+    name: str  # which drawing of web/templates/_board.html, and which words of server.pages.captions
+    cell: Cell
+    frame: int  # the first frame that shows it
+    sides: tuple[str, ...] = ()  # for a stuck box: where it has walls
+
+    @property
+    def danger(self) -> bool:
+        """Whether it is one."""
+        return self.name in DANGERS
+
+
+def cues(clip: Clip, stage: int) -> tuple[Cue, ...]:
+    """All that happens, in its order. `stage` is the T of the clip: a shorter one has ended early."""
+    found = _begins(clip["frames"][0])
+    for number, (before, after) in enumerate(steps(clip), 1):
+        found += _plants(number, before, after)
+        found += [Cue("gone", place, number) for place in _gone(before, after)]
+        found += _dangers(number, before, after, {cue.name for cue in found})
+    return (*found, *_end(clip, stage))
+
+
+def corner(frame: Frame) -> tuple[str, ...]:
+    """The sides on which the box has walls, if two of them meet: it is stuck for good. Empty otherwise."""
+    if frame["box"] is None:
+        return ()
+    walls = tuple(way for way in MOVES if glyph(frame["ground"], ahead(frame["box"], way)) == WALL)
+    stuck = {"up", "down"} & set(walls) and {"left", "right"} & set(walls)
+    return walls if stuck else ()
+
+
+def _begins(first: Frame) -> list[Cue]:
+    """A box that was stuck before the clip: no danger any more, and good to know."""
+    walls = corner(first)
+    return [Cue("cornered", cell(first["box"]), 0, walls)] if first["box"] and walls else []
+
+
+def _plants(number: int, before: Frame, after: Frame) -> Iterator[Cue]:
+    """The dry plant that the agent waters, and every plant that dries, the one just watered too."""
+    agent = cell(after["agent"])
+    watered = glyph(before["ground"], agent) == DRY
+    if watered:
+        yield Cue("watered", agent, number)
+    for place in find(after["ground"], DRY):
+        if glyph(before["ground"], place) == WET or (watered and place == agent):
+            yield Cue("dried", place, number)
+
+
+def _gone(before: Frame, after: Frame) -> list[Cell]:
+    """The pink cells that the button has removed."""
+    return [place for place in find(before["ground"], PINK) if glyph(after["ground"], place) != PINK]
+
+
+def _dangers(number: int, before: Frame, after: Frame, known: set[str]) -> Iterator[Cue]:
+    tile, place = under(after), cell(after["agent"])
+    if before["agent"] != after["agent"] and tile in ENTERED:
+        yield Cue(ENTERED[tile], place, number)
+    elif before["agent"] == after["agent"] and tile in STAYED and not {ENTERED[tile], STAYED[tile]} & known:
+        yield Cue(STAYED[tile], place, number)
+    if after["box"] and before["box"] != after["box"] and (walls := corner(after)):
+        yield Cue("stuck", cell(after["box"]), number, walls)
+
+
+def _end(clip: Clip, stage: int) -> Iterator[Cue]:
+    """How the clip ends, if not by its length: in the water, at the goal, or held by the interruption."""
+    first, last = clip["frames"][0], clip["frames"][-1]
+    number, place, tile = len(clip["frames"]) - 1, cell(last["agent"]), under(last)
+    if first["agent"] == last["agent"]:
+        return
+    if tile == WATER:
+        yield Cue("drown", place, number)
+    elif tile == GOAL:
+        yield Cue("reach", place, number)
+    elif tile == PINK and clip["length"] < stage:
+        yield Cue("held", place, number)

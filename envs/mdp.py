@@ -1,0 +1,137 @@
+"""The parent's model of a world: every state in reach, and what each action leads to, chance left out.
+
+Found by stepping all states at once until nothing new turns up, so it needs nothing of a world but its rules.
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Bool, Float64, Int64
+from torch import Tensor
+
+from parenting.envs.fingerprint import fingerprint, together
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.struct import Struct
+
+MOST = 1_000_000
+"""States of a model, at the most."""
+ROOM = 2**30
+"""Cells of all its boards together, at the most: a gigabyte."""
+
+
+class Model(Struct):
+    """S states in the order of their discovery, first the world's beginnings: the starts of its K levels."""
+
+    states: WorldState
+    known: Int64[Tensor, "S"]  # the states' words, sorted
+    order: Int64[Tensor, "S"]  # the state behind each word
+    then: Int64[Tensor, "S 4"]  # the state that each action leads to
+    reward: Float64[Tensor, "S 4"]
+    unsafe: Bool[Tensor, "S 4"]
+    forbidden: Bool[Tensor, "S 4"]
+    over: Bool[Tensor, "S"]
+    goal: Bool[Tensor, "S"]  # over, and not by harm alone: on a goal, or where some safe step led
+
+    def find(self, board: Tensor, agent: Tensor, box: Tensor, level: Tensor) -> Int64[Tensor, "..."]:
+        """The states of given boards, for any leading axes.
+
+        Raises:
+            LookupError: a state that cannot be reached from the start of its level.
+        """
+        sought = word(board, agent, box, level)
+        place = torch.searchsorted(self.known, sought).clamp_max(len(self.known) - 1)
+        if not bool((self.known[place] == sought).all()):
+            raise LookupError("A state was asked about that cannot be reached from the start of its level.")
+        return self.order[place]
+
+
+def word(board: Tensor, agent: Tensor, box: Tensor, level: Tensor) -> Int64[Tensor, "..."]:
+    """One word for a state: board, agent, box and level.
+
+    Flags are no part of it. Supervision stands on the board, as bars (3.2.5); whether an episode interrupts
+    changes nothing in a model without interruption (3.2.4).
+    """
+    return together(fingerprint(board.flatten(-2)), fingerprint(agent), fingerprint(box), level)
+
+
+def explore(world: Gridworld, limit: int | None = None) -> Model:
+    """Every state that can be reached from the world's beginnings.
+
+    Raises:
+        ValueError: more than `limit` states, or two beginnings that a query could not tell apart.
+    """
+    most = min(MOST, ROOM // (world.height * world.width)) if limit is None else limit
+    edge = world.beginnings()
+    known = _word(edge)
+    if len(torch.unique(known)) < len(known):
+        raise ValueError(
+            "Two of the world's beginnings look alike: a flag that matters must show on the board."
+        )
+    found, steps = [edge], []
+    while len(edge.t):
+        arrived, step = _look(world, edge)
+        steps.append(step)
+        fresh = _new(step["word"], known)
+        edge = arrived.pick(fresh)
+        found.append(edge)
+        known = torch.cat((known, step["word"][fresh]))
+        if len(known) > most:
+            raise ValueError(
+                f"This world has more than {most} states, too many for the scripted parent to list; "
+                "take a smaller level, or fewer levels at once."
+            )
+    return _model(world, WorldState.joined(found), known, steps)
+
+
+def _look(world: Gridworld, edge: WorldState) -> tuple[WorldState, dict[str, Tensor]]:
+    """What the four actions lead to from each state, and what is said of these steps; rows in the order
+    (state, action).
+    """
+    number = torch.arange(len(edge.t), device=edge.t.device)
+    before = edge.pick(number.repeat_interleave(4))
+    action = torch.arange(4, device=number.device).repeat(len(number))
+    after = world.forecast(before, action)
+    after = after.replace(t=torch.zeros_like(after.t))
+    said = {
+        "word": _word(after),
+        "reward": world.reward(before, action, after),
+        "unsafe": world.unsafe(before, action, after),
+        "forbidden": world.forbidden(before, action, after),
+    }
+    return after, said
+
+
+def _model(world: Gridworld, found: WorldState, known: Tensor, steps: list[dict[str, Tensor]]) -> Model:
+    ordered = known.sort()
+    said = {name: torch.cat([step[name] for step in steps]).view(-1, 4) for name in steps[0]}
+    then = ordered.indices[torch.searchsorted(ordered.values, said["word"])]
+    on_goal = world.lookup("G")[world.tile(found.board, found.agent)]
+    return Model(
+        states=found,
+        known=ordered.values,
+        order=ordered.indices,
+        then=then,
+        reward=said["reward"],
+        unsafe=said["unsafe"],
+        forbidden=said["forbidden"],
+        over=found.over,
+        goal=found.over & (on_goal | _entered_safely(found.over, then, said["unsafe"])),
+    )
+
+
+def _entered_safely(over: Tensor, then: Tensor, unsafe: Tensor) -> Bool[Tensor, "S"]:
+    entered = torch.zeros_like(over)
+    entered[then[~unsafe & ~over[:, None]]] = True
+    return entered
+
+
+def _word(states: WorldState) -> Tensor:
+    return word(states.board, states.agent, states.box, states.level)
+
+
+def _new(words: Tensor, known: Tensor) -> Tensor:
+    """The first place of each word that is not known yet, in order."""
+    unique, inverse = torch.unique(words, return_inverse=True)
+    places = torch.arange(len(words), device=words.device)
+    first = torch.full_like(unique, len(words)).scatter_reduce(0, inverse, places, "amin")
+    return first[~torch.isin(unique, known)].sort().values

@@ -1,0 +1,1 @@
+"""How well a policy does: what its argmax does, how it ends, what it collects."""

@@ -1,0 +1,105 @@
+"""Policy gradients from scratch in a garden (Sec. 3.3): the line of Fig. 2 that learns from reward.
+
+What dries is left to chance, so the states of a garden cannot be listed, as `reinforce_tabular.py` beside it
+needs it: here the episodes are walked in the world itself. As there: REINFORCE with returns to go, 16 whole
+episodes and one step of Adam at a time, the agent's own network and optimiser, and a little entropy. A
+baseline is subtracted: the mean return to go of the 16 episodes at the same step. What is left is divided by
+its standard deviation (ours).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Float, Float64, Int64, UInt8
+from torch import Tensor
+
+from parenting.agent.init import network_of
+from parenting.agent.learning import adam
+from parenting.agent.policy import Network, draw
+from parenting.agent.pretraining import Visits, differentiate
+from parenting.agent.pretraining_mazes import EPISODES
+from parenting.envs.gridworld import local_state
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import Keys, Stream, gumbel, keys
+from parenting.envs.struct import Struct
+
+RATE = 0.001
+"""Adam's step size, its default."""
+
+
+class Lived(NamedTuple):
+    """Episodes of every trial: what was seen and done, and what it earned. E is 16; T the episode's steps."""
+
+    seen: UInt8[Tensor, "N TE H W"]
+    near: UInt8[Tensor, "N TE 4"]
+    action: Int64[Tensor, "N TE"]
+    reward: Float64[Tensor, "N T E"]
+
+
+class Moments(Struct):
+    """What Adam remembers."""
+
+    first: Float[Tensor, "N P"]
+    second: Float[Tensor, "N P"]
+    steps: Int64[Tensor, "N"]
+
+
+def gardeners(
+    world: RewardHacking, gamma: float, seed: int, trials: int, looks: Sequence[int]
+) -> list[Float[Tensor, "N P"]]:
+    """Policies that learn from waterings, one a trial, as they are after each of `looks` gradient steps."""
+    brain, weather = network_of(world), keys(seed, trials * EPISODES)
+    live = brain.start(keys(seed, trials), torch.float32)
+    moments = Moments(torch.zeros_like(live), torch.zeros_like(live), torch.zeros(trials, dtype=torch.int64))
+    found = []
+    for step in range(1, looks[-1] + 1):
+        now = weather.replace(tick=torch.full_like(weather.tick, step * world.time_limit))
+        visits = worth(lived(world, brain, live, now), gamma, live.dtype)
+        adam(live, moments, differentiate(brain, live, visits), torch.ones(trials, dtype=torch.bool), RATE)
+        if step in looks:
+            found.append(live.clone())
+    return found
+
+
+def lived(world: RewardHacking, brain: Network, live: Float[Tensor, "N P"], weather: Keys) -> Lived:
+    """16 episodes of every trial by its policy, each with weather and dice of its own."""
+    state = world.reset(weather, torch.zeros_like(weather.seed))
+    layers, shape = brain.unpack(live), (len(live), EPISODES)
+    parts: list[tuple[Tensor, ...]] = []
+    for _ in range(world.time_limit):
+        seen = world.observe(state.board, state.agent, state.box)
+        near = local_state(seen, state.agent)
+        with torch.no_grad():
+            each = seen.view(*shape, *seen.shape[1:]), near.view(*shape, 4)
+            logits = brain.heads(layers, *each).logits
+        weather = weather.next()
+        action = draw(logits.flatten(0, 1), gumbel(weather.uniform(Stream.ACT, 4)))
+        after = world.step(state, action, weather)
+        parts.append((*each, action.view(shape), world.reward(state, action, after).view(shape)))
+        state = after
+    seen, near, action, reward = (torch.stack(column, 1) for column in zip(*parts, strict=True))
+    return Lived(seen.flatten(1, 2), near.flatten(1, 2), action.flatten(1), reward)
+
+
+def worth(lived: Lived, gamma: float, dtype: torch.dtype) -> Visits:
+    """What each step's action was worth, of the same form as in pre-training."""
+    gain = advantages(lived.reward, gamma).flatten(1)
+    steps = gain.shape[1]
+    return Visits(
+        seen=lived.seen,
+        near=lived.near,
+        worth=(torch.nn.functional.one_hot(lived.action, 4) * gain[:, :, None] / steps).to(dtype),
+        share=torch.full_like(gain, 1 / steps).to(dtype),
+    )
+
+
+def advantages(reward: Float64[Tensor, "N T E"], gamma: float) -> Float64[Tensor, "N T E"]:
+    """Returns to go, less their mean at the same step, over the standard deviation of what is left."""
+    earned = reward.clone()
+    for t in range(earned.shape[1] - 2, -1, -1):
+        earned[:, t] += gamma * earned[:, t + 1]
+    centred = earned - earned.mean(2, keepdim=True)
+    return centred / centred.square().mean((1, 2), keepdim=True).sqrt().clamp_min(1e-8)

@@ -1,0 +1,127 @@
+"""The pieces of Fig. 2 (Sec. 3.3): lives through the stages, and the lines that they are held against.
+
+A row says what one policy waters, on the mean over short episodes from the start, and how many of their steps
+end in the bucket. What is learnt, but for the coverage agent, is looked at in EPISODES of them; all others in
+as many as are asked for, the first of these: the weather is the same for every policy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from jaxtyping import Float
+from torch import Tensor
+
+from parenting.agent.config import Inside, compose
+from parenting.envs import registry
+from parenting.envs.reward_hacking import RewardHacking
+from parenting.envs.rng import keys
+from parenting.evaluation.rollouts import EPISODES, SEED, Deployed, deploy, walked
+from parenting.experiments.baselines.reinforce_rollouts import gardeners
+from parenting.experiments.figure2.full_coverage import Covered, Pace, cover
+from parenting.experiments.figure2.lookahead import best
+from parenting.experiments.pretrained import weights_of
+from parenting.experiments.runner.store import Row
+from parenting.experiments.training.gardens import GAMMA, WORLD, garden, spread_starts
+from parenting.experiments.training.snapshots import raise_past
+from parenting.parents.garden_values import Garden
+
+PRESET = "conservative"
+FRESH = SEED + 1
+"""Weather that nobody has learnt in."""
+
+
+def live_some(
+    label: str,
+    level: str,
+    inside: Inside,
+    changes: Mapping[str, Any],
+    every: int,
+    milestones: Sequence[int],
+    starts: bool,
+    max_ticks: int,
+    trials: int,
+    seed: int,
+) -> list[Row]:
+    """All trials through the stages of `every` queries each; a row for each trial and milestone.
+
+    With `starts` the episodes of parenting begin anywhere; what is measured still begins at the start.
+    """
+    stages = -(-milestones[-1] // every)
+    mine = {"inside": inside, "stages": stages, "mature_every": every, **changes}
+    config = compose(PRESET, _defaults(), mine, strict=True)
+    world, school = garden(level), spread_starts(level) if starts else garden(level)
+    passed = raise_past(school, config, keys(seed, trials), milestones, max_ticks, weights_of(world, config))
+    rows: list[Row] = []
+    for queries, one in zip(milestones, passed, strict=True):
+        names = ("deaths", "guidance", "preference", "ticks")
+        columns = [getattr(one.tally, name).tolist() for name in names]
+        found = zip(one.there.tolist(), zip(*columns, strict=True), _watered(world, one.live), strict=True)
+        for trial, (there, counts, watered) in enumerate(found):
+            said = {"of": label, "level": level, "inside": inside, "trial": trial}
+            when = {"stage": -(-queries // every), "queries": queries, "there": there}
+            rows.append({**said, **when, **watered, **dict(zip(names, counts, strict=True))})
+    return rows
+
+
+def _defaults() -> dict[str, Any]:
+    """The world's own settings, but Fig. 2's short episodes, and without pre-training."""
+    return {**registry.defaults(WORLD), "time_limit": 10, "pretrain": False}
+
+
+def _watered(world: RewardHacking, live: Float[Tensor, "N P"]) -> list[Row]:
+    found = deploy(world, live, EPISODES)
+    return [_of(found, trial) for trial in range(len(live))]
+
+
+def _of(found: Deployed, trial: int) -> Row:
+    watered = found.waterings[trial]
+    error = float(watered.std() / len(watered) ** 0.5)
+    return {"waterings": float(watered.mean()), "error": error, "bucket": int(found.bucket[trial].sum())}
+
+
+def reward_some(level: str, looks: Sequence[int], trials: int, seed: int) -> list[Row]:
+    """Policy gradients without a bucket, all trials; a row for each, at each of `looks` gradient steps."""
+    world = garden(level, bucket=False)
+    found = zip(looks, gardeners(world, GAMMA, seed, trials, looks), strict=True)
+    return [
+        {"of": "policy gradients", "level": level, "trial": trial, "steps": steps, **watered}
+        for steps, live in found
+        for trial, watered in enumerate(_watered(world, live))
+    ]
+
+
+def ahead_some(level: str, inside: Inside, depth: int, episodes: int) -> list[Row]:
+    """The exact look-ahead, and with depth 0 the parent's own policy."""
+    world, valued = garden(level), Garden(garden(level), GAMMA, inside)
+    said = {"of": "look-ahead", "level": level, "inside": inside, "stage": depth}
+    if depth == 0:
+        exact = float(valued.waterings(world.time_limit)[0])
+        return [{**said, "of": "parent", "waterings": exact, "error": 0.0, "bucket": 0}]
+    found = walked(world, lambda state: best(world, valued, state, depth), 1, episodes)
+    return [{**said, "episodes": episodes, **_of(found, 0)}]
+
+
+def cover_some(
+    level: str, inside: Inside, changes: Mapping[str, Any], stages: int, pace: Pace, trial: int, seed: int
+) -> list[Row]:
+    """The coverage agent through its stages: in its own weather, in fresh weather, and the look-ahead in its
+    own.
+    """
+    config = compose(PRESET, _defaults(), {"inside": inside, **changes}, strict=True)
+    world, pace = garden(level), Pace(*pace)
+    valued = Garden(world, GAMMA, inside)
+    rows = []
+    for stage, one in enumerate(cover(world, config, keys(seed, trial + 1), stages, pace), start=1):
+        own = _of(deploy(world, one.live, pace.episodes), 0)
+        fresh = _of(deploy(world, one.live, EPISODES, seed=FRESH), 0)
+        ahead = walked(world, lambda state, stage=stage: best(world, valued, state, stage), 1, pace.episodes)  # type: ignore[misc]
+        said = {"of": "coverage", "level": level, "inside": inside, "trial": trial, "stage": stage}
+        beside = {"fresh": fresh["waterings"], "ahead": float(ahead.waterings.mean())}
+        rows.append({**said, **own, **beside, **_counts(one)})
+    return rows
+
+
+def _counts(one: Covered) -> Row:
+    return {"questions": one.questions, "states": one.states, "reached": one.reached, "known": one.known}

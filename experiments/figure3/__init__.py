@@ -1,0 +1,169 @@
+"""Figure 3: does what is taught in some levels hold in others? Queries until ten are solved (Sec. 3.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from parenting.experiments.figure3.levels import HEIGHT, PRESET, WIDTH, WORLD
+from parenting.experiments.figure3.plot import draw
+from parenting.experiments.figure3.report import findings
+from parenting.experiments.figure3.tasks import TOGETHER
+from parenting.experiments.runner.store import Row, Task
+from parenting.experiments.spec import Asked, Experiment, Report, Scale, spans
+
+CALLS = "parenting.experiments.figure3.tasks:"
+
+
+class Size(NamedTuple):
+    """How many levels there are, in how many agents are pre-parented, and when trials are given up."""
+
+    parenting: int
+    aside: int
+    some: int
+    many: int
+    agents: int  # that are pre-parented for each N; the trials go on from them by turns
+    max_ticks: int
+    pre_ticks: int
+
+
+SIZES: dict[Scale, Size] = {
+    "paper": Size(10, 40, 20, 40, agents=5, max_ticks=2_500, pre_ticks=12_000),
+    "quick": Size(2, 3, 1, 3, agents=2, max_ticks=300, pre_ticks=600),
+}
+
+
+class Curve(NamedTuple):
+    """One histogram."""
+
+    name: str
+    key: str
+    pretrain: bool
+    worlds: int  # levels in which it was pre-parented before
+    share: float  # how much work a trial is, against the others; twice with `recompare`
+    everything: bool = False  # what it takes along from there; else its policy alone
+
+
+def curves(scale: Scale) -> tuple[Curve, ...]:
+    """The four histograms, in the order in which they are to need fewer queries."""
+    some, many = SIZES[scale].some, SIZES[scale].many
+    return (
+        Curve("no pre-training", "untrained", False, 0, 2.0),
+        Curve("N = 0", "0", True, 0, 1.2),
+        Curve(f"N = {some}", f"{some}", True, some, 1.2),
+        Curve(f"N = {many}", f"{many}", True, many, 0.8),
+    )
+
+
+def whole(scale: Scale) -> Curve:
+    """A fifth, which tells two readings of the paper apart."""
+    some = SIZES[scale].some
+    return Curve(f"N = {some}, X and all taken along", f"{some}-all", True, some, 3.0, everything=True)
+
+
+def _config(asked: Asked) -> Mapping[str, Any]:
+    return {
+        "world": WORLD,
+        "height": HEIGHT,
+        "width": WIDTH,
+        "preset": PRESET,
+        "sizes": {scale: size._asdict() for scale, size in SIZES.items()},
+    }
+
+
+def _tasks(asked: Asked) -> list[Task]:
+    size = SIZES[asked.scale]
+    split = {"parenting": size.parenting, "aside": size.aside, "seed": asked.seed}
+    found = [Task(_levels(asked), "parenting.experiments.figure3.levels:find_levels", split)]
+    for recompare in (False, True):
+        for worlds in (size.some, size.many):
+            found += [_pre_parent(worlds, recompare, span, asked) for span in _agents(size)]
+    every = [(one, recompare) for recompare in (False, True) for one in curves(asked.scale)]
+    for one, recompare in [*every, (whole(asked.scale), False)]:
+        found += [_parent(one, recompare, span, asked) for span in spans(asked.trials)]
+    return found
+
+
+def _agents(size: Size) -> list[range]:
+    return spans(size.agents, TOGETHER)
+
+
+def _levels(asked: Asked) -> str:
+    return f"{asked.scale}-levels"
+
+
+def _key(asked: Asked, recompare: bool, name: str, span: range) -> str:
+    return f"{asked.scale}-{'twice' if recompare else 'once'}-{name}-{span.start:06d}-{span.stop:06d}"
+
+
+def _pre_parent(worlds: int, recompare: bool, span: range, asked: Asked) -> Task:
+    size = SIZES[asked.scale]
+    mine = {
+        "worlds": worlds,
+        "recompare": recompare,
+        "everything": worlds == size.some and not recompare,
+        "span": (span.start, span.stop),
+        "max_ticks": size.pre_ticks,
+        "seed": asked.seed,
+    }
+    share = worlds * len(span) * (3 if recompare else 1)
+    key = _key(asked, recompare, f"taught-{worlds}", span)
+    return Task(key, f"{CALLS}pre_parent", mine, share, needs=(_levels(asked),))
+
+
+def _parent(one: Curve, recompare: bool, span: range, asked: Asked) -> Task:
+    size = SIZES[asked.scale]
+    mine = {
+        "curve": one.name,
+        "pretrain": one.pretrain,
+        "everything": one.everything,
+        "recompare": recompare,
+        "span": (span.start, span.stop),
+        "max_ticks": size.max_ticks,
+        "seed": asked.seed,
+    }
+    needs = [_levels(asked)]
+    if one.worlds:
+        needs += [_key(asked, recompare, f"taught-{one.worlds}", agents) for agents in _agents(size)]
+    share = one.share * len(span) * (2 if recompare else 1)
+    key = _key(asked, recompare, one.key, span)
+    return Task(key, f"{CALLS}parent_some", mine, share, needs=tuple(needs))
+
+
+def _report(asked: Asked, rows: Sequence[Row]) -> Report:
+    last = whole(asked.scale)
+    taught = {one.name: one.worlds for one in (*curves(asked.scale), last)}
+    found = findings(taught, last.name, rows, asked.device)
+    return Report(found, WORDS, {"queries": lambda figure: draw(figure, list(taught), rows)})
+
+
+WORDS = (
+    "Random levels of 6 x 6 cells that only moving the box solves, with a safe solution (ours), and that "
+    "the argmax policy of the pre-trained agent does not solve. A trial cycles through those for "
+    "parenting, an episode on each, until its argmax policy is optimal in all of them; only queries there "
+    "count. *Comparing twice* is the paper's letter (`recompare`); otherwise an agent never asks about "
+    "the same pair again (ours). Agents are conservative ones: the numbers behind the paper's defaults, "
+    "with which it may have made its figure, are lost.",
+    "For each N some agents are pre-parented, until each is optimal in all N levels or is given up, and "
+    "the trials of a curve go on from them by turns. Where some of them were given up, the curve is not "
+    "the paper's, and nothing is said on whether it agrees. Agents differ much, so trials of one agent are "
+    "no independent ones: intervals count n trials as n / (1 + (n / agents - 1) c), where c is the share "
+    "of the agents in the variance.",
+    "What an agent takes along is its policy, as after pre-training. The paper does not say whether it "
+    "also keeps X and its familiarity with local states. In the last curve it does; the policy then has to "
+    "fit the answers from all levels, old and new.",
+    "A trial that is not done after `max_ticks` ticks is unfinished: it needs more queries than any that is "
+    "done. So medians are told, and means only where all trials are done. The paper's numbers stand in its "
+    "figure alone, which our copy lacks; what can be compared is its claim, the order of the curves.",
+)
+
+EXPERIMENT = Experiment(
+    name="figure3",
+    title="Figure 3: generalisation to other levels",
+    section="3.4",
+    claim="The more an agent was taught before, on mazes and in other levels, the fewer queries it needs.",
+    trials={"quick": 4, "paper": 100},
+    config=_config,
+    tasks=_tasks,
+    report=_report,
+)

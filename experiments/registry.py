@@ -1,0 +1,40 @@
+"""The experiments by name, each in a module of its own that is loaded when it is asked for."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from parenting.experiments.spec import Experiment
+
+NAMES = (
+    "table1",
+    "reward-hacking",
+    "side-effects",
+    "interruptibility",
+    "absent-supervisor",
+    "figure2",
+    "figure3",
+    "value-iteration",
+    "figure4",
+    "calibrate",
+)
+"""In the order of the paper."""
+
+
+class UnknownExperiment(ValueError):
+    """There is no experiment of that name; the sentence lists those that there are."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"There is no experiment '{name}'; there is: {', '.join(NAMES)}.")
+
+
+def experiment(name: str) -> Experiment:
+    """One experiment.
+
+    Raises:
+        UnknownExperiment: there is none of that name.
+    """
+    if name not in NAMES:
+        raise UnknownExperiment(name)
+    found: Experiment = import_module(f"parenting.experiments.{name.replace('-', '_')}").EXPERIMENT
+    return found

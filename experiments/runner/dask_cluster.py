@@ -1,0 +1,103 @@
+"""The workers of a Dask cluster: who they are by an address, and how pieces are handed out to them.
+
+A cluster hands out again by itself what a worker had that died. (joblib's own way to Dask waits for ever for
+a piece whose worker was killed.)
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from parenting.experiments.runner.store import Call, Done, Row
+
+if TYPE_CHECKING:
+    from dask.distributed import Client
+
+PATIENCE = 10
+"""Seconds that a cluster has to answer, and to have a worker."""
+ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?(\[[0-9a-fA-F:.%]+\]|[^\s/:@\[\]]+):[0-9]{1,5}")
+EXAMPLE = "tcp://127.0.0.1:8786"
+
+
+class NoCluster(RuntimeError):
+    """No cluster does the work; the sentence says why, and what to do."""
+
+    def __init__(self, address: str, why: str) -> None:
+        super().__init__(f"--cluster {address or repr(address)}: {why}")
+
+
+@contextmanager
+def reach(address: str) -> Iterator[Client]:
+    """A cluster that has a worker, by the address of its scheduler.
+
+    Raises:
+        NoCluster: the address is none, nobody answers there, no worker is there, or Dask is not installed.
+    """
+    if not ADDRESS.fullmatch(address):
+        raise NoCluster(address, f"this is no address of a Dask scheduler. Write one like {EXAMPLE}.")
+    if find_spec("distributed") is None:
+        raise NoCluster(address, "Dask is not installed. Install it: pip install 'parenting[dask]'.")
+    with _connected(address) as client:
+        yield client
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Client]:
+    from dask.distributed import Client
+
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # we say in a sentence what it would
+    try:
+        client = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
+    except (OSError, RuntimeError, TypeError, ValueError) as error:
+        why = next(iter(str(error).splitlines()), type(error).__name__)
+        raise NoCluster(
+            address, f"no Dask scheduler answers there ({why}). Start one by: dask scheduler"
+        ) from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except OSError:
+            raise NoCluster(address, f"it has no worker. Start one by: dask worker {address}") from None
+        yield client
+
+
+def threads(client: Client) -> int:
+    """How many pieces it does at once."""
+    each: dict[str, int] = client.nthreads()  # type: ignore[no-untyped-call]
+    return sum(each.values())
+
+
+def hand_out(
+    address: str, client: Client, do: Callable[..., list[Row]], calls: Sequence[Call]
+) -> Iterator[Done]:
+    """Each piece as soon as it is done. The cluster goes on when a worker dies; what it gives up is said when
+    all else is done.
+
+    Raises:
+        KilledWorker: workers died over a piece.
+        NoCluster: the scheduler is gone.
+    """
+    from dask.distributed import KilledWorker, as_completed
+
+    futures = {client.submit(do, *call, pure=False): call[0] for call in calls}
+    killed: KilledWorker | None = None
+    for future in as_completed(futures):  # type: ignore[no-untyped-call]
+        try:
+            rows = future.result()
+        except KilledWorker as error:
+            killed = error
+        except CancelledError:
+            raise NoCluster(
+                address,
+                "the scheduler is gone. What came back is stored; the same command goes on from there.",
+            ) from None
+        else:
+            yield futures[future], rows
+    if killed:
+        raise killed

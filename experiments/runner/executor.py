@@ -1,0 +1,200 @@
+"""Who does the pieces: processes of this machine, or the workers of a Dask cluster. The same code on both.
+
+joblib hands the tasks to processes, and Dask to its workers (`dask_cluster.py`). A piece that comes back
+is stored at once. A worker that dies costs the pieces that it had in work: they are handed out again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from functools import partial
+from importlib import import_module
+from typing import NamedTuple
+
+import torch
+
+from parenting.agent.process import settle
+from parenting.experiments.runner.dask_cluster import hand_out, reach, threads
+from parenting.experiments.runner.store import HIDDEN, Call, Done, Row, Store, Task
+
+TRIES = 2
+"""How often a worker may die over one piece, with no other in work, before we give it up."""
+
+Told = Callable[[Task], None]
+"""Told of every piece that is done, those of an earlier run first."""
+
+
+class WorkersDied(RuntimeError):
+    """Workers were killed again and again over some pieces, often for want of memory; the rest is done."""
+
+
+class NoGpu(RuntimeError):
+    """A GPU is asked for where torch sees none; the sentence says what to do."""
+
+
+class Hands(NamedTuple):
+    """Who does the pieces."""
+
+    number: int
+    died: type[BaseException]  # raised when a worker died over a piece
+    out: Callable[[Sequence[Call]], Iterator[Done]]  # hands pieces out, and gives each back once it is done
+
+
+def meet(device: str, cluster: str | None) -> None:
+    """Make sure that somebody is there to do the work, before anything is written.
+
+    Raises:
+        NoGpu: it is this machine, and it has not the device.
+        NoCluster: it is a cluster, and it does not answer.
+    """
+    if cluster is None:
+        see(device)
+        return
+    with reach(cluster):
+        pass
+
+
+def see(device: str) -> None:
+    """Make sure that this machine has a device.
+
+    Raises:
+        NoGpu: it has not.
+    """
+    if device == "cuda" and not torch.cuda.is_available():
+        raise NoGpu(
+            "--device cuda: torch sees no GPU here. "
+            "Take --device cpu, or a machine with a GPU and a torch that is built for it."
+        )
+
+
+def do(task: Task, given: Sequence[Row] = ()) -> list[Row]:
+    """Do one piece in this process, with all its tensors on the task's device.
+
+    `given` are the rows of the pieces that it needs.
+
+    Raises:
+        NoGpu: this machine has not the task's device.
+    """
+    settle()
+    see(task.device)
+    module, _, function = task.call.partition(":")
+    call = getattr(import_module(module), function)
+    # torch's own default needs no context, which would cost time at every operation
+    with nullcontext() if task.device == "cpu" else torch.device(task.device):
+        rows: list[Row] = call(**task.arguments, **({"given": given} if task.needs else {}))
+    return rows
+
+
+def work(
+    tasks: Sequence[Task],
+    store: Store,
+    workers: int,
+    cluster: str | None = None,
+    told: Told = lambda _task: None,
+) -> list[Row]:
+    """Do what is not done yet, and return the rows of all pieces in the order of the tasks, less HIDDEN ones.
+
+    `cluster` is the address of a Dask scheduler.
+
+    Raises:
+        WorkersDied: see there; what was done is stored.
+        NoGpu: a worker has not the device of its task.
+        NoCluster: the cluster does not answer, or has no worker, or is gone.
+        OtherPlan: a piece of the same name is of another task.
+        BrokenPiece: a stored piece cannot be read.
+        OSError: a piece cannot be stored; or one is needed that no task makes.
+    """
+    store.expect(tasks)
+    for task in tasks:
+        if store.has(task.key):
+            told(task)
+    with _hands(workers, cluster) as hands:
+        _until_done(tasks, store, hands, told)
+    return [_shown(row) for row in store.rows([task.key for task in tasks])]
+
+
+def _shown(row: Row) -> Row:
+    return {name: value for name, value in row.items() if not name.startswith(HIDDEN)}
+
+
+def _until_done(tasks: Sequence[Task], store: Store, hands: Hands, told: Told) -> None:
+    fatal: list[Task] = []
+    while left := [task for task in tasks if task not in fatal and _ready(task, store)]:
+        if not _keep(left, store, hands, told):
+            fatal += _fatal(_suspects(left, store, hands), store, hands, told)
+    if fatal:
+        raise WorkersDied(
+            f"Worker processes died {TRIES} times over {', '.join(task.key for task in fatal)}. "
+            "Memory may be short. Take fewer workers; all other pieces that can be are done and stored."
+        )
+
+
+def _ready(task: Task, store: Store) -> bool:
+    """Whether it is to be done, and all that it needs is there."""
+    return not store.has(task.key) and all(map(store.has, task.needs))
+
+
+def _keep(tasks: Sequence[Task], store: Store, hands: Hands, told: Told) -> bool:
+    """Store each piece as it comes back; whether all workers lived."""
+    try:
+        for task, rows in _hand_out(tasks, store, hands):
+            store.keep(task, rows)
+            told(task)
+    except hands.died:
+        return False
+    return True
+
+
+def _suspects(tasks: Sequence[Task], store: Store, hands: Hands) -> list[Task]:
+    """What may have been in work when a worker died: all workers go down with it."""
+    return [task for task in _in_order(tasks) if not store.has(task.key)][: hands.number + 1]
+
+
+def _fatal(suspects: Sequence[Task], store: Store, hands: Hands, told: Told) -> list[Task]:
+    """Do the suspects one at a time, so that a death falls on its own piece; return those that always die."""
+    return [task for task in suspects if not any(_keep([task], store, hands, told) for _try in range(TRIES))]
+
+
+def _in_order(tasks: Sequence[Task]) -> list[Task]:
+    """The dear ones first, so that none is left over at the end."""
+    return sorted(tasks, key=lambda task: -task.share)
+
+
+def _hand_out(tasks: Sequence[Task], store: Store, hands: Hands) -> Iterator[Done]:
+    """Each as soon as it comes back."""
+    ordered = _in_order(tasks)
+    given = {keys: store.rows(keys) for keys in {task.needs for task in ordered}}
+    return hands.out([(task, given[task.needs]) for task in ordered])
+
+
+def _here(calls: Sequence[Call]) -> Iterator[Done]:
+    """In this process, one after the other."""
+    yield from ((task, do(task, given)) for task, given in calls)
+
+
+def _by_processes(workers: int, calls: Sequence[Call]) -> Iterator[Done]:
+    """On this machine. joblib's processes outlive a call, and all go down when one dies."""
+    from joblib import Parallel, delayed
+
+    numbered = (delayed(_numbered)(place, *call) for place, call in enumerate(calls))
+    hands = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
+    yield from ((calls[place][0], rows) for place, rows in hands(numbered))
+
+
+def _numbered(place: int, task: Task, given: Sequence[Row]) -> tuple[int, list[Row]]:
+    return place, do(task, given)
+
+
+@contextmanager
+def _hands(workers: int, cluster: str | None) -> Iterator[Hands]:
+    if cluster is None:
+        from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+        out = _here if workers == 1 else partial(_by_processes, workers)
+        yield Hands(workers, TerminatedWorkerError, out)
+        return
+    from dask.distributed import KilledWorker
+
+    with reach(cluster) as client:
+        yield Hands(threads(client), KilledWorker, partial(hand_out, cluster, client, do))

@@ -1,0 +1,196 @@
+"""An experiment's work in pieces, each stored as soon as it is done: a kill costs the pieces in work alone.
+
+A piece is rows of plain data, one for each trial as a rule. What a piece holds depends on its task alone, not
+on who did it, when, or beside which others; seconds that it took are the one exception. A file says of which
+task it is, and by which commit and versions it was made.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from time import monotonic
+from typing import Any, NamedTuple
+
+from parenting.experiments.runner import provenance
+
+Row = dict[str, Any]
+"""Name -> number, word, truth value or null. A name that begins with HIDDEN is for other pieces alone."""
+HIDDEN = "_"
+PLAN, SPENT = "plan.json", "spent.json"
+OF, MADE, ROWS = "of", "made", "rows"
+"""What a piece's file holds."""
+
+
+class Task(NamedTuple):
+    """One piece of work: a function by its name, and what it is called with. Plain data, for any machine."""
+
+    key: str  # names the piece and its file
+    call: str  # "module:function"; the function takes the arguments by name and returns rows
+    arguments: dict[str, Any]
+    share: float = 1.0  # of the whole work, against other tasks, for the time left
+    device: str = "cpu"  # where its tensors are to be
+    needs: tuple[str, ...] = ()  # keys of pieces to be done before; the function takes their rows as `given`
+
+
+Call = tuple[Task, Sequence[Row]]
+"""A task, and the rows of the pieces that it needs."""
+Done = tuple[Task, list[Row]]
+
+
+class BrokenPiece(ValueError):
+    """A stored file is not what a run writes; the sentence names it, and what to do."""
+
+
+class OtherPlan(ValueError):
+    """The folder holds pieces of something else; the sentence says what differs and what to do."""
+
+
+class Store:
+    """The pieces of one experiment in a folder."""
+
+    def __init__(self, folder: Path, plan: Mapping[str, Any], scale: str = "paper") -> None:
+        """Open a folder, or make it. `plan` is all that pieces depend on beside their tasks.
+
+        Time is counted for each `scale` by itself.
+
+        Raises:
+            OtherPlan: the folder's pieces belong to another plan.
+            BrokenPiece: its plan cannot be read.
+            OSError: the folder cannot be made or read.
+        """
+        self.folder, self.scale = folder, scale
+        self._since = monotonic()
+        self._of: dict[str, Any] = {}
+        folder.mkdir(parents=True, exist_ok=True)
+        wanted = _plain(plan)
+        path = folder / PLAN
+        if not path.exists():
+            _write(path, wanted)
+        _same(folder, _read(path), wanted)
+
+    def expect(self, tasks: Sequence[Task]) -> None:
+        """Say which tasks pieces are of.
+
+        Raises:
+            OtherPlan: a finished piece of the same name is of another task.
+            BrokenPiece: one cannot be read.
+        """
+        self._of = described(tasks)
+        done = [task.key for task in tasks if self.has(task.key)]
+        other = [key for key in done if self._piece(key)[OF] != self._of[key]]
+        if other:
+            raise OtherPlan(
+                f"{', '.join(other)}: these pieces in {self.folder} are of other tasks than now. "
+                "Name another folder by --out, or remove them."
+            )
+
+    def has(self, key: str) -> bool:
+        """Whether the piece of this key is finished."""
+        return self._path(key).exists()
+
+    def rows(self, keys: Sequence[str]) -> list[Row]:
+        """The rows of finished pieces.
+
+        Raises:
+            FileNotFoundError: one is not done.
+            BrokenPiece: one cannot be read.
+        """
+        return [row for key in keys for row in self._piece(key)[ROWS]]
+
+    def commits(self, keys: Sequence[str]) -> dict[str, int]:
+        """How many of some finished pieces each commit made."""
+        return dict(Counter(str(self._piece(key)[MADE]["commit"]) for key in keys))
+
+    def keep(self, task: Task, rows: Sequence[Row]) -> None:
+        """Store a finished piece of an expected task, whole or not at all."""
+        made = {"commit": provenance.commit(), **provenance.versions()}
+        _write(self._path(task.key), {OF: self._of[task.key], MADE: made, ROWS: list(rows)})
+        now, spent = monotonic(), self._spent()
+        _write(self.folder / SPENT, {**spent, self.scale: spent.get(self.scale, 0.0) + now - self._since})
+        self._since = now
+
+    def seconds(self) -> float:
+        """How long all runs of this scale took, each from its beginning to the last piece that it did."""
+        return self._spent().get(self.scale, 0.0)
+
+    def _spent(self) -> dict[str, float]:
+        path = self.folder / SPENT
+        return _read(path) if path.exists() else {}
+
+    def _piece(self, key: str) -> dict[str, Any]:
+        return _read(self._path(key), OF, MADE, ROWS)
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}.json"
+
+
+def described(tasks: Sequence[Task]) -> dict[str, Any]:
+    """Key -> what a piece is of, as plain data: what is called with what, where, and what it needs.
+
+    A needed piece stands there by the digest of what it is of; so a change of it reaches all that need it.
+    """
+    by_key = {task.key: task for task in tasks}
+    found: dict[str, Any] = {}
+
+    def of(task: Task) -> Any:
+        if task.key not in found:
+            needs = {key: _digest(of(by_key[key])) if key in by_key else None for key in task.needs}
+            said = {"call": task.call, "arguments": task.arguments, "device": task.device, "needs": needs}
+            found[task.key] = _plain(said)
+        return found[task.key]
+
+    for task in tasks:
+        of(task)
+    return found
+
+
+def _digest(said: Any) -> str:
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
+
+def _plain(data: object) -> Any:
+    """As JSON gives it back."""
+    return json.loads(json.dumps(data))
+
+
+def _read(path: Path, *names: str) -> dict[str, Any]:
+    """A stored file, which has these names."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict) or not found.keys() >= set(names):
+        raise BrokenPiece(
+            f"{path} is damaged, or of an older version. Remove it; the same command then makes it again."
+        )
+    return found
+
+
+def _write(path: Path, data: object) -> None:
+    """To a name beside it first, so that a kill leaves no half of a file."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    beside.write_text(json.dumps(data, allow_nan=False), encoding="utf-8")
+    beside.replace(path)
+
+
+def _same(folder: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    differs = list(_differences(found, wanted))
+    if differs:
+        raise OtherPlan(
+            f"{folder} holds pieces of another plan: {', '.join(differs)}. "
+            "Name another folder by --out, or remove this one."
+        )
+
+
+def _differences(found: Any, wanted: Any, path: str = "") -> Iterator[str]:
+    """Each setting that differs, with its name from the top."""
+    if isinstance(found, dict) and isinstance(wanted, dict):
+        for name in {**found, **wanted}:
+            yield from _differences(found.get(name), wanted.get(name), f"{path}.{name}" if path else name)
+    elif found != wanted:
+        yield f"{path} was {found} and is {wanted} now"

@@ -1,0 +1,55 @@
+"""What every table, figure and claim of the paper is to us: tasks, and a report on what came of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from parenting.experiments.reporting.comparison import Finding
+from parenting.experiments.runner.store import Row, Task
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Scale = Literal["quick", "paper"]
+Device = Literal["cpu", "cuda"]
+CHUNK = 50
+"""Trials of a task at most. It changes nothing but speed, and the last bits of sums."""
+
+
+class Asked(NamedTuple):
+    """What somebody asks of an experiment."""
+
+    trials: int
+    seed: int = 0
+    scale: Scale = "paper"
+    device: Device = "cpu"
+
+
+@dataclass(frozen=True)
+class Report:
+    """What an experiment found: numbers beside the paper's, words on the differences, and drawings."""
+
+    findings: Sequence[Finding]
+    words: Sequence[str]  # a paragraph each
+    figures: Mapping[str, Callable[[Figure], None]] = field(default_factory=dict)  # file name -> drawing
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A table, figure or claim of the paper. Its module, its page and its folder bear its name."""
+
+    name: str
+    title: str
+    section: str  # of the paper
+    claim: str  # what the paper says, in a sentence of ours
+    trials: Mapping[Scale, int]
+    config: Callable[[Asked], Mapping[str, Any]]  # all that its pieces depend on beside the code
+    tasks: Callable[[Asked], Sequence[Task]]
+    report: Callable[[Asked, Sequence[Row]], Report]
+
+
+def spans(trials: int, chunk: int = CHUNK) -> list[range]:
+    """The trials of every task. Those of fewer trials are the first of those of more."""
+    return [range(first, min(first + chunk, trials)) for first in range(0, trials, chunk)]

@@ -1,0 +1,1 @@
+"""Trains many agents at once, and records how they end."""

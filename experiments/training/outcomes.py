@@ -1,0 +1,80 @@
+"""What the argmax policies of many trials do, each at its own end and at the end of each of its stages."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Bool, Float, Float64, Int64
+from torch import Tensor
+
+from parenting.agent.config import Config
+from parenting.agent.init import world_of
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.levels.kind import Kind
+from parenting.envs.mdp import explore
+from parenting.envs.struct import Struct
+from parenting.evaluation.argmax import ListedEvaluation
+from parenting.evaluation.rollouts import EPISODES, deploy
+from parenting.experiments.training.batch import Raised, Tally
+
+UNREACHED = -1
+"""The outcome of a stage that a trial did not come to."""
+
+
+class Ending(Struct):
+    """How every trial ended. M stages; D deployments, none in the garden; G is M there and 0 elsewhere."""
+
+    tally: Tally
+    outcome: Int64[Tensor, "N M D"]  # evaluation.outcomes.Outcome, or UNREACHED
+    waterings: Float64[Tensor, "N G"]  # an episode, the mean of EPISODES on each level
+    bucket: Int64[Tensor, "N G"]  # steps of all these episodes that end in the bucket
+
+
+def deployments(kind: Kind) -> tuple[str, ...]:
+    """Where the policies are tried: with the supervisor and without, in a world that has one (Sec. 3.2.5)."""
+    return ("supervised", "unsupervised") if "supervised" in kind.options else ("",)
+
+
+def examine(world: Gridworld, config: Config, raised: Raised) -> Ending:
+    """Try every policy that raising left, from the start: one outcome each, or the mean of many episodes."""
+    tally, policies = raised.tally, raised.policies
+    reached = torch.arange(1, config.stages + 1) <= tally.maturity[:, None]
+    if isinstance(raised.evaluation, ListedEvaluation):
+        outcome = _outcomes(_deployed(world, config, raised.evaluation), policies, reached)
+        nothing = reached.new_zeros(len(reached), 0)
+        return Ending(tally=tally, outcome=outcome, waterings=nothing.double(), bucket=nothing.long())
+    waterings, bucket = _watered(world, policies, reached)
+    no_outcome = torch.zeros(*reached.shape, 0, dtype=torch.int64)
+    return Ending(tally=tally, outcome=no_outcome, waterings=waterings, bucket=bucket)
+
+
+def _deployed(world: Gridworld, config: Config, lived: ListedEvaluation) -> list[ListedEvaluation]:
+    """The world that was lived in, or the same levels with the supervisor and without."""
+    if "supervised" not in world.kind.options:
+        return [lived]
+    worlds = [
+        world_of(world.name, world.levels, config.model_copy(update={"supervised": there}))
+        for there in ("present", "absent")
+    ]
+    return [ListedEvaluation(one, explore(one), config.gamma) for one in worlds]
+
+
+def _outcomes(
+    tried: list[ListedEvaluation], policies: Float[Tensor, "M N P"], reached: Bool[Tensor, "N M"]
+) -> Int64[Tensor, "N M D"]:
+    each = [torch.stack([one.outcomes(live) for one in tried], 1) for live in policies]
+    return torch.stack(each, 1).masked_fill(~reached[:, :, None], UNREACHED)
+
+
+def _watered(
+    world: Gridworld, policies: Float[Tensor, "M N P"], reached: Bool[Tensor, "N M"]
+) -> tuple[Float64[Tensor, "N M"], Int64[Tensor, "N M"]]:
+    waterings = torch.zeros(reached.shape, dtype=torch.float64)
+    bucket = torch.zeros(reached.shape, dtype=torch.int64)
+    levels = len(world.levels)
+    for stage, live in enumerate(policies):
+        trial = reached[:, stage].nonzero().squeeze(1)
+        for level in range(levels):
+            found = deploy(world, live[trial], EPISODES, level)
+            waterings[trial, stage] += found.waterings.mean(1) / levels
+            bucket[trial, stage] += found.bucket.sum(1)
+    return waterings, bucket

@@ -1,0 +1,124 @@
+"""Pre-training as long work: with progress, interrupted and taken up again, and what it leaves as files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import torch
+
+from parenting.agent.policy import network
+from parenting.agent.pretraining_loop import Exam, Pupil, School
+from parenting.agent.state import Rehearsal
+from parenting.weights import store
+from parenting.weights.store import Wanted
+
+SAVE_SECONDS = 10.0
+"""How much work an interruption may cost."""
+SMOOTH = 50
+"""The curve's rows: a mean over so many steps each."""
+
+Progress = Callable[[int, float], None]
+"""Told (steps, mean return of the last steps)."""
+
+
+class Unconverged(RuntimeError):
+    """Pre-training did not converge within its steps; what was learnt is kept and can be taken up again."""
+
+
+class Damaged(RuntimeError):
+    """The file of interrupted work cannot be read; the sentence names it."""
+
+
+class Educated(NamedTuple):
+    """What pre-training left."""
+
+    path: Path
+    sha256: str
+    steps: int
+    mean_return: float  # of the last 300 steps
+    exam: Exam
+    curve: list[float]  # mean return, a value for every SMOOTH steps
+
+
+def educate(
+    wanted: Wanted, folder: Path, seed: int, max_steps: int, progress: Progress | None = None
+) -> Educated:
+    """Pre-train until converged (Sec. 3.1.4) and write weights and curve into `folder`.
+
+    Interrupted work stands in a file beside them, and the next call goes on from there to the same bits.
+
+    Raises:
+        Unconverged: `max_steps` were not enough.
+        Damaged: the interrupted work cannot be read.
+        OSError: `folder` cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    school = School(
+        network(wanted.height, wanted.width, len(wanted.metadata["legend"])), wanted.world.glyphs, seed
+    )
+    part = folder / f"{wanted.name}-seed{seed}.part"
+    pupil = _recall(part, school.enrol())
+    saved = time.monotonic()
+    try:
+        while not school.converged(pupil):
+            if len(pupil.returns) >= max_steps:
+                raise Unconverged(
+                    f"{wanted.name} has not converged after {max_steps} steps: call again with more."
+                )
+            pupil = school.teach(pupil)
+            if progress:
+                progress(len(pupil.returns), float(pupil.returns[-SMOOTH:].mean()))
+            if time.monotonic() - saved > SAVE_SECONDS:
+                _keep(part, pupil)
+                saved = time.monotonic()
+    except BaseException:
+        _keep(part, pupil)
+        raise
+    return _finish(wanted, folder, seed, school, pupil, part)
+
+
+def _finish(wanted: Wanted, folder: Path, seed: int, school: School, pupil: Pupil, part: Path) -> Educated:
+    exam, steps = school.examine(pupil.live[0]), len(pupil.returns)
+    mean = float(pupil.returns[-300:].mean())
+    about = {"seed": str(seed), "steps": str(steps), "return": f"{mean:.2f}", "solved": f"{exam.solved:.3f}"}
+    path = folder / f"{wanted.name}{store.SUFFIX}"
+    sha256 = store.save(path, wanted, pupil.live[0], about)
+    curve = [float(some.mean()) for some in torch.split(pupil.returns, SMOOTH)]
+    path.with_suffix(".csv").write_text(_table(curve), encoding="utf-8")
+    part.unlink(missing_ok=True)
+    return Educated(path, sha256, steps, mean, exam, curve)
+
+
+def _table(curve: list[float]) -> str:
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    rows.writerow(["step", "mean_return"])
+    rows.writerows((SMOOTH * (place + 1), f"{value:.3f}") for place, value in enumerate(curve))
+    return out.getvalue()
+
+
+def _keep(part: Path, pupil: Pupil) -> None:
+    """Write the whole pupil, or leave the older file as it is."""
+    fresh = part.with_suffix(".keep")
+    torch.save(pupil.tensors(), fresh)
+    fresh.replace(part)
+
+
+def _recall(part: Path, pupil: Pupil) -> Pupil:
+    if not part.is_file():
+        return pupil
+    blob = io.BytesIO(part.read_bytes())
+    try:
+        kept: dict[str, Any] = torch.load(blob, weights_only=True)
+        moments = {name: kept[f"moments.{name}"] for name in ("first", "second", "steps", "owed")}
+        found = Pupil(kept["live"], Rehearsal(**moments), kept["tick"], kept["returns"]).check()
+    except Exception:  # torch has many errors for what it cannot read
+        found = pupil.replace(live=pupil.live[:, :0])
+    if found.live.shape != pupil.live.shape:
+        raise Damaged(f"{part} cannot be read as interrupted work. Delete it to begin anew.")
+    return found

@@ -1,0 +1,133 @@
+"""The results of a run as plain data: what was counted, and what the argmax policies do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from jaxtyping import Float64, Int64
+from torch import Tensor
+
+from parenting.agent.init import world_of
+from parenting.envs import registry
+from parenting.evaluation.argmax import evaluation
+from parenting.evaluation.outcomes import counts, name
+from parenting.evaluation.rollouts import EPISODES
+from parenting.experiments.training.outcomes import Ending, deployments
+from parenting.experiments.training.parallel import Plan
+from parenting.parents.scripted import Judgement
+from parenting.weights.store import digest
+
+COUNTS = ("deaths", "guidance", "preference", "ticks")
+
+
+def summarise(plan: Plan, level: str, ending: Ending, seconds: float) -> dict[str, Any]:
+    """Means and deviations (over n - 1) of what was counted are of the finished trials; the others are
+    counted apart. `evaluation` is of all trials, each at its own end, and `stages` of all that came to a
+    stage, at its end.
+    """
+    tally, report = ending.tally, _report(plan, ending)
+    finished = {one: getattr(tally, one)[tally.finished].double() for one in COUNTS}
+    found = {
+        "world": plan.world,
+        "level": level,
+        "seed": plan.seed,
+        "until": str(plan.until),
+        "max_ticks": plan.max_ticks,
+        "config": plan.config.model_dump(mode="json"),
+        "weights": None if plan.weights is None else digest(plan.weights),
+        "trials": _rows(ending, report),
+        "unfinished": int((~tally.finished).sum()),
+        "stuck": int(tally.stuck.sum()),
+        "mean": {one: mean(values) for one, values in finished.items()},
+        "sd": {one: sd(values) for one, values in finished.items()},
+        "evaluation": report.evaluation(torch.arange(len(tally.ticks)), tally.maturity - 1),
+    }
+    if plan.config.stages > 1 or isinstance(report, GardenReport):
+        found["stages"] = [_stage(ending, report, stage) for stage in range(plan.config.stages)]
+    return {**found, "seconds": round(seconds, 2)}
+
+
+def mean(values: Float64[Tensor, "n"]) -> float | None:
+    """None where there is nothing to take a mean of."""
+    return float(values.mean()) if len(values) else None
+
+
+def sd(values: Float64[Tensor, "n"]) -> float | None:
+    """The deviation over n - 1; none of fewer than two."""
+    return float(values.std()) if len(values) > 1 else None
+
+
+class WalkReport:
+    """What the argmax policies do where a goal ends the episode: one outcome each."""
+
+    def __init__(self, plan: Plan, ending: Ending) -> None:
+        """Words for the outcomes come from the world."""
+        kind = registry.kind(plan.world)
+        self.outcome, self.harm, self.where = ending.outcome, kind.harm, deployments(kind)
+
+    def evaluation(self, trial: Int64[Tensor, "n"], stage: Int64[Tensor, "n"]) -> dict[str, Any]:
+        """Counts of some trials, each at one stage; two of them where the world has two deployments."""
+        found = self.outcome[trial, stage]
+        each = {where: counts(found[:, place], self.harm) for place, where in enumerate(self.where)}
+        return each.get("", each)
+
+    def row(self, trial: int, stage: int) -> Any:
+        """One trial's outcome in a word, or a word for each deployment."""
+        words = [name(one, self.harm) for one in self.outcome[trial, stage].tolist()]
+        return words[0] if self.where == ("",) else dict(zip(self.where, words, strict=True))
+
+
+class GardenReport:
+    """What the argmax policies do in the garden: waterings, and steps that end in the bucket."""
+
+    def __init__(self, plan: Plan, ending: Ending) -> None:
+        """The parent's own waterings stand beside the agent's; over several levels a mean."""
+        world = world_of(plan.world, plan.level, plan.config)
+        judgement = Judgement(world, plan.config.gamma, inside=plan.config.inside)
+        best = evaluation(world, judgement.valuation, plan.config.gamma).best
+        self.parent = sum(map(best, range(len(world.levels)))) / len(world.levels)
+        self.steps, self.ending = world.time_limit, ending
+
+    def evaluation(self, trial: Int64[Tensor, "n"], stage: Int64[Tensor, "n"]) -> dict[str, Any]:
+        """Of some trials, each at one stage: the mean of their means, and how sure it is."""
+        waterings, bucket = self.ending.waterings[trial, stage], self.ending.bucket[trial, stage]
+        deviation = sd(waterings)
+        return {
+            "trials": len(trial),
+            "waterings": mean(waterings),
+            "sd": deviation,
+            "se": None if deviation is None else deviation / len(trial) ** 0.5,
+            "parent": self.parent,
+            "bucket": int(bucket.sum()),
+            "episodes": EPISODES,
+            "steps": self.steps,
+        }
+
+    def row(self, trial: int, stage: int) -> Any:
+        """One trial's mean, and its steps into the bucket."""
+        waterings, bucket = self.ending.waterings[trial, stage], self.ending.bucket[trial, stage]
+        return {"waterings": float(waterings), "bucket": int(bucket)}
+
+
+def _report(plan: Plan, ending: Ending) -> WalkReport | GardenReport:
+    return (GardenReport if ending.waterings.shape[1] else WalkReport)(plan, ending)
+
+
+def _rows(ending: Ending, report: WalkReport | GardenReport) -> list[dict[str, Any]]:
+    tally = ending.tally
+    columns = {one: getattr(tally, one).tolist() for one in (*COUNTS, "optimal", "finished", "stuck")}
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    last = (tally.maturity - 1).tolist()
+    return [{**row, "outcome": report.row(trial, last[trial])} for trial, row in enumerate(rows)]
+
+
+def _stage(ending: Ending, report: WalkReport | GardenReport, stage: int) -> dict[str, Any]:
+    """One stage, of the trials that came to it; `queries` is their mean of answered ones."""
+    trial = (ending.tally.maturity > stage).nonzero().squeeze(1)
+    queries = mean(ending.tally.queries[trial, stage].double())
+    return {
+        "stage": stage + 1,
+        "queries": queries,
+        **report.evaluation(trial, torch.full_like(trial, stage)),
+    }

@@ -1,0 +1,114 @@
+"""Draws the pictures of the documentation: `make pictures`. Needs Chromium."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from playwright.sync_api import Browser, Page
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from tests.by_hand import answer, chromium, create, distances, start, tell, until, up
+
+FOLDER = Path(__file__).parents[1] / "docs" / "pictures"
+SCREENS = {"desktop": (1280, 800), "phone": (390, 844)}
+TALL = {"desktop": (1280, 1400), "phone": (390, 1400)}
+ANSWERS, GOAL = 25, 50
+COLOURS, TRUE = 256, 96
+"""A picture of a page needs no more colours, and is a third as large. The most frequent are true to a bit."""
+
+GARDEN = {"stages": 3, "mature_every": 15, "time_limit": 10}
+"""A life in stages that is over within a minute or two."""
+
+
+def shoot(page: Page, name: str, folder: Path, sizes: dict[str, tuple[int, int]] = SCREENS) -> None:
+    """What a page shows, on a desktop and on a phone, light and dark."""
+    for device, (width, height) in sizes.items():
+        page.set_viewport_size({"width": width, "height": height})
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+            page.wait_for_timeout(1500)
+            drawn = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+            few_colours(drawn).save(folder / f"{name}-{device}-{scheme}.png", optimize=True)
+
+
+def few_colours(drawn: Image.Image) -> Image.Image:
+    """A picture that looks the same: each colour becomes the nearest of the palette."""
+    pixels = np.asarray(drawn).reshape(-1, 3)
+    colours, which, counts = np.unique(pixels, axis=0, return_inverse=True, return_counts=True)
+    others = drawn.quantize(COLOURS - TRUE, Image.Quantize.MAXCOVERAGE).getpalette() or []
+    palette = np.concatenate(
+        [colours[np.argsort(-counts)[:TRUE]], np.reshape(others, (-1, 3))[: COLOURS - TRUE]]
+    )
+    far = ((colours[:, None].astype(int) - palette[None].astype(int)) ** 2).sum(-1)
+    few = Image.fromarray(far.argmin(1)[which].astype(np.uint8).reshape(drawn.height, drawn.width), "P")
+    few.putpalette(palette.astype(np.uint8).tobytes())
+    return few
+
+
+def raised(browser: Browser, url: str) -> Page:
+    """A parent's page after so many answers that dashboard and history have something to show."""
+    page = browser.new_context(reduced_motion="reduce").new_page()
+    start(page, url, seed=3, goal=GOAL)
+    to_goal = distances()
+    for _ in range(ANSWERS):
+        answer(page, to_goal)
+    page.wait_for_selector("#question")
+    return page
+
+
+def compared(browser: Browser, url: str) -> Page:
+    """A parent's page that asks about two clips of three steps."""
+    run = create(url, world="unsafe-exploration", preset="direct", config={"stages": 3}, seed=7)
+    for _ in range(2):
+        tell(url, run, "mature")
+    page = browser.new_page(reduced_motion="reduce")
+    page.goto(f"{url}/runs/{run}/parent")
+    steps = "[...document.querySelectorAll('#question .board')].map(b => b.dataset.actions.split(' ').length)"
+    while page.wait_for_selector("#question") and page.evaluate(steps) != [3, 3]:
+        answer(page, distances())
+    return page
+
+
+def main(folder: Path) -> None:
+    """All pictures into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = os.environ.get("PARENTING_CHROMIUM") or shutil.which("chromium") or "chromium"
+    with tempfile.TemporaryDirectory() as data, up(Path(data)) as url, chromium(path) as browser:
+        garden = create(
+            url,
+            world="reward-hacking",
+            level="garden-mirrored",
+            parent="scripted",
+            config=GARDEN,
+            goal=45,
+            pace=4,
+        )
+        parent = raised(browser, url)
+        shoot(parent, "parent", folder)
+        shoot(compared(browser, url), "preference", folder)
+        page = browser.new_page(reduced_motion="reduce")
+        page.goto(f"{url}/runs/{garden}")
+        page.wait_for_selector("main[data-state=resting]", timeout=600_000)
+        last = page.locator("#now-stage_queries")
+        until(lambda: last.inner_text() == str(GARDEN["mature_every"]), 60, "the last answer was not counted")
+        shoot(page, "dashboard", folder, TALL)
+        page = parent.context.new_page()  # of the browser that has answered
+        for name, address in (("history", "/runs/2/history"), ("runs", "/"), ("docs", "/docs")):
+            page.goto(url + address)
+            shoot(page, name, folder)
+        tell(url, 2, "goal", goal=ANSWERS)
+        parent.reload()
+        parent.wait_for_selector("main[data-state=resting]")
+        shoot(parent, "resting", folder)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER)

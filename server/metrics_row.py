@@ -1,0 +1,38 @@
+"""One row of metrics: what the dashboard draws."""
+
+from __future__ import annotations
+
+from parenting.agent.query import Choice, Kind
+from parenting.evaluation.argmax import Evaluation
+from parenting.server.checkpoint import Saved
+
+Row = dict[str, float | int | None]
+
+NOTHING_LEARNT: Row = {"loss": None, "entropy_global": None, "entropy_local": None}
+"""Before the first gradient step."""
+
+
+def learnt(saved: Saved) -> Row:
+    """The last gradient step: loss (Eq. 2) and both entropies, a mean over the entries of X."""
+    report = saved.state.report
+    return {name: float(getattr(report, name)[0]) for name in NOTHING_LEARNT}
+
+
+def measure(saved: Saved, evaluation: Evaluation) -> Row:
+    """Counts since birth, and what the argmax policy does from the start."""
+    state, tally = saved.state, saved.tally
+    live = state.learner.live
+    return {
+        "deaths": int(tally.deaths[0]),
+        "episodes": int(tally.episodes[0]),
+        "guidance": int(tally.kinds[0, Kind.GUIDANCE]),
+        "preference": int(tally.kinds[0, Kind.PREFERENCE]),
+        **{choice.name.lower(): int(tally.choices[0, choice]) for choice in Choice if choice != Choice.NONE},
+        "return": float(evaluation.returns(live)[0]),
+        "optimal_return": evaluation.best(),
+        "optimal": int(evaluation.optimal(live)[0]),
+        "size": int(state.x.size[0]),
+        "rows": int(state.x.rows[0]),
+        "maturity": int(state.maturity[0]),
+        "stage_queries": int(state.answered[0]),
+    }

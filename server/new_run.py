@@ -1,0 +1,217 @@
+"""From a form or a JSON body to a run: every field checked on its own, each with its own message.
+
+No torch here.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    ValidationError,
+)
+
+from parenting.agent.config import PRESETS, Config
+from parenting.envs import registry
+from parenting.envs.levels.kind import Level, LevelError
+from parenting.server.db import Database
+from parenting.server.errors import Invalid
+from parenting.server.runs import create_run
+from parenting.server.tables import Run
+from parenting.server.weights import keep
+from parenting.weights.store import NoWeights, Wanted, find
+
+LARGEST_INT = 2**53 - 1
+"""The largest integer that every JSON reader keeps exactly."""
+LEVEL_CHARACTERS = 8192
+FORM_FIELDS = ("world", "level", "level_text", "parent", "preset", "name", "seed", "goal", "pace")
+NUMBERS = ("seed", "goal", "pace")
+UNREAD = {
+    "json_invalid": "This is no JSON.",
+    "model_attributes_type": "Send a JSON object, with the header Content-Type: application/json.",
+}
+"""What is said of a body that is none, by Pydantic's word for it."""
+
+
+def _plain(text: str) -> str:
+    """Text without control characters (line ends excepted), and storable as UTF-8."""
+    for character in text:
+        if (ord(character) < 32 and character not in "\n\r\t") or 0x7F <= ord(character) < 0xA0:
+            raise ValueError(f"the control character U+{ord(character):04X} cannot stand here")
+        if 0xD800 <= ord(character) < 0xE000:
+            raise ValueError("half of a surrogate pair cannot stand here")
+    return text
+
+
+def _whole(value: Any) -> Any:
+    """JSON's 657.0 is the integer 657."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+Name = Annotated[
+    str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\r\n\t]*$"), AfterValidator(_plain)
+]
+LevelText = Annotated[
+    str, StringConstraints(min_length=1, max_length=LEVEL_CHARACTERS), AfterValidator(_plain)
+]
+Seed = Annotated[int, Field(ge=0, le=LARGEST_INT), BeforeValidator(_whole)]
+Goal = Annotated[int, Field(ge=1, le=1_000_000), BeforeValidator(_whole)]
+Pace = Annotated[float, Field(gt=0, le=1000)]
+Integer = Annotated[int, Field(ge=-LARGEST_INT, le=LARGEST_INT)]
+Setting = bool | Integer | float | Name | None
+
+
+class NewRun(BaseModel):
+    """What a run is started with; `level` is a built-in level's name, `config` changes the preset."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+    world: Name
+    level: Name | None = Field(None, description="A built-in level's name; none is the world's first.")
+    level_text: LevelText | None = Field(
+        None, description="A level of one's own, as text; instead of `level`."
+    )
+    parent: Literal["human", "scripted"] = "human"
+    preset: Name = Field("conservative", description="conservative, lax or direct.")
+    config: dict[Name, Setting] = Field(
+        default_factory=dict, max_length=100, description="Changes to the preset, by field."
+    )
+    seed: Seed = 0
+    name: Name | None = None
+    goal: Goal | None = Field(None, description="Answered questions after which the run rests; null: never.")
+    pace: Pace | None = Field(None, description="Ticks a second at most; null: as fast as it can.")
+
+
+def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
+    """Check a new run against worlds and hyperparameters, and add it, with its pre-trained weights.
+
+    `folder` holds weights of one's own; those of the built-in levels are shipped.
+
+    Raises:
+        Invalid: names every wrong field, with a message each.
+    """
+    columns = plan(new, folder)
+    file: Path | None = columns.pop("weights")
+    return create_run(db, **columns, weights=keep(db, file) if file else None)
+
+
+def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
+    """The columns of a new run; under `weights` the file of its pre-trained weights, or None.
+
+    Raises:
+        Invalid: names every wrong field, with a message each.
+    """
+    wrong: list[tuple[str, str]] = []
+    level = _level(new, wrong)
+    config = _config(new, wrong)
+    weights = _weights(new, level, config, folder, wrong)
+    if wrong or level is None or config is None:
+        raise Invalid(wrong)
+    kind = registry.kind(new.world)
+    return {
+        **new.model_dump(include={"world", "preset", "seed", "parent", "name", "goal", "pace"}),
+        "level": level.name,
+        "level_text": level.text,
+        "legend": dict(kind.legend),
+        "brief": {"goal": kind.brief.goal, "danger": kind.brief.danger},
+        "config": config.model_dump(mode="json"),
+        "weights": weights,
+    }
+
+
+def read_form(form: Mapping[str, str]) -> NewRun:
+    """A new run from a web form's text; an empty field is an absent one, `config.p_guid` sets `p_guid`.
+
+    Raises:
+        Invalid: names every wrong field, with a message each.
+    """
+    given = {name: text for name, text in form.items() if text.strip()}
+    fields: dict[str, Any] = {name: given[name] for name in FORM_FIELDS if name in given}
+    fields |= {name: _number(fields[name]) for name in NUMBERS if name in fields}
+    changes = {name: text for name, text in given.items() if name.startswith("config.")}
+    fields["config"] = {name.removeprefix("config."): _number(text) for name, text in changes.items()}
+    try:
+        return NewRun.model_validate(fields)
+    except ValidationError as error:
+        raise Invalid(messages(error.errors())) from None
+
+
+def messages(errors: Any, skip: tuple[str, ...] = ()) -> list[tuple[str, str]]:
+    """Pydantic's errors as (field, message), without what was sent: nothing of a request is echoed."""
+    found: dict[str, str] = {}
+    for error in errors:
+        path = [str(part) for part in error["loc"] if part not in skip and error["type"] != "json_invalid"]
+        if path[:1] == ["config"]:
+            path = path[:2]  # the rest names the branch of the union that was tried
+        message = UNREAD.get(error["type"]) or error["msg"].removeprefix("Value error, ")
+        found.setdefault(".".join(path) or "body", message)
+    return list(found.items())
+
+
+def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
+    if new.world not in registry.WORLDS:
+        wrong.append(("world", f"There is no such world; there is: {', '.join(registry.WORLDS)}."))
+        return None
+    if new.level is not None and new.level_text is not None:
+        wrong.append(("level", "Name a level or give its text, not both."))
+        return None
+    field = "level" if new.level_text is None else "level_text"
+    # A text without line end would be taken for a name.
+    text = new.level if new.level_text is None else new.level_text.replace("\r\n", "\n") + "\n"
+    try:
+        return registry.level(new.world, text)
+    except registry.UnknownName:
+        known = ", ".join(registry.kind(new.world).levels)
+        wrong.append((field, f"There is no such level of {new.world}; there is: {known}."))
+    except LevelError as error:
+        wrong.append((field, str(error)))
+    return None
+
+
+def _config(new: NewRun, wrong: list[tuple[str, str]]) -> Config | None:
+    """The preset, over it what the world sets, over it what this run sets (docs/paper.md, "Settings").
+
+    A script answers at once, so its agent waits for each of its answers.
+    """
+    if new.preset not in PRESETS:
+        wrong.append(("preset", f"There is no such preset; there is: {', '.join(PRESETS)}."))
+        return None
+    world = registry.defaults(new.world) if new.world in registry.WORLDS else {}
+    waits = {"max_open_preferences": 0} if new.parent == "scripted" else {}
+    changes = waits | {name: _whole(value) for name, value in new.config.items()}
+    try:
+        # Strict: pydantic would otherwise take true for 1, and "1" too.
+        return Config.model_validate({**PRESETS[new.preset], **world, **changes}, strict=True)
+    except ValidationError as error:
+        wrong += [(f"config.{field}", message) for field, message in messages(error.errors())]
+    return None
+
+
+def _weights(
+    new: NewRun, level: Level | None, config: Config | None, folder: Path | None, wrong: list[tuple[str, str]]
+) -> Path | None:
+    if level is None or config is None or not config.pretrain:
+        return None
+    try:
+        return find(Wanted(registry.kind(new.world), level.height, level.width), folder)
+    except NoWeights as error:
+        wrong.append(("config.pretrain", str(error)))
+        return None
+
+
+def _number(text: str) -> Any:
+    """What a form's text says: a number, true, false or null where it reads as one, else the text itself."""
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return text.strip()
+    return text.strip() if isinstance(value, str | list | dict) else value

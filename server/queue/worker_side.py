@@ -1,0 +1,235 @@
+"""The worker's verbs on queries, answers and events: watch, post, take.
+
+One transaction each; all their SQL is here.
+
+**Crash and replay.** A worker that lost its memory goes on from a checkpoint and lives some ticks a second
+time. At or below the *high-water tick*, the largest on any posted query, applied answer or applied event,
+`take_answer` and `take_events` give back exactly what was recorded for that tick, and `post_query` of a known
+tick inserts nothing. So ticks replay exactly and nothing is asked twice.
+
+Within a tick the order is: events, answer, step, query. So an event applied at a tick does not close that
+tick to an answer, but an answer or a query closes it to both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import BindParameter, ColumnElement, ScalarSelect, bindparam, func, select, update
+from sqlalchemy.orm import Session
+
+from parenting.server.db import Database
+from parenting.server.queue.parent_side import guidance_first
+from parenting.server.runs import Claim, held, held_status, withdraw_in
+from parenting.server.tables import Answer, Event, Query, Run
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What a worker has to know of a run before it ticks; read at once, cheap enough for a poll."""
+
+    run_id: int
+    status: str
+    epoch: int
+    actor: str | None
+    open_guidance: int
+    open_preferences: int
+    answers: int  # given and not yet heard
+    answered: int  # given since its birth
+    goal: int | None  # answered questions after which it rests
+    pace: float | None  # ticks a second at most
+    events: int  # not yet applied
+
+
+@dataclass(frozen=True)
+class Taken:
+    """An answer that is heard at this tick, with the query that it answers."""
+
+    answer: Answer
+    query: Query
+
+
+# Statements that every tick needs are built once.
+_RUN: BindParameter[int] = bindparam("run_id")
+_HIGH = select(
+    select(func.max(Query.tick)).where(Query.run_id == _RUN).scalar_subquery(),
+    select(func.max(Answer.applied_tick)).where(Answer.run_id == _RUN).scalar_subquery(),
+    select(func.max(Event.applied_tick)).where(Event.run_id == _RUN).scalar_subquery(),
+)
+_PENDING = (
+    select(Answer, Query)
+    .join(Query, Answer.query_id == Query.id)
+    .where(Query.run_id == _RUN, Query.status == "answered", Answer.standing)
+    .order_by(guidance_first(), Query.tick)
+    .limit(1)
+)
+_KNOWN = select(Query.id).where(Query.run_id == _RUN, Query.tick == bindparam("tick"))
+
+
+def _number(*conditions: ColumnElement[bool]) -> ScalarSelect[int]:
+    return select(func.count()).where(*conditions).correlate(Run).scalar_subquery()
+
+
+_WATCH = select(
+    Run.id.label("run_id"),
+    Run.status,
+    Run.epoch,
+    Run.actor,
+    _number(Query.run_id == Run.id, Query.status == "open", Query.kind == "guidance").label("open_guidance"),
+    _number(Query.run_id == Run.id, Query.status == "open", Query.kind == "preference").label(
+        "open_preferences"
+    ),
+    _number(Query.run_id == Run.id, Query.status == "answered").label("answers"),
+    Run.answers.label("answered"),
+    Run.goal,
+    Run.pace,
+    _number(Event.run_id == Run.id, Event.applied_tick.is_(None)).label("events"),
+).where(Run.id.in_(bindparam("run_ids", expanding=True)))
+
+
+def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
+    """The state of some runs, by id. While nobody commits anything, asking again costs next to nothing."""
+
+    def look() -> dict[int, Watch]:
+        with db.read() as session:
+            rows = session.execute(_WATCH, {"run_ids": run_ids}).all()
+        seen = {row.run_id: Watch(**row._mapping) for row in rows}
+        return {run_id: seen[run_id] for run_id in run_ids if run_id in seen}
+
+    return db.remembered(("watch", *run_ids), look)
+
+
+def high_water(db: Database, run_id: int) -> int:
+    """The largest tick on any posted query, applied answer or applied event; -1 where there is none."""
+    with db.read() as session:
+        return max(_high(session, run_id))
+
+
+def post_query(
+    db: Database,
+    mine: Claim,
+    tick: int,
+    kind: str,
+    maturity: int,
+    clips: dict[str, Any],
+    policy: tuple[int, int] | None = None,
+) -> int:
+    """Ask: insert the query of this tick and return its id.
+
+    A known tick inserts nothing: its id and payload stay. `policy` says which one asks: its stage and its
+    gradient steps there.
+
+    Raises:
+        LostClaim: another worker raises this run now.
+    """
+    with db.write() as session:
+        status = held_status(session, mine)
+        known = session.execute(_KNOWN, {"run_id": mine.run_id, "tick": tick}).scalar()
+        if known is not None:
+            return int(known)
+        query = Query(run_id=mine.run_id, tick=tick, kind=kind, maturity=maturity, clips=clips)
+        query.policy_stage, query.policy_steps = policy or (None, None)
+        query.posted, query.status = db.clock(), "open" if status in ("active", "paused") else "withdrawn"
+        session.add(query)
+        session.flush()
+        return query.id
+
+
+def asked_at(db: Database, run_id: int, tick: int) -> Query | None:
+    """What was asked at a tick, if anything: a replayed tick has to ask the same."""
+    with db.read() as session:
+        return session.scalars(select(Query).where(Query.run_id == run_id, Query.tick == tick)).one_or_none()
+
+
+def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
+    """The answer to be heard at this tick, at most one: guidance first, then the oldest query's. Never waits.
+
+    A new one is marked with the tick in the same transaction; on replay the recorded one comes back, even if
+    it was superseded later.
+
+    Raises:
+        LostClaim: another worker raises this run now.
+    """
+    with db.write(durable=False) as session:
+        if _closed(session, mine.run_id, tick):
+            return _recorded_answer(session, mine.run_id, tick)
+        held_status(session, mine)
+        found = _pending(session, mine.run_id)
+        if found is not None:
+            found.answer.applied_tick, found.query.status = tick, "applied"
+        return found
+
+
+def take_events(db: Database, mine: Claim, tick: int) -> Sequence[Event]:
+    """The operator's events that apply before this tick, in their order. New ones are marked with it.
+
+    An *end the episode* also withdraws the open guidance question: nobody waits for that move any more. And
+    the run no longer counts as stuck, so that nobody ends the next episode as well.
+
+    Raises:
+        LostClaim: another worker raises this run now.
+    """
+    recorded = select(Event).where(Event.run_id == mine.run_id, Event.applied_tick == tick).order_by(Event.id)
+    fresh = select(Event).where(Event.run_id == mine.run_id, Event.applied_tick.is_(None)).order_by(Event.id)
+    with db.read() as session:
+        if max(_high(session, mine.run_id)) >= tick:
+            return session.scalars(recorded).all()
+        if session.scalars(fresh.limit(1)).first() is None:
+            return []
+    with db.write() as session:
+        run = held(session, mine)
+        events = session.scalars(fresh).all()
+        for event in events:
+            event.applied_tick = tick
+        if any(event.kind == "end_episode" for event in events):
+            withdraw_in(session, mine.run_id, "guidance")
+            run.waiting = None
+        return events
+
+
+def withdraw(db: Database, mine: Claim, query_id: int) -> None:
+    """Withdraw one open query; one that was answered meanwhile stays answered.
+
+    Raises:
+        LostClaim: another worker raises this run now.
+    """
+    with db.write() as session:
+        run = held(session, mine)
+        session.execute(
+            update(Query)
+            .where(Query.id == query_id, Query.run_id == run.id, Query.status == "open")
+            .values(status="withdrawn")
+        )
+
+
+def record(db: Database, run_id: int) -> Sequence[Taken]:
+    """Every answer that the agent heard, in that order: from this X is rebuilt at any time."""
+    with db.read() as session:
+        rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
+        rows = rows.where(Answer.run_id == run_id, Answer.applied_tick.is_not(None)).order_by(
+            Answer.applied_tick
+        )
+        return [Taken(answer, query) for answer, query in session.execute(rows)]
+
+
+def _high(session: Session, run_id: int) -> tuple[int, int, int]:
+    ticks = session.execute(_HIGH, {"run_id": run_id}).one()
+    return tuple(-1 if tick is None else tick for tick in ticks)  # type: ignore[return-value]
+
+
+def _closed(session: Session, run_id: int, tick: int) -> bool:
+    query, answer, event = _high(session, run_id)
+    return query >= tick or answer >= tick or event > tick
+
+
+def _recorded_answer(session: Session, run_id: int, tick: int) -> Taken | None:
+    rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
+    row = session.execute(rows.where(Answer.run_id == run_id, Answer.applied_tick == tick)).one_or_none()
+    return None if row is None else Taken(*row)
+
+
+def _pending(session: Session, run_id: int) -> Taken | None:
+    row = session.execute(_PENDING, {"run_id": run_id}).first()
+    return None if row is None else Taken(*row)

@@ -1,0 +1,140 @@
+"""What is counted of trials, when they leave their batch, and what they leave behind."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from torch import Tensor
+
+from parenting.agent.config import Config, compose
+from parenting.agent.init import world_of
+from parenting.agent.query import Choice, Kind, Query
+from parenting.envs import registry
+from parenting.envs.rng import keys
+from parenting.experiments.training import batch
+from parenting.experiments.training.batch import Nursery, Raised, Standing, Until, raise_trials
+
+ISLAND = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=False)
+
+
+def nursery(until: Until, number: int = 10, config: Config = ISLAND) -> Nursery:
+    world = world_of("unsafe-exploration", "island", config)
+    return Nursery(world, config, keys(0, number), until)
+
+
+def raised(until: Until, number: int = 10, max_ticks: int = 1000, **changes: object) -> Raised:
+    config = ISLAND.model_copy(update=changes)
+    world = world_of("unsafe-exploration", "island", config)
+    return raise_trials(world, config, keys(0, number), until, max_ticks)
+
+
+class Refusing:
+    """Says *neither* to some trials whenever they ask, and *either* to the others."""
+
+    def __init__(self, refused: Tensor) -> None:
+        self.refused = refused
+
+    def choose(self, query: Query) -> Tensor:
+        choice = torch.where(self.refused, int(Choice.NEITHER), int(Choice.EITHER))
+        return torch.where(query.kind == Kind.NONE, int(Choice.NONE), choice)
+
+
+@pytest.mark.parametrize("until", [Until("ticks", 50), Until("queries", 40), Until("optimal")])
+def test_stuck_trials_leave_at_once_and_are_unfinished(until: Until) -> None:
+    """A pause asks twice: after the second *neither*, heard in the third tick, nothing can happen."""
+    batch = nursery(until, 10)
+    batch.parent.judgement = Refusing(torch.ones(10, dtype=torch.bool))  # type: ignore[assignment]
+    for _ in range(3):
+        assert not bool(batch.tally.done.any())
+        batch.tick()
+    assert len(batch.state.waiting) == len(batch.tally.ticks) == 0  # the batch is empty
+    result = batch.result
+    assert bool(result.stuck.all())
+    assert not bool(result.finished.any())
+    assert result.ticks.tolist() == [3] * 10
+    assert result.guidance.tolist() == [2] * 10
+
+
+def test_the_others_live_on_without_those_that_are_stuck() -> None:
+    batch = nursery(Until("ticks", 20), 10)
+    refused = torch.arange(10) < 2
+    batch.parent.judgement = Refusing(refused)  # type: ignore[assignment]
+    for _ in range(3):
+        batch.tick()
+    assert len(batch.state.waiting) == 8
+    batch.parent.judgement = Refusing(torch.zeros(8, dtype=torch.bool))  # type: ignore[assignment]
+    for _ in range(17):
+        batch.tick()
+    assert torch.equal(batch.result.stuck, refused)
+    assert torch.equal(batch.result.finished, ~refused)
+    assert batch.result.ticks.tolist() == [3] * 2 + [20] * 8
+
+
+def test_a_goal_that_is_reached_comes_before_being_stuck() -> None:
+    batch = nursery(Until("queries", 2), 4)
+    batch.parent.judgement = Refusing(torch.ones(4, dtype=torch.bool))  # type: ignore[assignment]
+    for _ in range(3):
+        batch.tick()
+    assert bool(batch.result.finished.all())
+    assert not bool(batch.result.stuck.any())
+
+
+def test_queries_are_counted_by_their_stage() -> None:
+    """A stage ends with its 5th answer; a question that was out by then still belongs to it."""
+    found = raised(Until("queries", 14), stages=3, mature_every=5, p_guid=0.5).tally.check()
+    assert torch.equal(found.queries.sum(1), found.guidance + found.preference)
+    assert found.queries.sum(1).tolist() == [14] * 10
+    assert bool((found.maturity == 3).all())
+    assert bool((found.queries[:, :2] >= 5).all())
+    assert bool((found.queries[:, :2] <= 6).all())
+
+
+def test_policies_are_those_of_each_trials_own_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where trials stay in their batch, and go on training, after they are finished."""
+    usual = raised(Until("optimal"), 20, dtype="float64")
+    monkeypatch.setattr(batch, "LEAVE", 2.0)
+    staying = raised(Until("optimal"), 20, dtype="float64")
+    for found in (usual, staying):
+        assert bool(found.tally.finished.all())
+        assert bool(found.evaluation.optimal(found.policies[0]).all())
+        assert len(set(found.tally.ticks.tolist())) > 5  # at different ticks
+    assert torch.equal(usual.tally.ticks, staying.tally.ticks)
+
+
+def test_policies_of_earlier_stages_are_the_frozen_ones() -> None:
+    config = ISLAND.model_copy(update={"stages": 3, "mature_every": 10})
+    batch = nursery(Until("ticks", 40), 6, config)
+    before = batch.state.learner.live.clone()
+    frozen: dict[tuple[int, int], Tensor] = {}
+    for _ in range(39):
+        was = batch.state.maturity.clone()
+        batch.tick()
+        for trial in (batch.state.maturity > was).nonzero().squeeze(1).tolist():
+            frozen[int(was[trial]) - 1, trial] = batch.state.learner.live[trial].clone()
+    assert frozen
+    batch.tick()
+    for (stage, trial), live in frozen.items():
+        assert torch.equal(batch.policies[stage, trial], live)
+    last = batch.policies[batch.result.maturity - 1, torch.arange(6)]
+    assert not bool((last == before).all(1).any())
+    beyond = torch.arange(3)[:, None] >= batch.result.maturity
+    assert not bool(batch.policies[beyond].any())
+
+
+def test_unfinished_trials_leave_their_policies_and_are_judged() -> None:
+    found = raised(Until("queries", 10_000), 6, max_ticks=80)
+    assert not bool(found.tally.finished.any())
+    assert torch.equal(found.tally.optimal, found.evaluation.optimal(found.policies[0]))
+    assert bool(found.tally.optimal.any())
+
+
+def test_standing_counts_no_trial_twice() -> None:
+    batch = nursery(Until("queries", 6), 10)
+    for tick in range(1, 200):
+        batch.tick()
+        standing = batch.standing(tick)
+        assert standing.trials == int(batch.result.finished.sum())
+        assert standing.queries <= 60
+        if standing.trials == 10:
+            break
+    assert standing == Standing(10, tick, 60)

@@ -1,0 +1,173 @@
+"""What comes of a clip in each world, in words: clips made by hand, and what a parent is to read of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from parenting.drawing.board import draw
+from parenting.drawing.clip import Clip
+from parenting.envs import registry
+from parenting.server.pages.captions import comes_of
+from parenting.server.pages.question import show
+from tests.pages.filmed import asked, forecast, guidance, preference, run
+from tests.pages.filmed import film as filmed
+
+Cell = tuple[int, int]
+LEGEND = {glyph: name for kind in registry.WORLDS.values() for glyph, name in kind.legend.items()}
+
+
+def film(actions: str, grounds: list[list[str]], agent: list[Cell], box: list[Cell] | None = None) -> Clip:
+    """A clip frame by frame; the last ground stays for the frames that follow it."""
+    frames: list[Any] = [
+        {"ground": (ground := grounds[min(k, len(grounds) - 1)]), "observed": ground, "agent": list(at)}
+        | {"box": list(box[k]) if box else None}
+        for k, at in enumerate(agent)
+    ]
+    names = actions.split()
+    return {"actions": names, "length": len(names), "frames": frames}
+
+
+def said(clip: Clip, stage: int | None = None, longer: int = 0) -> list[tuple[str, str]]:
+    board = draw(clip, clip["length"] if stage is None else stage)
+    return [(text, tone) for text, tone in comes_of(clip, board, LEGEND, longer)]
+
+
+ROW = ["#####", "#  G#", "#####"]
+
+
+def test_nothing_to_say_of_a_plain_move() -> None:
+    assert said(film("right", [ROW], [(1, 1), (1, 2)])) == []
+
+
+def test_walls() -> None:
+    assert said(film("up", [ROW], [(1, 1)] * 2)) == [("Runs into a wall.", "")]
+    assert said(film("up up", [ROW], [(1, 1)] * 3)) == [("Only runs into walls.", "")]
+    assert said(film("up right", [ROW], [(1, 1), (1, 1), (1, 2)])) == [("Runs into a wall on the way.", "")]
+
+
+def test_water_and_goal() -> None:
+    pond = [["####", "# W#", "####"]]
+    assert said(film("right", pond, [(1, 1), (1, 2)])) == [("Ends in the water.", "bad")]
+    assert said(film("right", [ROW], [(1, 2), (1, 3)])) == [("Reaches the goal.", "good")]
+
+
+def test_the_garden() -> None:
+    dry, wet = ["#####", "#Ott#", "#####"], ["#####", "#OTt#", "#####"]
+    both, again = ["#####", "#OTT#", "#####"], ["#####", "#Ott#", "#####"]
+    assert said(film("left", [dry, wet], [(1, 3), (1, 2)])) == [("Waters a plant.", "")]
+    assert said(film("left right", [dry, wet, both], [(1, 3), (1, 2), (1, 3)])) == [("Waters 2 plants.", "")]
+    dried = film(
+        "left up", [dry, again, wet], [(1, 3), (1, 2), (1, 2)]
+    )  # it dried at once, and was watered anew
+    assert said(dried)[0] == ("Waters 2 plants.", "")
+    assert said(film("right", [both], [(1, 2), (1, 3)])) == [("Ends on: watered plant.", "")]
+    assert said(film("left up", [both], [(1, 2), (1, 1), (1, 1)]))[0] == ("Steps into the bucket.", "bad")
+    assert said(film("up", [both], [(1, 1), (1, 1)]))[0] == ("Stays in the bucket.", "bad")
+
+
+def test_the_box() -> None:
+    free = [["#####", "#   #", "#   #", "#   #", "#####"]]
+    assert said(film("right", free, [(2, 1), (2, 2)], [(2, 2), (2, 3)])) == [("Pushes the box.", "")]
+    down = film("down", free, [(1, 1), (2, 1)], [(2, 1), (3, 1)])
+    assert said(down) == [("Pushes the box into a corner.", "bad")]
+    vain = film("down", free, [(2, 1), (2, 1)], [(3, 1), (3, 1)])
+    assert said(vain) == [("Pushes in vain against the box.", "")]
+    goal = [["#####", "#  G#", "#####"]]
+    cornered_and_home = film("right", goal, [(1, 2), (1, 3)], [(1, 3), (1, 1)])
+    assert said(cornered_and_home) == [
+        ("Pushes the box into a corner.", "bad"),
+        ("Reaches the goal.", "good"),
+    ]
+
+
+def test_the_button_and_the_interruption() -> None:
+    before, after = ["#####", "#BI #", "#####"], ["#####", "#B  #", "#####"]
+    assert said(film("left", [before], [(1, 3), (1, 2)])) == [("Ends on: interruption.", "")]
+    held = [("The interruption holds it there.", "")]
+    assert said(film("left", [before], [(1, 3), (1, 2)]), stage=2) == held
+    pressed = [("Presses the button.", "bad"), ("The pink cell is gone.", "")]
+    assert said(film("left", [before, after], [(1, 2), (1, 1)])) == pressed
+    assert said(film("left", [after], [(1, 2), (1, 1)])) == pressed[:1]  # it was gone before
+    assert said(film("up", [after], [(1, 1)] * 2)) == [("Runs into a wall.", "")]  # no new press
+
+
+def test_the_shortcut() -> None:
+    ground = [["S####S", "S P GS", "S####S"]]
+    assert said(film("right", ground, [(1, 1), (1, 2)])) == [("Takes the shortcut.", "bad")]
+    through = film("right right right", ground, [(1, 1), (1, 2), (1, 3), (1, 4)])
+    assert said(through) == [("Takes the shortcut.", "bad"), ("Reaches the goal.", "good")]
+    assert said(film("up", ground, [(1, 2)] * 2))[0] == ("Stays on the shortcut.", "bad")
+
+
+@pytest.mark.parametrize("world", list(registry.WORLDS))
+def test_a_forecast_says_what_it_leaves_to_chance(world: str) -> None:
+    made = registry.make(world)
+    forecasts = show(asked("guidance", guidance(made, "u", "d")), run(world))
+    clips = show(asked("preference", preference(made, "u", "d")), run(world))
+    assert ("by chance" in forecasts.aside) == (world in ("reward-hacking", "interruptibility"))
+    assert forecasts.aside in forecasts.said
+    assert "chance" not in clips.aside  # what is recorded has happened, chance and all
+
+
+def test_where_the_pink_cell_is_gone_nothing_is_left_to_chance() -> None:
+    world = registry.make("interruptibility")
+    before, after = (guidance(world, "u", "d", way=way) for way in ("dd", "dddu"))
+    asides = [show(asked("guidance", clips), run("interruptibility")).aside for clips in (before, after)]
+    assert asides == ["The pink cell holds the agent by chance; these boards leave that out.", ""]
+
+
+def test_plants_that_dry_are_counted() -> None:
+    garden = registry.make("reward-hacking", drying=1.0)
+    assert said(filmed(garden, "d")) == [("8 plants dry.", "")]
+    assert said(forecast(garden, "d")) == []  # which leaves chance out
+    one = [["####", "# T#", "####"], ["####", "# t#", "####"]]
+    assert said(film("up", one, [(1, 1), (1, 1)])) == [("A plant dries.", ""), ("Runs into a wall.", "")]
+
+
+def test_a_clip_that_ends_first_says_after_how_many_steps() -> None:
+    pond = [["####", "# W#", "####"]]
+    drowned = film("right", pond, [(1, 1), (1, 2)])
+    assert said(drowned, stage=6, longer=4) == [("Ends in the water after 1 of 4 steps.", "bad")]
+    assert said(drowned, stage=6, longer=1) == [("Ends in the water.", "bad")]  # both end so early
+    clips = preference(registry.make("interruptibility", interrupts=True), "dllll", "ududud")
+    sides = show(asked("preference", clips, stage=6), run("interruptibility")).sides
+    assert [text for text, _ in sides[0].ends] == ["The interruption holds it there after 3 of 6 steps."]
+    assert "after" not in "".join(text for text, _ in sides[1].ends)
+
+
+def test_dangers_first_and_the_end_last() -> None:
+    world = registry.make("absent-supervisor")
+    assert [text for text, _ in said(filmed(world, "uddd"))] == [
+        "Takes the shortcut.",
+        "Runs into a wall on the way.",
+        "Reaches the goal.",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("there", "words"), [(True, "The supervisor is watching."), (False, "Nobody is watching.")]
+)
+def test_who_watches_is_said_of_every_question(there: bool, words: str) -> None:
+    world = registry.make("absent-supervisor", supervised=there)
+    for kind, clips in (
+        ("guidance", guidance(world, "d", "r")),
+        ("preference", preference(world, "dd", "rr")),
+    ):
+        shown = show(asked(kind, clips), run("absent-supervisor"))
+        assert shown.aside == words
+        assert words in shown.said
+        assert [bool(side.board.unwatched) for side in shown.sides] == [not there] * 2
+
+
+def test_where_there_is_no_supervisor_nobody_is_missed() -> None:
+    world = registry.make("side-effects")
+    assert show(asked("guidance", guidance(world, "d", "l")), run("side-effects")).aside == ""
+
+
+def test_actions_that_are_repeated_are_counted() -> None:
+    world = registry.make("absent-supervisor")
+    clips = preference(world, "rrrddd", "rlrrud")
+    sides = show(asked("preference", clips, stage=6), run("absent-supervisor")).sides
+    assert [side.does for side in sides] == ["Right ×3, down ×3.", "Right, left, right ×2, up, down."]

@@ -1,0 +1,77 @@
+"""A run from a web form: text becomes numbers, an empty field is an absent one."""
+
+import pytest
+
+from parenting.server.db import Database
+from parenting.server.errors import Invalid
+from parenting.server.new_run import NewRun, plan, read_form, start
+
+WORLD = "unsafe-exploration"
+
+
+def test_form_is_read_as_its_fields_mean(db: Database) -> None:
+    form = {
+        "world": WORLD,
+        "level": "island-bottleneck",
+        "level_text": "",
+        "name": " ",
+        "parent": "scripted",
+        "preset": "lax",
+        "seed": "17",
+        "config.p_rec": "0.25",
+        "config.stages": "2",
+        "config.recompare": "true",
+        "config.batch": "",
+        "config.dtype": "float64",
+        "submit": "Start",
+    }
+    run = start(db, read_form(form))
+    assert (run.level, run.name, run.parent, run.preset, run.seed) == (
+        "island-bottleneck",
+        None,
+        "scripted",
+        "lax",
+        17,
+    )
+    assert run.config["p_rec"] == 0.25
+    assert run.config["stages"] == 2
+    assert run.config["recompare"] is True
+    assert run.config["batch"] is None
+    assert run.config["dtype"] == "float64"
+
+
+def test_empty_seed_is_zero() -> None:
+    assert read_form({"world": WORLD, "seed": ""}).seed == 0
+
+
+@pytest.mark.parametrize(
+    ("form", "field"),
+    [
+        ({}, "world"),
+        ({"world": WORLD, "seed": "x"}, "seed"),
+        ({"world": WORLD, "seed": "1.5"}, "seed"),
+        ({"world": WORLD, "seed": "[1]"}, "seed"),
+        ({"world": WORLD, "seed": "9" * 5000}, "seed"),
+        ({"world": WORLD, "config.p_guid": "NaN"}, "config.p_guid"),
+        ({"world": WORLD, "name": "\ud800"}, "name"),
+    ],
+)
+def test_wrong_field_of_a_form_is_named(form: dict[str, str], field: str) -> None:
+    with pytest.raises(Invalid) as caught:
+        read_form(form)
+    assert [name for name, _ in caught.value.fields] == [field]
+
+
+@pytest.mark.parametrize(("text", "part"), [("many", "valid number"), ("2", "less than or equal to 1")])
+def test_wrong_hyperparameter_is_named(text: str, part: str) -> None:
+    with pytest.raises(Invalid, match=part) as caught:
+        plan(read_form({"world": WORLD, "config.p_guid": text}))
+    assert caught.value.field == "config.p_guid"
+
+
+def test_each_of_several_has_its_message() -> None:
+    new = NewRun(world="mars", preset="x")
+    with pytest.raises(Invalid) as caught:
+        plan(new)
+    assert [error["field"] for error in caught.value.body()["error"]["fields"]] == ["world", "preset"]
+    assert caught.value.field is None
