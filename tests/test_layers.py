@@ -39,32 +39,24 @@ def test_web_process_never_loads_torch(module: str) -> None:
 def miniature(tmp_path: Path) -> Path:
     """The layout in empty files, in which everything is allowed that is there."""
     modules = {name for contract in CONTRACTS for name in contract.get("source_modules", [])}
-    modules |= {
-        "parenting.agent.learning",
-        "parenting.commands.run",
-        "parenting.envs.gridworld",
-        "parenting.experiments.table1",
-    }
-    modules |= {"parenting.parents.scripted"}
+    more = ("agent.learning", "commands.run", "envs.gridworld", "experiments.table1", "parents.scripted")
+    modules |= {f"parenting.{name}" for name in more}
     for module in modules:
-        *packages, name = module.split(".")
-        folder = tmp_path.joinpath(*packages[:2])
-        if len(packages) < 2:
-            folder /= name
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "__init__.py").touch()
-        if len(packages) == 2:
-            (folder / f"{name}.py").touch()
-    (tmp_path / "parenting/__init__.py").touch()
-    (tmp_path / "parenting/envs/gridworld.py").write_text("import torch\n")
-    (tmp_path / "parenting/envs/registry.py").write_text(
+        parts = module.split(".")
+        folder = tmp_path.joinpath(*parts)
+        for package in [folder, *folder.parents][: len(parts)]:
+            package.mkdir(parents=True, exist_ok=True)
+            (package / "__init__.py").touch()
+    house = tmp_path / "parenting"
+    (house / "envs/gridworld/__init__.py").write_text("import torch\n")
+    (house / "envs/registry/__init__.py").write_text(
         "if TYPE_CHECKING:\n    import parenting.envs.gridworld\n"
     )
-    (tmp_path / "parenting/weights/store.py").write_text("def load():\n    import torch\n")
-    (tmp_path / "parenting/agent/learning.py").write_text("import torch\nimport parenting.envs.registry\n")
-    (tmp_path / "parenting/parents/scripted.py").write_text("import parenting.agent.learning\n")
-    (tmp_path / "parenting/experiments/table1/__init__.py").write_text("import parenting.parents.scripted\n")
-    (tmp_path / "parenting/commands/run.py").write_text(
+    (house / "weights/store/__init__.py").write_text("def load():\n    import torch\n")
+    (house / "agent/learning/__init__.py").write_text("import torch\nimport parenting.envs.registry\n")
+    (house / "parents/scripted/__init__.py").write_text("import parenting.agent.learning\n")
+    (house / "experiments/table1/__init__.py").write_text("import parenting.parents.scripted\n")
+    (house / "commands/run/__init__.py").write_text(
         "import parenting.experiments.table1\nimport parenting.server.app\n"
     )
     return tmp_path
@@ -78,18 +70,18 @@ def test_miniature_is_allowed(miniature: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "line", "contract"),
     [
-        ("agent/learning.py", "import parenting.parents.scripted", "layers"),
-        ("agent/learning.py", "import parenting.parents.scripted", "parent-outside"),
-        ("envs/registry.py", "import parenting.agent.config", "layers"),
-        ("parents/scripted.py", "import parenting.server.queue.parent_side", "layers"),
+        ("agent/learning/__init__.py", "import parenting.parents.scripted", "layers"),
+        ("agent/learning/__init__.py", "import parenting.parents.scripted", "parent-outside"),
+        ("envs/registry/__init__.py", "import parenting.agent.config", "layers"),
+        ("parents/scripted/__init__.py", "import parenting.server.queue.parent_side", "layers"),
         ("experiments/table1/__init__.py", "import parenting.server.queue.parent_side", "layers"),
-        ("server/app.py", "import parenting.experiments.table1", "layers"),
-        ("server/app.py", "import parenting.commands.run", "layers"),
-        ("agent/learning.py", "import time", "pure"),
-        ("envs/art.py", "from pathlib import Path", "pure"),
-        ("envs/registry.py", "def draw():\n    import random", "pure"),
-        ("server/app.py", "import parenting.agent.learning", "web-without-torch"),
-        ("envs/levels.py", "import torch", "web-without-torch"),
+        ("server/app/__init__.py", "import parenting.experiments.table1", "layers"),
+        ("server/app/__init__.py", "import parenting.commands.run", "layers"),
+        ("agent/learning/__init__.py", "import time", "pure"),
+        ("envs/art/__init__.py", "from pathlib import Path", "pure"),
+        ("envs/registry/__init__.py", "def draw():\n    import random", "pure"),
+        ("server/app/__init__.py", "import parenting.agent.learning", "web-without-torch"),
+        ("envs/levels/__init__.py", "import torch", "web-without-torch"),
         ("agent/__init__.py", "from parenting.agent.learning import torch", "inits-without-torch"),
     ],
 )

@@ -8,12 +8,13 @@ import sys
 import zipfile
 from collections.abc import Iterable
 from importlib.metadata import packages_distributions
+from pathlib import Path
 
 import pytest
 
-from tests.tree import ROOT, git_files
+from tests.tree import LINKS, ROOT, git_files
 
-FOLDERS = tuple(sorted(link.name for link in (ROOT / "parenting").iterdir() if link.is_symlink()))
+FOLDERS = tuple(Path(link).name for link in LINKS)
 
 
 def files_of_the_project() -> list[str]:
@@ -25,7 +26,7 @@ def files_of_the_project() -> list[str]:
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
     """Built from a copy: it leaves nothing in the tree, and takes nothing from an earlier build."""
     source, target = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
-    for name in files_of_the_project():
+    for name in [*files_of_the_project(), *LINKS]:
         (source / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, source / name, follow_symlinks=False)
     # No isolation: the build uses the setuptools at hand and needs no network.
