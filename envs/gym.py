@@ -1,4 +1,4 @@
-"""Gymnasium adapter (docs/paper.md, "Levels: Adapter"): `import envs.gym` registers an id for each world.
+"""Gymnasium adapter (docs/paper.md, "Levels: Adapter"): importing it registers an id for each world.
 
 The rewards are the safety suite's own, which an agent could hack; what the suite holds back is in
 ``info["hidden_reward"]``. The parent's reward has no place here: PARENTING reads none.

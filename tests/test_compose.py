@@ -12,7 +12,7 @@ from parenting.commands.main import COMMANDS
 from parenting.server.settings import Settings
 from parenting.server.wake import Bell
 from tests.services import image_check, image_environment, read_compose, read_dockerfile
-from tests.tree import ROOT
+from tests.tree import LINKS, ROOT
 
 SERVICES = ("migrate", "web", "worker")
 LASTING = ("web", "worker")
@@ -163,11 +163,7 @@ def test_libraries_have_a_layer_that_no_change_of_code_undoes() -> None:
 def test_build_sees_the_packages_and_nothing_else() -> None:
     lines = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
     rules = [line for line in lines if not line.startswith("#")]
-    packages = {
-        name
-        for name in PROJECT["tool"]["setuptools"]["packages"]["find"]["include"]
-        if not name.endswith(".*")
-    }
+    packages = {"parenting", *(Path(link).name for link in LINKS)}
     files = {
         "pyproject.toml",
         "constraints.txt",

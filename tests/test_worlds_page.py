@@ -25,7 +25,7 @@ def section(name: str) -> str:
 
 @every_world
 def test_a_world_has_its_section_and_names_its_files(name: str) -> None:
-    module = registry.kind(name).rules.partition(":")[0].partition(".")[2]
+    module = registry.kind(name).rules.partition(":")[0].rpartition(".")[2]
     text = section(name)
     assert f"`{name}`" in text
     for file in (f"envs/levels/{module}.py", f"envs/{module}.py"):

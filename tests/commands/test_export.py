@@ -132,7 +132,7 @@ def test_a_reader_that_has_enough(db: Database, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", [["export", "1"], ["runs"]])
 def test_it_loads_no_torch(db: Database, command: list[str]) -> None:
-    code = f"from commands.main import app; import sys; app({command}, standalone_mode=False); "
+    code = f"from parenting.commands.main import app; import sys; app({command}, standalone_mode=False); "
     code += "sys.exit('torch' in sys.modules)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (found.returncode, found.stderr) == (0, "")

@@ -48,7 +48,7 @@ def test_help_loads_no_torch() -> None:
     torchless = ("up", "web", "migrate", "answer", "runs", "export", "replay")
     calls = [["--help"], *([name, "--help"] for name in torchless)]
     code = (
-        f"from commands.main import app; [app(call, standalone_mode=False) for call in {calls}]; "
+        f"from parenting.commands.main import app; [app(call, standalone_mode=False) for call in {calls}]; "
         "import sys; assert 'torch' not in sys.modules"
     )
     result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)

@@ -22,7 +22,12 @@ from tests.tree import ROOT
 
 SMALL = ("--world", "side-effects", "--size", "4x4")
 NAME = "side-effects-4x4-v1"
-EAGER = "from commands.main import app; from experiments import education; education.SAVE_SECONDS = 0; app()"
+EAGER = """
+from parenting.commands.main import app
+from parenting.experiments.training import pretrain
+pretrain.SAVE_SECONDS = 0
+app()
+"""
 """The command, which keeps its work after every step."""
 SMALL_LEVEL = "#####\n#AXG#\n#   #\n#   #\n#####\n"
 
