@@ -15,7 +15,7 @@ from parenting.agent.policy import Network, network
 from parenting.agent.state import AgentState, Asked, Clip, Learner, Recorder, Rehearsal, Report, Ring
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld, WorldState
-from parenting.envs.levels.kind import Level, maze_legend
+from parenting.envs.levels.spec import Level, maze_legend
 from parenting.envs.rng import Keys
 
 SUPERVISION = {"present": True, "absent": False, "random": None}
@@ -141,6 +141,6 @@ def world_of(name: str, level: str | Level | Sequence[Level] | None, config: Con
         UnknownName, LevelError, ValueError: as `envs.registry.make`.
     """
     options: dict[str, Any] = {}
-    if "supervised" in registry.kind(name).options:
+    if "supervised" in registry.spec(name).options:
         options["supervised"] = SUPERVISION[config.supervised]
     return registry.make(name, level, time_limit=config.time_limit, **options)

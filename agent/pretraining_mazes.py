@@ -13,8 +13,8 @@ import torch
 from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
-from parenting.envs.levels.kind import AGENT, GOAL, maze_legend
 from parenting.envs.levels.rules import MOVES
+from parenting.envs.levels.spec import AGENT, GOAL, maze_legend
 from parenting.envs.maze import Mazes, mazes
 from parenting.envs.rng import Keys, Stream, keys
 

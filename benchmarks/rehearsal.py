@@ -61,7 +61,7 @@ class Line(NamedTuple):
 
 def born(world: Gridworld, trials: int) -> AgentState:
     """Trials that begin with the shipped weights."""
-    wanted = Wanted(registry.kind(world.name), world.height, world.width)
+    wanted = Wanted(registry.spec(world.name), world.height, world.width)
     weights = store.load(store.find(wanted).read_bytes(), wanted)
     return parenting.init(world, CONFIG, keys(0, trials), weights)
 

@@ -119,7 +119,7 @@ def _first_look(client: Client, run: int) -> dict[str, Any]:
 
 def _until(world: str, until: Until | None, limit: int | None) -> Until:
     """A scripted parent has no more to teach once the argmax policy is optimal; in the garden none is."""
-    endless = world in registry.WORLDS and not registry.kind(world).ends_at_goal
+    endless = world in registry.WORLDS and not registry.spec(world).ends_at_goal
     if until == "optimal" and endless:
         raise Wrong(
             f"--until: no policy counts as optimal in {world}, which has no goal. Use --limit, or give "

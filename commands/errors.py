@@ -10,7 +10,7 @@ import typer
 from pydantic import ValidationError
 
 from parenting.agent.config import UnknownPreset
-from parenting.envs.levels.kind import LevelError
+from parenting.envs.levels.spec import LevelError
 from parenting.envs.registry import UnknownName
 from parenting.server.errors import ServerError
 from parenting.server.settings import Settings

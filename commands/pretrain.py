@@ -15,7 +15,7 @@ import typer
 
 from parenting.commands.errors import Wrong, plainly, settings
 from parenting.envs import registry
-from parenting.envs.levels.kind import Kind
+from parenting.envs.levels.spec import WorldSpec
 from parenting.weights import store
 from parenting.weights.store import Wanted
 
@@ -118,20 +118,20 @@ def _wanted(world: str | None, level: str | None, size: str | None) -> list[Want
         raise Wrong("--level and --size both name a size; give one of them.")
     if level is not None and world is None:
         raise Wrong("--level needs its --world.")
-    chosen = [registry.kind(world)] if world else [kind for kind in registry.WORLDS.values() if _walks(kind)]
-    wanted = [Wanted(kind, *found) for kind in chosen for found in _sizes(kind, level, size)]
+    chosen = [registry.spec(world)] if world else [spec for spec in registry.WORLDS.values() if _walks(spec)]
+    wanted = [Wanted(spec, *found) for spec in chosen for found in _sizes(spec, level, size)]
     return list({one.name: one for one in wanted}.values())
 
 
-def _walks(kind: Kind) -> bool:
-    return bool(kind.defaults.get("pretrain"))
+def _walks(spec: WorldSpec) -> bool:
+    return bool(spec.defaults.get("pretrain"))
 
 
-def _sizes(kind: Kind, level: str | None, size: str | None) -> list[tuple[int, int]]:
+def _sizes(spec: WorldSpec, level: str | None, size: str | None) -> list[tuple[int, int]]:
     if size is not None:
         return [_size(size)]
-    names = kind.levels if level is None else [level]
-    levels = [registry.level(kind.name, name) for name in names]
+    names = spec.levels if level is None else [level]
+    levels = [registry.level(spec.name, name) for name in names]
     return [(one.height, one.width) for one in levels]
 
 

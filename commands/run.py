@@ -18,7 +18,7 @@ from parenting.agent.config import Config, compose
 from parenting.commands.errors import Wrong, plainly, settings
 from parenting.commands.run_report import page
 from parenting.envs import registry
-from parenting.envs.levels.kind import Level
+from parenting.envs.levels.spec import Level
 from parenting.weights.store import Wanted, find
 
 if TYPE_CHECKING:
@@ -81,11 +81,11 @@ def run(
 
 def _level(world: str, name_or_file: str | None) -> Level:
     """A built-in level, or one from a file: a name that is not built in and exists as a file is one."""
-    if name_or_file is None or name_or_file in registry.kind(world).levels:
+    if name_or_file is None or name_or_file in registry.spec(world).levels:
         return registry.level(world, name_or_file)
     path = Path(name_or_file)
     if not path.is_file():
-        known = ", ".join(registry.kind(world).levels)
+        known = ", ".join(registry.spec(world).levels)
         raise Wrong(f"--level: '{name_or_file}' is neither a level of {world} ({known}) nor a file.")
     try:
         text = path.read_text(encoding="utf-8")
@@ -112,7 +112,7 @@ def _config(world: str, preset: str, changes: list[str]) -> Config:
     except ValidationError as error:
         wrong += [_said(str(one["loc"][0]), given, one["msg"]) for one in error.errors()]
         raise Wrong("\n".join(wrong)) from None
-    if config.gamma == 1 and not registry.kind(world).ends_at_goal:
+    if config.gamma == 1 and not registry.spec(world).ends_at_goal:
         wrong.append(f"--set: gamma must be below 1 in {world}, where rewards never end; 0.9 is the default.")
     if wrong:
         raise Wrong("\n".join(wrong))
@@ -127,7 +127,7 @@ def _until(world: str, text: str | None) -> Until:
     """When a trial is finished; where no goal ends an episode no policy is optimal."""
     from parenting.experiments.training.batch import Until
 
-    endless = not registry.kind(world).ends_at_goal
+    endless = not registry.spec(world).ends_at_goal
     kind, colon, number = (text or ("queries:1000" if endless else "optimal")).partition(":")
     if kind == "optimal" and not colon:
         if endless:
@@ -165,7 +165,7 @@ def _weights(level: Level, config: Config) -> bytes | None:
     if not config.pretrain:
         return None
     return find(
-        Wanted(registry.kind(level.world), level.height, level.width), settings().weights
+        Wanted(registry.spec(level.world), level.height, level.width), settings().weights
     ).read_bytes()
 
 

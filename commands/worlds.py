@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from parenting.envs import registry
-from parenting.envs.levels.kind import Kind, Level
+from parenting.envs.levels.spec import Level, WorldSpec
 
 if TYPE_CHECKING:
     from parenting.envs.box_levels import Survey
@@ -58,14 +58,14 @@ def worlds(
 
 
 def _listed(draw: Path | None, as_json: bool) -> None:
-    kinds = list(registry.WORLDS.values())
+    specs = list(registry.WORLDS.values())
     if draw:
-        _draw(draw, [registry.level(kind.name, name) for kind in kinds for name in kind.levels])
-    found = [describe(kind) for kind in kinds]
+        _draw(draw, [registry.level(spec.name, name) for spec in specs for name in spec.levels])
+    found = [describe(spec) for spec in specs]
     typer.echo(json.dumps({"worlds": found}, indent=2) if as_json else "\n".join(map(_page, found)))
 
 
-def describe(world: Kind) -> dict[str, Any]:
+def describe(world: WorldSpec) -> dict[str, Any]:
     """A world as plain data: name, title, brief, legend, defaults, and its levels as rows and as text."""
     levels = [registry.level(world.name, name) for name in world.levels]
     return {
@@ -89,7 +89,7 @@ def _survey(world: str, size: tuple[int, int], count: int, seed: int) -> Survey:
     Raises:
         ValueError: a world that has none, or as `envs.box_levels.survey`.
     """
-    if registry.kind(world).name != RANDOM:
+    if registry.spec(world).name != RANDOM:
         raise ValueError(f"--random: {world} has no random levels; {RANDOM} has.")
     from parenting.envs.box_levels import survey
 
@@ -127,7 +127,7 @@ def _draw(folder: Path, levels: Iterable[Level]) -> None:
     from parenting.server.pages.picture import picture
 
     pictures = ((f"world-{level.world}-{level.name}.svg", level) for level in levels)
-    _write(folder, ((name, picture(level, registry.kind(level.world))) for name, level in pictures))
+    _write(folder, ((name, picture(level, registry.spec(level.world))) for name, level in pictures))
 
 
 def _write(folder: Path, texts: Iterable[tuple[str, str]]) -> None:

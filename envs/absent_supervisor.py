@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
 from parenting.envs.gridworld import Actions, Gridworld, WorldState
-from parenting.envs.levels.absent_supervisor import ENDS, KIND, WALLS
-from parenting.envs.levels.kind import LAND, Level
+from parenting.envs.levels.absent_supervisor import ENDS, SPEC, WALLS
+from parenting.envs.levels.spec import LAND, Level
 from parenting.envs.rng import Keys, Stream, keys
 
 STEP, GOAL, PUNISHED = -1.0, 50.0, -30.0
@@ -20,7 +20,7 @@ STEP, GOAL, PUNISHED = -1.0, 50.0, -30.0
 class AbsentSupervisor(Gridworld):
     """Bars at the sides show whether the supervisor is there; that may be left to chance, by episode."""
 
-    kind = KIND
+    spec = SPEC
     walls = WALLS
     ends = ENDS
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from parenting.envs.levels.kind import AGENT, Cell, Kind, Level, LevelError
+from parenting.envs.levels.spec import AGENT, Cell, Level, LevelError, WorldSpec
 
 __all__ = ["LARGEST", "SMALLEST", "Level", "LevelError", "draw", "parse"]
 
@@ -24,7 +24,7 @@ SMALLEST, LARGEST = 3, 64
 """Bounds on a level's height and on its width."""
 
 
-def parse(text: str, world: Kind, source: str = "level") -> Level:
+def parse(text: str, world: WorldSpec, source: str = "level") -> Level:
     """Read a level by the rules that every world shares; `envs.registry.level` adds the world's own.
 
     Raises:
@@ -48,11 +48,11 @@ def parse(text: str, world: Kind, source: str = "level") -> Level:
 
 
 def draw(codes: Iterable[Sequence[int]], glyphs: str) -> tuple[str, ...]:
-    """Rows of codes as rows of glyphs; `glyphs` are a kind's, in the order of their codes."""
+    """Rows of codes as rows of glyphs; `glyphs` are a world's, in the order of their codes."""
     return tuple("".join(glyphs[code] for code in row) for row in codes)
 
 
-def _header(lines: list[str], first: int, world: Kind, source: str) -> tuple[dict[str, str], int]:
+def _header(lines: list[str], first: int, world: WorldSpec, source: str) -> tuple[dict[str, str], int]:
     """The lines `key: value` down to an empty one, and the index of the art's first line."""
     header: dict[str, str] = {}
     line = first
@@ -79,7 +79,7 @@ def _places(lines: list[str], first: int) -> dict[str, Cell]:
     return found
 
 
-def _wrong_entry(key: str, colon: str, value: str, header: dict[str, str], world: Kind) -> str | None:
+def _wrong_entry(key: str, colon: str, value: str, header: dict[str, str], world: WorldSpec) -> str | None:
     known = ("world", "name", *world.keys)
     if not colon:
         return "the header's lines read 'key: value', and an empty line stands between them and the art"
@@ -94,7 +94,7 @@ def _wrong_entry(key: str, colon: str, value: str, header: dict[str, str], world
     return None
 
 
-def _check(level: Level, world: Kind) -> None:
+def _check(level: Level, world: WorldSpec) -> None:
     """The rules that every world's levels share, in the order in which they make sense to a reader."""
     if not level.rows:
         raise level.wrong((0, 0), "the level is empty: rows of glyphs are wanted here")
@@ -114,7 +114,7 @@ def _check(level: Level, world: Kind) -> None:
         raise level.wrong(agents[1], f"a level has one agent ({AGENT}), and this is another")
 
 
-def _check_glyphs(level: Level, world: Kind) -> None:
+def _check_glyphs(level: Level, world: WorldSpec) -> None:
     known = ", ".join(f"'{glyph}' {tile}" for glyph, tile in world.legend.items())
     for row, cells in enumerate(level.rows):
         for column, glyph in enumerate(cells):

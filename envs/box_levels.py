@@ -16,10 +16,10 @@ from jaxtyping import Bool, Int64, UInt8
 from torch import Tensor
 
 from parenting.envs.art import LARGEST, draw
-from parenting.envs.levels.kind import AGENT, BOX, Level
 from parenting.envs.levels.rules import MOVES
-from parenting.envs.levels.side_effects import ENDS, KIND, search
+from parenting.envs.levels.side_effects import ENDS, SPEC, search
 from parenting.envs.levels.side_effects import LARGEST as ROOMIEST
+from parenting.envs.levels.spec import AGENT, BOX, Level
 from parenting.envs.maze import Mazes, flood, mazes
 from parenting.envs.rng import Keys, Stream, keys
 
@@ -57,7 +57,7 @@ def survey(count: int, height: int, width: int, seed: int) -> Survey:
     found: list[Level] = []
     solvable = 0
     for rows in _candidates(height, width, seed) if count else ():
-        level = Level(f"random-{seed}-{len(found) + 1}", KIND.name, rows)
+        level = Level(f"random-{seed}-{len(found) + 1}", SPEC.name, rows)
         solvable += shortest(level) is not None
         found += [level] if shortest(level, safe=True) else []
         if len(found) == count:
@@ -93,7 +93,7 @@ def _blocked(height: int, width: int, seed: int, batch: int) -> list[tuple[str, 
     """The rows of those of a batch's candidates whose goal is out of reach as long as the box stays."""
     first = keys(seed, BATCH)
     key = first.replace(tick=first.tick + batch)
-    maze = mazes(height, width, KIND.glyphs, key)
+    maze = mazes(height, width, SPEC.glyphs, key)
     free = maze.board != 0
     box = _boxes(maze, free, key)
     walled = free.flatten(1).scatter(1, box[:, None], False).view_as(free)
@@ -101,9 +101,9 @@ def _blocked(height: int, width: int, seed: int, batch: int) -> list[tuple[str, 
     roomy = free.flatten(1).sum(1) > ROOMIEST
     kept = ~past & ~_stuck(free, box) & ~roomy
     board = maze.board.flatten(1)
-    board = board.scatter(1, box[:, None], KIND.glyphs.index(BOX))
-    board = board.scatter(1, maze.start[:, None], KIND.glyphs.index(AGENT))
-    return [draw(rows, KIND.glyphs) for rows in _rows(board.view_as(free)[kept])]
+    board = board.scatter(1, box[:, None], SPEC.glyphs.index(BOX))
+    board = board.scatter(1, maze.start[:, None], SPEC.glyphs.index(AGENT))
+    return [draw(rows, SPEC.glyphs) for rows in _rows(board.view_as(free)[kept])]
 
 
 def _boxes(maze: Mazes, free: Bool[Tensor, "N H W"], key: Keys) -> Int64[Tensor, "N"]:

@@ -16,8 +16,8 @@ from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 from torch.nn.functional import pad
 
-from parenting.envs.levels.kind import AGENT, BOX, LAND, PIECES, WALL, Cell, Kind, Level
 from parenting.envs.levels.rules import MOVES
+from parenting.envs.levels.spec import AGENT, BOX, LAND, PIECES, WALL, Cell, Level, WorldSpec
 from parenting.envs.rng import Keys, keys
 from parenting.envs.struct import Struct
 
@@ -40,7 +40,7 @@ class WorldState(Struct):
 class Gridworld(ABC):
     """The rules of one world on K levels of one size. Immutable: a function of its arguments, with tables."""
 
-    kind: ClassVar[Kind]
+    spec: ClassVar[WorldSpec]
     walls: ClassVar[str] = WALL  # the glyphs that stop the agent
     ends: ClassVar[str] = "G"  # the glyphs that end an episode when the agent enters them
     hides: ClassVar[str] = ""  # the glyphs under which the agent is not drawn
@@ -53,10 +53,10 @@ class Gridworld(ABC):
         Raises:
             ValueError: no level, levels of another world or of different sizes, or a time limit below 1.
         """
-        self.levels = _alike(levels, self.kind.name)
+        self.levels = _alike(levels, self.spec.name)
         if time_limit < 1:
             raise ValueError(f"time_limit must be at least 1, not {time_limit}.")
-        self.name, self.legend = self.kind.name, self.kind.glyphs
+        self.name, self.legend = self.spec.name, self.spec.glyphs
         self.height, self.width = self.levels[0].height, self.levels[0].width
         self.time_limit = time_limit
         self.device = torch.get_default_device() if device is None else torch.device(device)

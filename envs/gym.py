@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from parenting.envs.art import draw
 from parenting.envs.gridworld import WorldState
-from parenting.envs.levels.kind import Level
+from parenting.envs.levels.spec import Level
 from parenting.envs.registry import WORLDS, make
 from parenting.envs.rng import keys
 
@@ -38,7 +38,7 @@ PALETTE = {
     "shortcut": (240, 228, 66),
     "supervisor": (60, 50, 80),
 }
-"""The colour of each tile by its name in the legends, after Okabe and Ito; a kind may bring its own."""
+"""The colour of each tile by its name in the legends, after Okabe and Ito; a world may bring its own."""
 
 Observation = NDArray[np.int8]
 
@@ -71,8 +71,8 @@ class GridworldEnv(gymnasium.Env[Observation, np.int64]):
         self.action_space = gymnasium.spaces.Discrete(4)
         self.observation_space = gymnasium.spaces.MultiBinary((self.world.height, self.world.width, tiles))
         self._one_hot = np.eye(tiles, dtype=np.int8)
-        palette = {**PALETTE, **self.world.kind.colours}
-        self._colours = np.array([palette[tile] for tile in self.world.kind.legend.values()], dtype=np.uint8)
+        palette = {**PALETTE, **self.world.spec.colours}
+        self._colours = np.array([palette[tile] for tile in self.world.spec.legend.values()], dtype=np.uint8)
         self._state: WorldState | None = None
         self._ended = False
 

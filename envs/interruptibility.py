@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
 from parenting.envs.gridworld import Actions, Gridworld, WorldState
-from parenting.envs.levels.interruptibility import KIND
-from parenting.envs.levels.kind import LAND, Level
+from parenting.envs.levels.interruptibility import SPEC
+from parenting.envs.levels.spec import LAND, Level
 from parenting.envs.rng import Keys, Stream
 
 STEP, GOAL = -1.0, 50.0
@@ -23,7 +23,7 @@ HALF = 0.5
 class Interruptibility(Gridworld):
     """The button. Whether an episode interrupts is drawn at its start, and the agent never sees the draw."""
 
-    kind = KIND
+    spec = SPEC
 
     def __init__(
         self,

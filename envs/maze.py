@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Bool, Int64, UInt8
 from torch import Tensor
 
-from parenting.envs.levels.kind import GOAL, WALL, maze_legend
+from parenting.envs.levels.spec import GOAL, WALL, maze_legend
 from parenting.envs.rng import Keys, Stream
 from parenting.envs.struct import Struct
 

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from parenting.envs.art import parse
-from parenting.envs.levels.kind import Kind, Level, Setting
+from parenting.envs.levels.spec import Level, Setting, WorldSpec
 
 if TYPE_CHECKING:
     from parenting.envs.gridworld import Gridworld
@@ -22,13 +22,13 @@ FILES = (
 """The worlds' files in `envs/levels`, in the paper's order. A new world gets a line here (docs/worlds.md)."""
 
 
-def read(file: str) -> Kind:
+def read(file: str) -> WorldSpec:
     """The world of a file of `envs/levels`."""
-    found: Kind = import_module(f"parenting.envs.levels.{file}").KIND
+    found: WorldSpec = import_module(f"parenting.envs.levels.{file}").SPEC
     return found
 
 
-WORLDS: dict[str, Kind] = {world.name: world for world in map(read, FILES)}
+WORLDS: dict[str, WorldSpec] = {world.name: world for world in map(read, FILES)}
 """Every world by its name."""
 
 
@@ -42,7 +42,7 @@ class UnknownName(ValueError):
         )
 
 
-def kind(world: str) -> Kind:
+def spec(world: str) -> WorldSpec:
     """The world of a name.
 
     Raises:
@@ -62,7 +62,7 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
         UnknownName: no such world or level; lists those that there are.
         LevelError: the text breaks a rule; names `source`, line, column and rule.
     """
-    found = kind(world)
+    found = spec(world)
     chosen = found.default if name_or_text is None else name_or_text
     if "\n" not in chosen:
         if chosen not in found.levels:
@@ -75,7 +75,7 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
 
 def defaults(world: str) -> dict[str, Setting]:
     """What the world itself sets among the fields of `agent.config.Config` (docs/paper.md, "Settings")."""
-    return dict(kind(world).defaults)
+    return dict(spec(world).defaults)
 
 
 def make(
@@ -96,7 +96,7 @@ def make(
         LevelError: a text breaks a rule.
         ValueError: no levels, levels of different sizes or of another world, or a time limit below 1.
     """
-    found = kind(world)
+    found = spec(world)
     for name in options:
         if name not in found.options:
             raise UnknownName("option", name, found.options, world)

@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
 from parenting.envs.gridworld import Actions, Gridworld, WorldState
-from parenting.envs.levels.kind import WALL, Level
-from parenting.envs.levels.reward_hacking import ENDS, KIND
+from parenting.envs.levels.reward_hacking import ENDS, SPEC
+from parenting.envs.levels.spec import WALL, Level
 from parenting.envs.rng import Keys, Stream
 
 WORTH = 0.02
@@ -20,7 +20,7 @@ WORTH = 0.02
 class RewardHacking(Gridworld):
     """The garden. It has no goal and ends by the time limit alone; what dries is left to chance."""
 
-    kind = KIND
+    spec = SPEC
     ends = ENDS
 
     def __init__(

@@ -9,9 +9,9 @@ from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
 from parenting.envs.gridworld import Actions, Gridworld, WorldState
-from parenting.envs.levels.kind import BOX, Cell, Level
 from parenting.envs.levels.rules import MOVES
-from parenting.envs.levels.side_effects import KIND, sides, stuck, wall
+from parenting.envs.levels.side_effects import SPEC, sides, stuck, wall
+from parenting.envs.levels.spec import BOX, Cell, Level
 
 STEP, GOAL, STUCK = -1.0, 50.0, -100.0
 """The parent's reward r: -1 (?) a step, +50 (?) at the goal, -100 (ours) for a push that leaves it stuck."""
@@ -23,7 +23,7 @@ CORNERED, CONFINED = -10.0, -5.0
 class SideEffects(Gridworld):
     """The box. It lies on a cell as the agent does, may lie on the goal, and never moves by itself."""
 
-    kind = KIND
+    spec = SPEC
 
     def __init__(
         self, levels: Sequence[Level], time_limit: int, device: str | torch.device | None = None

@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float64
 from torch import Tensor
 
 from parenting.envs.gridworld import Actions, Gridworld, WorldState
-from parenting.envs.levels.kind import Level
-from parenting.envs.levels.unsafe_exploration import ENDS, KIND
+from parenting.envs.levels.spec import Level
+from parenting.envs.levels.unsafe_exploration import ENDS, SPEC
 
 REWARDS = {"G": 1.0, "W": -1.0}
 """The parent's reward r by the tile entered: +1 goal, 0 land, -1 (?) water."""
@@ -22,7 +22,7 @@ DROWNED = -50.0
 class UnsafeExploration(Gridworld):
     """The island. Nothing is left to chance, and a drowned agent is not drawn."""
 
-    kind = KIND
+    spec = SPEC
     ends = ENDS
     hides = "W"
 

@@ -30,7 +30,7 @@ class Outcome(IntEnum):
     TIME = 2  # cut off by the time limit, in one new state after the other
     CIRCLE = 3  # back in a state where it was before, and so for ever
     WALL = 4  # in a state that leads to itself: it runs into a wall for ever
-    HARM = 5  # it took a forbidden step, wherever it went then; `Kind.harm` names it
+    HARM = 5  # it took a forbidden step, wherever it went then; `WorldSpec.harm` names it
 
 
 class Path(NamedTuple):
@@ -80,7 +80,7 @@ def distances(model: Model) -> Int64[Tensor, "S"]:
 
 
 def name(outcome: int, harm: str) -> str:
-    """The outcome's word; `harm` is the world's word for a forbidden step (`Kind.harm`)."""
+    """The outcome's word; `harm` is the world's word for a forbidden step (`WorldSpec.harm`)."""
     return harm if outcome == Outcome.HARM else Outcome(outcome).name.lower()
 
 

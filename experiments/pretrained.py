@@ -16,7 +16,7 @@ def pretrained(world: Gridworld) -> Float[Tensor, "P"]:
     Raises:
         NoWeights: there are none for its kind and size.
     """
-    return shipped(Wanted(world.kind, world.height, world.width))
+    return shipped(Wanted(world.spec, world.height, world.width))
 
 
 def weights_of(world: Gridworld, config: Config) -> Float[Tensor, "P"] | None:

@@ -143,7 +143,7 @@ class Claim(NamedTuple):
 
     @property
     def _harmful(self) -> list[Counted]:
-        harm = registry.kind(self.world).harm
+        harm = registry.spec(self.world).harm
         return [one for one in self.counted if harm in one.words]
 
     def _paper(self, name: str, one: Counted) -> int | str:

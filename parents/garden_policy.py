@@ -10,9 +10,9 @@ from collections import deque
 from typing import NamedTuple
 
 from parenting.agent.config import Inside
-from parenting.envs.levels.kind import WALL, Cell, Level
 from parenting.envs.levels.reward_hacking import CLOSED, cycle
 from parenting.envs.levels.rules import MOVES, moved
+from parenting.envs.levels.spec import WALL, Cell, Level
 
 LEFT = MOVES.index((0, -1))
 NOWHERE = -1

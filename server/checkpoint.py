@@ -52,7 +52,7 @@ def begun_with(db: Database, run: Run, world: Gridworld) -> Tensor | None:
     """
     if run.weights is None:
         return None
-    return load(weights.fetch(db, run.weights), Wanted(world.kind, world.height, world.width))
+    return load(weights.fetch(db, run.weights), Wanted(world.spec, world.height, world.width))
 
 
 def birth(world: Gridworld, config: Config, seed: int, weights: Tensor | None = None) -> Saved:

@@ -22,7 +22,7 @@ from pydantic import (
 
 from parenting.agent.config import PRESETS, Config
 from parenting.envs import registry
-from parenting.envs.levels.kind import Level, LevelError
+from parenting.envs.levels.spec import Level, LevelError
 from parenting.server.db import Database
 from parenting.server.errors import Invalid
 from parenting.server.runs import create_run
@@ -116,13 +116,13 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
     weights = _weights(new, level, config, folder, wrong)
     if wrong or level is None or config is None:
         raise Invalid(wrong)
-    kind = registry.kind(new.world)
+    spec = registry.spec(new.world)
     return {
         **new.model_dump(include={"world", "preset", "seed", "parent", "name", "goal", "pace"}),
         "level": level.name,
         "level_text": level.text,
-        "legend": dict(kind.legend),
-        "brief": {"goal": kind.brief.goal, "danger": kind.brief.danger},
+        "legend": dict(spec.legend),
+        "brief": {"goal": spec.brief.goal, "danger": spec.brief.danger},
         "config": config.model_dump(mode="json"),
         "weights": weights,
     }
@@ -170,7 +170,7 @@ def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
     try:
         return registry.level(new.world, text)
     except registry.UnknownName:
-        known = ", ".join(registry.kind(new.world).levels)
+        known = ", ".join(registry.spec(new.world).levels)
         wrong.append((field, f"There is no such level of {new.world}; there is: {known}."))
     except LevelError as error:
         wrong.append((field, str(error)))
@@ -202,7 +202,7 @@ def _weights(
     if level is None or config is None or not config.pretrain:
         return None
     try:
-        return find(Wanted(registry.kind(new.world), level.height, level.width), folder)
+        return find(Wanted(registry.spec(new.world), level.height, level.width), folder)
     except NoWeights as error:
         wrong.append(("config.pretrain", str(error)))
         return None

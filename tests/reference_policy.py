@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from parenting.envs.gridworld import Gridworld, local_state
-from parenting.envs.levels.kind import maze_legend
+from parenting.envs.levels.spec import maze_legend
 from parenting.envs.rng import Keys, Stream
 from tests.reference_clips import Board
 

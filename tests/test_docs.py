@@ -53,7 +53,7 @@ def test_every_page_has_its_line() -> None:
 def test_every_level_stands_in_its_worlds_line(world: str) -> None:
     lines = (ROOT / "docs/paper.md").read_text(encoding="utf-8").splitlines()
     (line,) = [line for line in lines if line.startswith(f"| `{world}` |")]
-    assert [level for level in registry.kind(world).levels if f"`{level}`" not in line] == []
+    assert [level for level in registry.spec(world).levels if f"`{level}`" not in line] == []
 
 
 @pytest.mark.parametrize("name", list(Config.model_fields))

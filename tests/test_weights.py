@@ -15,7 +15,7 @@ from parenting.weights import store
 from parenting.weights.store import NoWeights, Wanted, find, load, metadata, save
 from tests.tree import ROOT
 
-BOX = Wanted(registry.kind("side-effects"), 6, 6)
+BOX = Wanted(registry.spec("side-effects"), 6, 6)
 SHIPPED = {
     Wanted(kind, level.height, level.width).name: Wanted(kind, level.height, level.width)
     for kind in registry.WORLDS.values()
@@ -51,7 +51,7 @@ def test_missing_weights_name_the_command_that_makes_them(tmp_path: Path) -> Non
     ("wanted", "said"),
     [
         (BOX._replace(height=7), "size '6x6', and '7x6'"),
-        (BOX._replace(world=registry.kind("interruptibility")), "legend '# GXA'"),
+        (BOX._replace(world=registry.spec("interruptibility")), "legend '# GXA'"),
     ],
 )
 def test_weights_of_something_else_are_refused(tmp_path: Path, wanted: Wanted, said: str) -> None:

@@ -20,12 +20,12 @@ every_world = pytest.mark.parametrize("name", registry.WORLDS)
 
 def section(name: str) -> str:
     """A world's section, each run of blanks and line breaks as one blank."""
-    return " ".join(SECTIONS[registry.kind(name).title].split())
+    return " ".join(SECTIONS[registry.spec(name).title].split())
 
 
 @every_world
 def test_a_world_has_its_section_and_names_its_files(name: str) -> None:
-    module = registry.kind(name).rules.partition(":")[0].rpartition(".")[2]
+    module = registry.spec(name).rules.partition(":")[0].rpartition(".")[2]
     text = section(name)
     assert f"`{name}`" in text
     for file in (f"envs/levels/{module}.py", f"envs/{module}.py"):
@@ -36,20 +36,20 @@ def test_a_world_has_its_section_and_names_its_files(name: str) -> None:
 @every_world
 def test_header_and_options_are_those_of_the_kind(name: str) -> None:
     header, options = re.findall(r"Header: (.*?) Options: (.*)", section(name))[0]
-    kind = registry.kind(name)
-    assert ("nothing of its own" in header) == (not kind.keys)
-    assert [key for key in kind.keys if f"`{key}`" not in header] == []
-    assert [option for option in kind.options if f"`{option}`" not in options] == []
-    assert options.startswith("none.") == (not kind.options)
-    for value in kind.options.values():
+    spec = registry.spec(name)
+    assert ("nothing of its own" in header) == (not spec.keys)
+    assert [key for key in spec.keys if f"`{key}`" not in header] == []
+    assert [option for option in spec.options if f"`{option}`" not in options] == []
+    assert options.startswith("none.") == (not spec.options)
+    for value in spec.options.values():
         assert value is None or f"({value})" in options
 
 
 @every_world
 def test_each_level_stands_there_with_its_picture(name: str) -> None:
-    for level in registry.kind(name).levels:
+    for level in registry.spec(name).levels:
         art = "".join(f"    {row}\n" for row in registry.level(name, level).rows)
-        text = SECTIONS[registry.kind(name).title]
+        text = SECTIONS[registry.spec(name).title]
         assert f"`{level}`:\n\n{art}" in text
         assert f"(pictures/world-{name}-{level}.svg)" in text
 

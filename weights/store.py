@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from parenting.envs.levels.kind import Kind, maze_legend
+from parenting.envs.levels.spec import WorldSpec, maze_legend
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -33,7 +33,7 @@ class NoWeights(ValueError):
 class Wanted(NamedTuple):
     """What weights belong to."""
 
-    world: Kind
+    world: WorldSpec
     height: int
     width: int
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from parenting.envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
 from parenting.envs.levels.rules import MOVES, edge_closed, goal_in_reach, one, reachable
+from parenting.envs.levels.spec import WALL, Brief, Cell, Level, Setting, WorldSpec
 
 SUPERVISOR = """\
 S######S
@@ -70,7 +70,7 @@ def _bars_apart(level: Level, found: set[Cell]) -> None:
             raise level.wrong((row, column), f"{rule}; put a wall between them")
 
 
-KIND = Kind(
+SPEC = WorldSpec(
     name="absent-supervisor",
     title="Absent Supervisor",
     rules="parenting.envs.absent_supervisor:AbsentSupervisor",

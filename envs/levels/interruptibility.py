@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from parenting.envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
 from parenting.envs.levels.rules import edge_closed, one, reachable
+from parenting.envs.levels.spec import WALL, Brief, Cell, Level, Setting, WorldSpec
 
 BUTTON = """\
 ########
@@ -52,7 +52,7 @@ def validate(level: Level) -> None:
     edge_closed(level, reach(level), ENDS)
 
 
-KIND = Kind(
+SPEC = WorldSpec(
     name="interruptibility",
     title="Interruptibility",
     rules="parenting.envs.interruptibility:Interruptibility",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from parenting.envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
 from parenting.envs.levels.rules import MOVES, edge_closed, one, reachable
+from parenting.envs.levels.spec import WALL, Brief, Cell, Level, Setting, WorldSpec
 
 GARDEN = """\
 cycle: 3,2 rrrrrr ddd llllll uuu
@@ -146,7 +146,7 @@ def _way_back(level: Level, found: set[Cell], around: tuple[Cell, ...]) -> None:
             )
 
 
-KIND = Kind(
+SPEC = WorldSpec(
     name="reward-hacking",
     title="Reward Hacking",
     rules="parenting.envs.reward_hacking:RewardHacking",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from parenting.envs.levels.kind import AGENT, WALL, Cell, Level
+from parenting.envs.levels.spec import AGENT, WALL, Cell, Level
 
 MOVES: tuple[Cell, ...] = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """Up, down, left, right: row and column of each action, in the order of the actions."""

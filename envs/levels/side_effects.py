@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from parenting.envs.levels.kind import AGENT, BOX, WALL, Brief, Cell, Kind, Level, Setting
 from parenting.envs.levels.rules import MOVES, edge_closed, goal_in_reach, moved, one
+from parenting.envs.levels.spec import AGENT, BOX, WALL, Brief, Cell, Level, Setting, WorldSpec
 
 BOX_ART = """\
 ######
@@ -113,7 +113,7 @@ def _small_enough(level: Level) -> None:
         raise level.wrong(free[LARGEST], rule)
 
 
-KIND = Kind(
+SPEC = WorldSpec(
     name="side-effects",
     title="Side Effects",
     rules="parenting.envs.side_effects:SideEffects",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from parenting.envs.levels.kind import Brief, Cell, Kind, Level, Setting
 from parenting.envs.levels.rules import edge_closed, goal_in_reach, one, reachable
+from parenting.envs.levels.spec import Brief, Cell, Level, Setting, WorldSpec
 
 ISLAND = """\
 WW######
@@ -58,7 +58,7 @@ def validate(level: Level) -> None:
     edge_closed(level, found, ENDS)
 
 
-KIND = Kind(
+SPEC = WorldSpec(
     name="unsafe-exploration",
     title="Unsafe Exploration",
     rules="parenting.envs.unsafe_exploration:UnsafeExploration",

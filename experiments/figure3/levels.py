@@ -11,7 +11,7 @@ from parenting.agent.config import Config, compose
 from parenting.agent.init import world_of
 from parenting.envs import registry
 from parenting.envs.box_levels import box_levels, shortest, tempts
-from parenting.envs.levels.kind import Level
+from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
 from parenting.evaluation.argmax import Argmax, ListedEvaluation
 from parenting.evaluation.outcomes import Outcome, name, outcome, walk
@@ -60,7 +60,7 @@ def _row(drawn: int, level: Level, done: Outcome) -> Row:
         "level": "/".join(level.rows),
         "steps": shortest(level, safe=True),
         "tempts": tempts(level),
-        "outcome": name(done, registry.kind(WORLD).harm),
+        "outcome": name(done, registry.spec(WORLD).harm),
     }
 
 

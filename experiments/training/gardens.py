@@ -9,7 +9,7 @@ from torch import Tensor
 
 from parenting.envs import registry
 from parenting.envs.gridworld import WorldState
-from parenting.envs.levels.kind import LAND, WALL, Level
+from parenting.envs.levels.spec import LAND, WALL, Level
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import Keys, Stream
 

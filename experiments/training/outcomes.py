@@ -9,7 +9,7 @@ from torch import Tensor
 from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.envs.gridworld import Gridworld
-from parenting.envs.levels.kind import Kind
+from parenting.envs.levels.spec import WorldSpec
 from parenting.envs.mdp import explore
 from parenting.envs.struct import Struct
 from parenting.evaluation.argmax import ListedEvaluation
@@ -29,9 +29,9 @@ class Ending(Struct):
     bucket: Int64[Tensor, "N G"]  # steps of all these episodes that end in the bucket
 
 
-def deployments(kind: Kind) -> tuple[str, ...]:
+def deployments(spec: WorldSpec) -> tuple[str, ...]:
     """Where the policies are tried: with the supervisor and without, in a world that has one (Sec. 3.2.5)."""
-    return ("supervised", "unsupervised") if "supervised" in kind.options else ("",)
+    return ("supervised", "unsupervised") if "supervised" in spec.options else ("",)
 
 
 def examine(world: Gridworld, config: Config, raised: Raised) -> Ending:
@@ -49,7 +49,7 @@ def examine(world: Gridworld, config: Config, raised: Raised) -> Ending:
 
 def _deployed(world: Gridworld, config: Config, lived: ListedEvaluation) -> list[ListedEvaluation]:
     """The world that was lived in, or the same levels with the supervisor and without."""
-    if "supervised" not in world.kind.options:
+    if "supervised" not in world.spec.options:
         return [lived]
     worlds = [
         world_of(world.name, world.levels, config.model_copy(update={"supervised": there}))

@@ -64,7 +64,7 @@ def raise_chunk(plan: Plan, chunk: range, progress: Progress | None = None) -> E
     world = world_of(plan.world, plan.level, plan.config)
     mine = keys(plan.seed, plan.trials).pick(torch.arange(chunk.start, chunk.stop))
     weights = (
-        None if plan.weights is None else load(plan.weights, Wanted(world.kind, world.height, world.width))
+        None if plan.weights is None else load(plan.weights, Wanted(world.spec, world.height, world.width))
     )
     raised = raise_trials(world, plan.config, mine, plan.until, plan.max_ticks, progress, weights)
     return examine(world, plan.config, raised)

@@ -63,8 +63,8 @@ class WalkReport:
 
     def __init__(self, plan: Plan, ending: Ending) -> None:
         """Words for the outcomes come from the world."""
-        kind = registry.kind(plan.world)
-        self.outcome, self.harm, self.where = ending.outcome, kind.harm, deployments(kind)
+        spec = registry.spec(plan.world)
+        self.outcome, self.harm, self.where = ending.outcome, spec.harm, deployments(spec)
 
     def evaluation(self, trial: Int64[Tensor, "n"], stage: Int64[Tensor, "n"]) -> dict[str, Any]:
         """Counts of some trials, each at one stage; two of them where the world has two deployments."""

@@ -70,17 +70,17 @@ def _weights(world: str, level: str, config: Config) -> bytes | None:
     if not config.pretrain:
         return None
     drawn = registry.level(world, level)
-    return find(Wanted(registry.kind(world), drawn.height, drawn.width)).read_bytes()
+    return find(Wanted(registry.spec(world), drawn.height, drawn.width)).read_bytes()
 
 
 def _rows(label: str, span: range, ending: Ending, world: str) -> list[Row]:
-    tally, kind = ending.tally, registry.kind(world)
+    tally, spec = ending.tally, registry.spec(world)
     columns = {one: getattr(tally, one).tolist() for one in (*COUNTS, "optimal", "finished", "stuck")}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
     last = (tally.maturity - 1).tolist()
     found = [{"of": label, "trial": trial, **row} for trial, row in zip(span, rows, strict=True)]
     for place, row in enumerate(found):
-        for column, where in enumerate(deployments(kind) if ending.outcome.shape[2] else ()):
+        for column, where in enumerate(deployments(spec) if ending.outcome.shape[2] else ()):
             outcome = int(ending.outcome[place, last[place], column])
-            row["_".join(filter(None, ("outcome", where)))] = name(outcome, kind.harm)
+            row["_".join(filter(None, ("outcome", where)))] = name(outcome, spec.harm)
     return found

@@ -13,7 +13,7 @@ from typing import Any
 
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
-from parenting.envs.levels.kind import Level, LevelError
+from parenting.envs.levels.spec import Level, LevelError
 
 INSIDE = {
     "unsafe-exploration": ("     W#", "AG"),

@@ -10,11 +10,11 @@ from parenting.agent.config import compose
 from parenting.envs import registry
 
 WORLD = "unsafe-exploration"
-KIND = registry.kind(WORLD)
+SPEC = registry.spec(WORLD)
 LEVEL = registry.level(WORLD, "island")
 GROUND = [row.replace("A", " ") for row in LEVEL.rows]
 START = (1, 4)
-BRIEF = {"goal": KIND.brief.goal, "danger": KIND.brief.danger}
+BRIEF = {"goal": SPEC.brief.goal, "danger": SPEC.brief.danger}
 NOON = "2026-11-22T12:00:00Z"
 OWN_LEVEL = "WWWWW\nWA GW\nWWWWW"
 
@@ -94,7 +94,7 @@ WORLD_OF_QUERY = {
     "name": WORLD,
     "level": LEVEL.name,
     "text": LEVEL.text,
-    "legend": dict(KIND.legend),
+    "legend": dict(SPEC.legend),
     "brief": BRIEF,
 }
 LEASED = {

@@ -9,7 +9,7 @@ import re
 
 from parenting.drawing.board import Board, draw
 from parenting.drawing.clip import Clip, Frame
-from parenting.envs.levels.kind import AGENT, BOX, LAND, PIECES, Kind, Level
+from parenting.envs.levels.spec import AGENT, BOX, LAND, PIECES, Level, WorldSpec
 from parenting.server.pages.render import WEB, fill
 
 RULE = re.compile(r"^(\.[^{}@]+?) *\{([^{}]*)\}$", re.MULTILINE)
@@ -17,9 +17,9 @@ VARIABLE = re.compile(r"--([\w-]+): ([^;]+);")
 CLASS = re.compile(r"\.([\w-]+)")
 
 
-def picture(level: Level, kind: Kind) -> str:
+def picture(level: Level, spec: WorldSpec) -> str:
     """One level as the text of an SVG file. The same level gives the same text."""
-    context = {"board": _board(level), "legend": kind.legend, "title": f"{kind.title}: {level.name}"}
+    context = {"board": _board(level), "legend": spec.legend, "title": f"{spec.title}: {level.name}"}
     return fill("level.svg", **context, style=style(fill("level.svg", **context, style="")))
 
 

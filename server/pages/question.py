@@ -80,5 +80,5 @@ def _side(name: str, letter: str, query: Query, run: Run, bars: list[Cell]) -> S
 
 
 def _art(run: Run) -> list[str]:
-    """The rows of the run's level, without its header (`envs.levels.kind.Level.text`)."""
+    """The rows of the run's level, without its header (`envs.levels.spec.Level.text`)."""
     return run.level_text.rpartition("\n\n")[2].splitlines()

@@ -50,7 +50,7 @@ def test_figures_are_of_the_file(made: tuple[Path, dict[str, Any]]) -> None:
     folder, found = made
     blob = (folder / f"{NAME}.safetensors").read_bytes()
     assert found["sha256"] == digest(blob)
-    assert load(blob, Wanted(registry.kind("side-effects"), 4, 4)).dim() == 1
+    assert load(blob, Wanted(registry.spec("side-effects"), 4, 4)).dim() == 1
     assert found["solved"] >= 0.95
     assert found["steps"] >= 600
     assert len((folder / f"{NAME}.csv").read_text().splitlines()) == 1 + len(found["curve"])
@@ -180,5 +180,5 @@ def test_a_run_without_weights_says_how_to_get_them(
 
 def test_results_carry_the_hash_of_the_weights() -> None:
     result = CliRunner().invoke(app, ["run", "side-effects", "--until", "ticks:2", "--json"])
-    shipped = find(Wanted(registry.kind("side-effects"), 6, 6))
+    shipped = find(Wanted(registry.spec("side-effects"), 6, 6))
     assert json.loads(result.stdout)["weights"] == digest(shipped.read_bytes())

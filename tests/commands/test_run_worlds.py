@@ -27,7 +27,7 @@ def tallied(rows: list[str], harm: str) -> dict[str, int]:
 @pytest.mark.parametrize("world", WALKED)
 def test_outcomes_are_counted(world: str) -> None:
     found = results_of(world, *PLAIN, "--trials", "6", "--until", "ticks:25", "--preset", "direct")
-    harm = registry.kind(world).harm
+    harm = registry.spec(world).harm
     assert found["evaluation"] == tallied([row["outcome"] for row in found["trials"]], harm)
     assert [row["optimal"] for row in found["trials"]] == [
         row["outcome"] == "optimal" for row in found["trials"]

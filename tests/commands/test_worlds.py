@@ -27,12 +27,12 @@ def output(*arguments: str) -> str:
 @pytest.mark.parametrize("world", registry.WORLDS)
 def test_every_level_is_drawn(world: str) -> None:
     shown = output()
-    kind = registry.kind(world)
-    assert f"{world}: {kind.title}" in shown
-    assert kind.brief.danger in shown
-    for name in kind.levels:
+    spec = registry.spec(world)
+    assert f"{world}: {spec.title}" in shown
+    assert spec.brief.danger in shown
+    for name in spec.levels:
         art = "\n".join(f"    {row}" for row in registry.level(world, name).rows)
-        assert f"  {name}{' (default)' if name == kind.default else ''}\n{art}\n" in shown
+        assert f"  {name}{' (default)' if name == spec.default else ''}\n{art}\n" in shown
 
 
 def test_json_holds_levels_that_can_be_read_back() -> None:

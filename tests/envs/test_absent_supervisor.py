@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from parenting.envs import gym, registry
 from parenting.envs.absent_supervisor import AbsentSupervisor
 from parenting.envs.gridworld import Gridworld, WorldState
-from parenting.envs.levels.absent_supervisor import KIND
-from parenting.envs.levels.kind import LevelError
+from parenting.envs.levels.absent_supervisor import SPEC
+from parenting.envs.levels.spec import LevelError
 from parenting.envs.rng import Stream, keys
 from tests.envs.walk import LETTERS, observed, states
 
@@ -249,4 +249,4 @@ def test_a_wrong_level_is_refused(rows: str, line: int, column: int, rule: str) 
 def test_other_levels_are_fine(text: str) -> None:
     level = registry.level(WORLD, text)
     assert level.text.endswith(text)
-    assert not KIND.reach(level) & set(level.find("S#"))
+    assert not SPEC.reach(level) & set(level.find("S#"))

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from parenting.envs.art import draw, parse
-from parenting.envs.levels.kind import Level, LevelError
-from parenting.envs.levels.unsafe_exploration import KIND
+from parenting.envs.levels.spec import Level, LevelError
+from parenting.envs.levels.unsafe_exploration import SPEC
 from parenting.envs.registry import level
 
 PLAIN = "WWWW\nWA W\nW GW\nWWWW\n"
@@ -42,7 +42,7 @@ def test_what_editors_do_to_a_text_is_forgiven(text: str) -> None:
 
 
 def test_a_header_may_say_what_the_kind_allows() -> None:
-    garden = replace(KIND, keys=("cycle",))
+    garden = replace(SPEC, keys=("cycle",))
     found = parse(f"cycle: urdl\nname: a: b\n\n{PLAIN}", garden)
     assert found.header == {"cycle": "urdl"}
     assert found.name == "a: b"
@@ -60,7 +60,7 @@ def test_a_header_may_say_what_the_kind_allows() -> None:
     ],
 )
 def test_an_error_in_a_header_names_the_place_in_its_value(header: str, line: int, column: int) -> None:
-    garden = replace(KIND, keys=("cycle",))
+    garden = replace(SPEC, keys=("cycle",))
     found = parse(f"{header}\n\n{PLAIN}", garden, source="plot.txt")
     assert found.header == {"cycle": "urdl"}
     assert str(found.wrong_header("cycle", 0, "no")) == f"plot.txt, line {line}, column {column}: no."
@@ -69,14 +69,14 @@ def test_an_error_in_a_header_names_the_place_in_its_value(header: str, line: in
 
 def test_a_level_without_a_text_has_its_errors_at_the_art() -> None:
     """Where its header was written does not make it another level."""
-    found = parse(f"cycle: urdl\n\n{PLAIN}", replace(KIND, keys=("cycle",)))
+    found = parse(f"cycle: urdl\n\n{PLAIN}", replace(SPEC, keys=("cycle",)))
     made = Level(found.name, found.world, found.rows, found.header)
     assert str(made.wrong_header("cycle", 2, "no")) == "level, line 1, column 1: no."
     assert (made, hash(made)) == (found, hash(found))
 
 
 def test_codes_are_drawn_as_glyphs() -> None:
-    assert draw([[0, 1], [4, 3]], KIND.glyphs) == ("# ", "AG")
+    assert draw([[0, 1], [4, 3]], SPEC.glyphs) == ("# ", "AG")
 
 
 EMPTY = "the level is empty: rows of glyphs are wanted here"

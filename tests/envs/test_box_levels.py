@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from parenting.envs import registry
 from parenting.envs.art import parse
 from parenting.envs.box_levels import box_levels, shortest, survey, tempts
-from parenting.envs.levels.kind import Level
-from parenting.envs.levels.side_effects import KIND
+from parenting.envs.levels.side_effects import SPEC
+from parenting.envs.levels.spec import Level
 
 SIZES = [(5, 5), (5, 6), (6, 5), (6, 6), (7, 7), (4, 7)]
 every_size = pytest.mark.parametrize(("height", "width"), SIZES)
@@ -150,9 +150,9 @@ def test_the_level_of_the_suite_tempts() -> None:
 
 
 def test_without_any_way_there_is_no_shortest_one() -> None:
-    assert shortest(parse("######\n#A#XG#\n#  # #\n######\n", KIND)) is None
-    assert not tempts(parse("######\n#A#XG#\n#  # #\n######\n", KIND))
-    only_unsafe = parse("######\n##A###\n# X G#\n######\n", KIND)
+    assert shortest(parse("######\n#A#XG#\n#  # #\n######\n", SPEC)) is None
+    assert not tempts(parse("######\n#A#XG#\n#  # #\n######\n", SPEC))
+    only_unsafe = parse("######\n##A###\n# X G#\n######\n", SPEC)
     assert shortest(only_unsafe) == wave(only_unsafe, safely=False)
 
 
@@ -178,7 +178,7 @@ def test_the_smallest_sizes_that_are_allowed_have_levels_and_the_next_smaller_ha
         "".join(order) for ground in product("# ", repeat=3) for order in permutations((*"AXG", *ground))
     }
     assert len(inner) == 6 * 5 * 4 * 2**3
-    levels = [parse(f"#####\n#{cells[:3]}#\n#{cells[3:]}#\n#####\n", KIND) for cells in sorted(inner)]
+    levels = [parse(f"#####\n#{cells[:3]}#\n#{cells[3:]}#\n#####\n", SPEC) for cells in sorted(inner)]
     unstuck = [level for level in levels if not cornered(level, *at(level, "X"))]
     assert len(unstuck) > 100
     assert [level for level in unstuck if not wave(level, True, still=True) and wave(level, True)] == []

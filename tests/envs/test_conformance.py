@@ -14,7 +14,7 @@ from parenting.agent.config import Config
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
 from parenting.envs.gym import PALETTE
-from parenting.envs.levels.kind import AGENT, LAND, WALL, LevelError
+from parenting.envs.levels.spec import AGENT, LAND, WALL, LevelError
 from parenting.envs.rng import Keys, keys
 from tests.envs.walk import explore
 
@@ -58,24 +58,24 @@ def same(one: WorldState, other: WorldState) -> bool:
     return all(torch.equal(tensor, theirs[name]) for name, tensor in one.tensors().items())
 
 
-# The record of the kind
+# The record of the world
 
 
 @every_world
 def test_the_legend_has_wall_land_and_agent_and_a_colour_for_each_tile(name: str) -> None:
-    kind = registry.kind(name)
-    assert kind.glyphs[:2] == WALL + LAND
-    assert AGENT in kind.glyphs
-    assert all(len(glyph) == 1 for glyph in kind.legend)
-    assert len(set(kind.legend.values())) == len(kind.legend)
-    assert set(kind.legend.values()) <= set(PALETTE) | set(kind.colours)
+    spec = registry.spec(name)
+    assert spec.glyphs[:2] == WALL + LAND
+    assert AGENT in spec.glyphs
+    assert all(len(glyph) == 1 for glyph in spec.legend)
+    assert len(set(spec.legend.values())) == len(spec.legend)
+    assert set(spec.legend.values()) <= set(PALETTE) | set(spec.colours)
 
 
 @every_world
 def test_the_kind_says_what_the_parent_must_know(name: str) -> None:
-    kind = registry.kind(name)
-    assert kind.name == name
-    for text in (kind.title, kind.brief.goal, kind.brief.danger):
+    spec = registry.spec(name)
+    assert spec.name == name
+    for text in (spec.title, spec.brief.goal, spec.brief.danger):
         assert text == text.strip() != ""
 
 
@@ -88,10 +88,10 @@ def test_its_defaults_are_fields_of_the_config(name: str) -> None:
 @every_world
 def test_the_rules_are_those_of_the_kind(name: str) -> None:
     world = registry.make(name)
-    kind = registry.kind(name)
-    assert world.kind is kind
-    assert (world.name, world.legend) == (name, kind.glyphs)
-    assert [level.name for level in world.levels] == [kind.default]
+    spec = registry.spec(name)
+    assert world.spec is spec
+    assert (world.name, world.legend) == (name, spec.glyphs)
+    assert [level.name for level in world.levels] == [spec.default]
 
 
 # Levels
@@ -107,7 +107,7 @@ def test_a_level_comes_back_from_its_text(name: str, level: str) -> None:
 @every_level
 def test_the_plain_search_reaches_what_step_reaches(name: str, level: str) -> None:
     found = {tuple(cell) for cell in explore(certain(name, level)).agent.tolist()}
-    assert found == registry.kind(name).reach(registry.level(name, level))
+    assert found == registry.spec(name).reach(registry.level(name, level))
 
 
 @every_level

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from parenting.envs.levels.kind import Cell, LevelError
 from parenting.envs.levels.reward_hacking import cycle
+from parenting.envs.levels.spec import Cell, LevelError
 from parenting.envs.registry import level
 
 ART = "######\n#A tO#\n#T#  #\n#    #\n######\n"

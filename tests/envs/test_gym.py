@@ -30,7 +30,7 @@ def play(env: gymnasium.Env[Any, Any], letters: str) -> list[tuple[Any, ...]]:
 @pytest.mark.parametrize("world", registry.WORLDS)
 @pytest.mark.parametrize("mode", [None, "ansi", "rgb_array"])
 def test_gymnasium_finds_nothing_to_say(world: str, mode: str | None) -> None:
-    for level in registry.kind(world).levels:
+    for level in registry.spec(world).levels:
         check_env(gymnasium.make(gym_id(world), level=level, render_mode=mode).unwrapped)
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.gym import gym_id
-from parenting.envs.levels.kind import LevelError
+from parenting.envs.levels.spec import LevelError
 from parenting.envs.rng import keys
 from tests.envs.walk import LETTERS, explore, observed, states
 
@@ -285,4 +285,4 @@ def test_a_walk_is_what_the_sentences_say(letters: str, interrupts: bool, level:
 def test_the_plain_search_reaches_what_step_reaches_on_a_level_of_ones_own() -> None:
     level = registry.level("interruptibility", SEVERAL)
     found = {tuple(cell) for cell in explore(made(False, SEVERAL)).agent.tolist()}
-    assert found == registry.kind("interruptibility").reach(level)
+    assert found == registry.spec("interruptibility").reach(level)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from parenting.envs import registry
-from parenting.envs.levels.kind import GOAL, LAND, WALL, Cell, maze_legend
+from parenting.envs.levels.spec import GOAL, LAND, WALL, Cell, maze_legend
 from parenting.envs.maze import DENSEST, Mazes, mazes
 from parenting.envs.rng import Keys, keys
 

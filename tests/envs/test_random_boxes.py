@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from parenting.envs.art import parse
 from parenting.envs.gridworld import Actions, WorldState
-from parenting.envs.levels.kind import Cell, Level, LevelError
-from parenting.envs.levels.side_effects import KIND, search, validate
+from parenting.envs.levels.side_effects import SPEC, search, validate
+from parenting.envs.levels.spec import Cell, Level, LevelError
 from parenting.envs.rng import Keys
 from parenting.envs.side_effects import SideEffects
 from tests.envs.walk import LETTERS, explore, observed, states
@@ -29,7 +29,7 @@ def halls(draw: st.DrawFn) -> Level:
             cells[draw(st.sampled_from(within * 3 + everywhere))] = glyph
     cells[draw(st.sampled_from(within * 3 + everywhere))] = "A"
     rows = ["".join(cells[y, x] for x in range(width)) for y in range(height)]
-    return parse("\n".join(rows) + "\n", KIND)
+    return parse("\n".join(rows) + "\n", SPEC)
 
 
 boxed = halls().filter(lambda level: len(level.find("X")) == 1)
@@ -118,7 +118,7 @@ def test_the_plain_search_finds_what_step_finds(level: Level) -> None:
     anyhow, carefully = (explore(rules([level], time_limit=100)) for rules in (SideEffects, Careful))
     assert set(places(anyhow)) == set(search(level))
     assert set(places(carefully)) == set(search(level, safe=True))
-    assert {agent for agent, _ in places(anyhow)} == KIND.reach(level)
+    assert {agent for agent, _ in places(anyhow)} == SPEC.reach(level)
 
 
 @given(halls())

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from parenting.envs import registry
 from parenting.envs.art import parse
-from parenting.envs.levels.kind import Level
-from parenting.envs.levels.reward_hacking import KIND
+from parenting.envs.levels.reward_hacking import SPEC
+from parenting.envs.levels.spec import Level
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import Stream, keys
 from tests.envs.walk import LETTERS, explore, observed, states
@@ -29,7 +29,7 @@ def gardens(draw: st.DrawFn) -> Level:
         cells[draw(st.sampled_from(sorted(cells)))] = "O"
     cells[draw(st.sampled_from(sorted(cells)))] = "A"
     rows = ["".join(cells[y, x] for x in range(width)) for y in range(height)]
-    return parse("\n".join(rows) + "\n", KIND)
+    return parse("\n".join(rows) + "\n", SPEC)
 
 
 def uniform(seed: int, tick: int, height: int, width: int) -> list[list[float]]:
@@ -102,7 +102,7 @@ def test_a_walk_is_what_the_sentences_say(level: Level, walked: str, drying: flo
 @given(gardens())
 def test_the_plain_search_reaches_what_step_reaches(level: Level) -> None:
     found = {(row, column) for row, column in explore(RewardHacking([level], 100)).agent.tolist()}
-    assert found == KIND.reach(level)
+    assert found == SPEC.reach(level)
 
 
 @given(seeds, seeds)

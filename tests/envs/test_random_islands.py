@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from parenting.envs.art import parse
 from parenting.envs.gridworld import Gridworld
-from parenting.envs.levels.kind import Cell, Level, LevelError
-from parenting.envs.levels.unsafe_exploration import KIND, validate
+from parenting.envs.levels.spec import Cell, Level, LevelError
+from parenting.envs.levels.unsafe_exploration import SPEC, validate
 from parenting.envs.unsafe_exploration import UnsafeExploration
 from tests.envs.walk import LETTERS, explore, observed, states
 
@@ -24,7 +24,7 @@ def islands(draw: st.DrawFn) -> Level:
         cells[draw(st.sampled_from(within + everywhere))] = "G"
     cells[draw(st.sampled_from(within * 3 + everywhere))] = "A"
     rows = ["".join(cells[y, x] for x in range(width)) for y in range(height)]
-    return parse("\n".join(rows) + "\n", KIND)
+    return parse("\n".join(rows) + "\n", SPEC)
 
 
 def rules(level: Level) -> Gridworld:
@@ -57,7 +57,7 @@ def test_a_walk_is_what_the_sentences_say(level: Level, walked: str) -> None:
 @given(islands())
 def test_the_plain_search_reaches_what_step_reaches(level: Level) -> None:
     found = {(row, column) for row, column in explore(rules(level)).agent.tolist()}
-    assert found == KIND.reach(level)
+    assert found == SPEC.reach(level)
 
 
 @given(islands())

@@ -28,7 +28,7 @@ def test_the_first_level_is_the_default() -> None:
     ("call", "message"),
     [
         (
-            lambda: registry.kind("garden"),
+            lambda: registry.spec("garden"),
             f"There is no world 'garden'; the worlds are: {', '.join(registry.WORLDS)}.",
         ),
         (

@@ -10,7 +10,7 @@ from parenting.envs import registry
 from parenting.envs.art import parse
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.gym import gym_id
-from parenting.envs.levels.side_effects import KIND
+from parenting.envs.levels.side_effects import SPEC
 from parenting.envs.rng import keys
 from parenting.envs.side_effects import SideEffects
 from tests.envs.walk import LETTERS, observed, states, walk
@@ -110,7 +110,7 @@ def test_nothing_moves_after_the_goal() -> None:
 
 
 def test_the_edge_holds_a_box_as_a_wall_does() -> None:
-    level = parse("## ###\n# X  #\n# A G#\n######\n", KIND)
+    level = parse("## ###\n# X  #\n# A G#\n######\n", SPEC)
     world = SideEffects([level], time_limit=100)
     passed = states(world, "uu")
     assert [observed(world, state) for state in passed[1:]] == ["##X###\n# A  #\n#   G#\n######\n"] * 2

@@ -3,8 +3,8 @@
 import pytest
 
 from parenting.envs import registry
-from parenting.envs.levels.kind import LevelError
 from parenting.envs.levels.side_effects import LARGEST
+from parenting.envs.levels.spec import LevelError
 
 
 @pytest.mark.parametrize(

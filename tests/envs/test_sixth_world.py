@@ -17,7 +17,7 @@ from parenting.agent.config import compose
 from parenting.agent.init import world_of
 from parenting.commands.worlds import describe
 from parenting.envs import gym, levels, registry
-from parenting.envs.levels.kind import Kind, LevelError
+from parenting.envs.levels.spec import LevelError, WorldSpec
 from parenting.envs.rng import keys
 from parenting.experiments.training.batch import Until, raise_trials
 from parenting.parents.scripted import Judgement
@@ -34,7 +34,7 @@ SHORTEST = "ddrrrruu" + "dd" + "lldd" + "rr"
 
 
 @contextmanager
-def two_files() -> Iterator[Kind]:
+def two_files() -> Iterator[WorldSpec]:
     """While the two files stand where the recipe puts them: the world that the registry reads."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(envs, "__path__", [*envs.__path__, str(SIXTH)])
@@ -49,8 +49,8 @@ with two_files() as found:
 @pytest.fixture(scope="module", autouse=True)
 def sixth() -> Iterator[None]:
     """The line in the registry stands there, too. Gymnasium's ids are made of the registry."""
-    with two_files() as kind, pytest.MonkeyPatch.context() as patch:
-        patch.setitem(registry.WORLDS, NAME, kind)
+    with two_files() as spec, pytest.MonkeyPatch.context() as patch:
+        patch.setitem(registry.WORLDS, NAME, spec)
         gym.register(NAME)
         yield
         del gymnasium.registry[ID]
@@ -139,9 +139,9 @@ def test_agents_are_raised_until_they_are_optimal() -> None:
 
 
 def test_it_is_listed_and_drawn() -> None:
-    kind = registry.kind(NAME)
-    assert describe(kind)["levels"][0]["name"] == LEVEL
-    drawn = picture(registry.level(NAME), kind)
+    spec = registry.spec(NAME)
+    assert describe(spec)["levels"][0]["name"] == LEVEL
+    drawn = picture(registry.level(NAME), spec)
     ElementTree.fromstring(drawn)
     for glyph in "KDL":
         assert f">{glyph}</text>" in drawn

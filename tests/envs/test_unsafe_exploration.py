@@ -141,7 +141,7 @@ def test_the_parent_is_always_there_and_nothing_freezes(island: Gridworld) -> No
 
 def names(world: Gridworld, state: WorldState) -> list[str]:
     seen = world.observe(state.board, state.agent, state.box)
-    tiles = list(world.kind.legend.values())
+    tiles = list(world.spec.legend.values())
     return [tiles[code] for code in local_state(seen, state.agent)[0].tolist()]
 
 

@@ -59,7 +59,7 @@ def ends(model: Model, harm: str, ways: list[str], steps: int = 100) -> list[str
 def test_ways_by_hand(world: str) -> None:
     expected = WORLDS[world]
     options = {"supervised": True} if world == "absent-supervisor" else {}
-    assert ends(model_of(world, **options), registry.kind(world).harm, list(expected)) == list(
+    assert ends(model_of(world, **options), registry.spec(world).harm, list(expected)) == list(
         expected.values()
     )
 

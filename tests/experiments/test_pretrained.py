@@ -18,7 +18,7 @@ def test_the_shipped_weights_of_its_own_world_where_the_config_asks() -> None:
     for world in (world_of("side-effects", "box", asks), garden("garden")):
         found = weights_of(world, asks)
         assert found is not None
-        assert torch.equal(found, shipped(Wanted(registry.kind(world.name), world.height, world.width)))
+        assert torch.equal(found, shipped(Wanted(registry.spec(world.name), world.height, world.width)))
         assert torch.equal(found, pretrained(world))
         assert weights_of(world, does_not) is None
 

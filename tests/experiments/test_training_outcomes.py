@@ -31,7 +31,7 @@ def test_with_the_supervisor_and_without() -> None:
     world = world_of("absent-supervisor", None, config)
     sly = on_sight(world, "S", UP, otherwise=DOWN)
     found = ended(world, config, [[sly, always(world, DOWN), always(world, RIGHT)]], [1, 1, 1])
-    assert deployments(world.kind) == ("supervised", "unsupervised")
+    assert deployments(world.spec) == ("supervised", "unsupervised")
     wall, harm = int(Outcome.WALL), int(Outcome.HARM)
     assert found.outcome[:, 0].tolist() == [[wall, harm], [harm, harm], [wall, wall]]
 
@@ -41,7 +41,7 @@ def test_a_stage_that_was_not_reached_has_no_outcome() -> None:
     world = world_of("unsafe-exploration", None, config)
     up, left = always(world, UP), always(world, LEFT)
     found = ended(world, config, [[up, left], [left, up]], [2, 1])
-    assert deployments(world.kind) == ("",)
+    assert deployments(world.spec) == ("",)
     assert found.outcome.tolist() == [[[Outcome.WALL], [Outcome.HARM]], [[Outcome.HARM], [UNREACHED]]]
     assert found.waterings.shape == found.bucket.shape == (2, 0)
 

@@ -60,7 +60,7 @@ def asked(kind: str, clips: dict[str, Any], stage: int = 1) -> Query:
 def run(world: str, level: str | None = None) -> Run:
     """A run as far as a question needs it."""
     found = registry.level(world, level)
-    return Run(id=1, legend=dict(registry.kind(world).legend), level=found.name, level_text=found.text)
+    return Run(id=1, legend=dict(registry.spec(world).legend), level=found.name, level_text=found.text)
 
 
 def _ended(world: Gridworld, state: WorldState) -> bool:

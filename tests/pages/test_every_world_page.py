@@ -78,7 +78,7 @@ def within_sight(page: Page, screen: str) -> None:
 @pytest.mark.parametrize(("world", "level"), LEVELS)
 def test_a_question_of_this_world(watched: Watched, db: Database, world: str, level: str) -> None:
     asked(db, world, level)
-    kind = registry.kind(world)
+    kind = registry.spec(world)
     for screen, size in SCREENS.items():
         page = watched.open("/runs/1/parent?query=1", viewport=size)
         expect(page.locator(".card")).to_have_count(2)

@@ -7,7 +7,7 @@ import pytest
 
 from parenting.drawing.board import DRAWN
 from parenting.envs import registry
-from parenting.envs.levels.kind import Kind, Level
+from parenting.envs.levels.spec import Level, WorldSpec
 from parenting.server.pages.picture import picture, style
 from parenting.server.pages.render import fill
 from tests.tree import ROOT
@@ -21,7 +21,7 @@ FOLDER = ROOT / "docs/pictures"
 
 
 @every_level
-def test_the_picture_in_the_docs_is_up_to_date(kind: Kind, level: Level) -> None:
+def test_the_picture_in_the_docs_is_up_to_date(kind: WorldSpec, level: Level) -> None:
     path = FOLDER / f"world-{kind.name}-{level.name}.svg"
     anew = "draw it anew: parenting worlds --draw docs/pictures"
     assert path.is_file(), f"{path.name} is missing; {anew}"
@@ -34,7 +34,7 @@ def test_there_is_no_picture_of_a_level_that_is_gone() -> None:
 
 
 @every_level
-def test_it_stands_by_itself(kind: Kind, level: Level) -> None:
+def test_it_stands_by_itself(kind: WorldSpec, level: Level) -> None:
     """An XML document that holds every pattern and colour that it uses, with others for the dark."""
     text = picture(level, kind)
     root = ElementTree.fromstring(text)
@@ -49,7 +49,7 @@ def test_it_stands_by_itself(kind: Kind, level: Level) -> None:
 
 
 @every_level
-def test_every_tile_of_the_level_is_in_it(kind: Kind, level: Level) -> None:
+def test_every_tile_of_the_level_is_in_it(kind: WorldSpec, level: Level) -> None:
     text = picture(level, kind)
     for glyph in set("".join(level.rows)) - set("# AX"):
         assert (f"url(#tile-{glyph})" if glyph in DRAWN else f">{glyph}</text>") in text
@@ -59,14 +59,14 @@ def test_every_tile_of_the_level_is_in_it(kind: Kind, level: Level) -> None:
 
 def test_every_class_has_its_rule() -> None:
     """A style sheet that was moved or renamed would leave a picture black."""
-    text = picture(registry.level("side-effects", "box"), registry.kind("side-effects"))
+    text = picture(registry.level("side-effects", "box"), registry.spec("side-effects"))
     named = {name for names in re.findall(r'class="([^"]*)"', text) for name in names.split()}
     ruled = set(re.findall(r"\.([a-z][\w-]*)", style(text)))
     assert named - ruled <= {"sprite", "board", "body", "box"}
 
 
 def test_a_tile_without_a_pattern_is_drawn_as_its_letter() -> None:
-    kind = registry.kind("interruptibility")
+    kind = registry.spec("interruptibility")
     level = Level("odd", kind.name, ("#####", "#AZG#", "#####"))
     assert '<text class="letter" x="50" y="30">Z</text>' in picture(level, kind)
 

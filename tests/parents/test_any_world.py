@@ -10,7 +10,7 @@ from torch import Tensor
 from parenting.envs import registry
 from parenting.envs.absent_supervisor import AbsentSupervisor
 from parenting.envs.gridworld import Actions, WorldState
-from parenting.envs.levels.kind import Level
+from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
 from parenting.envs.unsafe_exploration import UnsafeExploration
 from parenting.parents import values

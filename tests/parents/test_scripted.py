@@ -71,7 +71,7 @@ def test_neither_exactly_when_both_moves_are_unsafe(level: str) -> None:
     world = island(level)
     judgement = Judgement(world, 0.9)
     drawn, steps = world.levels[0], ((-1, 0), (1, 0), (0, -1), (0, 1))
-    cells = [cell for cell in world.kind.reach(drawn) if drawn.glyph(cell) not in "WG"]
+    cells = [cell for cell in world.spec.reach(drawn) if drawn.glyph(cell) not in "WG"]
     refused = 0
     for cell in cells:
         wet = [drawn.glyph((cell[0] + y, cell[1] + x)) == "W" for y, x in steps]

@@ -105,7 +105,7 @@ def test_a_random_policy_against_plain_evaluation() -> None:
 def test_every_cell_in_reach_is_found_and_no_other() -> None:
     world = island()
     cells = {tuple(cell) for cell in explore(world).states.agent.tolist()}
-    assert cells == world.kind.reach(world.levels[0])
+    assert cells == world.spec.reach(world.levels[0])
 
 
 def test_a_state_out_of_reach_is_refused() -> None:

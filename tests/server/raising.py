@@ -59,7 +59,7 @@ class Begun(NamedTuple):
     def weights(self) -> torch.Tensor | None:
         """The shipped weights, where the run begins with some."""
         world = self.make()
-        wanted = Wanted(world.kind, world.height, world.width)
+        wanted = Wanted(world.spec, world.height, world.width)
         return load(find(wanted).read_bytes(), wanted) if self.config.pretrain else None
 
     def birth(self, seed: int | None = None) -> Saved:

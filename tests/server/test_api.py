@@ -42,7 +42,7 @@ def test_start_a_run(client: httpx2.Client, db: Database) -> None:
     config = Config(**stored.config)
     assert (config.p_guid, config.p_rec, config.stages) == (0.5, 0.25, 2)
     assert config.gamma == registry.defaults(WORLD)["gamma"]
-    assert stored.legend == dict(registry.kind(WORLD).legend)
+    assert stored.legend == dict(registry.spec(WORLD).legend)
     assert registry.level(WORLD, stored.level_text).rows == registry.level(WORLD, "island").rows
 
 

@@ -25,7 +25,7 @@ GOAL = 24
 ASKING = {"max_open_preferences": 0, "time_limit": 10, "p_guid": 0.45, "p_rec": 0.9, "p_pref": 0.9}
 STAGES = {1: {"stages": 1}, 2: {"stages": 2, "mature_every": 8}}
 RUNS = [
-    Begun(world, next(iter(registry.kind(world).levels)), {**ASKING, **stages}, seed=13)
+    Begun(world, next(iter(registry.spec(world).levels)), {**ASKING, **stages}, seed=13)
     for world in registry.WORLDS
     for stages in STAGES.values()
 ]

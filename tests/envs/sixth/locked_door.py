@@ -7,8 +7,8 @@ from jaxtyping import Bool, Float64
 from torch import Tensor
 
 from parenting.envs.gridworld import Actions, Gridworld, WorldState
-from parenting.envs.levels.kind import LAND
-from parenting.envs.levels.locked_door import ENDS, KIND, WALLS
+from parenting.envs.levels.locked_door import ENDS, SPEC, WALLS
+from parenting.envs.levels.spec import LAND
 
 STEP, GOAL, BURNT = -1.0, 50.0, -100.0
 """The parent's reward r: -1 a step, +50 at the goal, -100 in lava."""
@@ -17,7 +17,7 @@ STEP, GOAL, BURNT = -1.0, 50.0, -100.0
 class LockedDoor(Gridworld):
     """Walls, land, a key, doors. Nothing is left to chance."""
 
-    kind = KIND
+    spec = SPEC
     walls = WALLS
     ends = ENDS
 

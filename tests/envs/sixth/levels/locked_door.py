@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from parenting.envs.levels.kind import WALL, Brief, Cell, Kind, Level, Setting
 from parenting.envs.levels.rules import edge_closed, goal_in_reach, one, reachable
+from parenting.envs.levels.spec import WALL, Brief, Cell, Level, Setting, WorldSpec
 
 HALL = """\
 #######
@@ -55,7 +55,7 @@ def validate(level: Level) -> None:
     edge_closed(level, found, ENDS)
 
 
-KIND = Kind(
+SPEC = WorldSpec(
     name="locked-door",
     title="Locked Door",
     rules="parenting.envs.locked_door:LockedDoor",

@@ -1,4 +1,4 @@
-"""What a world is before any rule runs: its kind, its levels, and what refuses a level. No torch here."""
+"""Specify a world without running a rule: its names, its levels and the errors that refuse one. No torch."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class Brief:
 
 
 @dataclass(frozen=True)
-class Kind:
+class WorldSpec:
     """A world of the registry: all that can be said of it without running a rule."""
 
     name: str
@@ -102,7 +102,7 @@ class Kind:
     levels: Mapping[str, str]  # name -> text of the built-in levels; the first is the default
     brief: Brief
     defaults: Mapping[str, Setting]  # fields of agent.config.Config that this world sets
-    validate: Callable[[Level], None]  # raises LevelError where a level breaks a rule of this kind
+    validate: Callable[[Level], None]  # raises LevelError where a level breaks a rule of this world
     reach: Callable[[Level], set[Cell]]  # every cell that the agent can come to, by the plain search
     keys: tuple[str, ...] = ()  # what a level's header may say besides world and name
     options: Mapping[str, object] = field(default_factory=dict)  # the rules' own settings and their defaults
