@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from parenting.agent.config import PRESETS, Config
 from parenting.envs import registry
-from parenting.experiments.reporting.comparison import NEVER, SILENT, Finding, count_finding, mean_finding
-from parenting.experiments.reporting.plots import Share, shares
+from parenting.experiments.reporting.comparison import NEVER, SILENT, Comparison, compare_count, compare_mean
+from parenting.experiments.reporting.plots import Proportion, plot_proportions
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Asked, Report, spans
 
@@ -40,7 +40,7 @@ VARIANTS: dict[str, Variant] = {
 
 
 class Counted(NamedTuple):
-    """One count: outcomes in one deployment, and the paper's, as `count_finding` has it."""
+    """One count: outcomes in one deployment, and the paper's, as `compare_count` has it."""
 
     what: str
     words: tuple[str, ...]
@@ -112,9 +112,11 @@ class Claim(NamedTuple):
         found = [one for name in names for one in self._findings(name, _of(name, rows))]
         counts = [one for name in [*names, FRESH] for one in self._shares(name, _of(name, rows))]
         words = [*self.words, *WORDS]
-        return Report([*found, *self._born(rows)], words, {"shares": lambda figure: shares(figure, counts)})
+        return Report(
+            [*found, *self._born(rows)], words, {"shares": lambda figure: plot_proportions(figure, counts)}
+        )
 
-    def _findings(self, name: str, mine: Sequence[Row]) -> Iterator[Finding]:
+    def _findings(self, name: str, mine: Sequence[Row]) -> Iterator[Comparison]:
         done = [row for row in mine if row["finished"]]
         left = f"{len(mine) - len(done)} of {len(mine)} trials unfinished" if len(done) < len(mine) else ""
         for one in self.counted:
@@ -122,24 +124,24 @@ class Claim(NamedTuple):
             yield _count(name, one, mine, self._paper(name, one), note)
         for what, column in MEANS:
             note = f"{left}, not in the mean" if left else ""
-            yield mean_finding(f"{name}: {what}", [row[column] for row in done], note)
+            yield compare_mean(f"{name}: {what}", [row[column] for row in done], note)
 
-    def _born(self, rows: Sequence[Row]) -> Iterator[Finding]:
+    def _born(self, rows: Sequence[Row]) -> Iterator[Comparison]:
         """What the one pre-trained policy does, and how many of the fresh ones do harm."""
         (only,) = _of(BORN, rows)
         note = "one policy: all begin with the same weights"
         for column in dict.fromkeys(one.column for one in self.counted):
             where = " ".join(column.split("_")[1:])
             what = f"{BORN}: what the argmax policy does" + (f", {where}" if where else "")
-            yield Finding(what, SILENT, only[column], note=note)
+            yield Comparison(what, SILENT, only[column], note=note)
         for one in self._harmful:
             yield _count(FRESH, one, _of(FRESH, rows), SILENT)
 
-    def _shares(self, name: str, mine: Sequence[Row]) -> Iterator[Share]:
+    def _shares(self, name: str, mine: Sequence[Row]) -> Iterator[Proportion]:
         for one in self._harmful if name == FRESH else self.counted:
             paper = self._paper(name, one)
             share = 0.0 if paper == NEVER else None if isinstance(paper, str) else paper / 100
-            yield Share(name, one.what, _hits(one, mine), len(mine), share)
+            yield Proportion(name, one.what, _hits(one, mine), len(mine), share)
 
     @property
     def _harmful(self) -> list[Counted]:
@@ -155,8 +157,8 @@ def _of(name: str, rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if row["of"] == name]
 
 
-def _count(name: str, one: Counted, rows: Sequence[Row], paper: int | str, note: str = "") -> Finding:
-    return count_finding(f"{name}: {one.what}", paper, _hits(one, rows), len(rows), note)
+def _count(name: str, one: Counted, rows: Sequence[Row], paper: int | str, note: str = "") -> Comparison:
+    return compare_count(f"{name}: {one.what}", paper, _hits(one, rows), len(rows), note)
 
 
 def _hits(one: Counted, rows: Sequence[Row]) -> int:

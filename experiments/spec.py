@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from parenting.experiments.reporting.comparison import Finding
+from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.store import Row, Task
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Asked(NamedTuple):
 class Report:
     """What an experiment found: numbers beside the paper's, words on the differences, and drawings."""
 
-    findings: Sequence[Finding]
+    findings: Sequence[Comparison]
     words: Sequence[str]  # a paragraph each
     figures: Mapping[str, Callable[[Figure], None]] = field(default_factory=dict)  # file name -> drawing
 

@@ -19,7 +19,7 @@ README, PUBLISHED = ROOT / "README.md", ROOT / "docs/results"
 ROW = re.compile(r"^\| \[`([a-z0-9-]+)`\]\(docs/results/\1\.md\) \| (.+?) \|.*$", re.MULTILINE)
 
 
-class NoFinding(LookupError):
+class UnknownRowError(LookupError):
     """A page has no number of that name; the sentence says which are near."""
 
 
@@ -38,7 +38,7 @@ def row(name: str, what: str) -> str:
     found = {one["what"]: one for one in results(name)["findings"]}
     if what not in found:
         near = "; ".join(get_close_matches(what, found, n=3, cutoff=0)) or "nothing"
-        raise NoFinding(f"{name} has no row '{what}'. Near it: {near}.")
+        raise UnknownRowError(f"{name} has no row '{what}'. Near it: {near}.")
     one = found[what]
     cells = (f"[`{name}`](docs/results/{name}.md)", what, one["paper"], one["ours"], AGREES[one["agrees"]])
     return f"| {' | '.join(cells)} |"
@@ -67,5 +67,5 @@ def _write(readme: Path) -> None:
 if __name__ == "__main__":
     try:
         _write(README)
-    except NoFinding as error:
+    except UnknownRowError as error:
         raise SystemExit(f"README.md: {error}") from None

@@ -17,7 +17,7 @@ from parenting.experiments.reward_hacking import VARIANTS
 from parenting.experiments.safety_claims import BORN
 from parenting.experiments.spec import Asked
 from parenting.experiments.value_iteration import KINDS
-from tests.readme import PUBLISHED, README, NoFinding, anew, results, row, shown
+from tests.readme import PUBLISHED, README, UnknownRowError, anew, results, row, shown
 
 NAMES = sorted(path.parent.name for path in PUBLISHED.glob(f"*/{RESULTS}"))
 LIST = (PUBLISHED / "README.md").read_text(encoding="utf-8")
@@ -130,5 +130,5 @@ def test_an_old_number_is_made_anew_and_a_lost_one_is_named() -> None:
     start = f"| [`{name}`](docs/results/{name}.md) | {first} |"
     assert anew(f"before\n{start} lost | 1 | yes |\nafter\n") == f"before\n{row(name, first)}\nafter\n"
     assert anew(start) == row(name, first)
-    with pytest.raises(NoFinding, match=f"Near it: .*{re.escape(first)}"):
+    with pytest.raises(UnknownRowError, match=f"Near it: .*{re.escape(first)}"):
         row(name, f"{first}!")

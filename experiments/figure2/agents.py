@@ -8,7 +8,7 @@ from statistics import fmean
 
 from parenting.evaluation.rollouts import EPISODES
 from parenting.experiments.figure2.rows import MANY, Range, among, kinds, line, of, watered, where
-from parenting.experiments.reporting.comparison import SILENT, Finding, spread
+from parenting.experiments.reporting.comparison import SILENT, Comparison, mean_sd
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.gardens import EPISODE
 
@@ -18,7 +18,7 @@ LAST = 4
 """The paper's last T."""
 
 
-def lives(rows: Sequence[Row]) -> list[Finding]:
+def lives(rows: Sequence[Row]) -> list[Comparison]:
     """Every life at every milestone, and whether it rises; not that whose stages are not alike."""
     found = []
     for name, level, inside in kinds(rows):
@@ -30,19 +30,19 @@ def lives(rows: Sequence[Row]) -> list[Finding]:
     return found
 
 
-def _stage(name: str, mine: Sequence[Row], rows: Sequence[Row]) -> Finding:
+def _stage(name: str, mine: Sequence[Row], rows: Sequence[Row]) -> Comparison:
     """All trials at one milestone. At T = 1 the paper's agent is above its parent."""
     first, there = mine[0], [row for row in mine if row["there"]]
     what = f"{where(first)}: {name}, T = {first['stage']}, {first['queries']} queries in all"
     if not there:
-        return Finding(what, SILENT, SILENT, note=f"0 of {len(mine)} trials came so far")
+        return Comparison(what, SILENT, SILENT, note=f"0 of {len(mine)} trials came so far")
     parent, interval = line(rows, "parent", first), watered(there)
     values = [row["waterings"] for row in there]
     claimed = parent is not None and first["stage"] == 1
-    return Finding(
+    return Comparison(
         what,
         "above its parent" if claimed else SILENT,
-        spread(values),
+        mean_sd(values),
         difference="" if parent is None else f"{fmean(values) - parent:+.2f} on its parent",
         interval=_shown(interval),
         agrees=interval.above(parent) if claimed and parent is not None and interval else None,
@@ -60,7 +60,7 @@ def _note(there: Sequence[Row], trials: int, ahead: float | None) -> str:
     return "; ".join(filter(None, said))
 
 
-def _rise(name: str, mine: Sequence[Row]) -> Finding:
+def _rise(name: str, mine: Sequence[Row]) -> Comparison:
     """Does it rise with T? From T = 1 to the paper's last T, or the last there is before, trial by trial."""
     stages = sorted({row["stage"] for row in mine if row["stage"] <= LAST})
     first, last = (
@@ -70,10 +70,10 @@ def _rise(name: str, mine: Sequence[Row]) -> Finding:
     both = [(first[trial], last[trial]) for trial in last if trial in first]
     gains = [after["waterings"] - before["waterings"] for before, after in both]
     interval = among(gains, fmean(hypot(*(row["error"] for row in pair)) for pair in both)) if both else None
-    return Finding(
+    return Comparison(
         f"{where(mine[0])}: {name}, what T = {stages[-1]} adds to T = {stages[0]}",
         "rises",
-        spread(gains),
+        mean_sd(gains),
         interval=_shown(interval),
         agrees=interval.above(0) if interval else None,
     )
@@ -83,7 +83,7 @@ def _shown(interval: Range | None) -> str:
     return "" if interval is None else str(interval)
 
 
-def enough(rows: Sequence[Row]) -> list[Finding]:
+def enough(rows: Sequence[Row]) -> list[Comparison]:
     """How many queries at T = 1 would bring the learnt agent near the look-ahead."""
     mine = [row for row in of(rows, MANY) if row["stage"] == 1 and row["there"]]
     ahead = line(rows, "look-ahead", mine[0]) if mine else None
@@ -95,7 +95,7 @@ def enough(rows: Sequence[Row]) -> list[Finding]:
         points.append((queries, 1 - mean / ahead))
     said = ", ".join(f"{100 * gap:.1f} % at {queries}" for queries, gap in points)
     return [
-        Finding(
+        Comparison(
             f"{where(mine[0])}: {MANY}, queries for {100 * (1 - NEAR):.0f} % of the look-ahead, T = 1",
             SILENT,
             extrapolated(points, 1 - NEAR),

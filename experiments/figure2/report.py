@@ -11,7 +11,7 @@ from parenting.experiments.figure2.agents import NEAR, enough, lives
 from parenting.experiments.figure2.plot import draw
 from parenting.experiments.figure2.prose import words
 from parenting.experiments.figure2.rows import among, around, line, of, where
-from parenting.experiments.reporting.comparison import SILENT, Finding, spread
+from parenting.experiments.reporting.comparison import SILENT, Comparison, mean_sd
 from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import Report
 
@@ -41,15 +41,15 @@ def report(rows: Sequence[Row], raised: Mapping[str, Life], against: Lines) -> R
     return Report(findings, words(raised, against), {"maturation": lambda figure: draw(figure, rows)})
 
 
-def _parents(rows: Sequence[Row]) -> list[Finding]:
+def _parents(rows: Sequence[Row]) -> list[Comparison]:
     what = "the parent's own policy"
     return [
-        Finding(f"{where(row)}: {what}", "about 2", f"{row['waterings']:.2f}", note="exact")
+        Comparison(f"{where(row)}: {what}", "about 2", f"{row['waterings']:.2f}", note="exact")
         for row in of(rows, "parent")
     ]
 
 
-def _gradients(rows: Sequence[Row]) -> list[Finding]:
+def _gradients(rows: Sequence[Row]) -> list[Comparison]:
     """At the last of their gradient steps, and whether they are still rising."""
     every = of(rows, "policy gradients")
     before, last = sorted({row["steps"] for row in every})[-2:]
@@ -59,30 +59,30 @@ def _gradients(rows: Sequence[Row]) -> list[Finding]:
     ]
 
 
-def _gradient(level: str, mine: Sequence[Row], before: int, last: int) -> Finding:
+def _gradient(level: str, mine: Sequence[Row], before: int, last: int) -> Comparison:
     ended = [row for row in mine if row["steps"] == last]
     values = [row["waterings"] for row in ended]
     earlier = fmean(row["waterings"] for row in mine if row["steps"] == before)
     interval = among(values, fmean(row["error"] for row in ended))
-    return Finding(
+    return Comparison(
         f"{level}: policy gradients without a bucket",
         f"above {ABOVE:.0f}",
-        spread(values),
+        mean_sd(values),
         interval="" if interval is None else str(interval),
         agrees=interval.above(ABOVE) if interval else None,
         note=f"best {max(values):.2f}; {earlier:.2f} at {before} of {last} gradient steps",
     )
 
 
-def _aheads(rows: Sequence[Row]) -> list[Finding]:
+def _aheads(rows: Sequence[Row]) -> list[Comparison]:
     return [_ahead(row) for row in of(rows, "look-ahead")]
 
 
-def _ahead(row: Row) -> Finding:
+def _ahead(row: Row) -> Comparison:
     """Beside our first table, which knows the first parent alone."""
     number, known = row["stage"], row["inside"] == "up-down"
     first = FIRST[row["level"]][number - 1] if known else None
-    return Finding(
+    return Comparison(
         f"{where(row)}: exact look-ahead, T = {number}",
         SILENT if first is None else f"{first} (our first table)",
         f"{row['waterings']:.2f}",
@@ -98,15 +98,15 @@ def _same(row: Row, first: float, error: float) -> bool:
     return bool(abs(row["waterings"] - first) <= 3 * hypot(row["error"], error))
 
 
-def _covers(rows: Sequence[Row]) -> list[Finding]:
+def _covers(rows: Sequence[Row]) -> list[Comparison]:
     return [_cover(row, line(rows, "look-ahead", row)) for row in of(rows, "coverage")]
 
 
-def _cover(row: Row, ahead: float | None) -> Finding:
+def _cover(row: Row, ahead: float | None) -> Comparison:
     """An agent without a want of queries: beside the look-ahead in its own weather, and in fresh weather."""
     interval = around(row["waterings"], row["error"])
     beside = "" if ahead is None else f", {100 * row['fresh'] / ahead:.0f} % of the look-ahead's {ahead:.2f}"
-    return Finding(
+    return Comparison(
         f"{where(row)}: coverage agent, T = {row['stage']}",
         f"within {100 * (1 - NEAR):.0f} % of {row['ahead']:.2f} (look-ahead)",
         f"{row['waterings']:.2f}",

@@ -9,8 +9,13 @@ from statistics import fmean, median
 from typing import NamedTuple
 
 from parenting.experiments.figure3.tasks import TOGETHER
-from parenting.experiments.reporting.comparison import LOST, SILENT, Finding, spread
-from parenting.experiments.reporting.statistics import fewer, independent, median_interval, pairs_interval
+from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison, mean_sd
+from parenting.experiments.reporting.statistics import (
+    auc_interval,
+    effective_sample_size,
+    mann_whitney_auc,
+    median_interval,
+)
 from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import CHUNK
 
@@ -21,7 +26,7 @@ CORES, GPU = 100, 50
 TWICE = ", comparing twice"
 
 
-def findings(taught: Mapping[str, int], whole: str, rows: Sequence[Row], device: str) -> list[Finding]:
+def findings(taught: Mapping[str, int], whole: str, rows: Sequence[Row], device: str) -> list[Comparison]:
     """Of all curves: their queries, whether each needs fewer than those before, and what they cost.
 
     `taught` says in how many levels the agents of each curve were pre-parented. The curves come in the
@@ -57,7 +62,7 @@ class Of(NamedTuple):
     @property
     def worth(self) -> float:
         """How many independent trials these are."""
-        return independent(self.queries, [row["agent"] for row in self.trials])
+        return effective_sample_size(self.queries, [row["agent"] for row in self.trials])
 
     @property
     def premise(self) -> str:
@@ -78,21 +83,23 @@ def trials_of(name: str, twice: bool, rows: Sequence[Row]) -> list[Row]:
     return [row for row in mine if row["recompare"] == twice]
 
 
-def _of_levels(rows: Sequence[Row]) -> list[Finding]:
+def _of_levels(rows: Sequence[Row]) -> list[Comparison]:
     levels = [row for row in rows if row["of"] == "level"]
     drawn, harm = max(row["drawn"] for row in levels), sum(row["outcome"] == "stuck" for row in levels)
     tempting = sum(row["tempts"] for row in levels)
     return [
-        Finding("levels", "50" if len(levels) == 50 else SILENT, f"{len(levels)}", note=f"of {drawn} drawn"),
-        Finding("dropped: the pre-trained agent solves them", SILENT, f"{drawn - len(levels)} of {drawn}"),
-        Finding("levels that tempt: the shortest way is unsafe", SILENT, f"{tempting} of {len(levels)}"),
-        Finding(
+        Comparison(
+            "levels", "50" if len(levels) == 50 else SILENT, f"{len(levels)}", note=f"of {drawn} drawn"
+        ),
+        Comparison("dropped: the pre-trained agent solves them", SILENT, f"{drawn - len(levels)} of {drawn}"),
+        Comparison("levels that tempt: the shortest way is unsafe", SILENT, f"{tempting} of {len(levels)}"),
+        Comparison(
             "levels where the pre-trained policy leaves the box stuck", SILENT, f"{harm} of {len(levels)}"
         ),
     ]
 
 
-def _queries(one: Of) -> Finding:
+def _queries(one: Of) -> Comparison:
     done = [row["queries"] for row in one.trials if row["finished"]]
     left = len(one.trials) - len(done)
     notes = [
@@ -101,7 +108,7 @@ def _queries(one: Of) -> Finding:
         one.premise,
     ]
     low, high = median_interval(one.queries, one.worth)
-    return Finding(
+    return Comparison(
         what=f"queries at the median, {one.name}",
         paper=LOST,
         ours=_number(median(one.queries)),
@@ -114,12 +121,12 @@ def _number(queries: float) -> str:
     return f"{queries:g}" if queries < inf else "not reached"
 
 
-def _fewer(later: Of, earlier: Of) -> Finding:
-    share = fewer(later.queries, earlier.queries)
-    low, high = pairs_interval(share, later.worth, earlier.worth)
+def _fewer(later: Of, earlier: Of) -> Comparison:
+    share = mann_whitney_auc(later.queries, earlier.queries)
+    low, high = auc_interval(share, later.worth, earlier.worth)
     apart = not low <= 0.5 <= high
     premise = later.premise or earlier.premise
-    return Finding(
+    return Comparison(
         what=f"{later.name} needs fewer queries than {earlier.name.removesuffix(TWICE)}",
         paper="yes",
         ours=f"in {100 * share:.0f} % of pairs of trials",
@@ -129,24 +136,24 @@ def _fewer(later: Of, earlier: Of) -> Finding:
     )
 
 
-def _before(rows: Sequence[Row]) -> list[Finding]:
+def _before(rows: Sequence[Row]) -> list[Comparison]:
     """What pre-parenting itself took; its queries are in no curve."""
     found = []
     for worlds, twice in dict.fromkeys((row["worlds"], row["recompare"]) for row in rows):
         agents = [row for row in rows if (row["worlds"], row["recompare"]) == (worlds, twice)]
         done = [row["queries"] for row in agents if row["finished"]]
         found.append(
-            Finding(
+            Comparison(
                 what=f"queries of pre-parenting, N = {worlds}{TWICE * twice}",
                 paper=SILENT,
-                ours=spread(done),
+                ours=mean_sd(done),
                 note=f"{len(agents) - len(done)} of {len(agents)} agents unfinished",
             )
         )
     return found
 
 
-def _projected(rows: Sequence[Row], device: str) -> list[Finding]:
+def _projected(rows: Sequence[Row], device: str) -> list[Comparison]:
     """The paper's number of trials, of every curve that was run, by the seconds that these took."""
     groups: dict[tuple[str, bool], list[float]] = {}
     for row in rows:
@@ -157,12 +164,12 @@ def _projected(rows: Sequence[Row], device: str) -> list[Finding]:
     longest = TOGETHER * max(before) + CHUNK * max(map(fmean, groups.values()))  # these wait for each other
     what = f"{GOAL} trials of each of the {len(groups)} curves would take"
     if device != "cpu":
-        return [Finding(f"{what}, on this GPU", SILENT, duration(all_of_it))]
+        return [Comparison(f"{what}, on this GPU", SILENT, duration(all_of_it))]
     supposed = f"none was there to try it; supposed: it does the work of {GPU} cores"
     return [
-        Finding(f"{what}, on two cores", SILENT, duration(all_of_it / 2)),
-        Finding(f"{what}, on {CORES} cores", SILENT, duration(longest + all_of_it / CORES)),
-        Finding(f"{what}, on one GPU", SILENT, duration(all_of_it / GPU), note=supposed),
+        Comparison(f"{what}, on two cores", SILENT, duration(all_of_it / 2)),
+        Comparison(f"{what}, on {CORES} cores", SILENT, duration(longest + all_of_it / CORES)),
+        Comparison(f"{what}, on one GPU", SILENT, duration(all_of_it / GPU), note=supposed),
     ]
 
 

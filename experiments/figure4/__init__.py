@@ -18,7 +18,7 @@ from parenting.experiments.figure4.reward_model import (
     preferences,
     random_pairs,
 )
-from parenting.experiments.reporting.comparison import SILENT, Finding
+from parenting.experiments.reporting.comparison import SILENT, Comparison
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Asked, Experiment, Report
 
@@ -98,16 +98,18 @@ def _at(rows: Sequence[Row], of: str, shift: float) -> list[Row]:
     return [row for row in rows if row["of"] == of and row["shift"] == shift]
 
 
-def _sum(what: str, paper: str, ours: float) -> Finding:
-    return Finding(what, paper, f"{ours:g}", f"{ours - float(paper):+g}", agrees=ours == float(paper))
+def _sum(what: str, paper: str, ours: float) -> Comparison:
+    return Comparison(what, paper, f"{ours:g}", f"{ours - float(paper):+g}", agrees=ours == float(paper))
 
 
-def _planner(what: str, paper: str, rows: Sequence[Row]) -> Finding:
+def _planner(what: str, paper: str, rows: Sequence[Row]) -> Comparison:
     harms = sum(row["harms"] for row in rows)
     safe = sum(row["arrives"] and not row["harms"] for row in rows)
     ours = f"{harms} of {len(rows)} do harm, {safe} arrive safely"
     agrees = None if paper == SILENT else (harms if paper == "harm" else safe) == len(rows)
-    return Finding(what, paper, ours, agrees=agrees, note=f"the way of trial 0: {shortened(rows[0]['way'])}")
+    return Comparison(
+        what, paper, ours, agrees=agrees, note=f"the way of trial 0: {shortened(rows[0]['way'])}"
+    )
 
 
 def shortened(way: str) -> str:
@@ -117,13 +119,13 @@ def shortened(way: str) -> str:
     return said.replace(", , ", ", ").strip(", ")
 
 
-def _loss(rows: Sequence[Row]) -> Finding:
+def _loss(rows: Sequence[Row]) -> Comparison:
     """Eq. (12): no preference tells the shifted models apart."""
     fitted = [row for row in rows if row["of"] == "fitted"]
     trials = {row["trial"] for row in fitted}
     losses = [[row["loss"] for row in fitted if row["trial"] == trial] for trial in trials]
     most = max(max(each) - min(each) for each in losses)
-    return Finding("Eq. (12): the loss of all shifts differs by", "0", f"{most:.1e}", agrees=most < 1e-12)
+    return Comparison("Eq. (12): the loss of all shifts differs by", "0", f"{most:.1e}", agrees=most < 1e-12)
 
 
 def _draw(figure: Figure, rows: Sequence[Row]) -> None:

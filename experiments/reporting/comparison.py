@@ -19,7 +19,7 @@ NEVER = "never"
 
 
 @dataclass(frozen=True)
-class Finding:
+class Comparison:
     """One number or claim of the paper, and ours."""
 
     what: str
@@ -35,7 +35,7 @@ class Finding:
         return asdict(self)
 
 
-def spread(values: Sequence[float]) -> str:
+def mean_sd(values: Sequence[float]) -> str:
     """Mean +- standard deviation, over n - 1."""
     if not values:
         return "-"
@@ -62,22 +62,22 @@ def difference_interval(more: Sequence[float], less: Sequence[float]) -> tuple[f
     return difference - half, difference + half
 
 
-def between(values: Sequence[float]) -> str:
+def ci_text(values: Sequence[float]) -> str:
     """The interval of a mean as it is shown; empty where there is none."""
-    return shown(mean_interval(values))
+    return format_interval(mean_interval(values))
 
 
-def shown(interval: tuple[float, float] | None) -> str:
+def format_interval(interval: tuple[float, float] | None) -> str:
     """An interval in words; none is an empty one."""
     return "" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
 
 
-def mean_finding(what: str, values: Sequence[float], note: str = "") -> Finding:
+def compare_mean(what: str, values: Sequence[float], note: str = "") -> Comparison:
     """A mean with its deviation and interval, of which the paper says nothing."""
-    return Finding(what=what, paper=SILENT, ours=spread(values), interval=between(values), note=note)
+    return Comparison(what=what, paper=SILENT, ours=mean_sd(values), interval=ci_text(values), note=note)
 
 
-def share_interval(hits: int, trials: int) -> tuple[float, float]:
+def proportion_interval(hits: int, trials: int) -> tuple[float, float]:
     """The 95 % confidence interval of a share, by Wilson's score: it holds for 0 of n, too.
 
     Raises:
@@ -91,15 +91,15 @@ def share_interval(hits: int, trials: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def count_finding(what: str, paper: int | str, hits: int, trials: int, note: str = "") -> Finding:
+def compare_count(what: str, paper: int | str, hits: int, trials: int, note: str = "") -> Comparison:
     """A count of trials beside the paper's, which is of 100, or NEVER, LOST or SILENT; it agrees where both
     are the same share.
 
     The difference is in points: what share of 100 trials ours is, less the paper's.
     """
-    low, high = share_interval(hits, trials)
+    low, high = proportion_interval(hits, trials)
     number = 0 if paper == NEVER else paper
-    return Finding(
+    return Comparison(
         what=what,
         paper=paper if isinstance(paper, str) else f"{paper} of 100",
         ours=f"{hits} of {trials}",

@@ -19,7 +19,7 @@ from markupsafe import Markup, escape
 from pydantic import BaseModel, ValidationError
 
 from parenting.experiments.registry import NAMES, experiment
-from parenting.experiments.reporting.comparison import LOST, SILENT, Finding
+from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison
 from parenting.experiments.reporting.markdown import RESULTS, TRIALS
 from parenting.experiments.spec import Asked
 
@@ -45,7 +45,7 @@ class Results(BaseModel):
     section: str
     claim: str
     asked: Asked
-    findings: list[Finding]
+    findings: list[Comparison]
     words: list[str]
     command: str
     commit: str | None  # of the page
@@ -103,7 +103,7 @@ def report(out: Path) -> Path:
     return path
 
 
-def verdict(finding: Finding) -> str:
+def verdict(finding: Comparison) -> str:
     """What a row says of the paper."""
     if finding.agrees is not None:
         return YES if finding.agrees else NO

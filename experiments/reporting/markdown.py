@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import torch
 
-from parenting.experiments.reporting.comparison import Finding
+from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner import provenance
 from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import Asked, Experiment, Report
@@ -106,7 +106,7 @@ def page(results: dict[str, Any], figures: Sequence[str]) -> str:
     """The page of docs/results: the paper's numbers, ours, and how to make them again."""
     asked, name = results["asked"], results["name"]
     lines = [f"# {results['title']}", "", f"Sec. {results['section']}. {results['claim']}", ""]
-    lines += _table([Finding(**found) for found in results["findings"]])
+    lines += _table([Comparison(**found) for found in results["findings"]])
     for figure in figures:
         lines += ["", f"![{results['title']}: {figure}]({name}/{figure}.svg)"]
     lines += ["", *(line for words in results["words"] for line in (words, ""))]
@@ -138,7 +138,7 @@ def _where(results: dict[str, Any]) -> str:
     return f"Raised with `--device {results['asked']['device']}`, {tried}."
 
 
-def _table(findings: Sequence[Finding]) -> list[str]:
+def _table(findings: Sequence[Comparison]) -> list[str]:
     lines = [f"| {' | '.join(HEADS)} |", "|" + "---|" * len(HEADS)]
     for one in findings:
         what = f"{one.what} ({one.note})" if one.note else one.what

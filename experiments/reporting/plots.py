@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
-from parenting.experiments.reporting.comparison import share_interval
+from parenting.experiments.reporting.comparison import proportion_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 COLOUR, GREY, PAPER = "#0072b2", "#b0b0b0", "#d55e00"
 
 
-class Share(NamedTuple):
+class Proportion(NamedTuple):
     """A count of trials of an arm, and the share of them that the paper has, if it has one."""
 
     of: str
@@ -25,7 +25,7 @@ class Share(NamedTuple):
     paper: float | None = None
 
 
-def spreads(
+def box_plots(
     figure: Figure,
     groups: Mapping[str, Sequence[float]],
     label: str,
@@ -60,18 +60,18 @@ def spreads(
     figure.legend(loc="outside lower center")
 
 
-def shares(figure: Figure, counts: Sequence[Share]) -> None:
+def plot_proportions(figure: Figure, counts: Sequence[Proportion]) -> None:
     """A point for each count with its 95 % interval, as a share of the trials; a bar where the paper is.
 
     The counts of an arm, one after the other, stand below its name.
     """
-    lines: list[Share | str] = []
+    lines: list[Proportion | str] = []
     for of, mine in groupby(counts, lambda one: one.of):
         lines += [of, *mine]
     figure.set_size_inches(8, 1.1 + 0.26 * len(lines))
     axes = figure.subplots()
     for row, one in enumerate(lines):
-        if isinstance(one, Share):
+        if isinstance(one, Proportion):
             _share(axes, row, one)
     _name(axes, lines)
     axes.set_xlim(-2, 102)
@@ -82,15 +82,15 @@ def shares(figure: Figure, counts: Sequence[Share]) -> None:
     figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=2)
 
 
-def _share(axes: Axes, row: int, one: Share) -> None:
-    low, high = share_interval(one.hits, one.trials)
+def _share(axes: Axes, row: int, one: Proportion) -> None:
+    low, high = proportion_interval(one.hits, one.trials)
     axes.plot([100 * low, 100 * high], [row, row], color=COLOUR, linewidth=1)
     axes.plot(100 * one.hits / one.trials, row, "o", color=COLOUR, markersize=4, label="ours")
     if one.paper is not None:
         axes.plot(100 * one.paper, row, "|", color=PAPER, markersize=14, label="the paper")
 
 
-def _name(axes: Axes, lines: Sequence[Share | str]) -> None:
+def _name(axes: Axes, lines: Sequence[Proportion | str]) -> None:
     """From top to bottom, arms in bold."""
     axes.set_yticks(range(len(lines)), [one if isinstance(one, str) else one.what for one in lines])
     for label, one in zip(axes.get_yticklabels(), lines, strict=True):

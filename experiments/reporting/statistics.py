@@ -10,15 +10,15 @@ from statistics import fmean
 from parenting.experiments.reporting.comparison import Z
 
 
-def fewer(some: Sequence[float], others: Sequence[float]) -> float:
+def mann_whitney_auc(some: Sequence[float], others: Sequence[float]) -> float:
     """How often one of `some` is less than one of `others`, ties counted half (Mann and Whitney's U / mn)."""
     other = sorted(others)
     below = [bisect_left(other, x) + bisect_right(other, x) for x in some]
     return 1 - sum(below) / (2 * len(some) * len(other))
 
 
-def pairs_interval(share: float, m: float, n: float) -> tuple[float, float]:
-    """The 95 % interval of `fewer` for m and n trials: Newcombe's score interval (2006, method 5).
+def auc_interval(share: float, m: float, n: float) -> tuple[float, float]:
+    """The 95 % interval of `mann_whitney_auc` for m and n trials: Newcombe's score interval (2006, method 5).
 
     It ends where a true share would lie Z of its own deviations away; so it holds for a share of 1, too.
     """
@@ -51,7 +51,7 @@ def _edge(outside: Callable[[float], bool], inside: float, end: float) -> float:
     return inside
 
 
-def independent(values: Sequence[float], agents: Sequence[int | None]) -> float:
+def effective_sample_size(values: Sequence[float], agents: Sequence[int | None]) -> float:
     """How many independent trials these are worth, each of which goes on from an agent, or from none.
 
     n / (1 + (n / k - 1) c) for k agents: Kish's design effect. c is the share of the agents in the variance

@@ -12,8 +12,8 @@ from parenting.envs import registry
 from parenting.envs.rng import keys
 from parenting.evaluation.rollouts import deploy
 from parenting.experiments.pretrained import weights_of
-from parenting.experiments.reporting.comparison import Finding
-from parenting.experiments.reporting.plots import Share, shares
+from parenting.experiments.reporting.comparison import Comparison
+from parenting.experiments.reporting.plots import Proportion, plot_proportions
 from parenting.experiments.reward_hacking.report import EPISODES, STEPS, WORDS, counts, drawn, means
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Asked, Experiment, Report, spans
@@ -116,7 +116,7 @@ def _task(name: str, span: range, asked: Asked) -> Task:
 
 
 def _report(asked: Asked, rows: Sequence[Row]) -> Report:
-    findings, shown = list[Finding](), list[Share]()
+    findings, shown = list[Comparison](), list[Proportion]()
     for name, of in VARIANTS.items():
         milestones = _milestones(of, asked)
         for queries in milestones:
@@ -125,7 +125,7 @@ def _report(asked: Asked, rows: Sequence[Row]) -> Report:
         last = [row for row in mine if row["there"]]
         findings += means(what := f"{name}, after {milestones[-1]} queries", of.level, last)
         shown += drawn(what, last)
-    return Report(findings, WORDS, {"shares": lambda figure: shares(figure, shown)})
+    return Report(findings, WORDS, {"shares": lambda figure: plot_proportions(figure, shown)})
 
 
 EXPERIMENT = Experiment(

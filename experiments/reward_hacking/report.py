@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from parenting.experiments.reporting.comparison import NEVER, Finding, count_finding, mean_finding
-from parenting.experiments.reporting.plots import Share
+from parenting.experiments.reporting.comparison import NEVER, Comparison, compare_count, compare_mean
+from parenting.experiments.reporting.plots import Proportion
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.gardens import GAMMA, garden
 from parenting.parents.garden_values import Garden
@@ -20,7 +20,7 @@ EPISODES = 100
 SETTLE = "settle in the bucket"
 
 
-def counts(what: str, every: Sequence[Row]) -> Iterator[Finding]:
+def counts(what: str, every: Sequence[Row]) -> Iterator[Comparison]:
     """What the paper claims, that no policy hacks the reward: none settles in the bucket; or, read strictly,
     none steps into it at all.
     """
@@ -28,22 +28,22 @@ def counts(what: str, every: Sequence[Row]) -> Iterator[Finding]:
     left = len(every) - len(rows)
     note = f"{left} of {len(every)} trials did not come so far" if left else ""
     if not rows:
-        yield Finding(f"{what}: {SETTLE}", NEVER, "-", note=note)
+        yield Comparison(f"{what}: {SETTLE}", NEVER, "-", note=note)
         return
     ends = _episodes(rows, f"caught_{STEPS[-1]}", "end there")
-    yield count_finding(f"{what}: {SETTLE}", NEVER, _settled(rows), len(rows), _both(note, ends))
+    yield compare_count(f"{what}: {SETTLE}", NEVER, _settled(rows), len(rows), _both(note, ends))
     for steps in STEPS:
         column = f"bucket_{steps}"
         some = _both(note, _episodes(rows, column, "do"))
-        yield count_finding(f"{what}: {_step_in(steps)}", NEVER, _any(rows, column), len(rows), some)
+        yield compare_count(f"{what}: {_step_in(steps)}", NEVER, _any(rows, column), len(rows), some)
 
 
-def drawn(what: str, rows: Sequence[Row]) -> Iterator[Share]:
+def drawn(what: str, rows: Sequence[Row]) -> Iterator[Proportion]:
     """The same counts of policies that came so far, to be drawn; nothing of none."""
     if rows:
-        yield Share(what, SETTLE, _settled(rows), len(rows), 0.0)
+        yield Proportion(what, SETTLE, _settled(rows), len(rows), 0.0)
         for steps in STEPS:
-            yield Share(what, _step_in(steps), _any(rows, f"bucket_{steps}"), len(rows), 0.0)
+            yield Proportion(what, _step_in(steps), _any(rows, f"bucket_{steps}"), len(rows), 0.0)
 
 
 def _step_in(steps: int) -> str:
@@ -69,18 +69,18 @@ def _both(*notes: str) -> str:
     return "; ".join(filter(None, notes))
 
 
-def means(what: str, level: str, rows: Sequence[Row]) -> list[Finding]:
+def means(what: str, level: str, rows: Sequence[Row]) -> list[Comparison]:
     """Waterings of the policies, and steps into the bucket of the agents on their way."""
     deaths = [row["deaths"] for row in rows]
     waterings = [_waterings(what, level, steps, rows) for steps in STEPS]
-    return [*waterings, mean_finding(f"{what}: steps into the bucket while parented", deaths)]
+    return [*waterings, compare_mean(f"{what}: steps into the bucket while parented", deaths)]
 
 
-def _waterings(what: str, level: str, steps: int, rows: Sequence[Row]) -> Finding:
+def _waterings(what: str, level: str, steps: int, rows: Sequence[Row]) -> Comparison:
     parent = float(Garden(garden(level, steps), GAMMA).waterings(steps)[0])
     note = f"the parent's own policy: {parent:.2f}"
     values = [row[f"waterings_{steps}"] for row in rows]
-    return mean_finding(f"{what}: waterings in {steps} steps", values, note)
+    return compare_mean(f"{what}: waterings in {steps} steps", values, note)
 
 
 WORDS = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from parenting.experiments.reporting.plots import spreads
+from parenting.experiments.reporting.plots import box_plots
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Asked, Experiment, Report, spans
 from parenting.experiments.table1.report import (
@@ -57,7 +57,7 @@ def _report(asked: Asked, rows: Sequence[Row]) -> Report:
     deaths = {one.title: done(one, rows, "deaths") for one in ALGORITHMS}
     paper = {one.title: span for one in ALGORITHMS if (span := reach(one.deaths))}
     label = "deaths before the optimal policy"
-    return Report(findings, WORDS, {"deaths": lambda figure: spreads(figure, deaths, label, paper)})
+    return Report(findings, WORDS, {"deaths": lambda figure: box_plots(figure, deaths, label, paper)})
 
 
 WORDS = (

@@ -10,13 +10,13 @@ from typing import NamedTuple
 from parenting.experiments.reporting.comparison import (
     LOST,
     SILENT,
-    Finding,
-    between,
-    count_finding,
+    Comparison,
+    ci_text,
+    compare_count,
     difference_interval,
+    format_interval,
     mean_interval,
-    shown,
-    spread,
+    mean_sd,
 )
 from parenting.experiments.runner.store import Row
 
@@ -49,7 +49,7 @@ def done(one: Algorithm, rows: Sequence[Row], column: str) -> list[float]:
     return [row[column] for row in rows if row["of"] == one.name and row["finished"]]
 
 
-def cells(one: Algorithm, rows: Sequence[Row]) -> list[Finding]:
+def cells(one: Algorithm, rows: Sequence[Row]) -> list[Comparison]:
     """A row of the table: the cells that the paper has, and ours of the rows of that algorithm."""
     mine = [row for row in rows if row["of"] == one.name]
     left = sum(not row["finished"] for row in mine)
@@ -58,15 +58,15 @@ def cells(one: Algorithm, rows: Sequence[Row]) -> list[Finding]:
     return [_cell(one, name, paper, done(one, rows, name), note) for name, paper in columns if paper != "-"]
 
 
-def _cell(one: Algorithm, name: str, paper: str, values: Sequence[float], note: str) -> Finding:
+def _cell(one: Algorithm, name: str, paper: str, values: Sequence[float], note: str) -> Comparison:
     legible = _legible(paper)
     once = f"{sum(value <= 1 for value in values)} of {len(values)} trials died at most once"
-    return Finding(
+    return Comparison(
         what=f"{one.title}: {name}",
         paper=paper,
-        ours=spread(values),
+        ours=mean_sd(values),
         difference=f"{fmean(values) - legible[0]:+.1f}" if legible and values else "",
-        interval=between(values),
+        interval=ci_text(values),
         agrees=_agrees(paper, values),
         note="; ".join(filter(None, (once if paper == SELDOM else "", note))),
     )
@@ -96,26 +96,26 @@ def _agrees(paper: str, values: Sequence[float]) -> bool | None:
     return interval[1] <= 1
 
 
-def order(rows: Sequence[Row]) -> list[Finding]:
+def order(rows: Sequence[Row]) -> list[Comparison]:
     """Whether each algorithm dies more often than the next one, by the difference of their means."""
     return [_more(more, less, rows) for more, less in pairwise(ALGORITHMS)]
 
 
-def _more(more: Algorithm, less: Algorithm, rows: Sequence[Row]) -> Finding:
+def _more(more: Algorithm, less: Algorithm, rows: Sequence[Row]) -> Comparison:
     one, other = (done(each, rows, "deaths") for each in (more, less))
     interval = difference_interval(one, other)
     lost = LOST in (more.deaths, less.deaths)
-    return Finding(
+    return Comparison(
         what=f"order: deaths by {more.title} less those by {less.title.lower()}",
         paper="above 0",
         ours=f"{fmean(one) - fmean(other):.2f}" if one and other else "-",
-        interval=shown(interval),
+        interval=format_interval(interval),
         agrees=None if interval is None or interval[0] <= 0 <= interval[1] else interval[0] > 0,
         note="the paper's number of lax parenting is lost; its place is our reading" if lost else "",
     )
 
 
-def born(rows: Sequence[Row]) -> Finding:
+def born(rows: Sequence[Row]) -> Comparison:
     """How many trials begin with an optimal policy: all algorithms begin with the same ones.
 
     A parented agent is judged after its first tick, which teaches nothing, and a policy that learns from
@@ -125,7 +125,7 @@ def born(rows: Sequence[Row]) -> Finding:
     optimal = {row["trial"] for row in mine if row["finished"] and row["ticks"] <= 1}
     trials = {row["trial"] for row in mine}
     note = "in the means of all four with no deaths and no queries"
-    return count_finding("trials that begin with an optimal policy", SILENT, len(optimal), len(trials), note)
+    return compare_count("trials that begin with an optimal policy", SILENT, len(optimal), len(trials), note)
 
 
 AGREEMENT = (

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
-from parenting.experiments.reporting.comparison import Finding, share_interval
+from parenting.experiments.reporting.comparison import Comparison, proportion_interval
 from parenting.experiments.reporting.plots import COLOUR
 from parenting.experiments.runner.store import Row
 from parenting.experiments.value_iteration.converge import CONFIG, CONVERGING, STAGES
@@ -44,14 +44,14 @@ def _hits(rows: Sequence[Row]) -> int:
     return sum(row["greedy"] == row["states"] for row in rows)
 
 
-def finding(kind: str, stage: int, rows: Sequence[Row]) -> Finding:
+def finding(kind: str, stage: int, rows: Sequence[Row]) -> Comparison:
     """Whether a stage made every policy greedy for V_T, and kept greedy those that were so before."""
     taught, already, left = lives(kind, stage, rows)
     hits, kept = _hits(taught), _hits(already)
-    low, high = share_interval(hits, len(taught)) if taught else (0.0, 1.0)
+    low, high = proportion_interval(hits, len(taught)) if taught else (0.0, 1.0)
     missed = hits < len(taught) or kept < len(already)
     note = f"{len(already)} others were so when it began, and {kept} stayed so"
-    return Finding(
+    return Comparison(
         what=f"{kind}: lives that stage {stage} makes greedy for V_{stage} in every state",
         paper="all",
         ours=f"{hits} of {len(taught)}",

@@ -26,8 +26,13 @@ from parenting.experiments.figure3.report import duration, findings
 from parenting.experiments.figure3.tasks import parent_some, pre_parent
 from parenting.experiments.figure3.transfer import POLICY, learnt, pack, take_along
 from parenting.experiments.pretrained import pretrained, weights_of
-from parenting.experiments.reporting.comparison import Finding
-from parenting.experiments.reporting.statistics import fewer, independent, median_interval, pairs_interval
+from parenting.experiments.reporting.comparison import Comparison
+from parenting.experiments.reporting.statistics import (
+    auc_interval,
+    effective_sample_size,
+    mann_whitney_auc,
+    median_interval,
+)
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training import batch
 from parenting.experiments.training.batch import Nursery, Until
@@ -126,27 +131,27 @@ def test_an_agent_goes_on_from_where_it_was_taught() -> None:
 
 def test_pairs_by_hand() -> None:
     """1 < 2, 1 < inf, 2 < inf, and 2 = 2 counts half."""
-    assert fewer([1, 2], [2, float("inf")]) == 3.5 / 4
-    assert fewer([float("inf")], [float("inf")]) == 0.5
+    assert mann_whitney_auc([1, 2], [2, float("inf")]) == 3.5 / 4
+    assert mann_whitney_auc([float("inf")], [float("inf")]) == 0.5
 
 
 def test_interval_of_pairs_by_hand() -> None:
     """One pair: (1 - t)^2 = Z^2 t (1 - t), so t = 1 / (1 + Z^2). Of many, at a half, sd = sqrt(1 / 6n)."""
-    assert pairs_interval(1.0, 1, 1) == pytest.approx((1 / (1 + 1.959964**2), 1), abs=1e-6)
-    assert pairs_interval(0.0, 1, 1) == pytest.approx((0, 1 - 1 / (1 + 1.959964**2)), abs=1e-6)
+    assert auc_interval(1.0, 1, 1) == pytest.approx((1 / (1 + 1.959964**2), 1), abs=1e-6)
+    assert auc_interval(0.0, 1, 1) == pytest.approx((0, 1 - 1 / (1 + 1.959964**2)), abs=1e-6)
     half = 1.959964 / (6 * 10_000) ** 0.5
-    assert pairs_interval(0.5, 10_000, 10_000) == pytest.approx((0.5 - half, 0.5 + half), abs=1e-4)
+    assert auc_interval(0.5, 10_000, 10_000) == pytest.approx((0.5 - half, 0.5 + half), abs=1e-4)
 
 
 def test_trials_that_share_an_agent_are_worth_less() -> None:
     """Two agents of two trials: all alike within is worth 2, all the difference within is worth 4."""
-    assert independent([1, 1, 2, 2], [0, 0, 1, 1]) == pytest.approx(2)
-    assert independent([1, 2, 1, 2], [0, 0, 1, 1]) == pytest.approx(4)
-    assert independent([1, 1, 2, 2], [None] * 4) == 4
-    assert independent([1, 2], [0, 1]) == 2
-    assert independent([1, 2], [0, 0]) == 1
+    assert effective_sample_size([1, 1, 2, 2], [0, 0, 1, 1]) == pytest.approx(2)
+    assert effective_sample_size([1, 2, 1, 2], [0, 0, 1, 1]) == pytest.approx(4)
+    assert effective_sample_size([1, 1, 2, 2], [None] * 4) == 4
+    assert effective_sample_size([1, 2], [0, 1]) == 2
+    assert effective_sample_size([1, 2], [0, 0]) == 1
     # between the agents 1, within them 2: so they differ by no more than their trials do
-    assert independent([1, 3, 2, 4], [0, 0, 1, 1]) == 4
+    assert effective_sample_size([1, 3, 2, 4], [0, 0, 1, 1]) == 4
 
 
 def trial(curve: str, queries: int, twice: bool = False, finished: bool = True) -> Row:
@@ -163,7 +168,7 @@ def taught(finished: bool = True, twice: bool = False) -> Row:
     return {**said, "queries": 7, "finished": finished}
 
 
-def said(rows: list[Row]) -> dict[str, Finding]:
+def said(rows: list[Row]) -> dict[str, Comparison]:
     worlds = {"none": 0, "few": 0, "many": 3, "all": 3}
     return {one.what: one for one in findings(worlds, "all", rows, "cpu")}
 

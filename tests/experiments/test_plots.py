@@ -6,14 +6,18 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from parenting.experiments.reporting.plots import Share, shares
+from parenting.experiments.reporting.plots import Proportion, plot_proportions
 
 
 def test_a_share_has_a_point_and_the_paper_a_bar() -> None:
     figure = Figure(layout="constrained")
-    shares(
+    plot_proportions(
         figure,
-        [Share("lax", "pressed", 1, 4, 0.0), Share("lax", "optimal", 3, 4), Share("fresh", "pressed", 0, 4)],
+        [
+            Proportion("lax", "pressed", 1, 4, 0.0),
+            Proportion("lax", "optimal", 3, 4),
+            Proportion("fresh", "pressed", 0, 4),
+        ],
     )
     (axes,) = figure.axes
     marked = [one for one in axes.lines if one.get_marker() != "None"]

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from parenting.commands.main import app
 from parenting.experiments.registry import NAMES
-from parenting.experiments.reporting.comparison import LOST, SILENT, Finding
+from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison
 from parenting.experiments.reporting.html import NO, NOTHING, OPEN, YES, NoResults, prose, report, verdict
 from parenting.experiments.spec import Asked
 
@@ -66,7 +66,7 @@ def test_it_loads_nothing_and_runs_nothing(out: Path) -> None:
 
 def test_what_others_wrote_is_escaped(out: Path) -> None:
     evil = "<b onclick=x>&\"'`<u>`*<u>*"
-    found = Finding(evil, evil, evil, evil, evil, None, evil).plain()
+    found = Comparison(evil, evil, evil, evil, evil, None, evil).plain()
     page = changed(out, title=evil, claim=evil, words=[evil], command=evil, commit=evil, findings=[found])
     assert "<b onclick" not in page
     assert "<u>" not in page
@@ -74,10 +74,10 @@ def test_what_others_wrote_is_escaped(out: Path) -> None:
 
 def test_the_summary_counts_the_rows_and_leads_to_them(out: Path) -> None:
     rows = [
-        *[Finding("a", "1", "1", agrees=True).plain()] * 5,
-        *[Finding("b", "never", "3", agrees=False).plain()] * 3,
-        *[Finding("c", "51", "40").plain()] * 2,
-        *[Finding("d", paper, "2").plain() for paper in (SILENT, LOST, LOST, LOST)],
+        *[Comparison("a", "1", "1", agrees=True).plain()] * 5,
+        *[Comparison("b", "never", "3", agrees=False).plain()] * 3,
+        *[Comparison("c", "51", "40").plain()] * 2,
+        *[Comparison("d", paper, "2").plain() for paper in (SILENT, LOST, LOST, LOST)],
     ]
     page = changed(out, findings=rows)
     (line,) = re.findall(r'<tr[^>]*><th[^>]*><a href="#figure4">.*?</tr>', page, re.DOTALL)
@@ -97,7 +97,7 @@ def test_the_summary_counts_the_rows_and_leads_to_them(out: Path) -> None:
     ],
 )
 def test_no_verdict_on_a_claim_is_not_the_papers_silence(paper: str, agrees: bool | None, said: str) -> None:
-    assert verdict(Finding("it", paper, "ours", agrees=agrees)) == said
+    assert verdict(Comparison("it", paper, "ours", agrees=agrees)) == said
 
 
 def test_what_is_not_done_is_said_with_its_command(out: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from parenting.agent.config import Config
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.experiments import reward_hacking
-from parenting.experiments.reporting.comparison import Finding
+from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.reward_hacking import EXPERIMENT, VARIANTS, bucket_some
 from parenting.experiments.reward_hacking.report import STEPS
 from parenting.experiments.spec import Asked
@@ -25,7 +25,7 @@ def row(trial: int, stepped: int, settled: int = 0, there: bool = True) -> dict[
     return {"of": NAME, "queries": 50, "trial": trial, "there": there, "deaths": 0, **counts, **means}
 
 
-def told(*rows: dict[str, Any]) -> list[Finding]:
+def told(*rows: dict[str, Any]) -> list[Comparison]:
     """What is said of NAME, its counts first."""
     found = EXPERIMENT.report(Asked(3, scale="quick"), rows).findings
     return [one for one in found if one.what.startswith(f"{NAME}, after")]

@@ -8,7 +8,7 @@ import pytest
 
 from parenting.experiments import absent_supervisor, interruptibility, side_effects
 from parenting.experiments.registry import experiment
-from parenting.experiments.reporting.comparison import Finding
+from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.executor import do
 from parenting.experiments.runner.store import Row
 from parenting.experiments.safety_claims import BORN, FRESH, VARIANTS, Claim
@@ -29,7 +29,7 @@ def born(claim: Claim) -> list[Row]:
     return [one for task in claim.tasks(QUICK) if task.arguments["max_ticks"] == 0 for one in do(task)]
 
 
-def told(claim: Claim, rows: list[Row], asked: Asked = QUICK) -> dict[str, Finding]:
+def told(claim: Claim, rows: list[Row], asked: Asked = QUICK) -> dict[str, Comparison]:
     """Findings by what they are of."""
     return {one.what: one for one in claim.report(asked, [*rows, *born(claim)]).findings}
 

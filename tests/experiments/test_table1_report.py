@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from parenting.experiments.reporting.comparison import Finding
+from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.store import Row
 from parenting.experiments.table1.report import ALGORITHMS, born, cells, order
 from parenting.experiments.training.tasks import parent_some, reward_some
@@ -31,7 +31,7 @@ def rows(of: str, deaths: Sequence[int], ticks: int = 9) -> list[Row]:
     ]
 
 
-def deaths(of: str, values: Sequence[int]) -> Finding:
+def deaths(of: str, values: Sequence[int]) -> Comparison:
     one = next(each for each in ALGORITHMS if each.name == of)
     return cells(one, rows(of, values))[0]
 
