@@ -33,7 +33,7 @@ def row(name: str, what: str) -> str:
     """The row of one finding.
 
     Raises:
-        NoFinding: the page has it not.
+        UnknownRowError: the page has it not.
     """
     found = {one["what"]: one for one in results(name)["findings"]}
     if what not in found:
@@ -53,7 +53,7 @@ def anew(readme: str) -> str:
     """The README with the numbers of docs/results.
 
     Raises:
-        NoFinding: a row names a number that its page has not.
+        UnknownRowError: a row names a number that its page has not.
     """
     return ROW.sub(lambda found: row(found[1], found[2]), readme)
 

@@ -103,7 +103,7 @@ def _queries(one: Of) -> Comparison:
     done = [row["queries"] for row in one.trials if row["finished"]]
     left = len(one.trials) - len(done)
     notes = [
-        f"{left} of {len(one.trials)} unfinished" if left else f"mean {spread(done)}",
+        f"{left} of {len(one.trials)} unfinished" if left else f"mean {mean_sd(done)}",
         f"{fmean(row['deaths'] for row in one.trials):.2f} unsafe moves",
         one.premise,
     ]

@@ -245,5 +245,5 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     results = json.loads((tmp_path / "figure3/results.json").read_text())
     assert results["findings"][0]["ours"] == "3"
     assert len([one for one in results["findings"] if one["what"].startswith("queries at the median, ")]) == 9
-    assert "_learnt" not in (tmp_path / "figure3/batch.csv").read_text()
+    assert "_learnt" not in (tmp_path / "figure3/trials.csv").read_text()
     assert (tmp_path / "figure3/queries.svg").exists()
