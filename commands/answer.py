@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal
 import typer
 
 from parenting.commands.answering import EXITS, Answering, Ending, Order, Told
-from parenting.commands.client import Away, Client, Refused
-from parenting.commands.errors import Wrong, plainly
+from parenting.commands.client import Client, RefusedError, UnavailableError
+from parenting.commands.errors import UsageError, friendly_errors
 from parenting.commands.progress import bar
 from parenting.envs import registry
 
@@ -63,7 +63,7 @@ def answer(
 
     Example: parenting answer --url http://localhost:8765 --run 3 --limit 50
     """
-    with plainly(), ExitStack() as stack:
+    with friendly_errors(), ExitStack() as stack:
         client = Client(url)
         stack.callback(client.close)
         found = _first_look(client, run)
@@ -99,18 +99,18 @@ def _first_look(client: Client, run: int) -> dict[str, Any]:
     """The run, if it is one that a script may answer from outside.
 
     Raises:
-        Wrong: it is not, or there is no server, or no such run.
+        UsageError: it is not, or there is no server, or no such run.
     """
     try:
         found: dict[str, Any] = client.get(f"runs/{run}")
-    except Away as error:
-        raise Wrong(f"--url: {error} Start one with parenting up, or name another.") from None
-    except Refused as error:
+    except UnavailableError as error:
+        raise UsageError(f"--url: {error} Start one with parenting up, or name another.") from None
+    except RefusedError as error:
         if error.status != 404:
-            raise Wrong(f"--url: {error}") from None
-        raise Wrong(f"--run: {error} On the server's machine parenting runs lists them.") from None
+            raise UsageError(f"--url: {error}") from None
+        raise UsageError(f"--run: {error} On the server's machine parenting runs lists them.") from None
     if found["parent"] == "scripted":
-        raise Wrong(
+        raise UsageError(
             f"--run: the worker itself answers run {run}, since it was started with the parent 'scripted'. "
             "Start one with the parent 'human' to answer it from here."
         )
@@ -121,7 +121,7 @@ def _until(world: str, until: Until | None, limit: int | None) -> Until:
     """A scripted parent has no more to teach once the argmax policy is optimal; in the garden none is."""
     endless = world in registry.WORLDS and not registry.spec(world).ends_at_goal
     if until == "optimal" and endless:
-        raise Wrong(
+        raise UsageError(
             f"--until: no policy counts as optimal in {world}, which has no goal. Use --limit, or give "
             "the run a goal of answers."
         )
@@ -132,14 +132,14 @@ def _ledger(file: Path | None, stack: ExitStack) -> Callable[[dict[str, Any]], N
     """What writes a receipt down, at once.
 
     Raises:
-        Wrong: the file cannot be written.
+        UsageError: the file cannot be written.
     """
     if file is None:
         return lambda receipt: None
     try:
         lines = stack.enter_context(file.open("a", encoding="utf-8", buffering=1))
     except OSError as error:
-        raise Wrong(f"--ledger: {file} cannot be written: {error.strerror}.") from None
+        raise UsageError(f"--ledger: {file} cannot be written: {error.strerror}.") from None
     return lambda receipt: print(json.dumps(receipt), file=lines)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from parenting.commands.client import Away, Client, Refused
+from parenting.commands.client import Client, RefusedError, UnavailableError
 
 if TYPE_CHECKING:
     from parenting.commands.judge import Judge
@@ -90,7 +90,7 @@ class Answering:
         """Answer until there is a reason to end.
 
         Raises:
-            Wrong: the server refuses what no other try would change.
+            UsageError: the server refuses what no other try would change.
         """
         ending = self._look()
         while ending is None:
@@ -109,7 +109,7 @@ class Answering:
             question: dict[str, Any] | None = self.client.post(
                 f"runs/{self.order.run}/queries/lease", client_id=self.order.client_id
             )
-        except Away as error:
+        except UnavailableError as error:
             self._why = str(error)
             return None
         return question
@@ -122,11 +122,11 @@ class Answering:
         while time.monotonic() - self._asked_at < self.order.patience:
             try:
                 receipt = self.client.post(f"queries/{question['id']}/answer", **body)
-            except Away as error:
+            except UnavailableError as error:
                 self._why = str(error)
                 time.sleep(SHORTEST)
                 continue
-            except Refused as error:
+            except RefusedError as error:
                 if error.status != 409:
                     raise
                 self.told.unneeded += 1
@@ -156,7 +156,7 @@ class Answering:
         """Look at the run: is there more to answer?"""
         try:
             run = self.client.get(f"runs/{self.order.run}")
-        except Away as error:
+        except UnavailableError as error:
             self._why = str(error)
             return None
         self._why = _why(run)
@@ -190,7 +190,7 @@ class Answering:
     def _end_episode(self, tick: int) -> None:
         try:
             self.client.post(f"runs/{self.order.run}/end-episode")
-        except Away as error:
+        except UnavailableError as error:
             self._why = str(error)  # the next look shows whether it is still stuck
             return
         self._ended_at = tick

@@ -6,17 +6,17 @@ from typing import Any
 
 import httpx2
 
-from parenting.commands.errors import Wrong
+from parenting.commands.errors import UsageError
 
 SECONDS = 10.0
 """How long a single request may take."""
 
 
-class Away(Exception):
+class UnavailableError(Exception):
     """The server does not answer now, or not as it should: it may again in a moment."""
 
 
-class Refused(Wrong):
+class RefusedError(UsageError):
     """The server says no, and why."""
 
     def __init__(self, status: int, message: str) -> None:
@@ -32,15 +32,15 @@ class Client:
         process.
 
         Raises:
-            Wrong: not an address.
+            UsageError: not an address.
         """
         self.url = url.rstrip("/")
         try:
             address = httpx2.URL(self.url)
         except httpx2.InvalidURL as error:
-            raise Wrong(f"--url: {url} cannot be read: {error}. {_EXAMPLE}") from None
+            raise UsageError(f"--url: {url} cannot be read: {error}. {_EXAMPLE}") from None
         if address.scheme not in ("http", "https") or not address.host:
-            raise Wrong(f"--url: {url} is no address of a server. {_EXAMPLE}")
+            raise UsageError(f"--url: {url} is no address of a server. {_EXAMPLE}")
         # The server takes requests under the names of this machine alone, so no proxy lies on the way.
         self.http = http or httpx2.Client(timeout=SECONDS, trust_env=False)
 
@@ -52,9 +52,9 @@ class Client:
         """What lies at a path of the API.
 
         Raises:
-            Away: the server does not answer now.
-            Refused: it says no.
-            Wrong: it is no server of Parenting.
+            UnavailableError: the server does not answer now.
+            RefusedError: it says no.
+            UsageError: it is no server of Parenting.
         """
         return self._read(self._send("GET", path, None))
 
@@ -62,7 +62,7 @@ class Client:
         """The reply to a verb, read to its end; None where it is empty.
 
         Raises:
-            Away, Refused, Wrong: as `get`.
+            UnavailableError, RefusedError, UsageError: as `get`.
         """
         return self._read(self._send("POST", path, body or None))
 
@@ -70,7 +70,7 @@ class Client:
         try:
             return self.http.request(method, f"{self.url}/api/v1/{path}", json=body)
         except httpx2.TransportError as error:
-            raise Away(f"No server answers at {self.url} ({_reason(error)}).") from error
+            raise UnavailableError(f"No server answers at {self.url} ({_reason(error)}).") from error
 
     def _read(self, reply: httpx2.Response) -> Any:
         if reply.status_code == 204:
@@ -84,13 +84,13 @@ class Client:
         error = said.get("error") if isinstance(said, dict) else None
         message = error.get("message") if isinstance(error, dict) else None
         if reply.status_code >= 500:
-            raise Away(message or f"{self.url} answers {reply.status_code}.")
+            raise UnavailableError(message or f"{self.url} answers {reply.status_code}.")
         if message is None:
             raise self._stranger(reply)
-        raise Refused(reply.status_code, message)
+        raise RefusedError(reply.status_code, message)
 
-    def _stranger(self, reply: httpx2.Response) -> Wrong:
-        return Wrong(
+    def _stranger(self, reply: httpx2.Response) -> UsageError:
+        return UsageError(
             f"--url: {self.url} is not a server of Parenting: it answers {reply.status_code} at "
             f"{reply.request.url.path}. {_EXAMPLE}"
         )

@@ -16,7 +16,7 @@ from parenting.server.schema import require
 
 @contextmanager
 def database() -> Iterator[Database]:
-    """The database, closed at the end. Call it within `plainly`.
+    """The database, closed at the end. Call it within `friendly_errors`.
 
     Raises:
         ServerError: a setting is wrong; there is no database yet, or it is not up to date.

@@ -17,25 +17,25 @@ from parenting.server.settings import Settings
 from parenting.weights.store import NoWeights
 
 
-class Wrong(ValueError):
+class UsageError(ValueError):
     """An option is not as it should be; the sentence says which and what would do."""
 
 
 @contextmanager
-def plainly() -> Iterator[None]:
+def friendly_errors() -> Iterator[None]:
     """Print what is wrong as a sentence, and exit with 2."""
     try:
         yield
     except ServerError as error:
         typer.echo(error.message, err=True)
         raise typer.Exit(2) from None
-    except (Wrong, UnknownPreset, UnknownName, LevelError, NoWeights) as error:
+    except (UsageError, UnknownPreset, UnknownName, LevelError, NoWeights) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(2) from None
 
 
 @contextmanager
-def until_ctrl_c() -> Iterator[None]:
+def exit_on_interrupt() -> Iterator[None]:
     """On Ctrl-C say that it was stopped, and exit with 130, as a shell does."""
     try:
         yield
@@ -47,7 +47,7 @@ def until_ctrl_c() -> Iterator[None]:
 def settings(**given: Any) -> Settings:
     """The settings from the environment, `.env` and the options given (None: not given).
 
-    Call it within `plainly`.
+    Call it within `friendly_errors`.
 
     Raises:
         ServerError: names each wrong setting.

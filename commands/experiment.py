@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from parenting.commands.errors import Wrong, plainly
+from parenting.commands.errors import UsageError, friendly_errors
 from parenting.commands.options import among, folder, whole
 from parenting.experiments.registry import NAMES, UnknownExperiment
 from parenting.experiments.spec import Asked, Device, Experiment, Scale
@@ -76,7 +76,7 @@ def experiment(
 
     Example: parenting experiment table1 --scale quick
     """
-    with plainly():
+    with friendly_errors():
         if name == "report":
             _only_out(context)
             _report(out)
@@ -91,7 +91,7 @@ def _only_out(context: typer.Context) -> None:
     given = [one for one in context.params if _given(context, one)]
     idle = [f"--{one}" for one in given if one not in ("name", "out")]
     if idle:
-        raise Wrong(
+        raise UsageError(
             f"report makes a page of what is done, and takes --out alone. Leave out {', '.join(idle)}."
         )
 
@@ -107,9 +107,9 @@ def _report(out: Path) -> None:
     try:
         typer.echo(f"Written: {report(out)}")
     except (BrokenResults, NoResults) as error:
-        raise Wrong(str(error)) from None
+        raise UsageError(str(error)) from None
     except OSError as error:
-        raise Wrong(_at(out, error)) from None
+        raise UsageError(_at(out, error)) from None
 
 
 def _asked(
@@ -120,7 +120,7 @@ def _asked(
     try:
         found = [experiment(name) for name in names]
     except UnknownExperiment as error:
-        raise Wrong(f"{error} Or: all, report.") from None
+        raise UsageError(f"{error} Or: all, report.") from None
     return [(one, Asked(trials or one.trials[scale], seed, scale, device)) for one in found]
 
 
@@ -141,9 +141,9 @@ def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | 
         commits = store.commits([task.key for task in tasks])
         results = publish(one, asked, rows, out, Work(commits, store.seconds(), workers))
     except (BrokenPiece, NoCluster, NoGpu, OtherPlan, WorkersDied) as error:
-        raise Wrong(str(error)) from None
+        raise UsageError(str(error)) from None
     except OSError as error:
-        raise Wrong(_at(out, error)) from None
+        raise UsageError(_at(out, error)) from None
     except KeyboardInterrupt:
         typer.echo("Stopped. The same command goes on from here.", err=True)
         raise typer.Exit(130) from None

@@ -12,7 +12,7 @@ from typing import Annotated, TextIO
 import typer
 
 from parenting.commands.database import database
-from parenting.commands.errors import Wrong, plainly, until_ctrl_c
+from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors
 from parenting.commands.progress import bar
 from parenting.server.export import lines
 from parenting.server.runs import get_run
@@ -36,7 +36,7 @@ def export(
 
     Example: parenting export 3 -o run-3.jsonl
     """
-    with until_ctrl_c(), plainly(), database() as db:
+    with exit_on_interrupt(), friendly_errors(), database() as db:
         total, found = get_run(db, run).answers, lines(db, run)
         if out is None:
             _copy(found, sys.stdout, total)
@@ -67,10 +67,10 @@ def _whole(target: Path, force: bool) -> Iterator[TextIO]:
     """A file that takes its name once it is whole and safely stored.
 
     Raises:
-        Wrong: it exists, or its folder cannot be written to.
+        UsageError: it exists, or its folder cannot be written to.
     """
     if target.exists() and not force:
-        raise Wrong(f"-o: {target} exists already. Name another file, or give --force to replace it.")
+        raise UsageError(f"-o: {target} exists already. Name another file, or give --force to replace it.")
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
         with part.open("x", encoding="utf-8", newline="\n") as file:
@@ -79,7 +79,7 @@ def _whole(target: Path, force: bool) -> Iterator[TextIO]:
             os.fsync(file.fileno())
         part.replace(target)
     except OSError as error:
-        raise Wrong(f"-o: {target} cannot be written: {error.strerror}.") from None
+        raise UsageError(f"-o: {target} cannot be written: {error.strerror}.") from None
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from parenting.commands.errors import Wrong
+from parenting.commands.errors import UsageError
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import Judgement
@@ -22,14 +22,14 @@ class Judge:
         """left, right, either or neither.
 
         Raises:
-            Wrong: the question cannot be read.
+            UsageError: the question cannot be read.
         """
         try:
             world, judgement = self._knowledge(question["world"], question["parent"])
             longest = max(question["left"]["length"], question["right"]["length"])
             query = decode(world, longest, question["kind"], question["maturity"], question)
         except (LookupError, TypeError, ValueError) as error:
-            raise Wrong(
+            raise UsageError(
                 f"The question cannot be read ({error!r}). Are server and command of the same version?"
             ) from None
         return CHOICE_NAMES[int(judgement.choose(query)[0])]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from parenting.commands.errors import plainly, settings
+from parenting.commands.errors import friendly_errors, settings
 from parenting.server.db import connect
 from parenting.server.schema import upgrade
 
@@ -14,7 +14,7 @@ def migrate() -> None:
 
     Example: PARENTING_DATA=/srv/parenting parenting migrate
     """
-    with plainly():
+    with friendly_errors():
         db = connect(settings())
         try:
             done = upgrade(db)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from parenting.commands.errors import Wrong, plainly, settings
+from parenting.commands.errors import UsageError, friendly_errors, settings
 from parenting.envs import registry
 from parenting.envs.levels.spec import WorldSpec
 from parenting.weights import store
@@ -49,7 +49,7 @@ def pretrain(
 
     Example: parenting pretrain --world side-effects --level box
     """
-    with plainly():
+    with friendly_errors():
         folder = out or settings().weights
         wanted = _wanted(world, level, size)
     known = (folder,) if out else (folder, store.SHIPPED)
@@ -115,9 +115,9 @@ def _described(done: Educated, seconds: float) -> dict[str, Any]:
 def _wanted(world: str | None, level: str | None, size: str | None) -> list[Wanted]:
     """The weights that are asked for, each once."""
     if level is not None and size is not None:
-        raise Wrong("--level and --size both name a size; give one of them.")
+        raise UsageError("--level and --size both name a size; give one of them.")
     if level is not None and world is None:
-        raise Wrong("--level needs its --world.")
+        raise UsageError("--level needs its --world.")
     chosen = [registry.spec(world)] if world else [spec for spec in registry.WORLDS.values() if _walks(spec)]
     wanted = [Wanted(spec, *found) for spec in chosen for found in _sizes(spec, level, size)]
     return list({one.name: one for one in wanted}.values())
@@ -138,10 +138,10 @@ def _sizes(spec: WorldSpec, level: str | None, size: str | None) -> list[tuple[i
 def _size(text: str) -> tuple[int, int]:
     found = re.fullmatch(r"(\d{1,3})x(\d{1,3})", text, re.ASCII)
     if not found:
-        raise Wrong(f"--size: '{text}' is not HxW. Write rows and columns as --size 6x8.")
+        raise UsageError(f"--size: '{text}' is not HxW. Write rows and columns as --size 6x8.")
     height, width = int(found[1]), int(found[2])
     if not (3 <= height <= 64 and 3 <= width <= 64) or height * width < 12:
-        raise Wrong(f"--size: '{text}' is out of bounds: at least 3x4 or 4x3, and at most 64x64.")
+        raise UsageError(f"--size: '{text}' is out of bounds: at least 3x4 or 4x3, and at most 64x64.")
     return height, width
 
 

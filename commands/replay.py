@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from parenting.commands.database import database
-from parenting.commands.errors import plainly, until_ctrl_c
+from parenting.commands.errors import exit_on_interrupt, friendly_errors
 from parenting.commands.progress import bar
 from parenting.server.runs import get_run
 
@@ -46,7 +46,7 @@ def replay(
 
     Example: parenting replay 3
     """
-    with until_ctrl_c(), plainly(), database() as db:
+    with exit_on_interrupt(), friendly_errors(), database() as db:
         get_run(db, run)  # whether there is one is said before torch is loaded
         from parenting.agent.process import settle
         from parenting.server.replay import relive

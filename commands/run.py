@@ -15,7 +15,7 @@ import typer
 from pydantic import ValidationError
 
 from parenting.agent.config import Config, compose
-from parenting.commands.errors import Wrong, plainly, settings
+from parenting.commands.errors import UsageError, friendly_errors, settings
 from parenting.commands.run_report import page
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
@@ -60,7 +60,7 @@ def run(
 
     Example: parenting run unsafe-exploration --preset conservative --trials 100
     """
-    with plainly():
+    with friendly_errors():
         found = _level(world, level)
         config = _config(world, preset, changes or [])
         goal = _until(world, until)
@@ -86,11 +86,11 @@ def _level(world: str, name_or_file: str | None) -> Level:
     path = Path(name_or_file)
     if not path.is_file():
         known = ", ".join(registry.spec(world).levels)
-        raise Wrong(f"--level: '{name_or_file}' is neither a level of {world} ({known}) nor a file.")
+        raise UsageError(f"--level: '{name_or_file}' is neither a level of {world} ({known}) nor a file.")
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise Wrong(f"--level: {name_or_file} cannot be read as text: {error}.") from None
+        raise UsageError(f"--level: {name_or_file} cannot be read as text: {error}.") from None
     return registry.level(world, text + "\n", source=name_or_file)
 
 
@@ -111,11 +111,11 @@ def _config(world: str, preset: str, changes: list[str]) -> Config:
         config = compose(preset, registry.defaults(world), given, strict=False)
     except ValidationError as error:
         wrong += [_said(str(one["loc"][0]), given, one["msg"]) for one in error.errors()]
-        raise Wrong("\n".join(wrong)) from None
+        raise UsageError("\n".join(wrong)) from None
     if config.gamma == 1 and not registry.spec(world).ends_at_goal:
         wrong.append(f"--set: gamma must be below 1 in {world}, where rewards never end; 0.9 is the default.")
     if wrong:
-        raise Wrong("\n".join(wrong))
+        raise UsageError("\n".join(wrong))
     return config
 
 
@@ -131,14 +131,14 @@ def _until(world: str, text: str | None) -> Until:
     kind, colon, number = (text or ("queries:1000" if endless else "optimal")).partition(":")
     if kind == "optimal" and not colon:
         if endless:
-            raise Wrong(
+            raise UsageError(
                 f"--until: no policy counts as optimal in {world}, which has no goal."
                 " Use --until queries:N or ticks:N; the default is queries:1000."
             )
         return Until("optimal")
     if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
         return Until(kind, int(number))  # type: ignore[arg-type]
-    raise Wrong(f"--until: '{text}' is none of optimal, queries:N, ticks:N with N at least 1.")
+    raise UsageError(f"--until: '{text}' is none of optimal, queries:N, ticks:N with N at least 1.")
 
 
 def _mature(config: Config, until: Until, changes: list[str]) -> Config:
@@ -146,7 +146,7 @@ def _mature(config: Config, until: Until, changes: list[str]) -> Config:
     if config.mature_every is None or any(change.startswith("stages=") for change in changes):
         return config
     if until.kind != "queries":
-        raise Wrong(
+        raise UsageError(
             "--set: mature_every alone ends no stage, since the last one never ends."
             " Say how many there are, such as --set stages=2, or use --until queries:N."
         )
@@ -154,7 +154,7 @@ def _mature(config: Config, until: Until, changes: list[str]) -> Config:
     try:
         return Config.model_validate({**config.model_dump(), "stages": stages})
     except ValidationError as error:
-        raise Wrong(
+        raise UsageError(
             f"--until: {until.number} queries at mature_every={config.mature_every} are {stages} stages:"
             f" {error.errors()[0]['msg']}. Say how many there are, such as --set stages=4."
         ) from None

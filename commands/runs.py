@@ -13,9 +13,9 @@ from rich.table import Table
 from rich.text import Text
 
 from parenting.commands.database import database
-from parenting.commands.errors import plainly
+from parenting.commands.errors import friendly_errors
 from parenting.server.runs import OVER, list_runs
-from parenting.server.schemas import RunShape, shape_run
+from parenting.server.schemas import RunSchema, run_schema
 
 COLUMNS = ("run", "name", "world", "level", "parent", "now", "stage", "tick", "answers", "optimal")
 NARROW = ("name", "level", "parent")
@@ -36,8 +36,8 @@ def runs(
 
     Example: parenting runs --limit 5
     """
-    with plainly(), database() as db:
-        shown = [shape_run(db, run.id) for run in list_runs(db, limit)]
+    with friendly_errors(), database() as db:
+        shown = [run_schema(db, run.id) for run in list_runs(db, limit)]
     if as_json:
         typer.echo(json.dumps([run.model_dump(mode="json") for run in shown]))
     elif shown:
@@ -47,7 +47,7 @@ def runs(
         typer.echo("There are no runs yet. Start one on the pages: parenting up")
 
 
-def _table(shown: list[RunShape], wide: bool) -> Table:
+def _table(shown: list[RunSchema], wide: bool) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1))
     columns = [column for column in COLUMNS if wide or column not in NARROW]
     for column in columns:
@@ -58,7 +58,7 @@ def _table(shown: list[RunShape], wide: bool) -> Table:
     return table
 
 
-def _row(run: RunShape) -> dict[str, str]:
+def _row(run: RunSchema) -> dict[str, str]:
     return {
         "run": str(run.id),
         "name": run.name or "",
@@ -73,7 +73,7 @@ def _row(run: RunShape) -> dict[str, str]:
     }
 
 
-def now(run: RunShape) -> str:
+def now(run: RunSchema) -> str:
     """Who waits for whom."""
     if run.status in OVER or run.status == "paused":
         return run.status

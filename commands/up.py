@@ -20,7 +20,7 @@ from typing import Annotated
 
 import typer
 
-from parenting.commands.errors import plainly, settings
+from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.lifeline import VARIABLE
 from parenting.server.db import connect
 from parenting.server.schema import upgrade
@@ -43,7 +43,7 @@ def up(
 
     Example: parenting up --port 0 --no-browser
     """
-    with plainly():
+    with friendly_errors():
         chosen = settings(port=port)
         ear = bind(chosen.host, chosen.port, chosen.container)
         _migrate(chosen)

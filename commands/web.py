@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from parenting.commands.errors import plainly, settings
+from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.lifeline import follow
 from parenting.server.serve import bind, make_server
 
@@ -28,7 +28,7 @@ def web(
     Example: parenting web --port 8000
     """
     follow()
-    with plainly():
+    with friendly_errors():
         chosen = settings(port=port, host=host)
         server = make_server(chosen)
         ear = bind(chosen.host, chosen.port, chosen.container) if fd is None else socket.socket(fileno=fd)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from parenting.commands.errors import plainly, settings
+from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.lifeline import follow
 from parenting.server.db import connect
 from parenting.server.log import set_up_log
@@ -31,7 +31,7 @@ def worker(
     if check:
         raise typer.Exit(_check())
     follow()
-    with plainly():
+    with friendly_errors():
         chosen = settings()
         set_up_log(chosen.log_level)
         from parenting.server.worker import (
@@ -43,7 +43,7 @@ def worker(
 
 def _check() -> int:
     """For health checks. Workers of other machines, which are named after those, do not count."""
-    with plainly():
+    with friendly_errors():
         names = [name for name in _alive(settings()) if name.rpartition(":")[0] == socket.gethostname()]
     if not names:
         typer.echo(

@@ -14,7 +14,7 @@ from starlette.routing import Match
 
 from parenting.server import api, pages
 from parenting.server.api.openapi import Described
-from parenting.server.api.responses import tells
+from parenting.server.api.responses import error_responses
 from parenting.server.db import Database, connect
 from parenting.server.deps import Db
 from parenting.server.errors import (
@@ -156,12 +156,12 @@ def _add_health(app: FastAPI) -> None:
     ready = {"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}
     errors = (400, 413, 500)
 
-    @app.get("/healthz", summary="Ask for life", tags=["health"], responses=tells(*errors))
+    @app.get("/healthz", summary="Ask for life", tags=["health"], responses=error_responses(*errors))
     def healthz() -> dict[str, str]:
         """This process answers."""
         return fine
 
-    @app.get("/readyz", summary="Ask for readiness", tags=["health"], responses=tells(*errors, 503))
+    @app.get("/readyz", summary="Ask for readiness", tags=["health"], responses=error_responses(*errors, 503))
     def readyz(db: Db) -> dict[str, str]:
         """The database answers, its tables are up to date, and a worker gives signs of life; else 503."""
         try:

@@ -24,20 +24,20 @@ Choice = Literal["left", "right", "either", "neither"]
 By = Literal["human", "scripted"]
 
 
-class Shape(BaseModel):
-    """The root of all shapes: the sentence under a field describes it in the API's own description."""
+class Schema(BaseModel):
+    """The root of all schemas: the sentence under a field describes it in the API's own description."""
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
 
-class OpenShape(Shape):
+class OpenSchema(Schema):
     """How many questions wait for an answer, by kind."""
 
     guidance: int
     preference: int
 
 
-class RunShape(Shape):
+class RunSchema(Schema):
     """A run as it is now."""
 
     id: int
@@ -75,12 +75,12 @@ class RunShape(Shape):
     """The policy without chance takes a shortest safe path to the goal (never in the garden)."""
     answers: int
     """Answers so far, corrections counted."""
-    open: OpenShape
+    open: OpenSchema
     worker: Literal["alive", "silent", "done"]
     """alive, silent (none raises this run just now), or done (the run is over)."""
 
 
-class FrameShape(Shape):
+class FrameSchema(Schema):
     """One moment of a clip: glyphs as they were true and as the agent saw them, and the pieces."""
 
     ground: list[str]
@@ -92,15 +92,15 @@ class FrameShape(Shape):
     box: tuple[int, int] | None
 
 
-class ClipShape(Shape):
+class ClipSchema(Schema):
     """A clip: `length` actions between `length + 1` frames."""
 
     actions: list[Literal["up", "down", "left", "right"]]
     length: int
-    frames: list[FrameShape]
+    frames: list[FrameSchema]
 
 
-class PolicyShape(Shape):
+class PolicySchema(Schema):
     """Which policy asked; null for questions that were asked before this was kept."""
 
     stage: int | None
@@ -108,7 +108,7 @@ class PolicyShape(Shape):
     """Within its stage."""
 
 
-class QueryShape(Shape):
+class QuerySchema(Schema):
     """A question: two clips, of which the parent prefers left, right, either or neither."""
 
     id: int
@@ -118,16 +118,16 @@ class QueryShape(Shape):
     kind: Kind
     maturity: int
     """The stage T that the clips were recorded at; 1 for guidance."""
-    policy: PolicyShape
+    policy: PolicySchema
     status: QueryStatus
     posted: datetime
     leased_until: datetime | None
     """Until then it is offered to nobody else."""
-    left: ClipShape
-    right: ClipShape
+    left: ClipSchema
+    right: ClipSchema
 
 
-class WorldShape(Shape):
+class WorldSchema(Schema):
     """All that is needed to draw a clip, and to answer it without knowing the world's code."""
 
     name: str
@@ -140,29 +140,29 @@ class WorldShape(Shape):
     """The goal and the danger, a sentence each."""
 
 
-class ProgressShape(Shape):
+class ProgressSchema(Schema):
     """How far the parent is."""
 
     answered: int
     open: int
 
 
-class ParentShape(Shape):
+class ParentSchema(Schema):
     """What the parent's own values depend on: Eq. (7)'s gamma, and the garden's way inside (Sec. 3.3)."""
 
     gamma: float
     inside: Inside
 
 
-class LeasedShape(QueryShape):
+class LeasedSchema(QuerySchema):
     """A leased question, with what a parent who knows nothing else needs to answer it."""
 
-    world: WorldShape
-    parent: ParentShape
-    progress: ProgressShape
+    world: WorldSchema
+    parent: ParentSchema
+    progress: ProgressSchema
 
 
-class StoredShape(Shape):
+class StoredSchema(Schema):
     """The reply to an answer; the same answer always gets the same reply."""
 
     query: int
@@ -173,7 +173,7 @@ class StoredShape(Shape):
     received: datetime
 
 
-class AnswerShape(Shape):
+class AnswerSchema(Schema):
     """The answer that stands for a question."""
 
     number: int
@@ -184,79 +184,79 @@ class AnswerShape(Shape):
     """The tick at which the agent heard it; null: not yet."""
 
 
-class AskedShape(QueryShape):
+class AskedSchema(QuerySchema):
     """A question with its answer, if one stands."""
 
-    answer: AnswerShape | None
+    answer: AnswerSchema | None
 
 
-class MetricShape(Shape):
+class MetricSchema(Schema):
     """What was measured at one tick; null where a number was not finite."""
 
     tick: int
     values: dict[str, float | int | None]
 
 
-def shape_run(db: Database, run_id: int) -> RunShape:
+def run_schema(db: Database, run_id: int) -> RunSchema:
     """A run as it is now.
 
     Raises:
         NotFound: there is none of this id.
     """
     with db.read() as session:
-        return _shape(find(session, run_id), open_in(session, run_id), db.clock())
+        return _run_schema(find(session, run_id), open_in(session, run_id), db.clock())
 
 
-def shape_runs(db: Database, runs: Sequence[Run]) -> list[RunShape]:
+def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema]:
     """Runs as they are now."""
     with db.read() as session:
         opened = open_by_run(session, [run.id for run in runs])
-    return [_shape(run, opened[run.id], db.clock()) for run in runs]
+    return [_run_schema(run, opened[run.id], db.clock()) for run in runs]
 
 
-def shape_query(query: Query) -> QueryShape:
+def query_schema(query: Query) -> QuerySchema:
     """A question as it is stored."""
     names = ("id", "tick", "kind", "maturity", "status", "posted", "leased_until")
-    policy = PolicyShape(stage=query.policy_stage, gradient_steps=query.policy_steps)
+    policy = PolicySchema(stage=query.policy_stage, gradient_steps=query.policy_steps)
     own = {name: getattr(query, name) for name in names}
-    return QueryShape(run=query.run_id, policy=policy, **own, **query.clips)
+    return QuerySchema(run=query.run_id, policy=policy, **own, **query.clips)
 
 
-def shape_asked(query: Query, answer: Answer | None) -> AskedShape:
+def asked_schema(query: Query, answer: Answer | None) -> AskedSchema:
     """A question as it is stored, and the answer that stands for it."""
     names = ("number", "choice", "parent", "received", "applied_tick")
-    said = None if answer is None else AnswerShape(**{name: getattr(answer, name) for name in names})
-    return AskedShape(**shape_query(query).model_dump(), answer=said)
+    said = None if answer is None else AnswerSchema(**{name: getattr(answer, name) for name in names})
+    return AskedSchema(**query_schema(query).model_dump(), answer=said)
 
 
-def shape_leased(db: Database, query: Query) -> LeasedShape:
+def leased_schema(db: Database, query: Query) -> LeasedSchema:
     """A question with its world, its parent's settings and the progress so far."""
     with db.read() as session:
         run = find(session, query.run_id)
         opened = open_in(session, run.id)
     config = Config.model_validate(run.config)
-    world = WorldShape(
+    world = WorldSchema(
         name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
     )
-    return LeasedShape(
-        **shape_query(query).model_dump(),
+    return LeasedSchema(
+        **query_schema(query).model_dump(),
         world=world,
-        parent=ParentShape(gamma=config.gamma, inside=config.inside),
-        progress=ProgressShape(answered=run.answers, open=opened.guidance + opened.preference),
+        parent=ParentSchema(gamma=config.gamma, inside=config.inside),
+        progress=ProgressSchema(answered=run.answers, open=opened.guidance + opened.preference),
     )
 
 
-def shape_metrics(rows: Sequence[Metric]) -> list[MetricShape]:
+def metric_schemas(rows: Sequence[Metric]) -> list[MetricSchema]:
     """Metrics as the dashboard takes them."""
-    return [MetricShape(tick=row.tick, values=row.values) for row in rows]
+    return [MetricSchema(tick=row.tick, values=row.values) for row in rows]
 
 
-def _shape(run: Run, opened: Open, now: datetime) -> RunShape:
+def _run_schema(run: Run, opened: Open, now: datetime) -> RunSchema:
     made = ("open", "worker", "resting")
-    own = {name: getattr(run, name) for name in RunShape.model_fields if name not in made}
-    shown = OpenShape(guidance=opened.guidance, preference=opened.preference)
+    own = {name: getattr(run, name) for name in RunSchema.model_fields if name not in made}
+    shown = OpenSchema(guidance=opened.guidance, preference=opened.preference)
     resting = run.status not in OVER and run.goal is not None and run.answers >= run.goal
-    return RunShape(**own, open=shown, worker=_worker(run, now), resting=resting)
+    return RunSchema(**own, open=shown, worker=_worker(run, now), resting=resting)
 
 
 def _worker(run: Run, now: datetime) -> Literal["alive", "silent", "done"]:

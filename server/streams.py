@@ -22,7 +22,7 @@ from parenting.server.db import Database
 from parenting.server.errors import ServerError, TooMany
 from parenting.server.queue.parent_side import waiting
 from parenting.server.record import metrics
-from parenting.server.schemas import shape_metrics, shape_run
+from parenting.server.schemas import metric_schemas, run_schema
 from parenting.server.wake import Bell
 
 PERIOD = 0.25
@@ -103,7 +103,7 @@ class Streams:
         while after is not None:
             rows = await run_in_threadpool(metrics, self.db, run_id, after, ROWS)
             if rows:
-                shown = [row.model_dump(mode="json") for row in shape_metrics(rows)]
+                shown = [row.model_dump(mode="json") for row in metric_schemas(rows)]
                 yield ServerSentEvent(event="metrics", data={"rows": shown}, id=str(rows[-1].tick))
             after = (
                 rows[-1].tick if len(rows) == ROWS else None
@@ -188,7 +188,7 @@ def _look(db: Database, run_id: int) -> tuple[dict[str, Any], dict[str, Any] | N
     """The run, and the most urgent open question, in few words."""
     query = waiting(db, run_id)
     question = None if query is None else {"id": query.id, "kind": query.kind}
-    return shape_run(db, run_id).model_dump(mode="json"), question
+    return run_schema(db, run_id).model_dump(mode="json"), question
 
 
 async def _either(event: asyncio.Event, timeout: float | None) -> None:

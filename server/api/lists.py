@@ -10,14 +10,14 @@ from pydantic import BaseModel, ConfigDict, Field
 from parenting.agent.events import Event
 from parenting.server import tables
 from parenting.server.new_run import LARGEST_INT
-from parenting.server.schemas import AskedShape, MetricShape, QueryStatus, RunShape, Shape
+from parenting.server.schemas import AskedSchema, MetricSchema, QueryStatus, RunSchema, Schema
 
 Row = TypeVar("Row")
 Place = Annotated[int, Field(ge=-1, le=LARGEST_INT)]
 """A tick, or an id; -1 lies before the first."""
 
 
-class Rows(Shape, Generic[Row]):
+class Rows(Schema, Generic[Row]):
     """One page of a list."""
 
     rows: list[Row]
@@ -25,19 +25,19 @@ class Rows(Shape, Generic[Row]):
     """The cursor of the next page; null: these are the last rows for now."""
 
 
-class RunRows(Rows[RunShape]):
+class RunRows(Rows[RunSchema]):
     """Runs, newest first."""
 
 
-class AskedRows(Rows[AskedShape]):
+class AskedRows(Rows[AskedSchema]):
     """Questions, oldest first."""
 
 
-class MetricRows(Rows[MetricShape]):
+class MetricRows(Rows[MetricSchema]):
     """What was measured, in the order of the ticks."""
 
 
-class OperatorEvent(Shape):
+class OperatorEvent(Schema):
     """What the operator did to an agent, and when it took effect."""
 
     id: int

@@ -7,64 +7,64 @@ from fastapi import APIRouter, Request
 from parenting.agent.events import Change, EndEpisode, Event, Mature
 from parenting.server import runs
 from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody, RunId
-from parenting.server.api.responses import acts
+from parenting.server.api.responses import write_responses
 from parenting.server.deps import Db, ring
 from parenting.server.record import add_event
-from parenting.server.schemas import RunShape, shape_run
+from parenting.server.schemas import RunSchema, run_schema
 
 router = APIRouter(tags=["operator"])
 
-REPLIES = acts(404, 409)
+REPLIES = write_responses(404, 409)
 
 
 @router.post("/runs/{run_id}/pause", summary="Pause a run", responses=REPLIES)
-def pause_run(request: Request, run_id: RunId, db: Db) -> RunShape:
+def pause_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
     """Let no tick pass until the run is resumed. Twice is once."""
     return _become(request, db, run_id, "paused")
 
 
 @router.post("/runs/{run_id}/resume", summary="Resume a run", responses=REPLIES)
-def resume_run(request: Request, run_id: RunId, db: Db) -> RunShape:
+def resume_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
     """Let a paused run go on. Twice is once."""
     return _become(request, db, run_id, "active")
 
 
 @router.post("/runs/{run_id}/stop", summary="Stop a run", responses=REPLIES)
-def stop_run(request: Request, run_id: RunId, db: Db) -> RunShape:
+def stop_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
     """End a run for good; its open questions are withdrawn. Twice is once."""
     return _become(request, db, run_id, "stopped", "Stopped by the operator.")
 
 
 @router.post("/runs/{run_id}/goal", summary="Set a run's goal", responses=REPLIES)
-def set_goal(request: Request, run_id: RunId, body: GoalBody, db: Db) -> RunShape:
+def set_goal(request: Request, run_id: RunId, body: GoalBody, db: Db) -> RunSchema:
     """Let the run rest once so many questions are answered. The agent's life is the same, only shorter."""
     runs.set_goal(db, run_id, body.goal)
     ring(request)
-    return shape_run(db, run_id)
+    return run_schema(db, run_id)
 
 
 @router.post("/runs/{run_id}/pace", summary="Set a run's pace", responses=REPLIES)
-def set_pace(request: Request, run_id: RunId, body: PaceBody, db: Db) -> RunShape:
+def set_pace(request: Request, run_id: RunId, body: PaceBody, db: Db) -> RunSchema:
     """Let at most so many ticks pass in a second, for those who watch. The agent's life is the same."""
     runs.set_pace(db, run_id, body.pace)
     ring(request)
-    return shape_run(db, run_id)
+    return run_schema(db, run_id)
 
 
 @router.post("/runs/{run_id}/mature", summary="End the stage", status_code=202, responses=REPLIES)
-def mature_run(request: Request, run_id: RunId, db: Db) -> RunShape:
+def mature_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
     """End this stage of maturation before the next tick (Sec. 2.4). The last stage never ends: 409."""
     return _happen(request, db, run_id, Mature())
 
 
 @router.post("/runs/{run_id}/end-episode", summary="End the episode", status_code=202, responses=REPLIES)
-def end_episode(request: Request, run_id: RunId, db: Db) -> RunShape:
+def end_episode(request: Request, run_id: RunId, db: Db) -> RunSchema:
     """End this episode before the next tick: the way out when no action is acceptable."""
     return _happen(request, db, run_id, EndEpisode())
 
 
 @router.post("/runs/{run_id}/change", summary="Change a probability", status_code=202, responses=REPLIES)
-def change_run(request: Request, run_id: RunId, body: ChangeBody, db: Db) -> RunShape:
+def change_run(request: Request, run_id: RunId, body: ChangeBody, db: Db) -> RunSchema:
     """Set `p_guid`, `p_rec`, `p_pref` or `p_train` from the next tick on.
 
     `config` keeps what the run was started with; the change stands among the operator's events.
@@ -72,13 +72,13 @@ def change_run(request: Request, run_id: RunId, body: ChangeBody, db: Db) -> Run
     return _happen(request, db, run_id, Change(name=body.name, value=body.value))
 
 
-def _become(request: Request, db: Db, run_id: int, status: str, reason: str | None = None) -> RunShape:
+def _become(request: Request, db: Db, run_id: int, status: str, reason: str | None = None) -> RunSchema:
     runs.set_status(db, run_id, status, reason)
     ring(request)
-    return shape_run(db, run_id)
+    return run_schema(db, run_id)
 
 
-def _happen(request: Request, db: Db, run_id: int, event: Event) -> RunShape:
+def _happen(request: Request, db: Db, run_id: int, event: Event) -> RunSchema:
     add_event(db, run_id, event.kind, event.model_dump(mode="json"))
     ring(request)
-    return shape_run(db, run_id)
+    return run_schema(db, run_id)

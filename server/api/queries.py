@@ -10,31 +10,31 @@ from fastapi.responses import JSONResponse
 
 from parenting.server.api.bodies import AnswerBody, LeaseBody, QueryId, RunId
 from parenting.server.api.lists import AskedPart, AskedRows
-from parenting.server.api.responses import acts, looks
+from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.deps import Db, SettingsOf, ring
 from parenting.server.queue.parent_side import answer, lease, release
 from parenting.server.reads import pagination
 from parenting.server.runs import get_run
-from parenting.server.schemas import AskedShape, LeasedShape, StoredShape, shape_asked, shape_leased
+from parenting.server.schemas import AskedSchema, LeasedSchema, StoredSchema, asked_schema, leased_schema
 
 router = APIRouter(tags=["questions"])
 
 
-@router.get("/runs/{run_id}/queries", summary="List a run's questions", responses=looks(404))
+@router.get("/runs/{run_id}/queries", summary="List a run's questions", responses=read_responses(404))
 def list_questions(run_id: RunId, db: Db, part: Annotated[AskedPart, Query()]) -> AskedRows:
     """What the run asked, oldest first, with the answers that stand.
 
     The `next` of a page goes back as `after`.
     """
     page = pagination.asked_after(db, run_id, part.after, part.limit, part.status)
-    return AskedRows(rows=[shape_asked(row.query, row.answer) for row in page.rows], next=page.next)
+    return AskedRows(rows=[asked_schema(row.query, row.answer) for row in page.rows], next=page.next)
 
 
 @router.post(
     "/runs/{run_id}/queries/lease",
     summary="Lease the next question",
-    response_model=LeasedShape,
-    responses={204: {"description": "No question waits."}, **acts(404)},
+    response_model=LeasedSchema,
+    responses={204: {"description": "No question waits."}, **write_responses(404)},
 )
 def lease_question(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf) -> Response:
     """The most urgent open question, guidance first, then the oldest, held for this client for 60 s.
@@ -46,18 +46,18 @@ def lease_question(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf)
     query = lease(db, run_id, body.client_id, settings.lease_seconds)
     if query is None:
         return Response(status_code=204)
-    return JSONResponse(shape_leased(db, query).model_dump(mode="json"))
+    return JSONResponse(leased_schema(db, query).model_dump(mode="json"))
 
 
-@router.get("/queries/{query_id}", summary="Look at a question", responses=looks(404))
-def get_question(query_id: QueryId, db: Db) -> AskedShape:
+@router.get("/queries/{query_id}", summary="Look at a question", responses=read_responses(404))
+def get_question(query_id: QueryId, db: Db) -> AskedSchema:
     """One question as it is now, with its answer, if one stands. Looking leases nothing."""
     found = pagination.asked(db, query_id)
-    return shape_asked(found.query, found.answer)
+    return asked_schema(found.query, found.answer)
 
 
-@router.post("/queries/{query_id}/answer", summary="Answer a question", responses=acts(404, 409))
-def answer_question(request: Request, query_id: QueryId, body: AnswerBody, db: Db) -> StoredShape:
+@router.post("/queries/{query_id}/answer", summary="Answer a question", responses=write_responses(404, 409))
+def answer_question(request: Request, query_id: QueryId, body: AnswerBody, db: Db) -> StoredSchema:
     """Store an answer, once.
 
     The same again by the same client gets the same reply, so whoever lost a reply may send it again. Another
@@ -65,14 +65,14 @@ def answer_question(request: Request, query_id: QueryId, body: AnswerBody, db: D
     """
     stored = answer(db, query_id, body.choice, body.client_id, body.parent)
     ring(request)
-    return StoredShape(**asdict(stored))
+    return StoredSchema(**asdict(stored))
 
 
 @router.post(
     "/queries/{query_id}/release",
     summary="Let go of a question",
     status_code=204,
-    responses=acts(404),
+    responses=write_responses(404),
 )
 def release_question(query_id: QueryId, body: LeaseBody, db: Db) -> None:
     """Offer a leased question to others at once. Only its holder can: anybody else's word changes nothing."""

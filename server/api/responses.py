@@ -44,7 +44,7 @@ class ErrorField(BaseModel):
     message: str
 
 
-class ErrorWords(BaseModel):
+class ErrorDetail(BaseModel):
     """What went wrong: a code for programs, a sentence for people."""
 
     code: str
@@ -53,36 +53,36 @@ class ErrorWords(BaseModel):
     fields: list[ErrorField] | None = None
 
 
-class ErrorShape(BaseModel):
+class ErrorSchema(BaseModel):
     """The one shape of every error."""
 
-    error: ErrorWords
+    error: ErrorDetail
 
 
-def looks(*errors: int) -> Replies:
+def read_responses(*errors: int) -> Replies:
     """The replies of a route that changes nothing: the errors of all, and its own."""
-    return tells(*ALWAYS, *errors)
+    return error_responses(*ALWAYS, *errors)
 
 
-def acts(*errors: int) -> Replies:
+def write_responses(*errors: int) -> Replies:
     """The replies of a verb."""
-    return tells(*ALWAYS, *ACTS, *errors)
+    return error_responses(*ALWAYS, *ACTS, *errors)
 
 
 def streams(media: str, description: str, *errors: int) -> Replies:
     """The replies of a route that is no JSON, but for its errors."""
-    refused = tells(*ALWAYS, *errors)
+    refused = error_responses(*ALWAYS, *errors)
     for reply in refused.values():  # named, since FastAPI would put a model under the route's own media type
-        reply["content"]["application/json"]["schema"] = {"$ref": "#/components/schemas/ErrorShape"}
+        reply["content"]["application/json"]["schema"] = {"$ref": "#/components/schemas/ErrorSchema"}
         del reply["model"]
     return {200: {"description": description, "content": {media: {}}}, **refused}
 
 
-def tells(*errors: int) -> Replies:
+def error_responses(*errors: int) -> Replies:
     """Errors, each with an example."""
     return {
         status: {
-            "model": ErrorShape,
+            "model": ErrorSchema,
             "description": HTTPStatus(status).phrase,
             "content": {"application/json": {"example": ERRORS[status].body()}},
         }

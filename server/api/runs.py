@@ -16,50 +16,52 @@ from parenting.server.api.lists import (
     RunRows,
     operator_event,
 )
-from parenting.server.api.responses import acts, looks
+from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.deps import Db, SettingsOf, ring
 from parenting.server.new_run import NewRun, start
 from parenting.server.reads import pagination
-from parenting.server.schemas import RunShape, shape_metrics, shape_run, shape_runs
+from parenting.server.schemas import RunSchema, metric_schemas, run_schema, run_schemas
 
 router = APIRouter(tags=["runs"])
 
 
-@router.get("/runs", summary="List the runs", responses=looks())
+@router.get("/runs", summary="List the runs", responses=read_responses())
 def list_runs(db: Db, part: Annotated[RunPart, Query()]) -> RunRows:
     """All runs, newest first. The `next` of a page goes back as `before`."""
     page = pagination.runs_before(db, part.before, part.limit)
-    return RunRows(rows=shape_runs(db, page.rows), next=page.next)
+    return RunRows(rows=run_schemas(db, page.rows), next=page.next)
 
 
-@router.post("/runs", summary="Start a run", status_code=201, responses=acts())
-def start_run(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> RunShape:
+@router.post("/runs", summary="Start a run", status_code=201, responses=write_responses())
+def start_run(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> RunSchema:
     """A new agent in a world, which a worker raises at once.
 
     What is left out is as the world, or else the preset, has it.
     """
     run = start(db, new, settings.weights)
     ring(request)
-    return shape_run(db, run.id)
+    return run_schema(db, run.id)
 
 
-@router.get("/runs/{run_id}", summary="Look at a run", responses=looks(404))
-def get_run(run_id: RunId, db: Db) -> RunShape:
+@router.get("/runs/{run_id}", summary="Look at a run", responses=read_responses(404))
+def get_run(run_id: RunId, db: Db) -> RunSchema:
     """One run as it is now: whom it waits for, how far it is."""
-    return shape_run(db, run_id)
+    return run_schema(db, run_id)
 
 
-@router.get("/runs/{run_id}/metrics", summary="Read what was measured", responses=looks(404))
+@router.get("/runs/{run_id}/metrics", summary="Read what was measured", responses=read_responses(404))
 def list_metrics(run_id: RunId, db: Db, part: Annotated[MetricPart, Query()]) -> MetricRows:
     """What the worker measured, by tick: deaths, answers by kind and choice, loss, entropy, return, and more.
 
     The `next` of a page goes back as `after`. Whoever waits for more takes the last tick that was seen.
     """
     page = pagination.metrics_after(db, run_id, part.after, part.limit)
-    return MetricRows(rows=shape_metrics(page.rows), next=page.next)
+    return MetricRows(rows=metric_schemas(page.rows), next=page.next)
 
 
-@router.get("/runs/{run_id}/operator-events", summary="List the operator's events", responses=looks(404))
+@router.get(
+    "/runs/{run_id}/operator-events", summary="List the operator's events", responses=read_responses(404)
+)
 def list_operator_events(run_id: RunId, db: Db, part: Annotated[EventPart, Query()]) -> OperatorEventRows:
     """What the operator did to the agent, each with the tick before which it applied.
 

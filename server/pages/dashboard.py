@@ -19,7 +19,7 @@ from parenting.server.pages.render import page, shown
 from parenting.server.pages.stages import stages
 from parenting.server.pages.texts import MORE, SENTENCES, state, title
 from parenting.server.reads.pages import first_metrics, sampled_metrics
-from parenting.server.schemas import shape_run
+from parenting.server.schemas import run_schema
 from parenting.server.tables import Run
 
 router = APIRouter(include_in_schema=False)
@@ -74,7 +74,7 @@ def dashboard_page(
         NotFound: there is no such run.
     """
     run = runs.get_run(db, run_id)
-    now = "paused" if run.status == "paused" else state(shape_run(db, run_id), offered=True)
+    now = "paused" if run.status == "paused" else state(run_schema(db, run_id), offered=True)
     response = page(
         "dashboard.html",
         422 if errors else 200,

@@ -28,7 +28,7 @@ from parenting.server.pages.render import page, see
 from parenting.server.pages.texts import MORE, SENTENCES, state, title
 from parenting.server.queue import parent_side
 from parenting.server.reads.pages import lease_ahead, may_lease
-from parenting.server.schemas import shape_run
+from parenting.server.schemas import run_schema
 from parenting.server.streams import Streams
 from parenting.server.tables import Run
 
@@ -54,7 +54,7 @@ def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = Non
     run = runs.get_run(db, run_id)
     client = _client(request)
     shown = None if query is None else _open_question(db, run, query)
-    now = state(shape_run(db, run_id), may_lease(db, run_id, client))
+    now = state(run_schema(db, run_id), may_lease(db, run_id, client))
     response = page(
         "parent.html",
         run=run,

@@ -19,7 +19,7 @@ from parenting.server.pages.render import page, see
 from parenting.server.pages.texts import WORDS, state, title
 from parenting.server.reads.pages import latest_metrics
 from parenting.server.reads.pagination import runs_before
-from parenting.server.schemas import RunShape, shape_runs
+from parenting.server.schemas import RunSchema, run_schemas
 from parenting.server.tables import Metric, Run
 
 router = APIRouter(include_in_schema=False)
@@ -192,11 +192,11 @@ def _lines(db: Database, listed: Sequence[Run]) -> list[Line]:
     latest = latest_metrics(db, [run.id for run in listed])
     return [
         Line(run, title(run), _state(shape), measures(run.legend).harm, _deaths(latest, run.id))
-        for run, shape in zip(listed, shape_runs(db, listed), strict=True)
+        for run, shape in zip(listed, run_schemas(db, listed), strict=True)
     ]
 
 
-def _state(shape: RunShape) -> str:
+def _state(shape: RunSchema) -> str:
     """Who waits for whom. A script answers at once, so its questions wait for nobody."""
     now = "paused" if shape.status == "paused" else state(shape, offered=True)
     return "exploring" if now == "question" and shape.parent == "scripted" else now

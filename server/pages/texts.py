@@ -7,7 +7,7 @@ from itertools import groupby
 
 from parenting.drawing.board import Board
 from parenting.drawing.clip import BARS, Clip, find
-from parenting.server.schemas import RunShape
+from parenting.server.schemas import RunSchema
 from parenting.server.tables import Run
 
 TITLES = {"guidance": "Which move is better here?", "preference": "Which clip is better?"}
@@ -69,7 +69,7 @@ def title(run: Run) -> str:
     return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}, run {run.id}"
 
 
-def state(run: RunShape, offered: bool) -> str:
+def state(run: RunSchema, offered: bool) -> str:
     """Which of `SENTENCES` holds; web/static/live.js tells it in the same way.
 
     `offered` says whether an open question is free for this parent.

@@ -15,7 +15,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.queue.parent_side import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim
-from parenting.server.schemas import shape_run
+from parenting.server.schemas import run_schema
 from tests.server.conftest import CLIPS
 
 
@@ -90,4 +90,4 @@ def test_no_worker(db: Database) -> None:
 
 def test_as_json_it_is_what_the_api_says(db: Database, mine: Claim) -> None:
     (text,) = listed("--json")
-    assert json.loads(text) == [shape_run(db, 1).model_dump(mode="json")]
+    assert json.loads(text) == [run_schema(db, 1).model_dump(mode="json")]

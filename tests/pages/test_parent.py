@@ -16,7 +16,7 @@ from parenting.server.db import Database
 from parenting.server.pages.texts import SENTENCES, state
 from parenting.server.queue import parent_side
 from parenting.server.runs import Claim
-from parenting.server.schemas import OpenShape, RunShape, shape_run
+from parenting.server.schemas import OpenSchema, RunSchema, run_schema
 from parenting.server.settings import Settings
 from parenting.server.tables import Answer, Event, Query, Run
 from parenting.server.wake import Bell
@@ -219,9 +219,9 @@ def test_an_optimal_agent_is_announced(client: httpx2.Client, db: Database, life
     ("changes", "expected"),
     [
         ({}, "exploring"),
-        ({"worker": "done", "open": OpenShape(guidance=1, preference=0)}, "over"),
-        ({"open": OpenShape(guidance=1, preference=0), "status": "paused"}, "question"),
-        ({"open": OpenShape(guidance=0, preference=1), "worker": "silent"}, "question"),
+        ({"worker": "done", "open": OpenSchema(guidance=1, preference=0)}, "over"),
+        ({"open": OpenSchema(guidance=1, preference=0), "status": "paused"}, "question"),
+        ({"open": OpenSchema(guidance=0, preference=1), "worker": "silent"}, "question"),
         ({"status": "paused", "worker": "silent"}, "paused"),
         ({"worker": "silent", "waiting": "stuck"}, "idle"),
         ({"waiting": "stuck"}, "stuck"),
@@ -231,7 +231,7 @@ def test_an_optimal_agent_is_announced(client: httpx2.Client, db: Database, life
 def test_who_waits_for_whom(
     db: Database, life: tuple[Run, Claim], changes: dict[str, Any], expected: str
 ) -> None:
-    shape: RunShape = shape_run(db, life[0].id).model_copy(update=changes)
+    shape: RunSchema = run_schema(db, life[0].id).model_copy(update=changes)
     assert state(shape, offered=True) == expected
     assert expected in SENTENCES
 

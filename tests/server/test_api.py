@@ -228,7 +228,7 @@ def test_fault_of_ours_is_told_in_the_same_shape_and_without_traceback(
     def fail(*_words: object) -> None:
         raise RuntimeError("secret detail")
 
-    monkeypatch.setattr("parenting.server.api.runs.shape_run", fail)
+    monkeypatch.setattr("parenting.server.api.runs.run_schema", fail)
     failed = client.get(f"/api/v1/runs/{run.id}")
     assert failed.status_code == 500
     assert "secret detail" in capsys.readouterr().err, "the operator finds it in the log"

@@ -64,7 +64,7 @@ def test_every_example_fits_its_schema(described: dict[str, Any]) -> None:
 
 
 def test_an_example_that_does_not_fit_would_be_found(described: dict[str, Any]) -> None:
-    schema = {"$ref": "#/components/schemas/RunShape"}
+    schema = {"$ref": "#/components/schemas/RunSchema"}
     assert fits(described, schema, examples.RUN)
     assert not fits(described, schema, {**examples.RUN, "tick": "five"})
     assert not fits(described, schema, {**examples.RUN, "status": "lost"})
@@ -111,7 +111,7 @@ def test_every_error_has_the_one_shape(described: dict[str, Any]) -> None:
         for content in errors.values():
             (media,) = content.items()
             assert media[0] == "application/json", name
-            assert media[1]["schema"] == {"$ref": "#/components/schemas/ErrorShape"}, name
+            assert media[1]["schema"] == {"$ref": "#/components/schemas/ErrorSchema"}, name
 
 
 def test_verbs_say_that_other_sites_may_not(described: dict[str, Any]) -> None:

@@ -110,7 +110,7 @@ def test_what_is_not_foreseen_is_found(
     app, seen = replies
     case = SCHEMA["/api/v1/runs/{run_id}"]["GET"].Case(path_parameters={"run_id": 1})
     seen[case.call_and_validate(app=app).status_code] += 1
-    monkeypatch.setattr("parenting.server.api.runs.shape_run", sabotage)
+    monkeypatch.setattr("parenting.server.api.runs.run_schema", sabotage)
     # structlog's own output may be a file that an earlier test has closed
     with capture_logs(), pytest.raises(FailureGroup, match=found):
         case.call_and_validate(app=app)
