@@ -45,11 +45,11 @@ def up(
     """
     with friendly_errors():
         chosen = settings(port=port)
-        ear = bind(chosen.host, chosen.port, chosen.container)
+        listener = bind(chosen.host, chosen.port, chosen.container)
         _migrate(chosen)
-    with _signals() as told, _children(ear) as children:
-        url = f"http://localhost:{ear.getsockname()[1]}/"
-        ear.close()
+    with _signals() as told, _children(listener) as children:
+        url = f"http://localhost:{listener.getsockname()[1]}/"
+        listener.close()
         typer.echo(f"Parenting is at {url}  (Ctrl-C stops it)")
         if browser and _has_screen():
             threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
@@ -87,13 +87,13 @@ def _signals() -> Iterator[threading.Event]:
 
 
 @contextmanager
-def _children(ear: socket.socket) -> Iterator[Children]:
+def _children(listener: socket.socket) -> Iterator[Children]:
     """Web and worker, in sessions of their own: Ctrl-C reaches `up` alone, which stops both."""
     lifeline, held = os.pipe()
-    web = ["web", "--fd", str(ear.fileno())]
+    web = ["web", "--fd", str(listener.fileno())]
     children: dict[str, subprocess.Popen[bytes]] = {}
     try:
-        children["web"] = _start(web, lifeline, [ear.fileno()])
+        children["web"] = _start(web, lifeline, [listener.fileno()])
         children["worker"] = _start(["worker"], lifeline, [])
         yield children
     finally:

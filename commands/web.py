@@ -31,7 +31,11 @@ def web(
     with friendly_errors():
         chosen = settings(port=port, host=host)
         server = make_server(chosen)
-        ear = bind(chosen.host, chosen.port, chosen.container) if fd is None else socket.socket(fileno=fd)
+        listener = (
+            bind(chosen.host, chosen.port, chosen.container) if fd is None else socket.socket(fileno=fd)
+        )
         if fd is None:
-            typer.echo(f"Parenting's pages: http://localhost:{ear.getsockname()[1]}/  (Ctrl-C stops them)")
-        server.run(sockets=[ear])
+            typer.echo(
+                f"Parenting's pages: http://localhost:{listener.getsockname()[1]}/  (Ctrl-C stops them)"
+            )
+        server.run(sockets=[listener])

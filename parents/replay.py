@@ -26,7 +26,7 @@ Session = Callable[[int], Moment]
 """The record of a session: the moment of each tick, from tick 1 on."""
 
 
-class Parted(Exception):
+class ReplayMismatchError(Exception):
     """At this tick the agent asks something else than was recorded."""
 
     def __init__(self, tick: int, recorded: Query, asked: Query) -> None:
@@ -57,10 +57,10 @@ class ReplayParent:
         """Hold the query against the record.
 
         Raises:
-            Parted: it is another one.
+            ReplayMismatchError: it is another one.
         """
         if not same(self.now.asked, query):
-            raise Parted(self.tick, self.now.asked, query)
+            raise ReplayMismatchError(self.tick, self.now.asked, query)
 
     @property
     def now(self) -> Moment:

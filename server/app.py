@@ -18,22 +18,22 @@ from parenting.server.api.responses import error_responses
 from parenting.server.db import Database, connect
 from parenting.server.deps import Db
 from parenting.server.errors import (
-    Busy,
-    Invalid,
+    BusyError,
+    InvalidFieldsError,
     MethodNotAllowed,
     NotFound,
-    NotReady,
+    NotReadyError,
     ServerError,
     SetupError,
-    TooLarge,
+    TooLargeError,
 )
-from parenting.server.guard import Guard
 from parenting.server.new_run import messages
+from parenting.server.notify import Notifier
 from parenting.server.schema import require
+from parenting.server.security import SecurityMiddleware
 from parenting.server.settings import Settings
 from parenting.server.static import OthersFiles, OurFiles
 from parenting.server.streams import Streams
-from parenting.server.wake import Bell
 from parenting.server.workers import alive
 
 LARGEST_BODY = 64 * 1024
@@ -62,8 +62,8 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     require(db)
     app = bare_app()
     app.state.db, app.state.settings = db, settings
-    app.state.worker_bell = Bell(settings.data, "worker")
-    app.state.streams = Streams(db, Bell(settings.data, "web"), settings.streams)
+    app.state.worker_notifier = Notifier(settings.data, "worker")
+    app.state.streams = Streams(db, Notifier(settings.data, "web"), settings.streams)
     return app
 
 
@@ -80,7 +80,7 @@ def bare_app() -> FastAPI:
         redoc_url=None,
         lifespan=_lifespan,
     )
-    app.add_middleware(Guard, largest_body=LARGEST_BODY)
+    app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY)
     _add_errors(app)
     _add_health(app)
     app.include_router(api.router)
@@ -105,12 +105,14 @@ def _add_errors(app: FastAPI) -> None:
     def refused(request: Request, error: ServerError) -> Response:
         if error.status >= 500:
             log.warning("refused", path=request.url.path, code=error.code)
-        headers = {"Retry-After": "1"} if isinstance(error, Busy) else None
+        headers = {"Retry-After": "1"} if isinstance(error, BusyError) else None
         return _reply(request, error, headers)
 
     @app.exception_handler(RequestValidationError)
     def malformed(request: Request, error: RequestValidationError) -> Response:
-        return _reply(request, Invalid(messages(error.errors(), skip=("body", "path", "query", "header"))))
+        return _reply(
+            request, InvalidFieldsError(messages(error.errors(), skip=("body", "path", "query", "header")))
+        )
 
     @app.exception_handler(HTTPException)
     def http(request: Request, error: HTTPException) -> Response:
@@ -122,9 +124,9 @@ def _add_errors(app: FastAPI) -> None:
 
 def _said(error: HTTPException) -> ServerError:
     """What the framework refuses, in our words."""
-    kinds: dict[int, type[ServerError]] = {404: NotFound, 405: MethodNotAllowed, 413: TooLarge}
+    kinds: dict[int, type[ServerError]] = {404: NotFound, 405: MethodNotAllowed, 413: TooLargeError}
     if error.status_code == 400:  # a body that is no text, or no form
-        return Invalid([("body", "It cannot be read. Send JSON in UTF-8, or a form.")])
+        return InvalidFieldsError([("body", "It cannot be read. Send JSON in UTF-8, or a form.")])
     if error.status_code in kinds:
         return kinds[error.status_code]()
     said = ServerError(str(error.detail))
@@ -167,7 +169,7 @@ def _add_health(app: FastAPI) -> None:
         try:
             require(db)
         except SetupError as error:
-            raise NotReady(error.message) from None
+            raise NotReadyError(error.message) from None
         if not alive(db):
-            raise NotReady("No worker gives a sign of life. Start one: parenting worker")
+            raise NotReadyError("No worker gives a sign of life. Start one: parenting worker")
         return ready

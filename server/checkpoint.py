@@ -27,7 +27,7 @@ REPORT = "report."
 """Checkpoints leave the report out: it says what the last tick did, and nothing in the agent reads it."""
 
 
-class Diverged(ServerError):
+class DivergedError(ServerError):
     """The record and the agent disagree; the run was stopped so that nothing is built on it."""
 
 
@@ -77,12 +77,12 @@ def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None
     """What the bytes hold; `weights` are those that the run began with.
 
     Raises:
-        Diverged: other versions of torch or another number of threads wrote them: the bits would differ.
+        DivergedError: other versions of torch or another number of threads wrote them: the bits would differ.
         TypeError, KeyError: a piece is missing or has another shape than declared.
     """
     whole = torch.load(io.BytesIO(blob), weights_only=True)
     if whole["versions"] != versions():
-        raise Diverged(
+        raise DivergedError(
             f"This run was raised with {whole['versions']}; here it would go on with {versions()}."
         )
     template = birth(world, config, 0, weights)

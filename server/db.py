@@ -22,7 +22,7 @@ from sqlalchemy import Connection, Engine, PoolProxiedConnection, create_engine,
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError
 from sqlalchemy.orm import Session
 
-from parenting.server.errors import Busy, DiskFull, SetupError
+from parenting.server.errors import BusyError, DiskFullError, SetupError
 from parenting.server.settings import Settings
 
 SAFE_SQLITE = (3, 51, 3)
@@ -52,8 +52,8 @@ class Database:
         self._hurried = engine.execution_options(begin="IMMEDIATE", synchronous="normal")
         # One writer of this process at a time: fairer than many threads that sleep on SQLite's lock.
         self._turn = threading.Lock()
-        self._listening = threading.Lock()
-        self._ear: PoolProxiedConnection | None = None
+        self._cache_lock = threading.Lock()
+        self._watcher: PoolProxiedConnection | None = None
         self._last: tuple[int, Hashable, Any] | None = None
 
     @contextmanager
@@ -61,9 +61,9 @@ class Database:
         """A deferred transaction, for reading only; what is written in it is rolled back.
 
         Raises:
-            Busy: the database was locked for five seconds.
+            BusyError: the database was locked for five seconds.
         """
-        with _said_plainly(), Session(self.engine) as session:
+        with _translated_errors(), Session(self.engine) as session:
             yield session
 
     @contextmanager
@@ -74,50 +74,50 @@ class Database:
         it is for what nobody was promised, or what a worker does again: leases, ticks, metrics, checkpoints.
 
         Raises:
-            Busy: no turn to write within five seconds.
-            DiskFull: nothing was stored.
+            BusyError: no turn to write within five seconds.
+            DiskFullError: nothing was stored.
         """
         if not self._turn.acquire(timeout=BUSY_SECONDS):
-            raise Busy
+            raise BusyError
         try:
             engine = self._writing if durable else self._hurried
-            with _said_plainly(), Session(engine, expire_on_commit=False) as session, session.begin():
+            with _translated_errors(), Session(engine, expire_on_commit=False) as session, session.begin():
                 session.connection()  # BEGIN IMMEDIATE now, not at the first statement
                 yield session
         finally:
             self._turn.release()
 
-    def remembered(self, key: Hashable, look: Callable[[], Seen]) -> Seen:
+    def cached(self, key: Hashable, look: Callable[[], Seen]) -> Seen:
         """What `look()` gives, or what the last look under this key gave if nobody has committed since.
 
         For polls: SQLite tells cheaply whether anything was committed. The last look alone is kept.
         """
-        with self._listening:
-            pulse = self._pulse()  # before the look: what is committed meanwhile belongs to the next one
-            if pulse is None:
+        with self._cache_lock:
+            version = self.data_version()  # before the look: later commits belong to the next one
+            if version is None:
                 return look()
-            if self._last is None or self._last[:2] != (pulse, key):
-                self._last = (pulse, key, look())
+            if self._last is None or self._last[:2] != (version, key):
+                self._last = (version, key, look())
             seen: Seen = self._last[2]
             return seen
 
-    def _pulse(self) -> int | None:
+    def data_version(self) -> int | None:
         """SQLite's number that changes with every commit of another connection; None in other databases."""
         if self.engine.dialect.name != "sqlite":
             return None
-        with _said_plainly():
-            if self._ear is None:
-                self._ear = self.engine.raw_connection()  # it never writes, so all commits are others' to it
-            cursor = self._ear.cursor()
+        with _translated_errors():
+            if self._watcher is None:
+                self._watcher = self.engine.raw_connection()  # never writes: every commit is another's
+            cursor = self._watcher.cursor()
             cursor.execute("PRAGMA data_version")
             number: int = cursor.fetchall()[0][0]
             return number
 
     def close(self) -> None:
         """Close every connection."""
-        if self._ear is not None:
-            self._ear.close()
-            self._ear = None
+        if self._watcher is not None:
+            self._watcher.close()
+            self._watcher = None
         self.engine.dispose()
 
 
@@ -205,15 +205,15 @@ def _begin(connection: Connection) -> None:
 
 
 @contextmanager
-def _said_plainly() -> Iterator[None]:
+def _translated_errors() -> Iterator[None]:
     try:
         yield
     except OperationalError as error:
         name = str(getattr(error.orig, "sqlite_errorname", ""))
         if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
-            raise Busy from error
+            raise BusyError from error
         if name.startswith("SQLITE_FULL"):
-            raise DiskFull from error
+            raise DiskFullError from error
         raise
 
 

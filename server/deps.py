@@ -8,8 +8,8 @@
 `Db` is the `server.db.Database` that every verb of `server.runs`, `queue` and `record` takes first. Write
 `def`, not `async def`: verbs block, so they belong in the thread pool. Raise `server.errors` freely:
 `server.app` turns them into the one JSON shape for programs (/api, /static, /healthz, /readyz), and into the
-pages' `error_page` elsewhere. After a stored answer or event call `ring(request)`, so that the worker hears
-of it at once.
+pages' `error_page` elsewhere. After a stored answer or event call `notify_worker(request)`, so that the
+worker acts on it at once.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def settings_of(request: Request) -> Settings:
     return settings
 
 
-def ring(request: Request) -> None:
-    """Wake the worker after a commit. A hint: lost ones cost it one poll."""
-    request.app.state.worker_bell.ring()
+def notify_worker(request: Request) -> None:
+    """Wake the worker after a commit. This is a hint: a lost one costs the worker one poll."""
+    request.app.state.worker_notifier.notify()
 
 
 Db = Annotated[Database, Depends(database)]

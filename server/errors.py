@@ -49,7 +49,7 @@ class Forbidden(ServerError):
     status, code = 403, "cross_site"
 
 
-class UnknownHost(ServerError):
+class UnknownHostError(ServerError):
     """This server is called localhost or 127.0.0.1, and by no other name."""
 
     status, code = 400, "unknown_host"
@@ -61,37 +61,37 @@ class MethodNotAllowed(ServerError):
     status, code = 405, "method_not_allowed"
 
 
-class TooMany(ServerError):
+class TooManyStreamsError(ServerError):
     """Too many live streams are open. Close a page and load this one again."""
 
     status, code = 503, "too_many"
 
 
-class NotReady(ServerError):
+class NotReadyError(ServerError):
     """This server is not ready."""
 
     status, code = 503, "not_ready"
 
 
-class TooLarge(ServerError):
+class TooLargeError(ServerError):
     """The body of this request is too large."""
 
     status, code = 413, "too_large"
 
 
-class Busy(ServerError):
+class BusyError(ServerError):
     """The database was busy for five seconds; nothing was stored. Send the same again."""
 
     status, code = 503, "busy"
 
 
-class DiskFull(ServerError):
+class DiskFullError(ServerError):
     """The disk is full; nothing was stored. Free some space and send the same again."""
 
     status, code = 507, "disk_full"
 
 
-class Invalid(ServerError):
+class InvalidFieldsError(ServerError):
     """Some fields are not as they should be."""
 
     status, code = 422, "invalid"
@@ -116,7 +116,7 @@ class SetupError(ServerError):
     status, code = 500, "setup"
 
 
-class LostClaim(ServerError):
+class LostClaimError(ServerError):
     """Another worker raises this run now; this one must let go of it without writing."""
 
     status, code = 409, "lost_claim"

@@ -24,7 +24,7 @@ from parenting.agent.config import PRESETS, Config
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, LevelError
 from parenting.server.db import Database
-from parenting.server.errors import Invalid
+from parenting.server.errors import InvalidFieldsError
 from parenting.server.runs import create_run
 from parenting.server.tables import Run
 from parenting.server.weights import keep
@@ -97,7 +97,7 @@ def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
     `folder` holds weights of one's own; those of the built-in levels are shipped.
 
     Raises:
-        Invalid: names every wrong field, with a message each.
+        InvalidFieldsError: names every wrong field, with a message each.
     """
     columns = plan(new, folder)
     file: Path | None = columns.pop("weights")
@@ -108,14 +108,14 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
     """The columns of a new run; under `weights` the file of its pre-trained weights, or None.
 
     Raises:
-        Invalid: names every wrong field, with a message each.
+        InvalidFieldsError: names every wrong field, with a message each.
     """
     wrong: list[tuple[str, str]] = []
     level = _level(new, wrong)
     config = _config(new, wrong)
     weights = _weights(new, level, config, folder, wrong)
     if wrong or level is None or config is None:
-        raise Invalid(wrong)
+        raise InvalidFieldsError(wrong)
     spec = registry.spec(new.world)
     return {
         **new.model_dump(include={"world", "preset", "seed", "parent", "name", "goal", "pace"}),
@@ -132,7 +132,7 @@ def read_form(form: Mapping[str, str]) -> NewRun:
     """A new run from a web form's text; an empty field is an absent one, `config.p_guid` sets `p_guid`.
 
     Raises:
-        Invalid: names every wrong field, with a message each.
+        InvalidFieldsError: names every wrong field, with a message each.
     """
     given = {name: text for name, text in form.items() if text.strip()}
     fields: dict[str, Any] = {name: given[name] for name in FORM_FIELDS if name in given}
@@ -142,7 +142,7 @@ def read_form(form: Mapping[str, str]) -> NewRun:
     try:
         return NewRun.model_validate(fields)
     except ValidationError as error:
-        raise Invalid(messages(error.errors())) from None
+        raise InvalidFieldsError(messages(error.errors())) from None
 
 
 def messages(errors: Any, skip: tuple[str, ...] = ()) -> list[tuple[str, str]]:

@@ -60,7 +60,7 @@ def write_metrics(db: Database, mine: Claim, rows: Mapping[int, Mapping[str, flo
     A tick that is lived again replaces its row; what is not finite becomes null.
 
     Raises:
-        LostClaim: another worker raises this run now.
+        LostClaimError: another worker raises this run now.
     """
     with db.write(durable=False) as session:
         run = held(session, mine)
@@ -88,7 +88,7 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
     A tick saved again is replaced.
 
     Raises:
-        LostClaim: another worker raises this run now.
+        LostClaimError: another worker raises this run now.
     """
     digest = hashlib.sha256(blob).hexdigest()
     with db.write(durable=False) as session:

@@ -21,9 +21,9 @@ from parenting.agent.events import Event
 from parenting.agent.init import world_of
 from parenting.agent.query import Answer
 from parenting.envs.gridworld import Gridworld
-from parenting.parents.replay import Moment, Parted, ReplayParent
+from parenting.parents.replay import Moment, ReplayMismatchError, ReplayParent
 from parenting.server import tables
-from parenting.server.checkpoint import REPORT, Diverged, Saved, begun_with, birth, unpack, versions
+from parenting.server.checkpoint import REPORT, DivergedError, Saved, begun_with, birth, unpack, versions
 from parenting.server.codec import CHOICES, decode, kind_name
 from parenting.server.counters import count
 from parenting.server.db import Database
@@ -62,7 +62,7 @@ class Relived:
         return self.parted is None and not self.differ
 
 
-class Unreadable(ValueError):
+class UnreadableRecordError(ValueError):
     """What is stored of a tick cannot be what was written there."""
 
 
@@ -82,14 +82,14 @@ class Rows:
         """The moment of a tick.
 
         Raises:
-            Unreadable: its rows are damaged.
+            UnreadableRecordError: its rows are damaged.
         """
         if tick not in self._window:
             self._read(range(tick, tick + WINDOW))
         try:
             return Moment(list(self._events_of(tick)), self._answer_of(tick), self._query_of(tick))
         except (LookupError, TypeError, ValueError) as error:
-            raise Unreadable(f"What is stored of tick {tick} cannot be read: {error!r}.") from None
+            raise UnreadableRecordError(f"What is stored of tick {tick} cannot be read: {error!r}.") from None
 
     def _read(self, window: range) -> None:
         first, last, mine = window[0], window[-1], self.run_id
@@ -133,8 +133,8 @@ def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
 
     Raises:
         NotFound: there is no such run, or no intact checkpoint of it.
-        Diverged: it was raised by another build of torch or with other threads, so that bits would differ;
-            or its checkpoint does not fit its config.
+        DivergedError: it was raised by another build of torch or with other threads, so that the bits would
+            differ; or its checkpoint does not fit its config.
     """
     run = get_run(db, run_id)
     born = Config.model_validate(run.config)
@@ -147,8 +147,8 @@ def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
         for tick in range(1, last + 1):
             lived = _beat(world, lived, parent)
             progress(tick, last)
-    except (Parted, Unreadable) as error:
-        parted = _said(error) if isinstance(error, Parted) else str(error)
+    except (ReplayMismatchError, UnreadableRecordError) as error:
+        parted = _said(error) if isinstance(error, ReplayMismatchError) else str(error)
     differ = () if parted else differences(lived, kept)
     return Relived(run_id, parent.tick, rows.answers, rows.events, last, parted, differ)
 
@@ -171,13 +171,13 @@ def _checkpoint(db: Database, run: Run, world: Gridworld, born: Config, weights:
     try:
         return unpack(world, born, intact[0].blob, weights)
     except (TypeError, KeyError) as error:
-        raise Diverged(f"The checkpoint of run {run.id} does not fit its config: {error}.") from None
+        raise DivergedError(f"The checkpoint of run {run.id} does not fit its config: {error}.") from None
 
 
 def _same_build(run: Run) -> None:
     here, there = versions(), run.versions or versions()
     if here != there:
-        raise Diverged(
+        raise DivergedError(
             f"Run {run.id} was raised with torch {there['torch']} and {_threads(there['threads'])}; here are "
             f"torch {here['torch']} and {_threads(here['threads'])}, which give other bits. "
             f"Install torch {there['torch']} to replay it."
@@ -188,7 +188,7 @@ def _threads(number: int) -> str:
     return f"{number} thread{'' if number == 1 else 's'}"
 
 
-def _said(parted: Parted) -> str:
+def _said(parted: ReplayMismatchError) -> str:
     recorded, asked = kind_name(parted.recorded), kind_name(parted.asked)
     if recorded is None:
         return f"At tick {parted.tick} it asks for {asked}; the record has no question there."

@@ -15,12 +15,12 @@ from sqlalchemy import bindparam, func, or_, select, update
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
-from parenting.server.errors import Conflict, LostClaim, NotFound
+from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.tables import Query, Run
 
 CLAIM_SECONDS = 5.0
 OVER = ("stopped", "finished", "failed")
-SHOWN = frozenset({"tick", "waiting", "optimal", "versions", "maturity", "speed"})
+PROGRESS_FIELDS = frozenset({"tick", "waiting", "optimal", "versions", "maturity", "speed"})
 """What a worker reports of an agent."""
 
 
@@ -149,7 +149,7 @@ def let_go(db: Database, claims: Sequence[Claim]) -> None:
                 run.actor = run.heartbeat = None
 
 
-def beat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
+def heartbeat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
     """A sign of life for all runs of a worker; gives back the claims that still hold."""
     with db.write(durable=False) as session:
         kept = []
@@ -160,15 +160,15 @@ def beat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
         return kept
 
 
-def report(db: Database, mine: Claim, **fields: Any) -> Run:
-    """Show where an agent is: any of `SHOWN`. Also a sign of life.
+def report_progress(db: Database, mine: Claim, **fields: Any) -> Run:
+    """Show where an agent is: any of `PROGRESS_FIELDS`. Also a sign of life.
 
     Raises:
-        LostClaim: another worker raises this run now.
+        LostClaimError: another worker raises this run now.
     """
-    unknown = set(fields) - SHOWN
+    unknown = set(fields) - PROGRESS_FIELDS
     if unknown:
-        raise TypeError(f"report takes {sorted(SHOWN)}, not {sorted(unknown)}")
+        raise TypeError(f"report_progress takes {sorted(PROGRESS_FIELDS)}, not {sorted(unknown)}")
     with db.write(durable=False) as session:
         run = held(session, mine)
         run.heartbeat = db.clock()
@@ -183,7 +183,7 @@ def finish(db: Database, mine: Claim, status: str, reason: str, error: str | Non
     Withdraws what is open.
 
     Raises:
-        LostClaim: another worker raises this run now.
+        LostClaimError: another worker raises this run now.
     """
     with db.write() as session:
         run = held(session, mine)
@@ -232,7 +232,7 @@ def held(session: Session, mine: Claim) -> Run:
     """The run of a claim, locked, if the claim still holds: the first line of every write of a worker."""
     run = hold(session, mine.run_id)
     if (run.actor, run.epoch) != (mine.actor, mine.epoch):
-        raise LostClaim(
+        raise LostClaimError(
             f"Run {run.id} is raised by {run.actor or 'nobody'} now (epoch {run.epoch}, not {mine.epoch})."
         )
     return run

@@ -41,19 +41,19 @@ def bind(host: str, port: int, container: bool = False) -> socket.socket:
             f"host: {host} would let others in, and there is no login yet. Use {LOOPBACK}; or, in a "
             f"container whose port is published on loopback only, {EVERYWHERE} and PARENTING_CONTAINER=true."
         )
-    ear = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    ear.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        ear.bind((host, port))
+        listener.bind((host, port))
     except OSError as error:
-        ear.close()
+        listener.close()
         said = error.strerror or "it cannot be used"
         raise SetupError(
             f"port: {port} cannot be used ({said}). Name another one, or 0 for any free one."
         ) from None
-    ear.listen(128)
-    ear.set_inheritable(True)
-    return ear
+    listener.listen(128)
+    listener.set_inheritable(True)
+    return listener
 
 
 def make_server(settings: Settings) -> Server:

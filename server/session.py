@@ -14,7 +14,7 @@ from parenting.agent.query import Kind, Query
 from parenting.evaluation.argmax import evaluation
 from parenting.parents.scripted import Judgement
 from parenting.server import record, runs
-from parenting.server.checkpoint import Diverged, Saved, begun_with, birth, pack, unpack, versions
+from parenting.server.checkpoint import DivergedError, Saved, begun_with, birth, pack, unpack, versions
 from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
 from parenting.server.db import Database
@@ -41,7 +41,7 @@ class Life:
         """Take up a run where its last intact checkpoint left it, or at tick 0.
 
         Raises:
-            Diverged: the checkpoint was written under other versions, so that the bits would differ.
+            DivergedError: the checkpoint was written under other versions, so that the bits would differ.
         """
         self.db, self.mine, self.run = db, mine, run
         born = Config.model_validate(run.config)
@@ -57,7 +57,7 @@ class Life:
         self._measured_tick, self._lived_at, self._heard_at = self.tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
         self._stuck_at = -1  # the tick it was told of: whoever ends episodes has to see that another is stuck
-        runs.report(db, mine, versions=versions())
+        runs.report_progress(db, mine, versions=versions())
 
     def _parent(self, config: Config, judgement: Judgement, asked: Callable[[], None]) -> QueueParent:
         if self.run.parent == "scripted":
@@ -103,7 +103,7 @@ class Life:
             reason = "preferences"
         if reason != self.waiting or (reason == "stuck" and self.tick != self._stuck_at):
             self.waiting, self._stuck_at = reason, self.tick
-            runs.report(self.db, self.mine, tick=self.tick, waiting=reason)
+            runs.report_progress(self.db, self.mine, tick=self.tick, waiting=reason)
         self.save_if_due()
 
     def early(self, pace: float | None) -> float:
@@ -143,7 +143,7 @@ class Life:
         if (stored.kind if stored else None) != kind or (
             stored and stored.clips != encode(self.world, query)
         ):
-            raise Diverged(
+            raise DivergedError(
                 f"Run {self.mine.run_id} asked something else when tick {self.tick} was lived again."
             )
 
@@ -172,7 +172,7 @@ class Life:
         self.optimal, self.waiting, self.stage = bool(row["optimal"]), None, stage
         record.write_metrics(self.db, self.mine, {self.tick: row})
         shown = {"maturity": row["maturity"], "speed": speed, "optimal": self.optimal}
-        runs.report(self.db, self.mine, tick=self.tick, waiting=None, **shown)
+        runs.report_progress(self.db, self.mine, tick=self.tick, waiting=None, **shown)
 
     def finished(self) -> bool:
         """A scripted parent has no more to teach once the argmax policy is optimal; a person may go on."""

@@ -1,8 +1,8 @@
-"""Live streams: what a run does, told to the browsers that look at it, by server-sent events.
+"""Live streams: browsers follow a run by server-sent events.
 
-One watcher a run polls the database four times a second, however many browsers look, and at once when the
-worker rings. A question is told without delay; everything else at most once in 250 ms. Streams end at once
-when the server stops.
+However many browsers follow a run, one task polls the database for it, four times a second and after each
+notification of the worker. A question is sent without delay, everything else at most once in 250 ms. Streams
+end at once when the server stops.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from fastapi.sse import ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from parenting.server.db import Database
-from parenting.server.errors import ServerError, TooMany
+from parenting.server.errors import ServerError, TooManyStreamsError
+from parenting.server.notify import Notifier
 from parenting.server.queue.parent_side import waiting
 from parenting.server.record import metrics
 from parenting.server.schemas import metric_schemas, run_schema
-from parenting.server.wake import Bell
 
-PERIOD = 0.25
+POLL_SECONDS = 0.25
 """Seconds between polls, and at least between two events of the same browser, questions excepted."""
-COURTESY = 0.1
-"""Seconds after a ring for which the streams let those go first who wait for a question."""
+YIELD_SECONDS = 0.1
+"""After a notification, streams wait this many seconds so that requests for a question are served first."""
 
 Found = TypeVar("Found")
 
@@ -37,8 +37,8 @@ ROWS = 10_000
 
 
 @dataclass
-class Watcher:
-    """What is known of one run, and who wants to hear of it."""
+class Subscription:
+    """The last known state of one run, shared by every stream of it."""
 
     streams: int = 0
     run: dict[str, Any] = field(default_factory=dict)
@@ -50,18 +50,18 @@ class Watcher:
 class Streams:
     """All live streams of this process."""
 
-    def __init__(self, db: Database, bell: Bell, limit: int) -> None:
-        self.db, self.bell, self.limit = db, bell, limit
-        self.watchers: dict[int, Watcher] = {}
+    def __init__(self, db: Database, notifier: Notifier, limit: int) -> None:
+        self.db, self.notifier, self.limit = db, notifier, limit
+        self.subscriptions: dict[int, Subscription] = {}
         self.closed = False
-        self._askers = 0
-        self._rung = asyncio.Event()
+        self._waiting_requests = 0
+        self._notified = asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def open(self) -> None:
-        """Begin to listen for the bell, in the running event loop."""
+        """Begin to listen for notifications, in the running event loop."""
         self._loop = asyncio.get_running_loop()
-        self._loop.add_reader(self.bell.listen(), self._on_ring)
+        self._loop.add_reader(self.notifier.listen(), self._on_notification)
 
     def close(self) -> None:
         """End every stream now. May be called from a signal handler or from another thread."""
@@ -73,31 +73,31 @@ class Streams:
         """Stop listening, at the end of the application."""
         self.close()
         if self._loop is not None:
-            self._loop.remove_reader(self.bell.listen())
-        self.bell.close()
+            self._loop.remove_reader(self.notifier.listen())
+        self.notifier.close()
 
-    async def follow(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
+    async def subscribe(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
         """The events of a run: `run`, `question`, and, unless `after` is None, `metrics` of later ticks."""
-        watcher = self._join(run_id)
+        subscription = self._join(run_id)
         try:
             seen: dict[str, Any] = {}
             asked: Any = ...
             ready = 0.0
             while not self.closed:
-                changed = watcher.changed
-                if watcher.run and watcher.question != asked:
-                    asked = watcher.question
+                changed = subscription.changed
+                if subscription.run and subscription.question != asked:
+                    asked = subscription.question
                     yield ServerSentEvent(event="question", raw_data=json.dumps(asked))  # "null" is data too
                 now = asyncio.get_running_loop().time()
-                if watcher.run != seen and now >= ready:
-                    seen, ready = watcher.run, now + PERIOD
+                if subscription.run != seen and now >= ready:
+                    seen, ready = subscription.run, now + POLL_SECONDS
                     yield ServerSentEvent(event="run", data=seen)
                     async for event in self._metrics(run_id, after):
                         after = int(event.id or -1)
                         yield event
-                await _either(changed, ready - now if watcher.run != seen else None)
+                await _either(changed, ready - now if subscription.run != seen else None)
         finally:
-            self._leave(run_id, watcher)
+            self._leave(run_id, subscription)
 
     async def _metrics(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
         while after is not None:
@@ -109,79 +109,80 @@ class Streams:
                 rows[-1].tick if len(rows) == ROWS else None
             )  # there may be more: a run that is over stays so
 
-    async def first(
+    async def wait_for(
         self, look: Callable[[], Found | None], seconds: float, gone: Callable[[], Awaitable[bool]]
     ) -> Found | None:
-        """What a look finds, now or within `seconds`; it looks again at every ring, and now and then.
+        """Return what `look` finds now or within `seconds`; None if it finds nothing.
 
-        Where as many wait already as streams are allowed, it does not wait. Once who asked is `gone`, it does
-        not look: a question would be held for nobody.
+        It looks again after each notification and every `POLL_SECONDS`. It does not wait when as many
+        requests wait already as streams are allowed. It stops looking once the client is `gone`: a question
+        would be leased to nobody.
         """
-        until = time.monotonic() + (seconds if self._askers < self.limit else 0.0)
-        self._askers += 1
+        until = time.monotonic() + (seconds if self._waiting_requests < self.limit else 0.0)
+        self._waiting_requests += 1
         try:
             while not await gone():
-                rung = self._rung
+                notified = self._notified
                 found = await run_in_threadpool(look)
                 left = until - time.monotonic()
                 if found is not None or left <= 0 or self.closed:
                     return found
-                await _either(rung, min(left, PERIOD))
+                await _either(notified, min(left, POLL_SECONDS))
             return None
         finally:
-            self._askers -= 1
+            self._waiting_requests -= 1
 
-    def _join(self, run_id: int) -> Watcher:
-        watcher = self.watchers.setdefault(run_id, Watcher())
-        watcher.streams += 1
-        if watcher.task is None:
-            watcher.task = asyncio.create_task(self._watch(run_id, watcher))
-        return watcher
+    def _join(self, run_id: int) -> Subscription:
+        subscription = self.subscriptions.setdefault(run_id, Subscription())
+        subscription.streams += 1
+        if subscription.task is None:
+            subscription.task = asyncio.create_task(self._watch(run_id, subscription))
+        return subscription
 
-    def _leave(self, run_id: int, watcher: Watcher) -> None:
-        watcher.streams -= 1
-        if not watcher.streams and watcher.task is not None:
-            watcher.task.cancel()
-            del self.watchers[run_id]
+    def _leave(self, run_id: int, subscription: Subscription) -> None:
+        subscription.streams -= 1
+        if not subscription.streams and subscription.task is not None:
+            subscription.task.cancel()
+            del self.subscriptions[run_id]
 
-    async def _watch(self, run_id: int, watcher: Watcher) -> None:
+    async def _watch(self, run_id: int, subscription: Subscription) -> None:
         while not self.closed:
-            rung = self._rung
+            notified = self._notified
             look = partial(_look, self.db, run_id)
             try:
                 run, question = await run_in_threadpool(look)
             except ServerError:  # busy: the next look will tell
-                run, question = watcher.run, watcher.question
-            if (run, question) != (watcher.run, watcher.question):
-                watcher.run, watcher.question = run, question
-                _tell(watcher)
-            await _either(rung, PERIOD)
-            if rung.is_set() and self._askers:
-                await asyncio.sleep(COURTESY)
+                run, question = subscription.run, subscription.question
+            if (run, question) != (subscription.run, subscription.question):
+                subscription.run, subscription.question = run, question
+                _tell(subscription)
+            await _either(notified, POLL_SECONDS)
+            if notified.is_set() and self._waiting_requests:
+                await asyncio.sleep(YIELD_SECONDS)
 
-    def _on_ring(self) -> None:
-        self.bell.drain()
-        self._rung.set()
-        self._rung = asyncio.Event()
+    def _on_notification(self) -> None:
+        self.notifier.drain()
+        self._notified.set()
+        self._notified = asyncio.Event()
 
     def _wake_all(self) -> None:
-        self._rung.set()
-        for watcher in self.watchers.values():
-            _tell(watcher)
+        self._notified.set()
+        for subscription in self.subscriptions.values():
+            _tell(subscription)
 
     def check_room(self) -> None:
         """Refuse one stream too many.
 
         Raises:
-            TooMany: as many as allowed are open.
+            TooManyStreamsError: as many as allowed are open.
         """
-        if sum(watcher.streams for watcher in self.watchers.values()) >= self.limit:
-            raise TooMany
+        if sum(subscription.streams for subscription in self.subscriptions.values()) >= self.limit:
+            raise TooManyStreamsError
 
 
-def _tell(watcher: Watcher) -> None:
-    watcher.changed.set()
-    watcher.changed = asyncio.Event()
+def _tell(subscription: Subscription) -> None:
+    subscription.changed.set()
+    subscription.changed = asyncio.Event()
 
 
 def _look(db: Database, run_id: int) -> tuple[dict[str, Any], dict[str, Any] | None]:

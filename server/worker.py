@@ -1,6 +1,6 @@
 """The worker: raises every living run in turn, a few ticks each, and waits where a parent has not answered.
 
-It sleeps on a bell that the web rings after an answer; the bell is a hint, a poll every 50 ms is the truth.
+Between rounds it waits for a notification, which the web sends after each answer, and polls every 50 ms.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ import structlog
 from parenting.agent.process import settle
 from parenting.server import runs, workers
 from parenting.server.db import Database, connect
-from parenting.server.errors import Busy, DiskFull, LostClaim
+from parenting.server.errors import BusyError, DiskFullError, LostClaimError
+from parenting.server.notify import Notifier
 from parenting.server.queue import worker_side
 from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
 from parenting.server.schema import require
 from parenting.server.session import Life, reached
 from parenting.server.settings import Settings
-from parenting.server.wake import Bell
 
 log = structlog.get_logger()
 
@@ -45,7 +45,7 @@ class Worker:
         self.name = f"{socket.gethostname()}:{os.getpid()}"
         self.claims: dict[int, Claim] = {}
         self.lives: dict[int, Life] = {}
-        self.bell, self.web = Bell(settings.data, "worker"), Bell(settings.data, "web")
+        self.notifier, self.web_notifier = Notifier(settings.data, "worker"), Notifier(settings.data, "web")
         self.stopping = False
         self._claimed_at, self._signed_at = 0.0, -workers.SIGN_SECONDS
         self._soonest = POLL_SECONDS
@@ -56,7 +56,7 @@ class Worker:
 
     def work(self) -> None:
         """Raise runs in turn until stopped, then save them and give them back."""
-        self.bell.listen()
+        self.notifier.listen()
         try:
             while not self.stopping:
                 self._soonest = POLL_SECONDS
@@ -64,7 +64,7 @@ class Worker:
                 self._sign()
                 self._claim(2 * CLAIM_EVERY if lived else CLAIM_EVERY)
                 if not lived:
-                    self.bell.wait(self._soonest)
+                    self.notifier.wait(self._soonest)
         finally:
             self._close()
 
@@ -83,7 +83,7 @@ class Worker:
         if now - self._claimed_at < every:
             return
         self._claimed_at = now
-        kept = runs.beat(self.db, list(self.claims.values()))
+        kept = runs.heartbeat(self.db, list(self.claims.values()))
         fresh = runs.claim(self.db, self.name, self.settings.claim_seconds)
         self.claims = {claim.run_id: claim for claim in (*kept, *fresh)}
         self.lives = {
@@ -105,10 +105,10 @@ class Worker:
         """One run's turn. A run that fails stops alone, with its reason."""
         try:
             return self._turn(run_id, seen)
-        except LostClaim as error:
+        except LostClaimError as error:
             log.warning("run lost", run=run_id, reason=error.message)
             self._drop(run_id)
-        except (Busy, DiskFull) as error:
+        except (BusyError, DiskFullError) as error:
             log.warning(
                 "store refused; the run goes on from its checkpoint", run=run_id, reason=error.message
             )
@@ -140,14 +140,14 @@ class Worker:
 
     def _begin(self, run_id: int) -> Life:
         run = runs.get_run(self.db, run_id)
-        self.lives[run_id] = Life(self.db, self.claims[run_id], run, self.web.ring)
+        self.lives[run_id] = Life(self.db, self.claims[run_id], run, self.web_notifier.notify)
         log.info("run taken up", run=run_id, tick=self.lives[run_id].tick)
         return self.lives[run_id]
 
     def _end(self, run_id: int) -> None:
         """Save what was lived of a run that somebody stopped, and let go of it."""
         if run_id in self.lives:
-            with suppress(LostClaim):
+            with suppress(LostClaimError):
                 self.lives[run_id].save()
         self._drop(run_id)
 
@@ -159,11 +159,11 @@ class Worker:
         for run_id, life in list(self.lives.items()):
             try:
                 life.save()
-            except LostClaim:
+            except LostClaimError:
                 self._drop(run_id)
         runs.let_go(self.db, list(self.claims.values()))
         workers.sign_off(self.db, self.name)
-        self.bell.close()
+        self.notifier.close()
 
 
 def main(settings: Settings) -> int:

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from parenting.commands.main import COMMANDS
+from parenting.server.notify import Notifier
 from parenting.server.settings import Settings
-from parenting.server.wake import Bell
 from tests.services import image_check, image_environment, read_compose, read_dockerfile
 from tests.tree import LINKS, ROOT
 
@@ -176,6 +176,6 @@ def test_build_sees_the_packages_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("name", ["web", "worker"])
-def test_bells_of_containers_lie_in_the_folder_that_they_share(name: str) -> None:
+def test_sockets_of_containers_lie_in_the_folder_that_they_share(name: str) -> None:
     """A longer path would put them into /tmp, which every container has for itself."""
-    assert Bell(Path(image_environment()["PARENTING_DATA"]), name).folder == Path("/data/bells", name)
+    assert Notifier(Path(image_environment()["PARENTING_DATA"]), name).folder == Path("/data/sockets", name)

@@ -87,7 +87,7 @@ def test_the_services_raise_an_agent_and_stop(
     assert (stack.check("web"), stack.check("worker")) == (0, 1)
     assert stop(running["web"]) in (0, -signal.SIGTERM)  # uvicorn ends by the signal that it heard
     assert stack.check("web") != 0
-    assert not list(stack.data.glob("bells/*/*")), "every socket is taken away"
+    assert not list(stack.data.glob("sockets/*/*")), "every socket is taken away"
 
 
 def test_in_a_network_of_its_own_the_web_runs_as_it_stands(tmp_path: Path) -> None:

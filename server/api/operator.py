@@ -8,7 +8,7 @@ from parenting.agent.events import Change, EndEpisode, Event, Mature
 from parenting.server import runs
 from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody, RunId
 from parenting.server.api.responses import write_responses
-from parenting.server.deps import Db, ring
+from parenting.server.deps import Db, notify_worker
 from parenting.server.record import add_event
 from parenting.server.schemas import RunSchema, run_schema
 
@@ -39,7 +39,7 @@ def stop_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
 def set_goal(request: Request, run_id: RunId, body: GoalBody, db: Db) -> RunSchema:
     """Let the run rest once so many questions are answered. The agent's life is the same, only shorter."""
     runs.set_goal(db, run_id, body.goal)
-    ring(request)
+    notify_worker(request)
     return run_schema(db, run_id)
 
 
@@ -47,7 +47,7 @@ def set_goal(request: Request, run_id: RunId, body: GoalBody, db: Db) -> RunSche
 def set_pace(request: Request, run_id: RunId, body: PaceBody, db: Db) -> RunSchema:
     """Let at most so many ticks pass in a second, for those who watch. The agent's life is the same."""
     runs.set_pace(db, run_id, body.pace)
-    ring(request)
+    notify_worker(request)
     return run_schema(db, run_id)
 
 
@@ -74,11 +74,11 @@ def change_run(request: Request, run_id: RunId, body: ChangeBody, db: Db) -> Run
 
 def _become(request: Request, db: Db, run_id: int, status: str, reason: str | None = None) -> RunSchema:
     runs.set_status(db, run_id, status, reason)
-    ring(request)
+    notify_worker(request)
     return run_schema(db, run_id)
 
 
 def _happen(request: Request, db: Db, run_id: int, event: Event) -> RunSchema:
     add_event(db, run_id, event.kind, event.model_dump(mode="json"))
-    ring(request)
+    notify_worker(request)
     return run_schema(db, run_id)

@@ -11,7 +11,7 @@ from fastapi.responses import JSONResponse
 from parenting.server.api.bodies import AnswerBody, LeaseBody, QueryId, RunId
 from parenting.server.api.lists import AskedPart, AskedRows
 from parenting.server.api.responses import read_responses, write_responses
-from parenting.server.deps import Db, SettingsOf, ring
+from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.queue.parent_side import answer, lease, release
 from parenting.server.reads import pagination
 from parenting.server.runs import get_run
@@ -64,7 +64,7 @@ def answer_question(request: Request, query_id: QueryId, body: AnswerBody, db: D
     choice, or another client's, gets 409 and is not stored. A late answer is taken if none stands.
     """
     stored = answer(db, query_id, body.choice, body.client_id, body.parent)
-    ring(request)
+    notify_worker(request)
     return StoredSchema(**asdict(stored))
 
 

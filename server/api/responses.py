@@ -8,29 +8,29 @@ from typing import Any
 from pydantic import BaseModel
 
 from parenting.server.errors import (
-    Busy,
+    BusyError,
     Conflict,
-    DiskFull,
+    DiskFullError,
     Forbidden,
-    Invalid,
+    InvalidFieldsError,
     NotFound,
     ServerError,
-    TooLarge,
-    UnknownHost,
+    TooLargeError,
+    UnknownHostError,
 )
 
 Replies = dict[int | str, dict[str, Any]]
 
 ERRORS: dict[int, ServerError] = {
-    400: UnknownHost(),
+    400: UnknownHostError(),
     403: Forbidden(),
     404: NotFound("There is no run 9."),
     409: Conflict("Run 1 is stopped; nothing can be done to its agent any more."),
-    413: TooLarge(),
-    422: Invalid([("choice", "Input should be 'left', 'right', 'either' or 'neither'")]),
+    413: TooLargeError(),
+    422: InvalidFieldsError([("choice", "Input should be 'left', 'right', 'either' or 'neither'")]),
     500: ServerError(),
-    503: Busy(),
-    507: DiskFull(),
+    503: BusyError(),
+    507: DiskFullError(),
 }
 """One of each status, as an example. 503 is also said when too many live streams are open."""
 ALWAYS = (400, 413, 422, 500, 503)

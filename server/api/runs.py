@@ -17,7 +17,7 @@ from parenting.server.api.lists import (
     operator_event,
 )
 from parenting.server.api.responses import read_responses, write_responses
-from parenting.server.deps import Db, SettingsOf, ring
+from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.new_run import NewRun, start
 from parenting.server.reads import pagination
 from parenting.server.schemas import RunSchema, metric_schemas, run_schema, run_schemas
@@ -39,7 +39,7 @@ def start_run(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> Ru
     What is left out is as the world, or else the preset, has it.
     """
     run = start(db, new, settings.weights)
-    ring(request)
+    notify_worker(request)
     return run_schema(db, run.id)
 
 

@@ -57,7 +57,7 @@ async def follow_run(
         and len(last_event_id) < 16
     ):
         after = max(after, int(last_event_id))
-    async for event in request.app.state.streams.follow(run_id, after):
+    async for event in request.app.state.streams.subscribe(run_id, after):
         yield event
 
 

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from parenting.agent.events import Change, EndEpisode, Mature, Probability
 from parenting.server import record, runs
 from parenting.server.api.bodies import RunId
-from parenting.server.deps import Db, ring
+from parenting.server.deps import Db, notify_worker
 from parenting.server.new_run import Goal, Pace
 from parenting.server.pages.dashboard import dashboard_page
 from parenting.server.pages.operator_log import CHANCES, chances
@@ -110,5 +110,5 @@ def _numbers(
 
 def _back(request: Request, run_id: int, back: str) -> Response:
     """Wake the worker, and go back to where the button was."""
-    ring(request)
+    notify_worker(request)
     return see(f"/runs/{run_id}{WAYS[back]}")

@@ -12,7 +12,6 @@ from parenting.server import record, runs
 from parenting.server.api.bodies import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
-from parenting.server.guard import policy
 from parenting.server.pages.labels import Measures, began, measures
 from parenting.server.pages.operator_log import CHANCES, chances, done
 from parenting.server.pages.render import page, shown
@@ -20,6 +19,7 @@ from parenting.server.pages.stages import stages
 from parenting.server.pages.texts import MORE, SENTENCES, state, title
 from parenting.server.reads.pages import first_metrics, sampled_metrics
 from parenting.server.schemas import run_schema
+from parenting.server.security import policy
 from parenting.server.tables import Run
 
 router = APIRouter(include_in_schema=False)

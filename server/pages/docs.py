@@ -6,8 +6,8 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from parenting.server.guard import policy
 from parenting.server.pages.render import page
+from parenting.server.security import policy
 
 router = APIRouter(include_in_schema=False)
 

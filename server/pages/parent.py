@@ -20,7 +20,7 @@ from starlette.concurrency import run_in_threadpool
 from parenting.server import runs
 from parenting.server.api.bodies import Choice, ClientId, RunId
 from parenting.server.db import Database
-from parenting.server.deps import Db, SettingsOf, ring
+from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.errors import NotFound
 from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.question import Shown, show
@@ -89,7 +89,7 @@ async def question(
     streams: Streams = request.app.state.streams
     run = await run_in_threadpool(runs.get_run, db, run_id)
     take = partial(_markup, db, run, client_id, shown, settings.lease_seconds)
-    return await streams.first(take, wait, request.is_disconnected) or Response(status_code=204)
+    return await streams.wait_for(take, wait, request.is_disconnected) or Response(status_code=204)
 
 
 @router.post("/runs/{run_id}/parent/next")
@@ -113,7 +113,7 @@ def answer(
     if parent_side.get_query(db, query_id).run_id != run_id:
         raise NotFound(f"Question {query_id} is not one of run {run_id}.")
     parent_side.answer(db, query_id, choice, client_id, parent="human")
-    ring(request)
+    notify_worker(request)
     return _go_on(db, run_id, client_id, settings.lease_seconds, patience=PATIENCE)
 
 

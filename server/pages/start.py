@@ -11,8 +11,8 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from parenting.agent.config import PRESETS
 from parenting.envs.registry import WORLDS
 from parenting.server.db import Database
-from parenting.server.deps import Db, SettingsOf, ring
-from parenting.server.errors import Invalid
+from parenting.server.deps import Db, SettingsOf, notify_worker
+from parenting.server.errors import InvalidFieldsError
 from parenting.server.new_run import LARGEST_INT, plan, read_form, start
 from parenting.server.pages.labels import measures
 from parenting.server.pages.render import page, see
@@ -149,7 +149,7 @@ def create(request: Request, db: Db, settings: SettingsOf, form: FormOf) -> Resp
     if errors:
         return _page(db, {**FIRST, **form}, errors)
     run = start(db, read_form(given), settings.weights)
-    ring(request)
+    notify_worker(request)
     return see(f"/runs/{run.id}" + ("/parent" if run.parent == "human" else ""))
 
 
@@ -160,7 +160,7 @@ def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
         try:
             known = {name: text for name, text in given.items() if name not in errors}
             plan(read_form(known), folder)
-        except Invalid as error:
+        except InvalidFieldsError as error:
             errors = {**dict(error.fields), **errors}
     return errors
 

@@ -98,7 +98,7 @@ def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
         seen = {row.run_id: Watch(**row._mapping) for row in rows}
         return {run_id: seen[run_id] for run_id in run_ids if run_id in seen}
 
-    return db.remembered(("watch", *run_ids), look)
+    return db.cached(("watch", *run_ids), look)
 
 
 def high_water(db: Database, run_id: int) -> int:
@@ -122,7 +122,7 @@ def post_query(
     gradient steps there.
 
     Raises:
-        LostClaim: another worker raises this run now.
+        LostClaimError: another worker raises this run now.
     """
     with db.write() as session:
         status = held_status(session, mine)
@@ -150,7 +150,7 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
     it was superseded later.
 
     Raises:
-        LostClaim: another worker raises this run now.
+        LostClaimError: another worker raises this run now.
     """
     with db.write(durable=False) as session:
         if _closed(session, mine.run_id, tick):
@@ -169,7 +169,7 @@ def take_events(db: Database, mine: Claim, tick: int) -> Sequence[Event]:
     the run no longer counts as stuck, so that nobody ends the next episode as well.
 
     Raises:
-        LostClaim: another worker raises this run now.
+        LostClaimError: another worker raises this run now.
     """
     recorded = select(Event).where(Event.run_id == mine.run_id, Event.applied_tick == tick).order_by(Event.id)
     fresh = select(Event).where(Event.run_id == mine.run_id, Event.applied_tick.is_(None)).order_by(Event.id)
@@ -193,7 +193,7 @@ def withdraw(db: Database, mine: Claim, query_id: int) -> None:
     """Withdraw one open query; one that was answered meanwhile stays answered.
 
     Raises:
-        LostClaim: another worker raises this run now.
+        LostClaimError: another worker raises this run now.
     """
     with db.write() as session:
         run = held(session, mine)

@@ -124,7 +124,7 @@ def _interrupt(*_: object) -> str:
 def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Client) -> None:
     begin(db)
     (mine,) = runs.claim(db, "test", -1)
-    runs.report(db, mine, tick=7, waiting="stuck")
+    runs.report_progress(db, mine, tick=7, waiting="stuck")
     said = answer()
     assert said.exit_code == 1
     assert "No action was acceptable at tick 7, so the agent stands still. End the episode on " in said.stdout

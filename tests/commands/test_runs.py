@@ -65,14 +65,14 @@ def test_a_narrow_terminal_gets_fewer_columns(
 
 def test_who_waits_for_whom(db: Database, mine: Claim) -> None:
     assert "explores" in now()
-    runs.report(db, mine, tick=12, optimal=True)
+    runs.report_progress(db, mine, tick=12, optimal=True)
     assert now().split()[-1] == "yes"
     query = post_query(db, mine, 12, "guidance", 1, CLIPS)
     assert "waits for guidance" in now()
     answer(db, query, "left", "me", "human")
-    runs.report(db, mine, waiting="preferences")
+    runs.report_progress(db, mine, waiting="preferences")
     assert "waits for preferences" in now()
-    runs.report(db, mine, waiting="stuck")
+    runs.report_progress(db, mine, waiting="stuck")
     assert "stuck: end its episode" in now()
     runs.set_goal(db, mine.run_id, 1)
     assert "rests at its goal" in now()

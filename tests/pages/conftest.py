@@ -17,11 +17,11 @@ from playwright.sync_api import Browser, sync_playwright
 from parenting.server import runs
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
+from parenting.server.notify import Notifier
 from parenting.server.runs import Claim
 from parenting.server.schema import upgrade
 from parenting.server.serve import Server, bind
 from parenting.server.settings import Settings
-from parenting.server.wake import Bell
 from tests.pages import island
 from tests.pages.watched import Watched
 
@@ -57,17 +57,17 @@ def client(settings: Settings, db: Database) -> Iterator[httpx2.Client]:
 def address(settings: Settings, db: Database) -> Iterator[str]:
     """The site served at a free port, for a browser."""
     app = create_app(settings, db)
-    ear = bind("127.0.0.1", 0)
+    listener = bind("127.0.0.1", 0)
     server = Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [ear]})
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
     while not server.started:
         time.sleep(0.01)
-    yield f"http://127.0.0.1:{ear.getsockname()[1]}"
+    yield f"http://127.0.0.1:{listener.getsockname()[1]}"
     app.state.streams.close()
     server.should_exit = True
     thread.join()
-    ear.close()
+    listener.close()
 
 
 @pytest.fixture(scope="session")
@@ -98,10 +98,10 @@ def ask(db: Database, mine: Claim, settings: Settings) -> Callable[..., int]:
     ticks = iter(range(1, 1000))
 
     def post(kind: str = "guidance", left: str = "left", right: str = "down", start: Any = (1, 2)) -> int:
-        runs.report(db, mine, tick=0)  # a sign of life
+        runs.report_progress(db, mine, tick=0)  # a sign of life
         clips = {"guidance": island.guidance, "preference": island.preference}[kind](left, right, start)
         number = island.ask(db, mine, next(ticks), kind, clips)
-        Bell(settings.data, "web").ring()
+        Notifier(settings.data, "web").notify()
         return number
 
     return post

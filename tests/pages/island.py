@@ -9,7 +9,7 @@ from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import post_query
 from parenting.server.record import write_metrics
-from parenting.server.runs import Claim, claim, report
+from parenting.server.runs import Claim, claim, report_progress
 from parenting.server.tables import Run
 
 MOVES = {"up": (-1, 0), "down": (1, 0), "left": (0, -1), "right": (0, 1)}
@@ -54,7 +54,7 @@ def live(db: Database, **fields: Any) -> tuple[Run, Claim]:
     """A run that a worker raises just now."""
     run = start(db, NewRun(**{"world": "unsafe-exploration", **fields}))
     mine = next(claim for claim in claim(db, "worker") if claim.run_id == run.id)
-    report(db, mine, tick=0)
+    report_progress(db, mine, tick=0)
     return run, mine
 
 
@@ -83,7 +83,7 @@ def measure(db: Database, mine: Claim, ticks: int, begin: int = 1, maturity: int
             "episodes": int(9 * done),
         }
     write_metrics(db, mine, rows)
-    report(db, mine, tick=ticks)
+    report_progress(db, mine, tick=ticks)
 
 
 def ask(db: Database, mine: Claim, tick: int, kind: str, clips: dict[str, Any]) -> int:

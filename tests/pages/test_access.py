@@ -47,10 +47,10 @@ def lives(db: Database) -> None:
     told = island.ask(db, mine, 43, "preference", island.preference("left left", "down"))
     parent_side.answer(db, told, "left", "me", "human")
     _, other = island.live(db, level="island-bottleneck")
-    runs.report(db, other, waiting="stuck", optimal=True)
+    runs.report_progress(db, other, waiting="stuck", optimal=True)
     _, third = island.live(db, goal=1, pace=2.5, config={"stages": 2})
     island.measure(db, third, 40)
-    runs.report(db, third, maturity=2)
+    runs.report_progress(db, third, maturity=2)
     record.add_event(db, 3, "end_episode", {})
     parent_side.answer(
         db, island.ask(db, third, 41, "guidance", island.guidance("up", "left")), "left", "me", "human"

@@ -189,11 +189,11 @@ def test_it_works_without_javascript(watched: Watched, db: Database, ask: Callab
 def test_who_waits_is_told_as_it_changes(watched: Watched, db: Database, mine: Claim) -> None:
     page = watched.open("/runs/1/parent")
     expect(page.get_by_role("heading", name="exploring on its own")).to_be_visible()
-    runs.report(db, mine, waiting="stuck", optimal=True)
+    runs.report_progress(db, mine, waiting="stuck", optimal=True)
     expect(page.get_by_role("heading", name="No action was acceptable")).to_be_visible()
     expect(page.get_by_text("The agent has found the optimal way.")).to_be_visible()
     page.get_by_role("button", name="End this episode").click()
-    runs.report(db, mine, waiting=None)
+    runs.report_progress(db, mine, waiting=None)
     runs.set_status(db, 1, "paused")
     expect(page.get_by_role("heading", name="The run is paused")).to_be_visible()
     page.get_by_role("button", name="Resume").click()

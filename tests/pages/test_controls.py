@@ -127,7 +127,7 @@ def test_a_preset_of_the_pace_shows_that_it_holds(client: httpx2.Client, mine: C
 
 def test_the_last_stage_cannot_be_ended(client: httpx2.Client, db: Database, mine: Claim) -> None:
     assert "Mature now" in client.get("/runs/1").text
-    runs.report(db, mine, maturity=2)
+    runs.report_progress(db, mine, maturity=2)
     assert "Mature now" not in client.get("/runs/1").text
     reply = client.post("/runs/1/event", data={"kind": "mature"})
     assert reply.status_code == 409

@@ -12,7 +12,7 @@ from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import watch
 from parenting.server.reads.pages import latest_metrics, sampled_metrics
-from parenting.server.runs import claim, get_run, report, set_status
+from parenting.server.runs import claim, get_run, report_progress, set_status
 from parenting.server.session import Life
 from tests.pages import island
 
@@ -85,7 +85,7 @@ def test_who_waits_is_told(client: httpx2.Client, db: Database) -> None:
     assert "A question waits for the parent." in client.get("/runs/1").text
     set_status(db, 1, "paused")
     assert 'data-state="paused">' in client.get("/runs/1").text
-    report(db, mine, optimal=True)
+    report_progress(db, mine, optimal=True)
     assert '<dd id="now-optimal">optimal</dd>' in client.get("/runs/1").text
 
 

@@ -8,9 +8,9 @@ from playwright.sync_api import Page, expect
 
 from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.notify import Notifier
 from parenting.server.queue import parent_side, worker_side
 from parenting.server.settings import Settings
-from parenting.server.wake import Bell
 from tests.pages import island
 from tests.pages.watched import Watched
 
@@ -28,7 +28,7 @@ def test_the_table_of_stages_grows_as_it_is_drawn(watched: Watched, db: Database
     assert table(page) == ["1 now – – – – – –", "2 – – – – – –", "3 – – – – – –"]
     island.measure(db, mine, 30)
     island.measure(db, mine, 50, begin=31, maturity=2)
-    runs.report(db, mine, maturity=2)
+    runs.report_progress(db, mine, maturity=2)
     expect(page.locator("tr.now")).to_contain_text("2")
     expect(page.locator("tr.now")).to_contain_text("31 to 50")
     drawn = table(page)
@@ -50,7 +50,7 @@ def test_an_event_gets_its_tick_on_the_page(watched: Watched, db: Database) -> N
     page.get_by_role("button", name="Change").click()
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 before the next tick")
     worker_side.take_events(db, mine, 8)
-    runs.report(db, mine, tick=8)
+    runs.report_progress(db, mine, tick=8)
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 at tick 8")
 
 
@@ -65,7 +65,7 @@ def test_the_buttons_go_by_what_holds(watched: Watched, db: Database) -> None:
     expect(page.get_by_role("button", name="Resume")).to_be_visible()
     expect(page.get_by_role("button", name="Pause")).to_be_hidden()
     runs.set_status(db, 1, "active")
-    runs.report(db, mine, waiting="stuck")
+    runs.report_progress(db, mine, waiting="stuck")
     expect(page.get_by_role("button", name="End the episode")).to_have_count(2)
     runs.set_status(db, 1, "stopped", "Stopped by the operator.")
     expect(page.get_by_text("Stopped by the operator.")).to_be_visible()
@@ -113,7 +113,7 @@ def test_the_time_that_is_left_of_a_goal(watched: Watched, db: Database, setting
     _, mine = island.live(db, goal=6)
     for tick in range(1, 8):
         island.ask(db, mine, tick, "preference", island.preference("left left", "down down"))
-    Bell(settings.data, "web").ring()
+    Notifier(settings.data, "web").notify()
     page = watched.open("/runs/1/parent")
     expect(page.locator("#goal")).to_have_text("of 6")
     for count in range(1, 6):

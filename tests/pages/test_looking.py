@@ -38,7 +38,7 @@ def test_no_get_changes_anything(client: httpx2.Client, db: Database) -> None:
     parent_side.answer(db, query, "left", "me", "human")
     record.add_event(db, 1, "end_episode", {"kind": "end_episode"})
     _, other = island.live(db)
-    runs.report(db, other, waiting="stuck")
+    runs.report_progress(db, other, waiting="stuck")
     island.ask(db, other, 1, "guidance", island.guidance("left", "down"))
     before = rows(db)
     assert all(before[name] for name in ("run", "query", "answer", "event", "metric"))

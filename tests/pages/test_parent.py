@@ -13,13 +13,13 @@ from sqlalchemy import select
 
 from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.notify import Notifier
 from parenting.server.pages.texts import SENTENCES, state
 from parenting.server.queue import parent_side
 from parenting.server.runs import Claim
 from parenting.server.schemas import OpenSchema, RunSchema, run_schema
 from parenting.server.settings import Settings
 from parenting.server.tables import Answer, Event, Query, Run
-from parenting.server.wake import Bell
 from tests.pages import island
 
 ME, OTHER = "client-of-mine", "client-of-another"
@@ -200,7 +200,7 @@ def test_while_it_waits_the_page_without_javascript_reloads(
 
 
 def test_the_operator_ends_an_episode(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
-    runs.report(db, life[1], waiting="stuck")
+    runs.report_progress(db, life[1], waiting="stuck")
     page = client.get("/runs/1/parent").text
     assert 'data-state="stuck"' in page.partition("<main")[2].partition(">")[0]
     reply = client.post("/runs/1/event", data={"kind": "end_episode", "back": "parent"})
@@ -211,7 +211,7 @@ def test_the_operator_ends_an_episode(client: httpx2.Client, db: Database, life:
 def test_an_optimal_agent_is_announced(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
     note = re.compile(r'<div id="optimal" class="note"( hidden)?>')
     assert note.search(client.get("/runs/1/parent").text)[1] == " hidden"  # type: ignore[index]
-    runs.report(db, life[1], optimal=True)
+    runs.report_progress(db, life[1], optimal=True)
     assert note.search(client.get("/runs/1/parent").text)[1] is None  # type: ignore[index]
 
 
@@ -248,7 +248,7 @@ def test_a_request_for_a_question_waits_for_it(
     def post() -> None:
         time.sleep(0.1)
         island.ask(db, life[1], 1, "guidance", island.guidance("left", "down"))
-        Bell(settings.data, "web").ring()
+        Notifier(settings.data, "web").notify()
 
     agent = threading.Thread(target=post)
     agent.start()

@@ -12,7 +12,7 @@ from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.pages.start import PAGE
 from parenting.server.queue.parent_side import answer
-from parenting.server.runs import get_run, let_go, list_runs, report, set_goal, set_status
+from parenting.server.runs import get_run, let_go, list_runs, report_progress, set_goal, set_status
 from tests.pages import island
 
 FORM = {
@@ -98,7 +98,7 @@ def test_a_stranger_field_is_no_crash(client: httpx2.Client) -> None:
 def test_the_list_says_where_every_run_is(client: httpx2.Client, db: Database) -> None:
     _, mine = island.live(db, name="<b>Bold</b>")
     island.measure(db, mine, 50)
-    report(db, mine, optimal=True)
+    report_progress(db, mine, optimal=True)
     island.live(db, parent="scripted")
     page = client.get("/").text
     assert "&lt;b&gt;Bold&lt;/b&gt;" in page
@@ -184,7 +184,7 @@ def test_the_list_says_who_waits_for_whom(client: httpx2.Client, db: Database) -
 
     _, mine = island.live(db)
     assert chips() == ["exploring"]
-    report(db, mine, waiting="stuck")
+    report_progress(db, mine, waiting="stuck")
     assert chips() == ["no action acceptable"]
     query = island.ask(db, mine, 1, "guidance", island.guidance("left", "down"))
     assert chips() == ["a question waits"]

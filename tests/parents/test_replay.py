@@ -15,7 +15,7 @@ from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
 from parenting.parents.parent import Parent
-from parenting.parents.replay import Moment, Parted, ReplayParent, same
+from parenting.parents.replay import Moment, ReplayMismatchError, ReplayParent, same
 from parenting.parents.scripted import Judgement, ScriptedParent
 from tests.parents.walking import island
 
@@ -116,7 +116,7 @@ def test_a_changed_record_is_found(
 ) -> None:
     changed = tamper(recorded[1])
     parent = ReplayParent(changed.__getitem__)
-    with pytest.raises(Parted, match="asks something else than was recorded") as caught:
+    with pytest.raises(ReplayMismatchError, match="asks something else than was recorded") as caught:
         lived(world, parent)
     assert caught.value.tick == parent.tick
     assert not same(caught.value.recorded, caught.value.asked)

@@ -35,9 +35,9 @@ def parenting(*arguments: str, data: Path, **more: str) -> Iterator[subprocess.P
 
 def free_port() -> int:
     """A port that nobody listened on a moment ago."""
-    with socket.socket() as ear:
-        ear.bind(("127.0.0.1", 0))
-        port: int = ear.getsockname()[1]
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        port: int = listener.getsockname()[1]
         return port
 
 

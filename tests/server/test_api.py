@@ -11,7 +11,7 @@ from parenting.server.db import Database
 from parenting.server.log import set_up_log
 from parenting.server.queue.worker_side import take_events
 from parenting.server.record import write_metrics
-from parenting.server.runs import Claim, get_run, report
+from parenting.server.runs import Claim, get_run, report_progress
 from parenting.server.tables import Run
 from tests.server.conftest import Clock
 
@@ -123,7 +123,7 @@ def test_list_runs(client: httpx2.Client) -> None:
 def test_run_shows_where_it_is(
     client: httpx2.Client, db: Database, mine: Claim, guidance: int, clock: Clock
 ) -> None:
-    report(db, mine, tick=5, waiting="guidance")
+    report_progress(db, mine, tick=5, waiting="guidance")
     shown = client.get(f"/api/v1/runs/{mine.run_id}").json()
     assert (shown["tick"], shown["waiting"], shown["worker"]) == (5, "guidance", "alive")
     assert shown["open"] == {"guidance": 1, "preference": 0}

@@ -6,7 +6,7 @@ import httpx2
 import pytest
 
 from parenting.server.db import Database
-from parenting.server.errors import Busy
+from parenting.server.errors import BusyError
 from parenting.server.queue.parent_side import get_query
 from parenting.server.queue.worker_side import take_answer
 from parenting.server.runs import Claim, set_status
@@ -111,7 +111,7 @@ def test_busy_database_says_when_to_come_again(
     client: httpx2.Client, guidance: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def busy(*_words: object, **_more: object) -> None:
-        raise Busy
+        raise BusyError
 
     monkeypatch.setattr("parenting.server.api.queries.answer", busy)
     refused = reply(client, guidance)

@@ -3,7 +3,7 @@
 import pytest
 
 from parenting.server.db import Database
-from parenting.server.errors import Invalid
+from parenting.server.errors import InvalidFieldsError
 from parenting.server.new_run import NewRun, plan, read_form, start
 
 WORLD = "unsafe-exploration"
@@ -57,21 +57,21 @@ def test_empty_seed_is_zero() -> None:
     ],
 )
 def test_wrong_field_of_a_form_is_named(form: dict[str, str], field: str) -> None:
-    with pytest.raises(Invalid) as caught:
+    with pytest.raises(InvalidFieldsError) as caught:
         read_form(form)
     assert [name for name, _ in caught.value.fields] == [field]
 
 
 @pytest.mark.parametrize(("text", "part"), [("many", "valid number"), ("2", "less than or equal to 1")])
 def test_wrong_hyperparameter_is_named(text: str, part: str) -> None:
-    with pytest.raises(Invalid, match=part) as caught:
+    with pytest.raises(InvalidFieldsError, match=part) as caught:
         plan(read_form({"world": WORLD, "config.p_guid": text}))
     assert caught.value.field == "config.p_guid"
 
 
 def test_each_of_several_has_its_message() -> None:
     new = NewRun(world="mars", preset="x")
-    with pytest.raises(Invalid) as caught:
+    with pytest.raises(InvalidFieldsError) as caught:
         plan(new)
     assert [error["field"] for error in caught.value.body()["error"]["fields"]] == ["world", "preset"]
     assert caught.value.field is None

@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import update
 
 from parenting.server.db import Database
-from parenting.server.errors import Conflict, LostClaim, NotFound
+from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.record import (
     add_event,
     list_events,
@@ -93,8 +93,8 @@ def test_damaged_checkpoint_is_told(db: Database, mine: Claim) -> None:
 def test_writes_are_fenced(db: Database, mine: Claim, clock: Clock) -> None:
     clock.pass_seconds(6)
     claim(db, "b")
-    with pytest.raises(LostClaim):
+    with pytest.raises(LostClaimError):
         save_checkpoint(db, mine, 1, b"state")
-    with pytest.raises(LostClaim):
+    with pytest.raises(LostClaimError):
         write_metrics(db, mine, {1: {"loss": 0.5}})
     assert load_checkpoints(db, mine.run_id) == []

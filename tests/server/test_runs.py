@@ -3,12 +3,21 @@
 import pytest
 
 from parenting.server.db import Database
-from parenting.server.errors import Conflict, LostClaim, NotFound
+from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.parent_side import get_query
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim as ClaimOf
-from parenting.server.runs import beat, claim, finish, get_run, let_go, list_runs, report, set_status
+from parenting.server.runs import (
+    claim,
+    finish,
+    get_run,
+    heartbeat,
+    let_go,
+    list_runs,
+    report_progress,
+    set_status,
+)
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock
 
@@ -50,11 +59,11 @@ def test_one_worker_a_run(db: Database, run: Run, clock: Clock) -> None:
 def test_sign_of_life_keeps_the_claim(db: Database, mine: ClaimOf, clock: Clock) -> None:
     for _ in range(3):
         clock.pass_seconds(4)
-        assert beat(db, [mine]) == [mine]
+        assert heartbeat(db, [mine]) == [mine]
         assert claim(db, "b") == []
     clock.pass_seconds(6)
     claim(db, "b")
-    assert beat(db, [mine]) == []
+    assert heartbeat(db, [mine]) == []
 
 
 def test_run_that_was_let_go_is_free_at_once(db: Database, mine: ClaimOf) -> None:
@@ -73,7 +82,7 @@ def test_run_that_is_over_is_not_claimed(db: Database, run: Run, mine: ClaimOf, 
 
 
 def test_report_shows_where_the_agent_is(db: Database, mine: ClaimOf) -> None:
-    report(db, mine, tick=12, waiting="guidance", optimal=True, versions={"torch": "2.13"})
+    report_progress(db, mine, tick=12, waiting="guidance", optimal=True, versions={"torch": "2.13"})
     found = get_run(db, mine.run_id)
     assert (found.tick, found.waiting, found.optimal, found.versions) == (
         12,
@@ -81,10 +90,10 @@ def test_report_shows_where_the_agent_is(db: Database, mine: ClaimOf) -> None:
         True,
         {"torch": "2.13"},
     )
-    report(db, mine, waiting=None)
+    report_progress(db, mine, waiting=None)
     assert get_run(db, mine.run_id).waiting is None
     with pytest.raises(TypeError, match="seed"):
-        report(db, mine, seed=3)
+        report_progress(db, mine, seed=3)
 
 
 def test_finished_run_withdraws_what_is_open_and_keeps_its_reason(
@@ -100,7 +109,7 @@ def test_finished_run_withdraws_what_is_open_and_keeps_its_reason(
 def test_finish_is_fenced(db: Database, mine: ClaimOf, clock: Clock) -> None:
     clock.pass_seconds(6)
     claim(db, "b")
-    with pytest.raises(LostClaim):
+    with pytest.raises(LostClaimError):
         finish(db, mine, "finished", "It is optimal.")
     assert get_run(db, mine.run_id).status == "active"
 

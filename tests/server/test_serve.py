@@ -13,7 +13,7 @@ from parenting.server.settings import Settings
 ELSEWHERE = ["0.0.0.0", "192.168.1.2", "::", "localhost", ""]
 
 
-class Ear(socket.socket):
+class Listener(socket.socket):
     """Notes where it would listen, and opens nothing: a test lets nobody in."""
 
     asked: tuple[str, int]
@@ -27,13 +27,13 @@ class Ear(socket.socket):
 
 @pytest.fixture
 def deaf(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("parenting.server.serve.socket.socket", Ear)
+    monkeypatch.setattr("parenting.server.serve.socket.socket", Listener)
 
 
 def test_this_machine_alone_can_reach_it() -> None:
-    with bind("127.0.0.1", 0) as ear:
-        assert ear.getsockname()[0] == "127.0.0.1"
-        with socket.create_connection(ear.getsockname(), timeout=5):
+    with bind("127.0.0.1", 0) as listener:
+        assert listener.getsockname()[0] == "127.0.0.1"
+        with socket.create_connection(listener.getsockname(), timeout=5):
             pass
 
 
@@ -49,9 +49,9 @@ def test_other_addresses_are_refused_with_the_remedy(host: str) -> None:
 @pytest.mark.usefixtures("deaf")
 def test_in_a_container_it_may_listen_on_its_whole_network() -> None:
     for host in ("127.0.0.1", "0.0.0.0"):
-        with bind(host, 8765, container=True) as ear:
-            assert isinstance(ear, Ear)
-            assert ear.asked == (host, 8765)
+        with bind(host, 8765, container=True) as listener:
+            assert isinstance(listener, Listener)
+            assert listener.asked == (host, 8765)
 
 
 @pytest.mark.parametrize("host", ELSEWHERE[1:])

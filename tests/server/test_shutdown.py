@@ -99,8 +99,8 @@ def test_web_and_worker_do_not_outlive_up(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", ["up", "web"])
 def test_port_in_use_is_told_in_a_sentence(data: Path, command: str) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as ear:
-        port = ear.getsockname()[1]
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
         with parenting(command, "--port", str(port), data=data) as child:
             out, said = child.communicate(timeout=30)
     assert child.returncode == 2

@@ -15,11 +15,11 @@ from sqlalchemy.exc import IntegrityError, OperationalError
 
 from parenting.server import db as database
 from parenting.server.db import Database, connect, sqlite_module
-from parenting.server.errors import Busy, DiskFull, SetupError
+from parenting.server.errors import BusyError, DiskFullError, SetupError
 from parenting.server.queue.parent_side import answer, lease
 from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.record import add_event, save_checkpoint
-from parenting.server.runs import Claim, report
+from parenting.server.runs import Claim, report_progress
 from parenting.server.settings import Settings
 from parenting.server.tables import Answer, Query, Run
 from tests.tree import ROOT
@@ -50,7 +50,7 @@ def test_every_connection_is_set_up(db: Database, name: str, value: object) -> N
         (lambda db, mine, query: add_event(db, mine.run_id, "end_episode", {}), FULL),
         (lambda db, mine, query: lease(db, mine.run_id, "a"), NORMAL),
         (lambda db, mine, query: take_answer(db, mine, 9), NORMAL),
-        (lambda db, mine, query: report(db, mine, tick=9), NORMAL),
+        (lambda db, mine, query: report_progress(db, mine, tick=9), NORMAL),
         (lambda db, mine, query: save_checkpoint(db, mine, 9, b"state"), NORMAL),
     ],
 )
@@ -114,10 +114,10 @@ def test_database_that_stays_locked_is_busy(
 ) -> None:
     monkeypatch.setitem(database.PRAGMAS, "busy_timeout", "50")
     other = connect(settings)
-    with db.write(), pytest.raises(Busy), other.write():
+    with db.write(), pytest.raises(BusyError), other.write():
         pass
     monkeypatch.setattr(database, "BUSY_SECONDS", 0.05)
-    with db.write(), pytest.raises(Busy), db.write():
+    with db.write(), pytest.raises(BusyError), db.write():
         pass
     other.close()
 
@@ -129,7 +129,7 @@ def test_full_disk_is_told_and_stores_no_half(db: Database, run: Run) -> None:
             session.execute(text(f"PRAGMA max_page_count = {pages}"))
             session.get_one(Run, run.id).level_text = "W" * 10_000_000
 
-    with pytest.raises(DiskFull):
+    with pytest.raises(DiskFullError):
         fill()
     with db.read() as session:
         assert len(session.get_one(Run, run.id).level_text) < 1000
@@ -215,14 +215,14 @@ def test_poll_looks_again_only_after_a_commit(db: Database, settings: Settings, 
         looks.append(1)
         return len(looks)
 
-    assert [db.remembered("a", look) for _ in range(3)] == [1, 1, 1]
+    assert [db.cached("a", look) for _ in range(3)] == [1, 1, 1]
     for writer in (other, db):
         before = len(looks)
         with writer.write() as session:
             session.get_one(Run, run.id).tick += 1
-            assert db.remembered("a", look) == before, "not committed yet"
-        assert [db.remembered("a", look) for _ in range(2)] == [before + 1, before + 1]
-    assert db.remembered("b", look) == len(looks) == 4, "another question is not answered by the old look"
+            assert db.cached("a", look) == before, "not committed yet"
+        assert [db.cached("a", look) for _ in range(2)] == [before + 1, before + 1]
+    assert db.cached("b", look) == len(looks) == 4, "another question is not answered by the old look"
     other.close()
 
 
@@ -235,4 +235,4 @@ def test_commit_during_a_look_is_seen_by_the_next(db: Database, run: Run) -> Non
                 session.get_one(Run, run.id).tick = 1
         return seen
 
-    assert [db.remembered("a", look) for _ in range(2)] == [0, 1]
+    assert [db.cached("a", look) for _ in range(2)] == [0, 1]

@@ -11,14 +11,14 @@ import uvicorn
 
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
+from parenting.server.notify import Notifier
 from parenting.server.queue.parent_side import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.record import write_metrics
-from parenting.server.runs import Claim, report
+from parenting.server.runs import Claim, report_progress
 from parenting.server.schema import upgrade
 from parenting.server.settings import Settings
-from parenting.server.streams import PERIOD
-from parenting.server.wake import Bell
+from parenting.server.streams import POLL_SECONDS
 from tests.server.conftest import CLIPS
 from tests.server.serving import Stream, until_up
 
@@ -35,12 +35,12 @@ def db(settings: Settings) -> Iterator[Database]:
 @pytest.fixture
 def url(settings: Settings, db: Database) -> Iterator[str]:
     """A server in a thread, with room for two streams."""
-    ear = socket.create_server(("127.0.0.1", 0))
+    listener = socket.create_server(("127.0.0.1", 0))
     app = create_app(settings.model_copy(update={"streams": 2}))
     server = uvicorn.Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [ear]})
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
-    base = f"http://127.0.0.1:{ear.getsockname()[1]}"
+    base = f"http://127.0.0.1:{listener.getsockname()[1]}"
     until_up(base)
     yield base
     app.state.streams.close()
@@ -69,19 +69,19 @@ def test_question_is_told_when_the_bell_rings(
 ) -> None:
     stream = follow(url, mine)
     assert stream.wait_for("question") == [None]
-    bell, delays = Bell(settings.data, "web"), []
+    notifier, delays = Notifier(settings.data, "web"), []
     for tick in range(5):
         query = post_query(db, mine, tick, "guidance", 1, CLIPS)
         posted = time.monotonic()
-        bell.ring()
+        notifier.notify()
         assert stream.wait_for("question", 2 * tick + 2)[-1] == {"id": query, "kind": "guidance"}
         delays.append(
             stream.events[-1][2] - posted if stream.events[-1][0] == "question" else time.monotonic() - posted
         )
         answer(db, query, "left", "a", "human")
-        bell.ring()
+        notifier.notify()
         assert stream.wait_for("question", 2 * tick + 3)[-1] is None
-    assert sorted(delays)[2] < PERIOD / 2, "by the poll alone it would take as long as this on average"
+    assert sorted(delays)[2] < POLL_SECONDS / 2, "by the poll alone it would take as long as this on average"
 
 
 def test_question_is_told_without_any_bell(url: str, db: Database, mine: Claim) -> None:
@@ -94,15 +94,15 @@ def test_question_is_told_without_any_bell(url: str, db: Database, mine: Claim) 
 def test_the_rest_is_told_four_times_a_second(
     url: str, settings: Settings, db: Database, mine: Claim
 ) -> None:
-    stream, bell = follow(url, mine), Bell(settings.data, "web")
+    stream, notifier = follow(url, mine), Notifier(settings.data, "web")
     began = time.monotonic()
     stream.wait_for("run")
     for tick in range(60):
-        report(db, mine, tick=tick)
-        bell.ring()
+        report_progress(db, mine, tick=tick)
+        notifier.notify()
         time.sleep(0.02)
     told = stream.wait_for("run", 4)
-    assert len(told) <= (time.monotonic() - began) / PERIOD + 2
+    assert len(told) <= (time.monotonic() - began) / POLL_SECONDS + 2
     end = time.monotonic() + 10
     while stream.wait_for("run")[-1]["tick"] != 59:
         assert time.monotonic() < end, "the last state is told in the end"
@@ -114,7 +114,7 @@ def test_metrics_follow_a_tick(url: str, db: Database, mine: Claim) -> None:
     stream = follow(url, mine, "?after=1")
     assert stream.wait_for("metrics") == [{"rows": [{"tick": 2, "values": {"loss": 0.25}}]}]
     write_metrics(db, mine, {3: {"loss": None}})
-    report(db, mine, tick=3)
+    report_progress(db, mine, tick=3)
     assert stream.wait_for("metrics", 2)[1] == {"rows": [{"tick": 3, "values": {"loss": None}}]}
 
 
@@ -131,7 +131,7 @@ def test_parents_page_is_spared_the_metrics(url: str, db: Database, mine: Claim)
     write_metrics(db, mine, {1: {"loss": 0.5}})
     stream = follow(url, mine)
     stream.wait_for("run")
-    report(db, mine, tick=1)
+    report_progress(db, mine, tick=1)
     stream.wait_for("run", 2)
     assert "metrics" not in {name for name, _, _ in stream.events}
 

@@ -3,7 +3,7 @@
 import pytest
 
 from parenting.server.db import Database
-from parenting.server.errors import LostClaim
+from parenting.server.errors import LostClaimError
 from parenting.server.queue.parent_side import answer, correct, get_query
 from parenting.server.queue.worker_side import (
     high_water,
@@ -15,7 +15,7 @@ from parenting.server.queue.worker_side import (
     withdraw,
 )
 from parenting.server.record import add_event
-from parenting.server.runs import Claim, claim, get_run, open_counts, report, set_status
+from parenting.server.runs import Claim, claim, get_run, open_counts, report_progress, set_status
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock
 
@@ -175,9 +175,9 @@ def test_worker_that_slept_past_its_claim_cannot_write(
         lambda: take_answer(db, mine, 9),
         lambda: take_events(db, mine, 9),
         lambda: withdraw(db, mine, query),
-        lambda: report(db, mine, tick=9),
+        lambda: report_progress(db, mine, tick=9),
     ):
-        with pytest.raises(LostClaim, match="raised by worker-2"):
+        with pytest.raises(LostClaimError, match="raised by worker-2"):
             write()
     assert get_run(db, run.id).tick == 0
     assert get_query(db, query).status == "answered"

@@ -127,7 +127,7 @@ def test_a_run_that_is_over_takes_neither(db: Database, run: Run, verb: object) 
 
 def test_the_last_stage_never_ends(db: Database, mine: Claim) -> None:
     add_event(db, mine.run_id, "mature", {"kind": "mature"})
-    runs.report(db, mine, maturity=2)
+    runs.report_progress(db, mine, maturity=2)
     with pytest.raises(Conflict, match="is in its last stage, T = 2"):
         add_event(db, mine.run_id, "mature", {"kind": "mature"})
 

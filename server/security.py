@@ -15,7 +15,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from parenting.server.errors import Forbidden, ServerError, TooLarge, UnknownHost
+from parenting.server.errors import Forbidden, ServerError, TooLargeError, UnknownHostError
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 HOSTS = ("localhost", "127.0.0.1", "[::1]")
@@ -41,7 +41,7 @@ HEADERS = {
 }
 
 
-class Guard:
+class SecurityMiddleware:
     """The outermost layer of the application."""
 
     def __init__(self, app: ASGIApp, largest_body: int, hosts: Sequence[str] = HOSTS) -> None:
@@ -87,10 +87,10 @@ class Guard:
         """Why this request must not pass, or None."""
         host = headers.get("host", "")
         if _without_port(host) not in self.hosts:
-            return UnknownHost()
+            return UnknownHostError()
         length = headers.get("content-length", "0")
         if not length.isdecimal() or len(length) > 15 or int(length) > self.largest_body:
-            return TooLarge()
+            return TooLargeError()
         if method in SAFE_METHODS:
             return None
         site, origin = headers.get("sec-fetch-site"), headers.get("origin")

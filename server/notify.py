@@ -1,0 +1,94 @@
+"""Notifications between processes: a Unix datagram after a commit wakes the process at the other end.
+
+Each process that waits binds a socket of its own in the data folder; a notification sends one byte to each
+socket. Nothing is queued: ten notifications wake a listener once. A notification is only a hint. Every
+listener polls the database as well, so a lost one costs one poll and never an answer.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+import select
+import socket
+import tempfile
+from pathlib import Path
+
+MAX_PATH_BYTES = 100
+"""The longest path of a Unix socket that we use; the operating systems allow 104 to 108 bytes."""
+
+
+class Notifier:
+    """One channel of a data folder.
+
+    The channel `worker` is notified after answers and operator events, `web` after questions.
+    """
+
+    def __init__(self, data: Path, channel: str) -> None:
+        self.folder = _folder(data, channel)
+        self._listener: socket.socket | None = None
+        self._path: Path | None = None
+
+    def notify(self) -> None:
+        """Wake every listener. Never blocks and never fails; removes sockets that no process holds."""
+        try:
+            paths = list(self.folder.iterdir())
+        except OSError:
+            return  # nobody has listened yet
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
+            out.setblocking(False)
+            for path in paths:
+                try:
+                    out.sendto(b"!", str(path))
+                except (ConnectionRefusedError, FileNotFoundError):
+                    path.unlink(missing_ok=True)
+                except OSError:
+                    continue  # its buffer is full: it will wake anyway
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for a notification, at most `timeout` seconds; return False when none came.
+
+        A notification sent since the last call counts.
+        """
+        listener = self.listen()
+        if not select.select([listener], [], [], max(timeout, 0))[0]:
+            return False
+        self.drain()
+        return True
+
+    def listen(self) -> socket.socket:
+        """Return the socket that receives notifications, bound at the first call; for an event loop."""
+        if self._listener is None:
+            self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            # A random name instead of the process id: containers that share the folder have equal ids.
+            self._path = self.folder / secrets.token_hex(8)
+            self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            self._listener.setblocking(False)
+            self._listener.bind(str(self._path))
+        return self._listener
+
+    def drain(self) -> None:
+        """Discard every notification received so far."""
+        listener = self.listen()
+        try:
+            while listener.recv(16):
+                pass
+        except BlockingIOError:
+            return
+
+    def close(self) -> None:
+        """Stop listening and remove the socket."""
+        if self._listener is not None and self._path is not None:
+            self._listener.close()
+            self._path.unlink(missing_ok=True)
+            self._listener = self._path = None
+
+
+def _folder(data: Path, channel: str) -> Path:
+    """Return a folder below the data folder, or below the temporary one where a path would be too long."""
+    folder = data.absolute() / "sockets" / channel
+    if len(os.fsencode(folder)) + 20 <= MAX_PATH_BYTES:
+        return folder
+    digest = hashlib.sha256(os.fsencode(data.absolute())).hexdigest()[:16]
+    return Path(tempfile.gettempdir()) / f"parenting-{os.getuid()}-{digest}" / channel
