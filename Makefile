@@ -1,7 +1,7 @@
 # Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
 # A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
 .DEFAULT_GOAL := help
-.PHONY: help run test check format coverage pictures weights constraints clean
+.PHONY: help run test check docs format coverage pictures weights constraints clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -20,11 +20,12 @@ test: $(VENV)/.installed-dev ## Install, then run every check and every test (AR
 	@checks=passed; $(MAKE) --no-print-directory check || checks=failed; \
 	$(BIN)/pytest $(ARGS) && test $$checks = passed
 
-check: $(VENV)/.installed-dev ## Lint, formatting, types, layers
+check: $(VENV)/.installed-dev ## Lint, formatting, types, layers, documentation
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+	@$(MAKE) --no-print-directory docs
 
 format: $(VENV)/.installed-dev ## Format the code and mend what lint can mend
 	$(BIN)/ruff check --fix .
@@ -36,6 +37,10 @@ coverage: $(VENV)/.installed-dev ## Run the tests and print the lines that none 
 pictures: $(VENV)/.installed-dev ## Draw the pictures of the documentation anew (needs Chromium)
 	$(BIN)/parenting worlds --draw docs/pictures > /dev/null
 	$(BIN)/python scripts/screenshots.py
+
+docs: $(VENV)/.installed-dev ## Build the documentation as a site in build/docs; a warning is an error
+	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs build/docs
+	$(BIN)/python scripts/offline.py build/docs
 
 weights: $(VENV)/.installed ## Pre-train the weights of the built-in levels anew (20 minutes)
 	$(BIN)/parenting pretrain --out weights --again
