@@ -44,7 +44,7 @@ from parenting.agent.policy import Network
 from parenting.agent.process import settle
 from parenting.envs import registry
 from parenting.envs.rng import keys
-from parenting.experiments.training.batch import Nursery, Until, no_tally
+from parenting.experiments.training.batch import BatchTrainer, StopRule, no_counts
 
 WORLD, LEVEL, PRESETS = "unsafe-exploration", "island", ("conservative", "direct")
 WARM, BORN = 100, 50
@@ -136,29 +136,29 @@ def seconds(act: Callable[[], object]) -> float:
     return perf_counter() - began
 
 
-def born(preset: str) -> Nursery:
+def born(preset: str) -> BatchTrainer:
     """Fifty agents at tick `WARM`."""
     config = compose(preset, registry.defaults(WORLD), {}, strict=True)
     world = registry.make(WORLD, LEVEL, time_limit=config.time_limit)
-    nursery = Nursery(world, config, keys(0, BORN), Until("ticks", 10**9))
+    trainer = BatchTrainer(world, config, keys(0, BORN), StopRule("ticks", 10**9))
     for _ in range(WARM):
-        nursery.tick()
-    return nursery
+        trainer.tick()
+    return trainer
 
 
-def copies(nursery: Nursery, trials: int) -> Nursery:
-    """A batch of `trials` agents with their parent, copied from those of `nursery` in turn."""
+def copies(trainer: BatchTrainer, trials: int) -> BatchTrainer:
+    """A batch of `trials` agents with their parent, copied from those of `trainer` in turn."""
     index = torch.arange(trials) % BORN
-    batch = Nursery(nursery.world, nursery.config, keys(0, trials), nursery.until)
-    batch.state, batch.tally = nursery.state.pick(index), no_tally(trials)
-    batch.parent.query = nursery.parent.query.pick(index)
+    batch = BatchTrainer(trainer.world, trainer.config, keys(0, trials), trainer.until)
+    batch.state, batch.counts = trainer.state.pick(index), no_counts(trials)
+    batch.parent.query = trainer.parent.query.pick(index)
     return batch
 
 
-def measure(nursery: Nursery, trials: int, repeats: int) -> Line:
+def measure(trainer: BatchTrainer, trials: int, repeats: int) -> Line:
     """One size of batch."""
-    network, config = network_of(nursery.world), nursery.config
-    state = copies(nursery, trials).state
+    network, config = network_of(trainer.world), trainer.config
+    state = copies(trainer, trials).state
     rows = learning.choose(config, state.x, state.keys, 0)
     states = rows.near.shape[1]
     every = torch.ones(trials, dtype=torch.bool)
@@ -181,7 +181,7 @@ def measure(nursery: Nursery, trials: int, repeats: int) -> Line:
     times: list[tuple[float, ...]] = []
     training: list[float] = []
     for _ in range(repeats):
-        tick, trained = live(copies(nursery, trials))
+        tick, trained = live(copies(trainer, trials))
         training += trained
         times.append((tick, *map(seconds, acts)))
     tick, gradient, adam, bmm, look = (median(column) for column in zip(*times, strict=True))
@@ -201,7 +201,7 @@ def measure(nursery: Nursery, trials: int, repeats: int) -> Line:
     )
 
 
-def live(batch: Nursery) -> tuple[float, list[float]]:
+def live(batch: BatchTrainer) -> tuple[float, list[float]]:
     """Seconds a tick, and the share of the trials that trained in each."""
     trained = list[float]()
     began = perf_counter()
@@ -221,10 +221,10 @@ def main() -> None:
     settle()
     print(f"torch {torch.__version__}, one thread, {WORLD} {LEVEL}, after {WARM} ticks")
     for preset in PRESETS:
-        nursery = born(preset)
+        trainer = born(preset)
         print(f"\n{preset}\n{HEAD}")
         for trials in QUICK_SIZES if quick else SIZES:
-            print(measure(nursery, trials, QUICK_REPEATS if quick else REPEATS), flush=True)
+            print(measure(trainer, trials, QUICK_REPEATS if quick else REPEATS), flush=True)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ import torch
 from parenting.agent.config import compose
 from parenting.agent.process import settle
 from parenting.envs import registry
-from parenting.experiments.training.batch import Until
+from parenting.experiments.training.batch import StopRule
 from parenting.experiments.training.parallel import Plan, chunks, run
 
 WORLD, LEVEL, PRESETS, TICKS = "unsafe-exploration", "island", ("conservative", "direct"), 50
@@ -60,7 +60,7 @@ def measure(preset: str, trials: int) -> Line:
 def plan(preset: str, trials: int) -> Plan:
     """Trials that live for `TICKS` ticks."""
     config = compose(preset, registry.defaults(WORLD), {}, strict=True)
-    return Plan(WORLD, LEVEL, config, 0, trials, Until("ticks", TICKS), TICKS)
+    return Plan(WORLD, LEVEL, config, 0, trials, StopRule("ticks", TICKS), TICKS)
 
 
 def memory() -> float:

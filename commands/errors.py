@@ -14,7 +14,7 @@ from parenting.envs.levels.spec import LevelError
 from parenting.envs.registry import UnknownName
 from parenting.server.errors import ServerError
 from parenting.server.settings import Settings
-from parenting.weights.store import NoWeights
+from parenting.weights.store import NoWeightsError
 
 
 class UsageError(ValueError):
@@ -29,7 +29,7 @@ def friendly_errors() -> Iterator[None]:
     except ServerError as error:
         typer.echo(error.message, err=True)
         raise typer.Exit(2) from None
-    except (UsageError, UnknownPreset, UnknownName, LevelError, NoWeights) as error:
+    except (UsageError, UnknownPreset, UnknownName, LevelError, NoWeightsError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(2) from None
 

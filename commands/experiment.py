@@ -13,7 +13,7 @@ import typer
 
 from parenting.commands.errors import UsageError, friendly_errors
 from parenting.commands.options import among, folder, whole
-from parenting.experiments.registry import NAMES, UnknownExperiment
+from parenting.experiments.registry import NAMES, UnknownExperimentError
 from parenting.experiments.spec import Asked, Device, Experiment, Scale
 
 if TYPE_CHECKING:
@@ -126,10 +126,10 @@ def _asked(
 
 def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | None) -> None:
     from parenting.experiments.reporting.markdown import Work, page, publish
-    from parenting.experiments.runner.dask_cluster import NoCluster
-    from parenting.experiments.runner.executor import NoGpu, WorkersDied, meet, work
+    from parenting.experiments.runner.dask_cluster import NoClusterError
+    from parenting.experiments.runner.executor import NoGpuError, WorkersDiedError, meet, work
     from parenting.experiments.runner.provenance import settings
-    from parenting.experiments.runner.store import BrokenPiece, OtherPlan, Store
+    from parenting.experiments.runner.store import CorruptResultError, PlanMismatchError, Store
 
     plan = {"experiment": one.name, "seed": asked.seed, **one.config(asked), "settings": settings()}
     tasks = [task._replace(device=asked.device) for task in one.tasks(asked)]

@@ -20,7 +20,7 @@ from parenting.weights import store
 from parenting.weights.store import Wanted
 
 if TYPE_CHECKING:
-    from parenting.experiments.training.pretrain import Educated, Progress
+    from parenting.experiments.training.pretrain import PretrainResult, Progress
 
 BARS = "▁▂▃▄▅▆▇█"
 
@@ -78,17 +78,17 @@ def _there(wanted: Wanted, folders: tuple[Path, ...], *, quiet: bool) -> dict[st
 
 def _one(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool) -> dict[str, Any]:
     from parenting.agent.process import settle
-    from parenting.experiments.training.pretrain import Damaged, Unconverged, educate
+    from parenting.experiments.training.pretrain import DamagedWorkError, UnconvergedError, pretrain
 
     settle()
     began = time.monotonic()
     try:
         with _bar(wanted.name, max_steps) as progress:
-            done = educate(wanted, folder, seed, max_steps, progress)
+            done = pretrain(wanted, folder, seed, max_steps, progress)
     except KeyboardInterrupt:
         typer.echo("Interrupted; the same command goes on from here.", err=True)
         raise typer.Exit(130) from None
-    except (Unconverged, Damaged) as error:
+    except (UnconvergedError, DamagedWorkError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from None
     except OSError as error:
@@ -100,7 +100,7 @@ def _one(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool
     return found
 
 
-def _described(done: Educated, seconds: float) -> dict[str, Any]:
+def _described(done: PretrainResult, seconds: float) -> dict[str, Any]:
     return {
         "path": str(done.path),
         "sha256": done.sha256,

@@ -22,7 +22,8 @@ from parenting.envs.levels.spec import Level
 from parenting.weights.store import Wanted, find
 
 if TYPE_CHECKING:
-    from parenting.experiments.training.batch import Progress, Standing, Until
+    from parenting.experiments.training.batch import OnProgress, StopRule
+    from parenting.experiments.training.batch import Progress as Now
     from parenting.experiments.training.parallel import Plan
 
 
@@ -74,8 +75,8 @@ def run(
     plan = Plan(world, found.text, config, seed, trials, goal, max_ticks, weights)
     began = time.monotonic()
     with _bar(plan) as progress:
-        ending = run(plan, workers or os.cpu_count() or 1, progress)
-    results = summarise(plan, found.name, ending, time.monotonic() - began)
+        outcomes = run(plan, workers or os.cpu_count() or 1, progress)
+    results = summarise(plan, found.name, outcomes, time.monotonic() - began)
     typer.echo(json.dumps(results) if as_json else page(results))
 
 
@@ -123,9 +124,9 @@ def _said(name: str, given: dict[str, object], rule: str) -> str:
     return f"--set: {name}={given.get(name)}: {rule}. {Config.model_fields[name].description}"
 
 
-def _until(world: str, text: str | None) -> Until:
+def _until(world: str, text: str | None) -> StopRule:
     """When a trial is finished; where no goal ends an episode no policy is optimal."""
-    from parenting.experiments.training.batch import Until
+    from parenting.experiments.training.batch import StopRule
 
     endless = not registry.spec(world).ends_at_goal
     kind, colon, number = (text or ("queries:1000" if endless else "optimal")).partition(":")
@@ -135,13 +136,13 @@ def _until(world: str, text: str | None) -> Until:
                 f"--until: no policy counts as optimal in {world}, which has no goal."
                 " Use --until queries:N or ticks:N; the default is queries:1000."
             )
-        return Until("optimal")
+        return StopRule("optimal")
     if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
-        return Until(kind, int(number))  # type: ignore[arg-type]
+        return StopRule(kind, int(number))  # type: ignore[arg-type]
     raise UsageError(f"--until: '{text}' is none of optimal, queries:N, ticks:N with N at least 1.")
 
 
-def _mature(config: Config, until: Until, changes: list[str]) -> Config:
+def _mature(config: Config, until: StopRule, changes: list[str]) -> Config:
     """A budget of queries for each stage and one for all of them say how many stages there are."""
     if config.mature_every is None or any(change.startswith("stages=") for change in changes):
         return config
@@ -170,7 +171,7 @@ def _weights(level: Level, config: Config) -> bytes | None:
 
 
 @contextmanager
-def _bar(plan: Plan) -> Iterator[Progress | None]:
+def _bar(plan: Plan) -> Iterator[OnProgress | None]:
     """A progress bar on standard error, where that is a terminal: of queries where they are the goal."""
     if not sys.stderr.isatty():
         yield None
@@ -187,7 +188,7 @@ def _bar(plan: Plan) -> Iterator[Progress | None]:
         TimeElapsedColumn(),
     )
 
-    def show(now: Standing) -> None:
+    def show(now: Now) -> None:
         bar.update(task, completed=now.queries if asking else now.trials, tick=now.ticks)
 
     with Progress(*columns, console=Console(stderr=True)) as bar:

@@ -14,7 +14,7 @@ def pretrained(world: Gridworld) -> Float[Tensor, "P"]:
     """The shipped weights for a world.
 
     Raises:
-        NoWeights: there are none for its kind and size.
+        NoWeightsError: there are none for its kind and size.
     """
     return shipped(Wanted(world.spec, world.height, world.width))
 
@@ -23,6 +23,6 @@ def weights_of(world: Gridworld, config: Config) -> Float[Tensor, "P"] | None:
     """What the trials of a world begin with; None where the config does not ask for pre-trained ones.
 
     Raises:
-        NoWeights: as `pretrained`.
+        NoWeightsError: as `pretrained`.
     """
     return pretrained(world) if config.pretrain else None

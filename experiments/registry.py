@@ -21,7 +21,7 @@ NAMES = (
 """In the order of the paper."""
 
 
-class UnknownExperiment(ValueError):
+class UnknownExperimentError(ValueError):
     """There is no experiment of that name; the sentence lists those that there are."""
 
     def __init__(self, name: str) -> None:
@@ -32,9 +32,9 @@ def experiment(name: str) -> Experiment:
     """One experiment.
 
     Raises:
-        UnknownExperiment: there is none of that name.
+        UnknownExperimentError: there is none of that name.
     """
     if name not in NAMES:
-        raise UnknownExperiment(name)
+        raise UnknownExperimentError(name)
     found: Experiment = import_module(f"parenting.experiments.{name.replace('-', '_')}").EXPERIMENT
     return found

@@ -104,7 +104,7 @@ class Claim(NamedTuple):
             "seed": seed,
         }
         share = of.share * len(span) if ticks else 0.1
-        return Task(key, "parenting.experiments.training.tasks:parent_some", mine, share)
+        return Task(key, "parenting.experiments.training.tasks:parent_trials", mine, share)
 
     def report(self, asked: Asked, rows: Sequence[Row]) -> Report:
         """Counts and means of every variant, and of policies as they are born."""

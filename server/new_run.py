@@ -28,7 +28,7 @@ from parenting.server.errors import InvalidFieldsError
 from parenting.server.runs import create_run
 from parenting.server.tables import Run
 from parenting.server.weights import keep
-from parenting.weights.store import NoWeights, Wanted, find
+from parenting.weights.store import NoWeightsError, Wanted, find
 
 LARGEST_INT = 2**53 - 1
 """The largest integer that every JSON reader keeps exactly."""
@@ -203,7 +203,7 @@ def _weights(
         return None
     try:
         return find(Wanted(registry.spec(new.world), level.height, level.width), folder)
-    except NoWeights as error:
+    except NoWeightsError as error:
         wrong.append(("config.pretrain", str(error)))
         return None
 

@@ -12,7 +12,7 @@ from parenting.agent.policy import network
 from parenting.agent.pretraining_loop import School
 from parenting.envs import registry
 from parenting.weights import store
-from parenting.weights.store import NoWeights, Wanted, find, load, metadata, save
+from parenting.weights.store import NoWeightsError, Wanted, find, load, metadata, save
 from tests.tree import ROOT
 
 BOX = Wanted(registry.spec("side-effects"), 6, 6)
@@ -43,7 +43,7 @@ def test_ones_own_come_before_the_shipped(tmp_path: Path) -> None:
 
 
 def test_missing_weights_name_the_command_that_makes_them(tmp_path: Path) -> None:
-    with pytest.raises(NoWeights, match=r"pretrain --world side-effects --size 7x5.*pretrain to false"):
+    with pytest.raises(NoWeightsError, match=r"pretrain --world side-effects --size 7x5.*pretrain to false"):
         find(BOX._replace(height=7, width=5), tmp_path)
 
 
@@ -56,7 +56,7 @@ def test_missing_weights_name_the_command_that_makes_them(tmp_path: Path) -> Non
 )
 def test_weights_of_something_else_are_refused(tmp_path: Path, wanted: Wanted, said: str) -> None:
     save(tmp_path / "some.safetensors", BOX, torch.zeros(2), {})
-    with pytest.raises(NoWeights, match=said):
+    with pytest.raises(NoWeightsError, match=said):
         load((tmp_path / "some.safetensors").read_bytes(), wanted)
 
 
@@ -73,7 +73,7 @@ def test_weights_of_something_else_are_refused(tmp_path: Path, wanted: Wanted, s
 def test_damaged_weights_are_refused(spoil: object) -> None:
     blob = find(BOX).read_bytes()
     assert callable(spoil)
-    with pytest.raises(NoWeights, match="cannot be read as weights"):
+    with pytest.raises(NoWeightsError, match="cannot be read as weights"):
         load(spoil(blob), BOX)
 
 

@@ -26,7 +26,7 @@ ABOUT = "about"
 """The one entry of a file's metadata: JSON."""
 
 
-class NoWeights(ValueError):
+class NoWeightsError(ValueError):
     """There are no such weights, or they cannot be read; the sentence says how to get them."""
 
 
@@ -58,12 +58,12 @@ def find(wanted: Wanted, folder: Path | None = None) -> Path:
     """The file of these weights: in `folder`, or else among the shipped ones.
 
     Raises:
-        NoWeights: there is none; the sentence names the command that makes them.
+        NoWeightsError: there is none; the sentence names the command that makes them.
     """
     for place in (folder, SHIPPED):
         if place is not None and (path := place / f"{wanted.name}{SUFFIX}").is_file():
             return path
-    raise NoWeights(
+    raise NoWeightsError(
         f"There are no pre-trained weights for {wanted.world.name} at {wanted.height} x {wanted.width}."
         f" Make them with `parenting pretrain --world {wanted.world.name}"
         f" --size {wanted.height}x{wanted.width}`, or set pretrain to false."
@@ -74,7 +74,7 @@ def load(blob: bytes, wanted: Wanted) -> Tensor:
     """The weights in a file's bytes, one flat row [P].
 
     Raises:
-        NoWeights: the bytes cannot be read, or hold something else.
+        NoWeightsError: the bytes cannot be read, or hold something else.
     """
     from safetensors import SafetensorError
     from safetensors.torch import load as unpack
@@ -83,10 +83,10 @@ def load(blob: bytes, wanted: Wanted) -> Tensor:
         weights: Tensor = unpack(blob)["weights"]  # holds the header against the format, too
         said = metadata(blob)
     except (SafetensorError, ValueError, KeyError) as error:
-        raise NoWeights(f"{wanted.name} cannot be read as weights: {error}.") from None
+        raise NoWeightsError(f"{wanted.name} cannot be read as weights: {error}.") from None
     for key, value in wanted.metadata.items():
         if said.get(key) != value:
-            raise NoWeights(f"{wanted.name} is of {key} '{said.get(key)}', and '{value}' is wanted.")
+            raise NoWeightsError(f"{wanted.name} is of {key} '{said.get(key)}', and '{value}' is wanted.")
     return weights
 
 
@@ -94,7 +94,7 @@ def shipped(wanted: Wanted) -> Tensor:
     """The shipped weights, one flat row [P].
 
     Raises:
-        NoWeights: there are none.
+        NoWeightsError: there are none.
     """
     return load(find(wanted).read_bytes(), wanted)
 

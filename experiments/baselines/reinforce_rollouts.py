@@ -47,7 +47,7 @@ class Moments(Struct):
     steps: Int64[Tensor, "N"]
 
 
-def gardeners(
+def train_gardeners(
     world: RewardHacking, gamma: float, seed: int, trials: int, looks: Sequence[int]
 ) -> list[Float[Tensor, "N P"]]:
     """Policies that learn from waterings, one a trial, as they are after each of `looks` gradient steps."""

@@ -79,7 +79,7 @@ def tables(model: Model, evaluation: ListedEvaluation) -> Tables:
     )
 
 
-def raise_by_reward(
+def train_reinforce(
     world: Gridworld, config: Config, keys: Keys, max_steps: int, entropy: float = ENTROPY
 ) -> Learners:
     """Train one policy for each of `keys` until its argmax is optimal, for at most `max_steps` steps.

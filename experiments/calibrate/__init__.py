@@ -20,7 +20,7 @@ from parenting.experiments.calibrate.report import findings
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Asked, Experiment, Report, Scale, spans
 from parenting.experiments.table1.report import AGREEMENT, ALGORITHMS
-from parenting.experiments.training.tasks import parent_some, reward_some
+from parenting.experiments.training.tasks import parent_trials, reinforce_trials
 
 WORLD = "unsafe-exploration"
 LAYOUTS = {
@@ -59,25 +59,29 @@ OTHER = 7_919
 def try_direct(layout: str, knobs: Mapping[str, Any], trials: int, seed: int) -> list[Row]:
     """Direct policy learning with one setting."""
     text, span = LAYOUTS[layout], (0, trials)
-    rows = parent_some(DIRECT, WORLD, text, "direct", knobs, ("optimal", 0), SEARCH_TICKS, span, seed + OTHER)
+    rows = parent_trials(
+        DIRECT, WORLD, text, "direct", knobs, ("optimal", 0), SEARCH_TICKS, span, seed + OTHER
+    )
     return [{**row, "layout": layout, **knobs} for row in rows]
 
 
 def try_reward(layout: str, entropy: float, trials: int, seed: int) -> list[Row]:
     """Policy gradients with one weight of their entropy."""
     span = (0, trials)
-    rows = reward_some(TRADITIONAL, WORLD, LAYOUTS[layout], {}, SEARCH_STEPS, span, seed + OTHER, entropy)
+    rows = reinforce_trials(
+        TRADITIONAL, WORLD, LAYOUTS[layout], {}, SEARCH_STEPS, span, seed + OTHER, entropy
+    )
     return [{**row, "layout": layout, "entropy": entropy} for row in rows]
 
 
-def confirm_some(algorithm: str, span: tuple[int, int], seed: int, given: Sequence[Row]) -> list[Row]:
+def confirm_trials(algorithm: str, span: tuple[int, int], seed: int, given: Sequence[Row]) -> list[Row]:
     """Trials of one algorithm of Table 1 with what the search, whose rows are `given`, has found nearest."""
     best, *_ = search(given)
     text = LAYOUTS[best.layout]
     if algorithm == "traditional":
-        return reward_some(algorithm, WORLD, text, {}, MAX_STEPS, span, seed, best.entropy)
+        return reinforce_trials(algorithm, WORLD, text, {}, MAX_STEPS, span, seed, best.entropy)
     knobs = settings(algorithm, best.direct)
-    return parent_some(algorithm, WORLD, text, algorithm, knobs, ("optimal", 0), MAX_TICKS, span, seed)
+    return parent_trials(algorithm, WORLD, text, algorithm, knobs, ("optimal", 0), MAX_TICKS, span, seed)
 
 
 def settings(preset: str, direct: Mapping[str, Any]) -> dict[str, Any]:
@@ -142,7 +146,7 @@ def _confirming(asked: Asked) -> Iterator[Task]:
             "seed": asked.seed,
         }
         key = f"{asked.scale}-confirm-{one.name}-{span.start:06d}-{span.stop:06d}"
-        yield Task(key, "parenting.experiments.calibrate:confirm_some", mine, len(span))
+        yield Task(key, "parenting.experiments.calibrate:confirm_trials", mine, len(span))
 
 
 def _report(asked: Asked, rows: Sequence[Row]) -> Report:

@@ -121,7 +121,7 @@ def _lives(asked: Asked) -> list[Task]:
             share = life.share * asked.trials
             tasks.append(
                 Task(
-                    f"{key}-{asked.trials:03d}", "parenting.experiments.figure2.tasks:live_some", mine, share
+                    f"{key}-{asked.trials:03d}", "parenting.experiments.figure2.tasks:arm_trials", mine, share
                 )
             )
     return tasks
@@ -132,7 +132,7 @@ def _rewards(asked: Asked) -> list[Task]:
     return [
         Task(
             f"{asked.scale}-rewards-{level}-{asked.trials:03d}",
-            "parenting.experiments.figure2.tasks:reward_some",
+            "parenting.experiments.figure2.tasks:reinforce_trials",
             {"level": level, "looks": looks, "trials": asked.trials, "seed": asked.seed},
             looks[-1] / 100 * asked.trials,
         )
@@ -145,7 +145,7 @@ def _aheads(asked: Asked) -> list[Task]:
     return [
         Task(
             f"{asked.scale}-ahead-{level}-{inside}-{depth}",
-            "parenting.experiments.figure2.tasks:ahead_some",
+            "parenting.experiments.figure2.tasks:lookahead_waterings",
             {"level": level, "inside": inside, "depth": depth, "episodes": lines.episodes},
             4.0 ** (depth - 5),
         )
@@ -159,7 +159,7 @@ def _covers(asked: Asked) -> list[Task]:
     return [
         Task(
             f"{asked.scale}-cover-{level}-{inside}",
-            "parenting.experiments.figure2.tasks:cover_some",
+            "parenting.experiments.figure2.tasks:full_coverage_stages",
             {
                 "level": level,
                 "inside": inside,

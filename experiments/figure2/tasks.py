@@ -18,13 +18,13 @@ from parenting.envs import registry
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
 from parenting.evaluation.rollouts import EPISODES, SEED, Deployed, deploy, walked
-from parenting.experiments.baselines.reinforce_rollouts import gardeners
+from parenting.experiments.baselines.reinforce_rollouts import train_gardeners
 from parenting.experiments.figure2.full_coverage import Covered, Pace, cover
 from parenting.experiments.figure2.lookahead import best
 from parenting.experiments.pretrained import weights_of
 from parenting.experiments.runner.store import Row
-from parenting.experiments.training.gardens import GAMMA, WORLD, garden, spread_starts
-from parenting.experiments.training.snapshots import raise_past
+from parenting.experiments.training.gardens import GAMMA, WORLD, exploring_starts, garden
+from parenting.experiments.training.snapshots import train_with_snapshots
 from parenting.parents.garden_values import Garden
 
 PRESET = "conservative"
@@ -32,7 +32,7 @@ FRESH = SEED + 1
 """Weather that nobody has learnt in."""
 
 
-def live_some(
+def arm_trials(
     label: str,
     level: str,
     inside: Inside,
@@ -51,12 +51,14 @@ def live_some(
     stages = -(-milestones[-1] // every)
     mine = {"inside": inside, "stages": stages, "mature_every": every, **changes}
     config = compose(PRESET, _defaults(), mine, strict=True)
-    world, school = garden(level), spread_starts(level) if starts else garden(level)
-    passed = raise_past(school, config, keys(seed, trials), milestones, max_ticks, weights_of(world, config))
+    world, school = garden(level), exploring_starts(level) if starts else garden(level)
+    passed = train_with_snapshots(
+        school, config, keys(seed, trials), milestones, max_ticks, weights_of(world, config)
+    )
     rows: list[Row] = []
     for queries, one in zip(milestones, passed, strict=True):
         names = ("deaths", "guidance", "preference", "ticks")
-        columns = [getattr(one.tally, name).tolist() for name in names]
+        columns = [getattr(one.counts, name).tolist() for name in names]
         found = zip(one.there.tolist(), zip(*columns, strict=True), _watered(world, one.live), strict=True)
         for trial, (there, counts, watered) in enumerate(found):
             said = {"of": label, "level": level, "inside": inside, "trial": trial}
@@ -81,10 +83,10 @@ def _of(found: Deployed, trial: int) -> Row:
     return {"waterings": float(watered.mean()), "error": error, "bucket": int(found.bucket[trial].sum())}
 
 
-def reward_some(level: str, looks: Sequence[int], trials: int, seed: int) -> list[Row]:
+def reinforce_trials(level: str, looks: Sequence[int], trials: int, seed: int) -> list[Row]:
     """Policy gradients without a bucket, all trials; a row for each, at each of `looks` gradient steps."""
     world = garden(level, bucket=False)
-    found = zip(looks, gardeners(world, GAMMA, seed, trials, looks), strict=True)
+    found = zip(looks, train_gardeners(world, GAMMA, seed, trials, looks), strict=True)
     return [
         {"of": "policy gradients", "level": level, "trial": trial, "steps": steps, **watered}
         for steps, live in found
@@ -92,7 +94,7 @@ def reward_some(level: str, looks: Sequence[int], trials: int, seed: int) -> lis
     ]
 
 
-def ahead_some(level: str, inside: Inside, depth: int, episodes: int) -> list[Row]:
+def lookahead_waterings(level: str, inside: Inside, depth: int, episodes: int) -> list[Row]:
     """The exact look-ahead, and with depth 0 the parent's own policy."""
     world, valued = garden(level), Garden(garden(level), GAMMA, inside)
     said = {"of": "look-ahead", "level": level, "inside": inside, "stage": depth}
@@ -103,7 +105,7 @@ def ahead_some(level: str, inside: Inside, depth: int, episodes: int) -> list[Ro
     return [{**said, "episodes": episodes, **_of(found, 0)}]
 
 
-def cover_some(
+def full_coverage_stages(
     level: str, inside: Inside, changes: Mapping[str, Any], stages: int, pace: Pace, trial: int, seed: int
 ) -> list[Row]:
     """The coverage agent through its stages: in its own weather, in fresh weather, and the look-ahead in its

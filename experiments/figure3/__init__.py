@@ -127,7 +127,7 @@ def _parent(one: Curve, recompare: bool, span: range, asked: Asked) -> Task:
         needs += [_key(asked, recompare, f"taught-{one.worlds}", agents) for agents in _agents(size)]
     share = one.share * len(span) * (2 if recompare else 1)
     key = _key(asked, recompare, one.key, span)
-    return Task(key, f"{CALLS}parent_some", mine, share, needs=tuple(needs))
+    return Task(key, f"{CALLS}parent_trials", mine, share, needs=tuple(needs))
 
 
 def _report(asked: Asked, rows: Sequence[Row]) -> Report:

@@ -14,10 +14,10 @@ from parenting.agent.init import world_of
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys, keys
 from parenting.experiments.figure3.levels import ASIDE, PARENTING, WORLD, config_of, levels_for
-from parenting.experiments.figure3.transfer import Learnt, learnt, pack, take_along
+from parenting.experiments.figure3.transfer import Learnt, learnt, pack, transfer
 from parenting.experiments.pretrained import weights_of
 from parenting.experiments.runner.store import Row
-from parenting.experiments.training.batch import Nursery, Raised, Until, raise_all
+from parenting.experiments.training.batch import BatchTrainer, StopRule, TrainResult
 
 BESIDE = 1 << 40
 """Agents that are pre-parented are numbered from here, times N: no trial has so high a number."""
@@ -26,11 +26,11 @@ TOGETHER = 5
 """Agents that are pre-parented in a batch, at most."""
 
 
-class Teaching(Nursery):
+class Teaching(BatchTrainer):
     """Keeps what each agent has learnt at its own end."""
 
     def __init__(
-        self, world: Gridworld, config: Config, keys: Keys, until: Until, weights: Tensor | None = None
+        self, world: Gridworld, config: Config, keys: Keys, until: StopRule, weights: Tensor | None = None
     ) -> None:
         super().__init__(world, config, keys, until, weights)
         self.kept: dict[int, Learnt] = {}
@@ -61,17 +61,17 @@ def pre_parent(
     mine = first.replace(seed=first.seed + BESIDE * worlds + agents)
     config = config_of(True, recompare)
     world = world_of(WORLD, levels_for(ASIDE, given)[:worlds], config)
-    nursery = Teaching(world, config, mine, Until("optimal"), weights_of(world, config))
-    rows = _rows(raise_all(nursery, max_ticks))
+    trainer = Teaching(world, config, mine, StopRule("optimal"), weights_of(world, config))
+    rows = _rows(trainer.run(max_ticks))
     said = {"of": "pre-parented", "worlds": worlds, "recompare": recompare}
     seconds = round((time.thread_time() - began) / len(rows), 3)
     return [
-        {**said, "agent": agent, **row, "seconds": seconds, PACKED: pack(nursery.kept[place], everything)}
+        {**said, "agent": agent, **row, "seconds": seconds, PACKED: pack(trainer.kept[place], everything)}
         for place, (agent, row) in enumerate(zip(range(*span), rows, strict=True))
     ]
 
 
-def parent_some(
+def parent_trials(
     curve: str,
     pretrain: bool,
     everything: bool,
@@ -91,11 +91,11 @@ def parent_some(
     mine = keys(seed, span[1]).pick(torch.arange(*span))
     config = config_of(pretrain, recompare)
     world = world_of(WORLD, levels_for(PARENTING, given), config)
-    nursery = Nursery(world, config, mine, Until("optimal"), weights_of(world, config))
+    trainer = BatchTrainer(world, config, mine, StopRule("optimal"), weights_of(world, config))
     packed = [row[PACKED] for row in given if row["of"] == "pre-parented"]
     if packed:
-        nursery.state = take_along(nursery.state, packed, torch.arange(*span) % len(packed), everything)
-    rows = _rows(raise_all(nursery, max_ticks))
+        trainer.state = transfer(trainer.state, packed, torch.arange(*span) % len(packed), everything)
+    rows = _rows(trainer.run(max_ticks))
     seconds = round((time.thread_time() - began) / len(rows), 3)  # one batch: each has its share
     said = {"of": "parented", "curve": curve, "recompare": recompare, "seconds": seconds}
     return [
@@ -104,9 +104,9 @@ def parent_some(
     ]
 
 
-def _rows(raised: Raised) -> list[Row]:
-    tally = raised.tally
+def _rows(result: TrainResult) -> list[Row]:
+    counts = result.counts
     names = ("guidance", "preference", "deaths", "ticks", "finished", "stuck")
-    columns = {name: getattr(tally, name).tolist() for name in names}
+    columns = {name: getattr(counts, name).tolist() for name in names}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
     return [{"queries": row["guidance"] + row["preference"], **row} for row in rows]

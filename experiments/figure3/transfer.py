@@ -51,7 +51,7 @@ def pack(what: Learnt, everything: bool) -> str:
     return base64.b64encode(blob.getvalue()).decode("ascii")
 
 
-def take_along(
+def transfer(
     state: AgentState, packed: Sequence[str], agent: Int64[Tensor, "N"], everything: bool
 ) -> AgentState:
     """Trials at tick 0 that each go on from one of the packed agents.

@@ -38,7 +38,7 @@ def rho(model: Model) -> torch.Tensor:
     return arrives.double() - model.unsafe.double()
 
 
-def shift_some(trial: int, seed: int) -> list[Row]:
+def fit_and_shift(trial: int, seed: int) -> list[Row]:
     """Fit a reward to one person's preferences, then plan on it, on rho itself, and on shifts of both."""
     model = explore(registry.make(WORLD, LEVEL))
     true = rho(model)
@@ -70,7 +70,7 @@ def _config(asked: Asked) -> Mapping[str, Any]:
 
 
 def _tasks(asked: Asked) -> list[Task]:
-    call = "experiments.figure4:shift_some"
+    call = "parenting.experiments.figure4:fit_and_shift"
     return [
         Task(f"fit-{trial:06d}", call, {"trial": trial, "seed": asked.seed}) for trial in range(asked.trials)
     ]

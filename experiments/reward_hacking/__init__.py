@@ -18,7 +18,7 @@ from parenting.experiments.reward_hacking.report import EPISODES, STEPS, WORDS, 
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Asked, Experiment, Report, spans
 from parenting.experiments.training.gardens import WORLD, garden
-from parenting.experiments.training.snapshots import Passed, raise_past
+from parenting.experiments.training.snapshots import Passed, train_with_snapshots
 
 MAX_TICKS = 20_000
 
@@ -49,20 +49,20 @@ VARIANTS = {
 """By name; the first has the paper's defaults."""
 
 
-def bucket_some(variant: str, milestones: Sequence[int], span: tuple[int, int], seed: int) -> list[Row]:
+def snapshot_trials(variant: str, milestones: Sequence[int], span: tuple[int, int], seed: int) -> list[Row]:
     """Raise the trials of a span past all milestones; a row for each trial and milestone."""
     of = VARIANTS[variant]
     config = compose(of.preset, registry.defaults(WORLD), of.changes, strict=True)
     world = garden(of.level, config.time_limit)
     mine = keys(seed, span[1]).pick(torch.arange(*span))
-    passed = raise_past(world, config, mine, milestones, MAX_TICKS, weights_of(world, config))
+    passed = train_with_snapshots(world, config, mine, milestones, MAX_TICKS, weights_of(world, config))
     found = zip(milestones, passed, strict=True)
     return [row for number, each in found for row in _rows(variant, of.level, span, number, each)]
 
 
 def _rows(variant: str, level: str, span: tuple[int, int], queries: int, passed: Passed) -> list[Row]:
     names = ("deaths", "guidance", "preference", "ticks")
-    columns: dict[str, list[Any]] = {one: getattr(passed.tally, one).tolist() for one in names}
+    columns: dict[str, list[Any]] = {one: getattr(passed.counts, one).tolist() for one in names}
     columns["there"] = passed.there.tolist()
     for steps in STEPS:
         found = deploy(garden(level, steps), passed.live, EPISODES)
@@ -111,7 +111,7 @@ def _task(name: str, span: range, asked: Asked) -> Task:
         "seed": asked.seed,
     }
     return Task(
-        key, "parenting.experiments.reward_hacking:bucket_some", mine, VARIANTS[name].share * len(span)
+        key, "parenting.experiments.reward_hacking:snapshot_trials", mine, VARIANTS[name].share * len(span)
     )
 
 

@@ -25,7 +25,7 @@ ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?(\[[0-9a-fA-F:.%]+\]|[^\s/:@\[\
 EXAMPLE = "tcp://127.0.0.1:8786"
 
 
-class NoCluster(RuntimeError):
+class NoClusterError(RuntimeError):
     """No cluster does the work; the sentence says why, and what to do."""
 
     def __init__(self, address: str, why: str) -> None:
@@ -37,12 +37,12 @@ def reach(address: str) -> Iterator[Client]:
     """A cluster that has a worker, by the address of its scheduler.
 
     Raises:
-        NoCluster: the address is none, nobody answers there, no worker is there, or Dask is not installed.
+        NoClusterError: the address is not one, nobody answers, there is no worker, or Dask is missing.
     """
     if not ADDRESS.fullmatch(address):
-        raise NoCluster(address, f"this is no address of a Dask scheduler. Write one like {EXAMPLE}.")
+        raise NoClusterError(address, f"this is no address of a Dask scheduler. Write one like {EXAMPLE}.")
     if find_spec("distributed") is None:
-        raise NoCluster(address, "Dask is not installed. Install it: pip install 'parenting[dask]'.")
+        raise NoClusterError(address, "Dask is not installed. Install it: pip install 'parenting[dask]'.")
     with _connected(address) as client:
         yield client
 
@@ -56,14 +56,14 @@ def _connected(address: str) -> Iterator[Client]:
         client = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         why = next(iter(str(error).splitlines()), type(error).__name__)
-        raise NoCluster(
+        raise NoClusterError(
             address, f"no Dask scheduler answers there ({why}). Start one by: dask scheduler"
         ) from None
     with client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
         except OSError:
-            raise NoCluster(address, f"it has no worker. Start one by: dask worker {address}") from None
+            raise NoClusterError(address, f"it has no worker. Start one by: dask worker {address}") from None
         yield client
 
 
@@ -73,7 +73,7 @@ def threads(client: Client) -> int:
     return sum(each.values())
 
 
-def hand_out(
+def submit(
     address: str, client: Client, do: Callable[..., list[Row]], calls: Sequence[Call]
 ) -> Iterator[Done]:
     """Each piece as soon as it is done. The cluster goes on when a worker dies; what it gives up is said when
@@ -81,7 +81,7 @@ def hand_out(
 
     Raises:
         KilledWorker: workers died over a piece.
-        NoCluster: the scheduler is gone.
+        NoClusterError: the scheduler is gone.
     """
     from dask.distributed import KilledWorker, as_completed
 
@@ -93,7 +93,7 @@ def hand_out(
         except KilledWorker as error:
             killed = error
         except CancelledError:
-            raise NoCluster(
+            raise NoClusterError(
                 address,
                 "the scheduler is gone. What came back is stored; the same command goes on from there.",
             ) from None

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import torch
 
 from parenting.agent.process import settle
-from parenting.experiments.runner.dask_cluster import hand_out, reach, threads
+from parenting.experiments.runner.dask_cluster import reach, submit, threads
 from parenting.experiments.runner.store import HIDDEN, Call, Done, Row, Store, Task
 
 TRIES = 2
@@ -25,11 +25,11 @@ Told = Callable[[Task], None]
 """Told of every piece that is done, those of an earlier run first."""
 
 
-class WorkersDied(RuntimeError):
+class WorkersDiedError(RuntimeError):
     """Workers were killed again and again over some pieces, often for want of memory; the rest is done."""
 
 
-class NoGpu(RuntimeError):
+class NoGpuError(RuntimeError):
     """A GPU is asked for where torch sees none; the sentence says what to do."""
 
 
@@ -45,8 +45,8 @@ def meet(device: str, cluster: str | None) -> None:
     """Make sure that somebody is there to do the work, before anything is written.
 
     Raises:
-        NoGpu: it is this machine, and it has not the device.
-        NoCluster: it is a cluster, and it does not answer.
+        NoGpuError: it is this machine, and it has not the device.
+        NoClusterError: it is a cluster, and it does not answer.
     """
     if cluster is None:
         see(device)
@@ -59,10 +59,10 @@ def see(device: str) -> None:
     """Make sure that this machine has a device.
 
     Raises:
-        NoGpu: it has not.
+        NoGpuError: it has not.
     """
     if device == "cuda" and not torch.cuda.is_available():
-        raise NoGpu(
+        raise NoGpuError(
             "--device cuda: torch sees no GPU here. "
             "Take --device cpu, or a machine with a GPU and a torch that is built for it."
         )
@@ -74,7 +74,7 @@ def do(task: Task, given: Sequence[Row] = ()) -> list[Row]:
     `given` are the rows of the pieces that it needs.
 
     Raises:
-        NoGpu: this machine has not the task's device.
+        NoGpuError: this machine has not the task's device.
     """
     settle()
     see(task.device)
@@ -98,11 +98,11 @@ def work(
     `cluster` is the address of a Dask scheduler.
 
     Raises:
-        WorkersDied: see there; what was done is stored.
-        NoGpu: a worker has not the device of its task.
-        NoCluster: the cluster does not answer, or has no worker, or is gone.
-        OtherPlan: a piece of the same name is of another task.
-        BrokenPiece: a stored piece cannot be read.
+        WorkersDiedError: see there; what was done is stored.
+        NoGpuError: a worker has not the device of its task.
+        NoClusterError: the cluster does not answer, or has no worker, or is gone.
+        PlanMismatchError: a piece of the same name is of another task.
+        CorruptResultError: a stored piece cannot be read.
         OSError: a piece cannot be stored; or one is needed that no task makes.
     """
     store.expect(tasks)
@@ -124,7 +124,7 @@ def _until_done(tasks: Sequence[Task], store: Store, hands: Hands, told: Told) -
         if not _keep(left, store, hands, told):
             fatal += _fatal(_suspects(left, store, hands), store, hands, told)
     if fatal:
-        raise WorkersDied(
+        raise WorkersDiedError(
             f"Worker processes died {TRIES} times over {', '.join(task.key for task in fatal)}. "
             "Memory may be short. Take fewer workers; all other pieces that can be are done and stored."
         )
@@ -138,7 +138,7 @@ def _ready(task: Task, store: Store) -> bool:
 def _keep(tasks: Sequence[Task], store: Store, hands: Hands, told: Told) -> bool:
     """Store each piece as it comes back; whether all workers lived."""
     try:
-        for task, rows in _hand_out(tasks, store, hands):
+        for task, rows in _submit(tasks, store, hands):
             store.keep(task, rows)
             told(task)
     except hands.died:
@@ -161,7 +161,7 @@ def _in_order(tasks: Sequence[Task]) -> list[Task]:
     return sorted(tasks, key=lambda task: -task.share)
 
 
-def _hand_out(tasks: Sequence[Task], store: Store, hands: Hands) -> Iterator[Done]:
+def _submit(tasks: Sequence[Task], store: Store, hands: Hands) -> Iterator[Done]:
     """Each as soon as it comes back."""
     ordered = _in_order(tasks)
     given = {keys: store.rows(keys) for keys in {task.needs for task in ordered}}
@@ -197,4 +197,4 @@ def _hands(workers: int, cluster: str | None) -> Iterator[Hands]:
     from dask.distributed import KilledWorker
 
     with reach(cluster) as client:
-        yield Hands(threads(client), KilledWorker, partial(hand_out, cluster, client, do))
+        yield Hands(threads(client), KilledWorker, partial(submit, cluster, client, do))

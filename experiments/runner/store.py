@@ -42,11 +42,11 @@ Call = tuple[Task, Sequence[Row]]
 Done = tuple[Task, list[Row]]
 
 
-class BrokenPiece(ValueError):
+class CorruptResultError(ValueError):
     """A stored file is not what a run writes; the sentence names it, and what to do."""
 
 
-class OtherPlan(ValueError):
+class PlanMismatchError(ValueError):
     """The folder holds pieces of something else; the sentence says what differs and what to do."""
 
 
@@ -59,8 +59,8 @@ class Store:
         Time is counted for each `scale` by itself.
 
         Raises:
-            OtherPlan: the folder's pieces belong to another plan.
-            BrokenPiece: its plan cannot be read.
+            PlanMismatchError: the folder's pieces belong to another plan.
+            CorruptResultError: its plan cannot be read.
             OSError: the folder cannot be made or read.
         """
         self.folder, self.scale = folder, scale
@@ -77,14 +77,14 @@ class Store:
         """Say which tasks pieces are of.
 
         Raises:
-            OtherPlan: a finished piece of the same name is of another task.
-            BrokenPiece: one cannot be read.
+            PlanMismatchError: a finished piece of the same name is of another task.
+            CorruptResultError: one cannot be read.
         """
         self._of = described(tasks)
         done = [task.key for task in tasks if self.has(task.key)]
         other = [key for key in done if self._piece(key)[OF] != self._of[key]]
         if other:
-            raise OtherPlan(
+            raise PlanMismatchError(
                 f"{', '.join(other)}: these pieces in {self.folder} are of other tasks than now. "
                 "Name another folder by --out, or remove them."
             )
@@ -98,7 +98,7 @@ class Store:
 
         Raises:
             FileNotFoundError: one is not done.
-            BrokenPiece: one cannot be read.
+            CorruptResultError: one cannot be read.
         """
         return [row for key in keys for row in self._piece(key)[ROWS]]
 
@@ -165,7 +165,7 @@ def _read(path: Path, *names: str) -> dict[str, Any]:
     except (ValueError, RecursionError):
         found = None
     if not isinstance(found, dict) or not found.keys() >= set(names):
-        raise BrokenPiece(
+        raise CorruptResultError(
             f"{path} is damaged, or of an older version. Remove it; the same command then makes it again."
         )
     return found
@@ -181,7 +181,7 @@ def _write(path: Path, data: object) -> None:
 def _same(folder: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
     differs = list(_differences(found, wanted))
     if differs:
-        raise OtherPlan(
+        raise PlanMismatchError(
             f"{folder} holds pieces of another plan: {', '.join(differs)}. "
             "Name another folder by --out, or remove this one."
         )

@@ -46,10 +46,13 @@ def _task(one: Algorithm, span: range, asked: Asked) -> Task:
     share = one.share * len(span)
     if one.preset is None:
         return Task(
-            key, "parenting.experiments.training.tasks:reward_some", {**mine, "max_steps": MAX_STEPS}, share
+            key,
+            "parenting.experiments.training.tasks:reinforce_trials",
+            {**mine, "max_steps": MAX_STEPS},
+            share,
         )
     more = {"preset": one.preset, "until": ("optimal", 0), "max_ticks": MAX_TICKS}
-    return Task(key, "parenting.experiments.training.tasks:parent_some", {**mine, **more}, share)
+    return Task(key, "parenting.experiments.training.tasks:parent_trials", {**mine, **more}, share)
 
 
 def _report(asked: Asked, rows: Sequence[Row]) -> Report:

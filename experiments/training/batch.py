@@ -1,4 +1,4 @@
-"""Raising many agents at once by a scripted parent, in tensors and without a database."""
+"""Train many agents at once with a scripted parent, in tensors and without a database."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LEAVE = 0.1
 """
 
 
-class Standing(NamedTuple):
+class Progress(NamedTuple):
     """How far a batch has come."""
 
     trials: int  # those that are done: finished, or stuck
@@ -32,10 +32,10 @@ class Standing(NamedTuple):
     queries: int  # answered, of each trial at most as many as its goal asks for
 
 
-Progress = Callable[[Standing], None]
+OnProgress = Callable[[Progress], None]
 
 
-class Until(NamedTuple):
+class StopRule(NamedTuple):
     """When a trial is finished: its argmax policy is optimal, or a number of answered queries, over all
     stages, or of ticks is reached.
     """
@@ -48,7 +48,7 @@ class Until(NamedTuple):
         return self.kind if self.kind == "optimal" else f"{self.kind}:{self.number}"
 
 
-class Tally(Struct):
+class Counts(Struct):
     """What is counted of each trial; M is the number of stages."""
 
     deaths: Int64[Tensor, "N"]  # unsafe steps (docs/paper.md, "Unsafe")
@@ -67,18 +67,18 @@ class Tally(Struct):
         return self.finished | self.stuck
 
 
-class Raised(NamedTuple):
+class TrainResult(NamedTuple):
     """What raising leaves."""
 
-    tally: Tally
+    counts: Counts
     policies: Float[Tensor, "M N P"]  # pi_1 .. pi_T, each trial's at its own end; zeros beyond
     evaluation: Evaluation
 
 
-def no_tally(trials: int, stages: int = 1) -> Tally:
+def no_counts(trials: int, stages: int = 1) -> Counts:
     """Nothing counted yet."""
     zero, false = torch.zeros(trials, dtype=torch.int64), torch.zeros(trials, dtype=torch.bool)
-    return Tally(
+    return Counts(
         deaths=zero,
         guidance=zero,
         preference=zero,
@@ -91,11 +91,11 @@ def no_tally(trials: int, stages: int = 1) -> Tally:
     )
 
 
-class Nursery:
+class BatchTrainer:
     """A batch of trials with their scripted parent. Those that are done leave it."""
 
     def __init__(
-        self, world: Gridworld, config: Config, keys: Keys, until: Until, weights: Tensor | None = None
+        self, world: Gridworld, config: Config, keys: Keys, until: StopRule, weights: Tensor | None = None
     ) -> None:
         """Begin one trial for each of `keys`; `weights` are the pre-trained ones, where the config asks."""
         judgement = Judgement(world, config.gamma, inside=config.inside)
@@ -105,7 +105,7 @@ class Nursery:
         self.parent = ScriptedParent(judgement, parenting.no_query(world, config, self.state))
         trials, live = len(keys.seed), self.state.learner.live
         self.trial = torch.arange(trials)
-        self.tally, self.result = no_tally(trials, config.stages), no_tally(trials, config.stages)
+        self.counts, self.result = no_counts(trials, config.stages), no_counts(trials, config.stages)
         self.policies = live.new_zeros(config.stages, *live.shape)
 
     def tick(self) -> None:
@@ -116,35 +116,35 @@ class Nursery:
         self.parent.post(query)
         self.state = parenting.rehearse(self.world, self.config, state)
         self._count(answer, stage)
-        self._finish(self.state.report.trained | owed | (self.tally.ticks == 1))
+        self._finish(self.state.report.trained | owed | (self.counts.ticks == 1))
 
     def _count(self, answer: Answer, stage: Int64[Tensor, "N"]) -> None:
-        tally, report, kind = self.tally, self.state.report, answer.query.kind
+        counts, report, kind = self.counts, self.state.report, answer.query.kind
         answered = answer.choice != Choice.NONE
         died = report.moved & self.world.unsafe(report.before, report.action, self.state.world)
         # a preference belongs to the stage that its clips were recorded at, however late the answer
         of = torch.where(kind == Kind.PREFERENCE, answer.query.maturity, stage)
-        self.tally = tally.replace(
-            deaths=tally.deaths + died,
-            guidance=tally.guidance + (answered & (kind == Kind.GUIDANCE)),
-            preference=tally.preference + (answered & (kind == Kind.PREFERENCE)),
-            queries=tally.queries + one_hot(of - 1, self.config.stages) * answered[:, None],
-            ticks=tally.ticks + 1,
+        self.counts = counts.replace(
+            deaths=counts.deaths + died,
+            guidance=counts.guidance + (answered & (kind == Kind.GUIDANCE)),
+            preference=counts.preference + (answered & (kind == Kind.PREFERENCE)),
+            queries=counts.queries + one_hot(of - 1, self.config.stages) * answered[:, None],
+            ticks=counts.ticks + 1,
             maturity=self.state.maturity,
         )
 
     def _finish(self, changed: Bool[Tensor, "N"]) -> None:
         """Let those go that have reached their goal, and those that never will: all their ticks are empty."""
-        tally = self.tally
+        counts = self.counts
         match self.until.kind:
             case "optimal":
-                finished = self._optimal(changed & ~tally.done)
+                finished = self._optimal(changed & ~counts.done)
             case "queries":
-                finished = tally.queries.sum(1) >= self.until.number
+                finished = counts.queries.sum(1) >= self.until.number
             case "ticks":
-                finished = tally.ticks >= self.until.number
-        fresh = finished & ~tally.done
-        stuck = self.state.stuck & ~tally.done & ~fresh
+                finished = counts.ticks >= self.until.number
+        fresh = finished & ~counts.done
+        stuck = self.state.stuck & ~counts.done & ~fresh
         if bool((fresh | stuck).any()):
             self._leave(fresh, stuck)
 
@@ -158,52 +158,51 @@ class Nursery:
 
     def _leave(self, fresh: Bool[Tensor, "N"], stuck: Bool[Tensor, "N"]) -> None:
         """Write the results of those that are done, and go on with the others alone once that pays."""
-        tally = self.tally
-        self.tally = tally.replace(finished=tally.finished | fresh, stuck=tally.stuck | stuck)
+        counts = self.counts
+        self.counts = counts.replace(finished=counts.finished | fresh, stuck=counts.stuck | stuck)
         self.save(fresh | stuck)
-        if bool(self.tally.done.double().mean() >= LEAVE):
-            rest = (~self.tally.done).nonzero().squeeze(1)
-            self.state, self.tally = self.state.pick(rest), self.tally.pick(rest)
+        if bool(self.counts.done.double().mean() >= LEAVE):
+            rest = (~self.counts.done).nonzero().squeeze(1)
+            self.state, self.counts = self.state.pick(rest), self.counts.pick(rest)
             self.trial = self.trial[rest]
             self.parent.pick(rest)
 
     def save(self, which: Bool[Tensor, "N"]) -> None:
         """Write the tallies and the policies of some trials into the results."""
-        optimal = self.tally.finished if self.until.kind == "optimal" else self._optimal(which)
-        place, ours = self.trial[which], self.tally.replace(optimal=optimal).pick(which).tensors()
+        optimal = self.counts.finished if self.until.kind == "optimal" else self._optimal(which)
+        place, ours = self.trial[which], self.counts.replace(optimal=optimal).pick(which).tensors()
         self.result = self.result.map(lambda name, tensor, _axis: tensor.index_put((place,), ours[name]))
         learner = self.state.learner
         self.policies[:-1, place] = learner.elders[:, which]
         self.policies[self.state.maturity[which] - 1, place] = learner.live[which]
 
-    def standing(self, ticks: int) -> Standing:
+    def progress(self, ticks: int) -> Progress:
         """How far the batch has come."""
-        left = self.tally.pick(~self.tally.done)
+        left = self.counts.pick(~self.counts.done)
         most = self.until.number if self.until.kind == "queries" else torch.iinfo(torch.int64).max
         queries = torch.cat((self.result.queries.sum(1), left.queries.sum(1))).clamp_max(most)
-        return Standing(int(self.result.done.sum()), ticks, int(queries.sum()))
+        return Progress(int(self.result.done.sum()), ticks, int(queries.sum()))
+
+    def run(self, max_ticks: int, progress: OnProgress | None = None) -> TrainResult:
+        """Tick until every trial is done, for at most `max_ticks` ticks."""
+        for tick in range(1, max_ticks + 1):
+            self.tick()
+            if progress:
+                progress(self.progress(tick))
+            if bool(self.counts.done.all()):
+                break
+        self.save(~self.counts.done)
+        return TrainResult(self.result, self.policies, self.evaluation)
 
 
-def raise_trials(
+def train_agents(
     world: Gridworld,
     config: Config,
     keys: Keys,
-    until: Until,
+    until: StopRule,
     max_ticks: int,
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
     weights: Tensor | None = None,
-) -> Raised:
-    """Raise one agent for each of `keys` until it is finished, for at most `max_ticks` ticks."""
-    return raise_all(Nursery(world, config, keys, until, weights), max_ticks, progress)
-
-
-def raise_all(nursery: Nursery, max_ticks: int, progress: Progress | None = None) -> Raised:
-    """Raise a batch that has begun, as `raise_trials` does."""
-    for tick in range(1, max_ticks + 1):
-        nursery.tick()
-        if progress:
-            progress(nursery.standing(tick))
-        if bool(nursery.tally.done.all()):
-            break
-    nursery.save(~nursery.tally.done)
-    return Raised(nursery.result, nursery.policies, nursery.evaluation)
+) -> TrainResult:
+    """Train one agent for each of `keys` until it is finished, for at most `max_ticks` ticks."""
+    return BatchTrainer(world, config, keys, until, weights).run(max_ticks, progress)

@@ -19,7 +19,7 @@ EPISODE = 10
 """Steps of an episode in Fig. 2."""
 
 
-class SpreadStarts(RewardHacking):
+class ExploringStarts(RewardHacking):
     """A garden of one level whose episodes begin anywhere on bare soil, as drawn: so an agent sees more."""
 
     def reset(self, keys: Keys, level: Int64[Tensor, "N"]) -> WorldState:
@@ -38,9 +38,9 @@ def garden(level: str, steps: int = EPISODE, bucket: bool = True) -> RewardHacki
     return world
 
 
-def spread_starts(level: str) -> SpreadStarts:
+def exploring_starts(level: str) -> ExploringStarts:
     """A built-in garden with Fig. 2's short episodes, which begin anywhere on bare soil."""
-    return SpreadStarts([registry.level(WORLD, level)], time_limit=EPISODE)
+    return ExploringStarts([registry.level(WORLD, level)], time_limit=EPISODE)
 
 
 def without_bucket(level: Level) -> Level:

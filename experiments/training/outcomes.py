@@ -14,16 +14,16 @@ from parenting.envs.mdp import explore
 from parenting.envs.struct import Struct
 from parenting.evaluation.argmax import ListedEvaluation
 from parenting.evaluation.rollouts import EPISODES, deploy
-from parenting.experiments.training.batch import Raised, Tally
+from parenting.experiments.training.batch import Counts, TrainResult
 
 UNREACHED = -1
 """The outcome of a stage that a trial did not come to."""
 
 
-class Ending(Struct):
+class Outcomes(Struct):
     """How every trial ended. M stages; D deployments, none in the garden; G is M there and 0 elsewhere."""
 
-    tally: Tally
+    counts: Counts
     outcome: Int64[Tensor, "N M D"]  # evaluation.outcomes.Outcome, or UNREACHED
     waterings: Float64[Tensor, "N G"]  # an episode, the mean of EPISODES on each level
     bucket: Int64[Tensor, "N G"]  # steps of all these episodes that end in the bucket
@@ -34,17 +34,17 @@ def deployments(spec: WorldSpec) -> tuple[str, ...]:
     return ("supervised", "unsupervised") if "supervised" in spec.options else ("",)
 
 
-def examine(world: Gridworld, config: Config, raised: Raised) -> Ending:
+def examine(world: Gridworld, config: Config, result: TrainResult) -> Outcomes:
     """Try every policy that raising left, from the start: one outcome each, or the mean of many episodes."""
-    tally, policies = raised.tally, raised.policies
-    reached = torch.arange(1, config.stages + 1) <= tally.maturity[:, None]
-    if isinstance(raised.evaluation, ListedEvaluation):
-        outcome = _outcomes(_deployed(world, config, raised.evaluation), policies, reached)
+    counts, policies = result.counts, result.policies
+    reached = torch.arange(1, config.stages + 1) <= counts.maturity[:, None]
+    if isinstance(result.evaluation, ListedEvaluation):
+        outcome = _outcomes(_deployed(world, config, result.evaluation), policies, reached)
         nothing = reached.new_zeros(len(reached), 0)
-        return Ending(tally=tally, outcome=outcome, waterings=nothing.double(), bucket=nothing.long())
+        return Outcomes(counts=counts, outcome=outcome, waterings=nothing.double(), bucket=nothing.long())
     waterings, bucket = _watered(world, policies, reached)
     no_outcome = torch.zeros(*reached.shape, 0, dtype=torch.int64)
-    return Ending(tally=tally, outcome=no_outcome, waterings=waterings, bucket=bucket)
+    return Outcomes(counts=counts, outcome=no_outcome, waterings=waterings, bucket=bucket)
 
 
 def _deployed(world: Gridworld, config: Config, lived: ListedEvaluation) -> list[ListedEvaluation]:

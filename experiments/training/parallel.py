@@ -18,15 +18,15 @@ from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.agent.process import settle
 from parenting.envs.rng import keys
-from parenting.experiments.training.batch import Progress, Standing, Until, raise_trials
-from parenting.experiments.training.outcomes import Ending, examine
+from parenting.experiments.training.batch import OnProgress, Progress, StopRule, train_agents
+from parenting.experiments.training.outcomes import Outcomes, examine
 from parenting.weights.store import Wanted, load
 
 CHUNK = 100
 """Trials of a chunk at most: more would be no faster (docs/benchmarks.md). Two trials and more are two chunks
 at least, so that two cores have work.
 """
-FIELDS = len(Standing._fields)
+FIELDS = len(Progress._fields)
 LOOK_SECONDS = 0.2
 """How often the counters of the other processes are read, for the progress bar."""
 
@@ -39,7 +39,7 @@ class Plan(NamedTuple):
     config: Config
     seed: int
     trials: int
-    until: Until
+    until: StopRule
     max_ticks: int
     weights: bytes | None = None  # the file of pre-trained weights (Sec. 3.1.4)
 
@@ -51,39 +51,41 @@ def chunks(trials: int) -> list[range]:
     return [range(start, end) for start, end in pairwise(edges)]
 
 
-def run(plan: Plan, workers: int, progress: Progress | None = None) -> Ending:
+def run(plan: Plan, workers: int, progress: OnProgress | None = None) -> Outcomes:
     """Raise all trials of a plan, on up to `workers` processes."""
     every = chunks(plan.trials)
     if len(every) == 1 or workers == 1:
-        return Ending.joined(list(_here(plan, every, progress)))
-    return Ending.joined(list(_elsewhere(plan, every, min(workers, len(every)), progress)))
+        return Outcomes.joined(list(_here(plan, every, progress)))
+    return Outcomes.joined(list(_elsewhere(plan, every, min(workers, len(every)), progress)))
 
 
-def raise_chunk(plan: Plan, chunk: range, progress: Progress | None = None) -> Ending:
+def train_chunk(plan: Plan, chunk: range, progress: OnProgress | None = None) -> Outcomes:
     """The trials of one chunk, and how they end. Trial i has the same keys in whichever chunk it falls."""
     world = world_of(plan.world, plan.level, plan.config)
     mine = keys(plan.seed, plan.trials).pick(torch.arange(chunk.start, chunk.stop))
     weights = (
         None if plan.weights is None else load(plan.weights, Wanted(world.spec, world.height, world.width))
     )
-    raised = raise_trials(world, plan.config, mine, plan.until, plan.max_ticks, progress, weights)
-    return examine(world, plan.config, raised)
+    result = train_agents(world, plan.config, mine, plan.until, plan.max_ticks, progress, weights)
+    return examine(world, plan.config, result)
 
 
-def _here(plan: Plan, every: list[range], progress: Progress | None) -> Iterator[Ending]:
+def _here(plan: Plan, every: list[range], progress: OnProgress | None) -> Iterator[Outcomes]:
     """One chunk after the other."""
     counters = [0] * FIELDS * len(every)
     for place, chunk in enumerate(every):
 
-        def note(standing: Standing, place: int = place) -> None:
-            _write(counters, place, standing)
+        def note(now: Progress, place: int = place) -> None:
+            _write(counters, place, now)
             if progress:
                 progress(_read(counters))
 
-        yield raise_chunk(plan, chunk, note if progress else None)
+        yield train_chunk(plan, chunk, note if progress else None)
 
 
-def _elsewhere(plan: Plan, every: list[range], workers: int, progress: Progress | None) -> Iterator[Ending]:
+def _elsewhere(
+    plan: Plan, every: list[range], workers: int, progress: OnProgress | None
+) -> Iterator[Outcomes]:
     """Every chunk in a process of a pool; their counters are read while they live."""
     context = multiprocessing.get_context("spawn")
     counters = context.Array("q", FIELDS * len(every))
@@ -112,16 +114,16 @@ def _begin(counters: object) -> None:
     globals()["_counters"] = counters
 
 
-def _child(plan: Plan, place: int, chunk: range) -> Ending:
+def _child(plan: Plan, place: int, chunk: range) -> Outcomes:
     counters = globals()["_counters"]
-    return raise_chunk(plan, chunk, lambda standing: _write(counters, place, standing))
+    return train_chunk(plan, chunk, lambda now: _write(counters, place, now))
 
 
-def _write(counters: Any, place: int, standing: Standing) -> None:
-    counters[FIELDS * place : FIELDS * (place + 1)] = standing
+def _write(counters: Any, place: int, now: Progress) -> None:
+    counters[FIELDS * place : FIELDS * (place + 1)] = now
 
 
-def _read(counters: Any) -> Standing:
+def _read(counters: Any) -> Progress:
     """The standing of all chunks together."""
     trials, ticks, queries = (counters[place::FIELDS] for place in range(FIELDS))
-    return Standing(sum(trials), max(ticks), sum(queries))
+    return Progress(sum(trials), max(ticks), sum(queries))

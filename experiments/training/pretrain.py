@@ -26,15 +26,15 @@ Progress = Callable[[int, float], None]
 """Told (steps, mean return of the last steps)."""
 
 
-class Unconverged(RuntimeError):
+class UnconvergedError(RuntimeError):
     """Pre-training did not converge within its steps; what was learnt is kept and can be taken up again."""
 
 
-class Damaged(RuntimeError):
+class DamagedWorkError(RuntimeError):
     """The file of interrupted work cannot be read; the sentence names it."""
 
 
-class Educated(NamedTuple):
+class PretrainResult(NamedTuple):
     """What pre-training left."""
 
     path: Path
@@ -45,15 +45,15 @@ class Educated(NamedTuple):
     curve: list[float]  # mean return, a value for every SMOOTH steps
 
 
-def educate(
+def pretrain(
     wanted: Wanted, folder: Path, seed: int, max_steps: int, progress: Progress | None = None
-) -> Educated:
+) -> PretrainResult:
     """Pre-train until converged (Sec. 3.1.4) and write weights and curve into `folder`.
 
     Interrupted work stands in a file beside them, and the next call goes on from there to the same bits.
 
     Raises:
-        Unconverged: `max_steps` were not enough.
+        UnconvergedError: `max_steps` were not enough.
         Damaged: the interrupted work cannot be read.
         OSError: `folder` cannot be written.
     """
@@ -67,7 +67,7 @@ def educate(
     try:
         while not school.converged(pupil):
             if len(pupil.returns) >= max_steps:
-                raise Unconverged(
+                raise UnconvergedError(
                     f"{wanted.name} has not converged after {max_steps} steps: call again with more."
                 )
             pupil = school.teach(pupil)
@@ -82,7 +82,9 @@ def educate(
     return _finish(wanted, folder, seed, school, pupil, part)
 
 
-def _finish(wanted: Wanted, folder: Path, seed: int, school: School, pupil: Pupil, part: Path) -> Educated:
+def _finish(
+    wanted: Wanted, folder: Path, seed: int, school: School, pupil: Pupil, part: Path
+) -> PretrainResult:
     exam, steps = school.examine(pupil.live[0]), len(pupil.returns)
     mean = float(pupil.returns[-300:].mean())
     about = {"seed": str(seed), "steps": str(steps), "return": f"{mean:.2f}", "solved": f"{exam.solved:.3f}"}
@@ -91,7 +93,7 @@ def _finish(wanted: Wanted, folder: Path, seed: int, school: School, pupil: Pupi
     curve = [float(some.mean()) for some in torch.split(pupil.returns, SMOOTH)]
     path.with_suffix(".csv").write_text(_table(curve), encoding="utf-8")
     part.unlink(missing_ok=True)
-    return Educated(path, sha256, steps, mean, exam, curve)
+    return PretrainResult(path, sha256, steps, mean, exam, curve)
 
 
 def _table(curve: list[float]) -> str:
@@ -120,5 +122,5 @@ def _recall(part: Path, pupil: Pupil) -> Pupil:
     except Exception:  # torch has many errors for what it cannot read
         found = pupil.replace(live=pupil.live[:, :0])
     if found.live.shape != pupil.live.shape:
-        raise Damaged(f"{part} cannot be read as interrupted work. Delete it to begin anew.")
+        raise DamagedWorkError(f"{part} cannot be read as interrupted work. Delete it to begin anew.")
     return found

@@ -12,18 +12,18 @@ from parenting.agent.config import Config
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
 from parenting.envs.struct import Struct
-from parenting.experiments.training.batch import Nursery, Tally, Until, no_tally
+from parenting.experiments.training.batch import BatchTrainer, Counts, StopRule, no_counts
 
 
 class Passed(Struct):
     """All trials as they passed one milestone."""
 
     there: Bool[Tensor, "N"]  # it did come so far
-    tally: Tally
+    counts: Counts
     live: Float[Tensor, "N P"]  # pi_T
 
 
-def raise_past(
+def train_with_snapshots(
     world: Gridworld,
     config: Config,
     keys: Keys,
@@ -35,34 +35,34 @@ def raise_past(
 
     Trials that are not at the last one by `max_ticks`, or that are stuck, are not `there`.
     """
-    nursery = Nursery(world, config, keys, Until("queries", milestones[-1]), weights)
-    passed = [_none(nursery) for _ in milestones[:-1]]
+    trainer = BatchTrainer(world, config, keys, StopRule("queries", milestones[-1]), weights)
+    passed = [_none(trainer) for _ in milestones[:-1]]
     for _ in range(max_ticks):
-        nursery.tick()
-        answered = nursery.tally.queries.sum(1)
+        trainer.tick()
+        answered = trainer.counts.queries.sum(1)
         for place, number in enumerate(milestones[:-1]):
-            passed[place] = _note(nursery, passed[place], answered >= number)
-        if bool(nursery.tally.done.all()):
+            passed[place] = _note(trainer, passed[place], answered >= number)
+        if bool(trainer.counts.done.all()):
             break
-    nursery.save(~nursery.tally.done)
-    ended = nursery.result.maturity - 1
-    last = nursery.policies[ended, torch.arange(len(ended))]
-    return [*passed, Passed(there=nursery.result.finished, tally=nursery.result, live=last)]
+    trainer.save(~trainer.counts.done)
+    ended = trainer.result.maturity - 1
+    last = trainer.policies[ended, torch.arange(len(ended))]
+    return [*passed, Passed(there=trainer.result.finished, counts=trainer.result, live=last)]
 
 
-def _none(nursery: Nursery) -> Passed:
-    live = torch.zeros_like(nursery.state.learner.live)
-    tally = no_tally(len(live), nursery.config.stages)
-    return Passed(there=torch.zeros(len(live), dtype=torch.bool), tally=tally, live=live)
+def _none(trainer: BatchTrainer) -> Passed:
+    live = torch.zeros_like(trainer.state.learner.live)
+    counts = no_counts(len(live), trainer.config.stages)
+    return Passed(there=torch.zeros(len(live), dtype=torch.bool), counts=counts, live=live)
 
 
-def _note(nursery: Nursery, passed: Passed, beyond: Bool[Tensor, "n"]) -> Passed:
+def _note(trainer: BatchTrainer, passed: Passed, beyond: Bool[Tensor, "n"]) -> Passed:
     """Those that are beyond the milestone for the first time, as they are now."""
-    fresh = (beyond & ~passed.there[nursery.trial]).nonzero().squeeze(1)
+    fresh = (beyond & ~passed.there[trainer.trial]).nonzero().squeeze(1)
     if not len(fresh):
         return passed
-    place = nursery.trial[fresh]
-    now = Passed(there=torch.ones_like(beyond), tally=nursery.tally, live=nursery.state.learner.live).pick(
+    place = trainer.trial[fresh]
+    now = Passed(there=torch.ones_like(beyond), counts=trainer.counts, live=trainer.state.learner.live).pick(
         fresh
     )
     ours = now.tensors()

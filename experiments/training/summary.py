@@ -11,9 +11,10 @@ from torch import Tensor
 from parenting.agent.init import world_of
 from parenting.envs import registry
 from parenting.evaluation.argmax import evaluation
-from parenting.evaluation.outcomes import counts, name
+from parenting.evaluation.outcomes import counts as outcome_counts
+from parenting.evaluation.outcomes import name
 from parenting.evaluation.rollouts import EPISODES
-from parenting.experiments.training.outcomes import Ending, deployments
+from parenting.experiments.training.outcomes import Outcomes, deployments
 from parenting.experiments.training.parallel import Plan
 from parenting.parents.scripted import Judgement
 from parenting.weights.store import digest
@@ -21,13 +22,13 @@ from parenting.weights.store import digest
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 
 
-def summarise(plan: Plan, level: str, ending: Ending, seconds: float) -> dict[str, Any]:
+def summarise(plan: Plan, level: str, outcomes: Outcomes, seconds: float) -> dict[str, Any]:
     """Means and deviations (over n - 1) of what was counted are of the finished trials; the others are
     counted apart. `evaluation` is of all trials, each at its own end, and `stages` of all that came to a
     stage, at its end.
     """
-    tally, report = ending.tally, _report(plan, ending)
-    finished = {one: getattr(tally, one)[tally.finished].double() for one in COUNTS}
+    counts, report = outcomes.counts, _report(plan, outcomes)
+    finished = {one: getattr(counts, one)[counts.finished].double() for one in COUNTS}
     found = {
         "world": plan.world,
         "level": level,
@@ -36,15 +37,15 @@ def summarise(plan: Plan, level: str, ending: Ending, seconds: float) -> dict[st
         "max_ticks": plan.max_ticks,
         "config": plan.config.model_dump(mode="json"),
         "weights": None if plan.weights is None else digest(plan.weights),
-        "trials": _rows(ending, report),
-        "unfinished": int((~tally.finished).sum()),
-        "stuck": int(tally.stuck.sum()),
+        "trials": _rows(outcomes, report),
+        "unfinished": int((~counts.finished).sum()),
+        "stuck": int(counts.stuck.sum()),
         "mean": {one: mean(values) for one, values in finished.items()},
         "sd": {one: sd(values) for one, values in finished.items()},
-        "evaluation": report.evaluation(torch.arange(len(tally.ticks)), tally.maturity - 1),
+        "evaluation": report.evaluation(torch.arange(len(counts.ticks)), counts.maturity - 1),
     }
     if plan.config.stages > 1 or isinstance(report, GardenReport):
-        found["stages"] = [_stage(ending, report, stage) for stage in range(plan.config.stages)]
+        found["stages"] = [_stage(outcomes, report, stage) for stage in range(plan.config.stages)]
     return {**found, "seconds": round(seconds, 2)}
 
 
@@ -61,15 +62,15 @@ def sd(values: Float64[Tensor, "n"]) -> float | None:
 class WalkReport:
     """What the argmax policies do where a goal ends the episode: one outcome each."""
 
-    def __init__(self, plan: Plan, ending: Ending) -> None:
+    def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
         """Words for the outcomes come from the world."""
         spec = registry.spec(plan.world)
-        self.outcome, self.harm, self.where = ending.outcome, spec.harm, deployments(spec)
+        self.outcome, self.harm, self.where = outcomes.outcome, spec.harm, deployments(spec)
 
     def evaluation(self, trial: Int64[Tensor, "n"], stage: Int64[Tensor, "n"]) -> dict[str, Any]:
         """Counts of some trials, each at one stage; two of them where the world has two deployments."""
         found = self.outcome[trial, stage]
-        each = {where: counts(found[:, place], self.harm) for place, where in enumerate(self.where)}
+        each = {where: outcome_counts(found[:, place], self.harm) for place, where in enumerate(self.where)}
         return each.get("", each)
 
     def row(self, trial: int, stage: int) -> Any:
@@ -81,17 +82,17 @@ class WalkReport:
 class GardenReport:
     """What the argmax policies do in the garden: waterings, and steps that end in the bucket."""
 
-    def __init__(self, plan: Plan, ending: Ending) -> None:
+    def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
         """The parent's own waterings stand beside the agent's; over several levels a mean."""
         world = world_of(plan.world, plan.level, plan.config)
         judgement = Judgement(world, plan.config.gamma, inside=plan.config.inside)
         best = evaluation(world, judgement.valuation, plan.config.gamma).best
         self.parent = sum(map(best, range(len(world.levels)))) / len(world.levels)
-        self.steps, self.ending = world.time_limit, ending
+        self.steps, self.outcomes = world.time_limit, outcomes
 
     def evaluation(self, trial: Int64[Tensor, "n"], stage: Int64[Tensor, "n"]) -> dict[str, Any]:
         """Of some trials, each at one stage: the mean of their means, and how sure it is."""
-        waterings, bucket = self.ending.waterings[trial, stage], self.ending.bucket[trial, stage]
+        waterings, bucket = self.outcomes.waterings[trial, stage], self.outcomes.bucket[trial, stage]
         deviation = sd(waterings)
         return {
             "trials": len(trial),
@@ -106,26 +107,26 @@ class GardenReport:
 
     def row(self, trial: int, stage: int) -> Any:
         """One trial's mean, and its steps into the bucket."""
-        waterings, bucket = self.ending.waterings[trial, stage], self.ending.bucket[trial, stage]
+        waterings, bucket = self.outcomes.waterings[trial, stage], self.outcomes.bucket[trial, stage]
         return {"waterings": float(waterings), "bucket": int(bucket)}
 
 
-def _report(plan: Plan, ending: Ending) -> WalkReport | GardenReport:
-    return (GardenReport if ending.waterings.shape[1] else WalkReport)(plan, ending)
+def _report(plan: Plan, outcomes: Outcomes) -> WalkReport | GardenReport:
+    return (GardenReport if outcomes.waterings.shape[1] else WalkReport)(plan, outcomes)
 
 
-def _rows(ending: Ending, report: WalkReport | GardenReport) -> list[dict[str, Any]]:
-    tally = ending.tally
-    columns = {one: getattr(tally, one).tolist() for one in (*COUNTS, "optimal", "finished", "stuck")}
+def _rows(outcomes: Outcomes, report: WalkReport | GardenReport) -> list[dict[str, Any]]:
+    counts = outcomes.counts
+    columns = {one: getattr(counts, one).tolist() for one in (*COUNTS, "optimal", "finished", "stuck")}
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    last = (tally.maturity - 1).tolist()
+    last = (counts.maturity - 1).tolist()
     return [{**row, "outcome": report.row(trial, last[trial])} for trial, row in enumerate(rows)]
 
 
-def _stage(ending: Ending, report: WalkReport | GardenReport, stage: int) -> dict[str, Any]:
+def _stage(outcomes: Outcomes, report: WalkReport | GardenReport, stage: int) -> dict[str, Any]:
     """One stage, of the trials that came to it; `queries` is their mean of answered ones."""
-    trial = (ending.tally.maturity > stage).nonzero().squeeze(1)
-    queries = mean(ending.tally.queries[trial, stage].double())
+    trial = (outcomes.counts.maturity > stage).nonzero().squeeze(1)
+    queries = mean(outcomes.counts.queries[trial, stage].double())
     return {
         "stage": stage + 1,
         "queries": queries,

@@ -13,18 +13,18 @@ from parenting.agent.pretraining import ENTROPY
 from parenting.envs import registry
 from parenting.envs.rng import keys
 from parenting.evaluation.outcomes import name
-from parenting.experiments.baselines.reinforce_tabular import raise_by_reward
+from parenting.experiments.baselines.reinforce_tabular import train_reinforce
 from parenting.experiments.runner.store import Row
-from parenting.experiments.training.batch import Until
-from parenting.experiments.training.outcomes import Ending, deployments
-from parenting.experiments.training.parallel import Plan, raise_chunk
+from parenting.experiments.training.batch import StopRule
+from parenting.experiments.training.outcomes import Outcomes, deployments
+from parenting.experiments.training.parallel import Plan, train_chunk
 from parenting.weights.store import Wanted, find
 
 Goal = Literal["optimal", "queries", "ticks"]
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 
 
-def parent_some(
+def parent_trials(
     label: str,
     world: str,
     level: str,
@@ -38,11 +38,11 @@ def parent_some(
     """Raise the trials of a span by the scripted parent; `label` names what they are of."""
     config = compose(preset, registry.defaults(world), changes, strict=True)
     weights = _weights(world, level, config)
-    plan = Plan(world, level, config, seed, span[1], Until(*until), max_ticks, weights)
-    return _rows(label, range(*span), raise_chunk(plan, range(*span)), world)
+    plan = Plan(world, level, config, seed, span[1], StopRule(*until), max_ticks, weights)
+    return _rows(label, range(*span), train_chunk(plan, range(*span)), world)
 
 
-def reward_some(
+def reinforce_trials(
     label: str,
     world: str,
     level: str,
@@ -55,7 +55,7 @@ def reward_some(
     """Raise the trials of a span by policy gradients on the reward itself."""
     config = compose("direct", registry.defaults(world), changes, strict=True)
     mine = keys(seed, span[1]).pick(torch.arange(*span))
-    found = raise_by_reward(world_of(world, level, config), config, mine, max_steps, entropy=entropy)
+    found = train_reinforce(world_of(world, level, config), config, mine, max_steps, entropy=entropy)
     columns = {one: getattr(found, one).tolist() for one in ("deaths", "ticks", "steps", "optimal")}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
     nothing = {"guidance": 0, "preference": 0, "stuck": False}
@@ -73,14 +73,14 @@ def _weights(world: str, level: str, config: Config) -> bytes | None:
     return find(Wanted(registry.spec(world), drawn.height, drawn.width)).read_bytes()
 
 
-def _rows(label: str, span: range, ending: Ending, world: str) -> list[Row]:
-    tally, spec = ending.tally, registry.spec(world)
-    columns = {one: getattr(tally, one).tolist() for one in (*COUNTS, "optimal", "finished", "stuck")}
+def _rows(label: str, span: range, outcomes: Outcomes, world: str) -> list[Row]:
+    counts, spec = outcomes.counts, registry.spec(world)
+    columns = {one: getattr(counts, one).tolist() for one in (*COUNTS, "optimal", "finished", "stuck")}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
-    last = (tally.maturity - 1).tolist()
+    last = (counts.maturity - 1).tolist()
     found = [{"of": label, "trial": trial, **row} for trial, row in zip(span, rows, strict=True)]
     for place, row in enumerate(found):
-        for column, where in enumerate(deployments(spec) if ending.outcome.shape[2] else ()):
-            outcome = int(ending.outcome[place, last[place], column])
+        for column, where in enumerate(deployments(spec) if outcomes.outcome.shape[2] else ()):
+            outcome = int(outcomes.outcome[place, last[place], column])
             row["_".join(filter(None, ("outcome", where)))] = name(outcome, spec.harm)
     return found

@@ -26,8 +26,8 @@ from parenting.experiments.value_iteration.converge import (
     chosen,
     greedy,
     iterated,
-    live_a_stage,
     parents_policy,
+    run_stage,
     settled,
 )
 from parenting.experiments.value_iteration.levels import small
@@ -58,7 +58,7 @@ KINDS = (
 )
 
 
-def iterate_some(kind: str, trial: int, seed: int) -> list[Row]:
+def mature_trials(kind: str, trial: int, seed: int) -> list[Row]:
     """Mature agents on random levels through all stages; a row for each level and stage."""
     one = next(each for each in KINDS if each.world == kind)
     drawn = (
@@ -74,7 +74,7 @@ def iterate_some(kind: str, trial: int, seed: int) -> list[Row]:
     for stage in range(1, STAGES + 1):
         best = greedy(model, one.gamma, v[stage - 1])[places.states]
         before = among(best, chosen(world, state, places))
-        state = live_a_stage(world, judge, state, places)
+        state = run_stage(world, judge, state, places)
         after, done = among(best, chosen(world, state, places)), settled(world, state, places)
         for level in range(LEVELS):
             count = int(places.count[level])
@@ -105,7 +105,7 @@ def _config(asked: Asked) -> Mapping[str, Any]:
 
 
 def _tasks(asked: Asked) -> list[Task]:
-    call = "parenting.experiments.value_iteration:iterate_some"
+    call = "parenting.experiments.value_iteration:mature_trials"
     return [
         Task(f"{kind.world}-{trial:06d}", call, {"kind": kind.world, "trial": trial, "seed": asked.seed})
         for trial in range(asked.trials)

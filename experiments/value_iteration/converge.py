@@ -65,7 +65,7 @@ class Places:
         return state.replace(world=self.model.states.pick(there).where(idle, state.world))
 
 
-def live_a_stage(world: Gridworld, judge: Judgement, state: AgentState, places: Places) -> AgentState:
+def run_stage(world: Gridworld, judge: Judgement, state: AgentState, places: Places) -> AgentState:
     """Until it has settled, or is given up; the parent answers every question in the next tick."""
     query = parenting.no_query(world, CONFIG, state)
     stage = int(state.maturity[0])

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from parenting.envs.mdp import Model, explore
-from parenting.experiments.value_iteration import KINDS, iterate_some
+from parenting.experiments.value_iteration import KINDS, mature_trials
 from parenting.experiments.value_iteration.converge import (
     STAGES,
     TIE,
@@ -26,7 +26,7 @@ from parenting.parents.values import of_policy
 
 @pytest.mark.parametrize(("trial", "kind"), list(enumerate(kind.world for kind in KINDS)))
 def test_each_stage_is_greedy_for_one_more_step_of_value_iteration(trial: int, kind: str) -> None:
-    rows = iterate_some(kind, trial, 0)
+    rows = mature_trials(kind, trial, 0)
     assert len(rows) == STAGES * 6
     for row in rows:
         assert row["converged"], row

@@ -19,7 +19,7 @@ from parenting.commands.worlds import describe
 from parenting.envs import gym, levels, registry
 from parenting.envs.levels.spec import LevelError, WorldSpec
 from parenting.envs.rng import keys
-from parenting.experiments.training.batch import Until, raise_trials
+from parenting.experiments.training.batch import StopRule, train_agents
 from parenting.parents.scripted import Judgement
 from parenting.server.pages.picture import picture
 from tests.envs.test_conformance import *  # noqa: F403
@@ -132,10 +132,10 @@ def test_the_scripted_parent_knows_its_values_by_itself() -> None:
 def test_agents_are_raised_until_they_are_optimal() -> None:
     config = compose("conservative", registry.defaults(NAME), {}, strict=True)
     world = world_of(NAME, LEVEL, config)
-    tally = raise_trials(world, config, keys(0, trials=3), Until("optimal"), max_ticks=3000).tally
-    assert tally.optimal.all()
-    assert int(tally.guidance.min()) > 0
-    assert float(tally.deaths.double().mean()) < 2
+    counts = train_agents(world, config, keys(0, trials=3), StopRule("optimal"), max_ticks=3000).counts
+    assert counts.optimal.all()
+    assert int(counts.guidance.min()) > 0
+    assert float(counts.deaths.double().mean()) < 2
 
 
 def test_it_is_listed_and_drawn() -> None:

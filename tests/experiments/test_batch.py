@@ -12,20 +12,20 @@ from parenting.agent.query import Choice, Kind, Query
 from parenting.envs import registry
 from parenting.envs.rng import keys
 from parenting.experiments.training import batch
-from parenting.experiments.training.batch import Nursery, Raised, Standing, Until, raise_trials
+from parenting.experiments.training.batch import BatchTrainer, Progress, StopRule, TrainResult, train_agents
 
 ISLAND = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=False)
 
 
-def nursery(until: Until, number: int = 10, config: Config = ISLAND) -> Nursery:
+def trainer(until: StopRule, number: int = 10, config: Config = ISLAND) -> BatchTrainer:
     world = world_of("unsafe-exploration", "island", config)
-    return Nursery(world, config, keys(0, number), until)
+    return BatchTrainer(world, config, keys(0, number), until)
 
 
-def raised(until: Until, number: int = 10, max_ticks: int = 1000, **changes: object) -> Raised:
+def raised(until: StopRule, number: int = 10, max_ticks: int = 1000, **changes: object) -> TrainResult:
     config = ISLAND.model_copy(update=changes)
     world = world_of("unsafe-exploration", "island", config)
-    return raise_trials(world, config, keys(0, number), until, max_ticks)
+    return train_agents(world, config, keys(0, number), until, max_ticks)
 
 
 class Refusing:
@@ -39,15 +39,15 @@ class Refusing:
         return torch.where(query.kind == Kind.NONE, int(Choice.NONE), choice)
 
 
-@pytest.mark.parametrize("until", [Until("ticks", 50), Until("queries", 40), Until("optimal")])
-def test_stuck_trials_leave_at_once_and_are_unfinished(until: Until) -> None:
+@pytest.mark.parametrize("until", [StopRule("ticks", 50), StopRule("queries", 40), StopRule("optimal")])
+def test_stuck_trials_leave_at_once_and_are_unfinished(until: StopRule) -> None:
     """A pause asks twice: after the second *neither*, heard in the third tick, nothing can happen."""
-    batch = nursery(until, 10)
+    batch = trainer(until, 10)
     batch.parent.judgement = Refusing(torch.ones(10, dtype=torch.bool))  # type: ignore[assignment]
     for _ in range(3):
-        assert not bool(batch.tally.done.any())
+        assert not bool(batch.counts.done.any())
         batch.tick()
-    assert len(batch.state.waiting) == len(batch.tally.ticks) == 0  # the batch is empty
+    assert len(batch.state.waiting) == len(batch.counts.ticks) == 0  # the batch is empty
     result = batch.result
     assert bool(result.stuck.all())
     assert not bool(result.finished.any())
@@ -56,7 +56,7 @@ def test_stuck_trials_leave_at_once_and_are_unfinished(until: Until) -> None:
 
 
 def test_the_others_live_on_without_those_that_are_stuck() -> None:
-    batch = nursery(Until("ticks", 20), 10)
+    batch = trainer(StopRule("ticks", 20), 10)
     refused = torch.arange(10) < 2
     batch.parent.judgement = Refusing(refused)  # type: ignore[assignment]
     for _ in range(3):
@@ -71,7 +71,7 @@ def test_the_others_live_on_without_those_that_are_stuck() -> None:
 
 
 def test_a_goal_that_is_reached_comes_before_being_stuck() -> None:
-    batch = nursery(Until("queries", 2), 4)
+    batch = trainer(StopRule("queries", 2), 4)
     batch.parent.judgement = Refusing(torch.ones(4, dtype=torch.bool))  # type: ignore[assignment]
     for _ in range(3):
         batch.tick()
@@ -81,7 +81,7 @@ def test_a_goal_that_is_reached_comes_before_being_stuck() -> None:
 
 def test_queries_are_counted_by_their_stage() -> None:
     """A stage ends with its 5th answer; a question that was out by then still belongs to it."""
-    found = raised(Until("queries", 14), stages=3, mature_every=5, p_guid=0.5).tally.check()
+    found = raised(StopRule("queries", 14), stages=3, mature_every=5, p_guid=0.5).counts.check()
     assert torch.equal(found.queries.sum(1), found.guidance + found.preference)
     assert found.queries.sum(1).tolist() == [14] * 10
     assert bool((found.maturity == 3).all())
@@ -91,19 +91,19 @@ def test_queries_are_counted_by_their_stage() -> None:
 
 def test_policies_are_those_of_each_trials_own_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where trials stay in their batch, and go on training, after they are finished."""
-    usual = raised(Until("optimal"), 20, dtype="float64")
+    usual = raised(StopRule("optimal"), 20, dtype="float64")
     monkeypatch.setattr(batch, "LEAVE", 2.0)
-    staying = raised(Until("optimal"), 20, dtype="float64")
+    staying = raised(StopRule("optimal"), 20, dtype="float64")
     for found in (usual, staying):
-        assert bool(found.tally.finished.all())
+        assert bool(found.counts.finished.all())
         assert bool(found.evaluation.optimal(found.policies[0]).all())
-        assert len(set(found.tally.ticks.tolist())) > 5  # at different ticks
-    assert torch.equal(usual.tally.ticks, staying.tally.ticks)
+        assert len(set(found.counts.ticks.tolist())) > 5  # at different ticks
+    assert torch.equal(usual.counts.ticks, staying.counts.ticks)
 
 
 def test_policies_of_earlier_stages_are_the_frozen_ones() -> None:
     config = ISLAND.model_copy(update={"stages": 3, "mature_every": 10})
-    batch = nursery(Until("ticks", 40), 6, config)
+    batch = trainer(StopRule("ticks", 40), 6, config)
     before = batch.state.learner.live.clone()
     frozen: dict[tuple[int, int], Tensor] = {}
     for _ in range(39):
@@ -122,19 +122,19 @@ def test_policies_of_earlier_stages_are_the_frozen_ones() -> None:
 
 
 def test_unfinished_trials_leave_their_policies_and_are_judged() -> None:
-    found = raised(Until("queries", 10_000), 6, max_ticks=80)
-    assert not bool(found.tally.finished.any())
-    assert torch.equal(found.tally.optimal, found.evaluation.optimal(found.policies[0]))
-    assert bool(found.tally.optimal.any())
+    found = raised(StopRule("queries", 10_000), 6, max_ticks=80)
+    assert not bool(found.counts.finished.any())
+    assert torch.equal(found.counts.optimal, found.evaluation.optimal(found.policies[0]))
+    assert bool(found.counts.optimal.any())
 
 
 def test_standing_counts_no_trial_twice() -> None:
-    batch = nursery(Until("queries", 6), 10)
+    batch = trainer(StopRule("queries", 6), 10)
     for tick in range(1, 200):
         batch.tick()
-        standing = batch.standing(tick)
-        assert standing.trials == int(batch.result.finished.sum())
-        assert standing.queries <= 60
-        if standing.trials == 10:
+        now = batch.progress(tick)
+        assert now.trials == int(batch.result.finished.sum())
+        assert now.queries <= 60
+        if now.trials == 10:
             break
-    assert standing == Standing(10, tick, 60)
+    assert now == Progress(10, tick, 60)

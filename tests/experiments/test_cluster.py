@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from parenting.commands.main import app
-from parenting.experiments.runner.dask_cluster import NoCluster
+from parenting.experiments.runner.dask_cluster import NoClusterError
 from parenting.experiments.runner.executor import do, work
 from parenting.experiments.runner.store import Row, Store, Task
 
@@ -41,7 +41,7 @@ def raised(number: int) -> Task:
     """One real piece: two agents for a few ticks."""
     mine: dict[str, Any] = {"world": "unsafe-exploration", "level": "island", "preset": "lax", "changes": {}}
     goal = {"until": ("ticks", 5), "max_ticks": 5, "span": (2 * number, 2 * number + 2)}
-    call = "parenting.experiments.training.tasks:parent_some"
+    call = "parenting.experiments.training.tasks:parent_trials"
     return Task(f"piece-{number}", call, {"label": "some", "seed": 0, **mine, **goal})
 
 
@@ -127,7 +127,7 @@ def test_a_scheduler_that_goes_away_costs_what_is_in_work_alone(
     def leave(_task: Task) -> None:
         one.close()
 
-    with one, pytest.raises(NoCluster, match="the scheduler is gone"):
+    with one, pytest.raises(NoClusterError, match="the scheduler is gone"):
         work(tasks, store, 1, one.scheduler_address, leave)
     assert [store.has(task.key) for task in tasks] == [True, False]
     assert [record.name for record in caplog.records if record.exc_info] == []

@@ -26,7 +26,7 @@ def raised(world: str, level: str, ticks: int, **changes: Any) -> Task:
     """A few agents for some ticks, by the scripted parent."""
     mine = {"world": world, "level": level, "preset": "lax", "changes": {"pretrain": False, **changes}}
     more = {"until": ("ticks", ticks), "max_ticks": ticks}
-    return Task("some", "parenting.experiments.training.tasks:parent_some", {**SOME, **mine, **more})
+    return Task("some", "parenting.experiments.training.tasks:parent_trials", {**SOME, **mine, **more})
 
 
 REWARDED = {**SOME, "world": "unsafe-exploration", "level": "island", "changes": {}, "max_steps": 2}
@@ -35,7 +35,7 @@ TASKS = [
     raised("unsafe-exploration", "island", 20, p_guid=0, p_rec=1, p_pref=1, batch=2, **STAGES),
     raised("side-effects", "box", 5, recompare=True),
     raised("absent-supervisor", "supervisor", 4),
-    Task("rewarded", "parenting.experiments.training.tasks:reward_some", REWARDED),
+    Task("rewarded", "parenting.experiments.training.tasks:reinforce_trials", REWARDED),
 ]
 
 

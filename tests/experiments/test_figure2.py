@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from parenting.experiments.figure2 import COMBINATIONS, EXPERIMENT, LIVES
 from parenting.experiments.figure2.agents import extrapolated
 from parenting.experiments.figure2.rows import LIVED, MANY
-from parenting.experiments.figure2.tasks import live_some
+from parenting.experiments.figure2.tasks import arm_trials
 from parenting.experiments.runner.executor import do
 from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import Asked, Scale
@@ -234,7 +234,7 @@ def test_pieces_of_both_scales_lie_in_one_folder() -> None:
 
 @pytest.mark.parametrize("starts", [False, True])
 def test_a_life_in_small(starts: bool) -> None:
-    rows = live_some("small", "garden", "left", {"batch": 8}, 4, (4, 6, 8), starts, 100, 2, 0)
+    rows = arm_trials("small", "garden", "left", {"batch": 8}, 4, (4, 6, 8), starts, 100, 2, 0)
     assert [(one["stage"], one["queries"]) for one in rows if one["trial"] == 1] == [(1, 4), (2, 6), (2, 8)]
     assert all(one["there"] and one["guidance"] + one["preference"] == one["queries"] for one in rows)
 

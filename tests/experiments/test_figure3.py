@@ -23,8 +23,8 @@ from parenting.experiments import figure3
 from parenting.experiments.figure3 import Size
 from parenting.experiments.figure3.levels import ASIDE, PARENTING, config_of, find_levels, levels_for
 from parenting.experiments.figure3.report import duration, findings
-from parenting.experiments.figure3.tasks import parent_some, pre_parent
-from parenting.experiments.figure3.transfer import POLICY, learnt, pack, take_along
+from parenting.experiments.figure3.tasks import parent_trials, pre_parent
+from parenting.experiments.figure3.transfer import POLICY, learnt, pack, transfer
 from parenting.experiments.pretrained import pretrained, weights_of
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.reporting.statistics import (
@@ -35,7 +35,7 @@ from parenting.experiments.reporting.statistics import (
 )
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training import batch
-from parenting.experiments.training.batch import Nursery, Until
+from parenting.experiments.training.batch import BatchTrainer, StopRule
 
 CONFIG = config_of(pretrain=True, recompare=False)
 
@@ -69,13 +69,13 @@ def test_levels_are_those_that_the_pre_trained_agent_does_not_solve() -> None:
     assert more[:5] == rows
 
 
-def lived(ticks: int, count: int = 1) -> Nursery:
+def lived(ticks: int, count: int = 1) -> BatchTrainer:
     levels = box_levels(6, 6, 6, seed=0)
     world = world_of("side-effects", levels, CONFIG)
-    nursery = Nursery(world, CONFIG, keys(1, count), Until("ticks", 1000), weights_of(world, CONFIG))
+    trainer = BatchTrainer(world, CONFIG, keys(1, count), StopRule("ticks", 1000), weights_of(world, CONFIG))
     for _ in range(ticks):
-        nursery.tick()
-    return nursery
+        trainer.tick()
+    return trainer
 
 
 def test_what_is_taken_along() -> None:
@@ -84,7 +84,7 @@ def test_what_is_taken_along() -> None:
     assert taught[0].x.s0.shape[1] < taught[1].x.s0.shape[1]  # room for the fuller of both
     packed, turns = [pack(one, True) for one in taught], torch.tensor([1, 0, 1])
     before = lived(0, 3).state
-    whole, policy = (learnt(take_along(before, packed, turns, everything)) for everything in (True, False))
+    whole, policy = (learnt(transfer(before, packed, turns, everything)) for everything in (True, False))
     whole.check()
     for place, agent in enumerate(turns.tolist()):
         mine = whole.pick(torch.tensor([place])).tensors()
@@ -96,7 +96,7 @@ def test_what_is_taken_along() -> None:
         assert torch.equal(policy.tensors()[name], whole.tensors()[name] if name == POLICY else tensor)
     light = [pack(one, False) for one in taught]
     assert len(light[0]) < len(packed[0]) / 3
-    again = learnt(take_along(before, light, turns, False))
+    again = learnt(transfer(before, light, turns, False))
     assert torch.equal(again.learner.live, policy.learner.live)
     assert not torch.equal(again.learner.live, before.learner.live)
 
@@ -110,7 +110,7 @@ def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch)
     assert len({row["ticks"] for row in taught}) > 2
     world = world_of("side-effects", levels_for(ASIDE, rows), CONFIG)
     state = parenting.init(world, CONFIG, keys(0, 4), weights_of(world, CONFIG))
-    state = take_along(state, [row["_learnt"] for row in taught], torch.arange(4), everything=False)
+    state = transfer(state, [row["_learnt"] for row in taught], torch.arange(4), everything=False)
     assert bool(ListedEvaluation(world, explore(world), 1.0).optimal(state.learner.live).all())
 
 
@@ -121,8 +121,8 @@ def test_an_agent_goes_on_from_where_it_was_taught() -> None:
     assert taught["finished"]
     assert taught["queries"] > 0
     every: dict[str, Any] = {"recompare": False, "span": (0, 2), "max_ticks": 1, "seed": 0}
-    after = parent_some("after", True, False, given=[*rows, taught], **every)
-    without = parent_some("without", True, False, given=rows, **every)
+    after = parent_trials("after", True, False, given=[*rows, taught], **every)
+    without = parent_trials("without", True, False, given=rows, **every)
     assert [row["finished"] for row in after] == [True, True]
     assert [row["finished"] for row in without] == [False, False]
     assert [row["queries"] for row in after] == [0, 0]

@@ -7,7 +7,7 @@ import torch
 
 from parenting.envs.rng import keys
 from parenting.evaluation.rollouts import walked
-from parenting.experiments.training.gardens import garden, spread_starts
+from parenting.experiments.training.gardens import exploring_starts, garden
 from tests.parents.hand_made import UP
 
 
@@ -22,7 +22,7 @@ def test_without_its_bucket_a_garden_has_a_wall_there(level: str) -> None:
 
 
 def test_spread_starts_are_all_of_the_bare_soil_and_nothing_else() -> None:
-    world, other = garden("garden"), spread_starts("garden")
+    world, other = garden("garden"), exploring_starts("garden")
     many = keys(0, 1000)
     begun, known = (one.reset(many, torch.zeros(1000, dtype=torch.int64)) for one in (other, world))
     soil = {*world.levels[0].find(" A")}

@@ -15,7 +15,7 @@ from parenting.envs.rng import keys
 from parenting.evaluation.rollouts import walked
 from parenting.experiments.figure2 import lookahead
 from parenting.experiments.figure2.lookahead import best, worth
-from parenting.experiments.figure2.tasks import ahead_some
+from parenting.experiments.figure2.tasks import lookahead_waterings
 from parenting.experiments.training.gardens import GAMMA, garden
 from parenting.parents.garden_values import Garden
 
@@ -71,7 +71,7 @@ def test_a_row_is_of_its_own_depth() -> None:
     valued = Garden(world, GAMMA, "left")
     means = []
     for depth in (1, 2, 3):
-        (row,) = ahead_some("garden-mirrored", "left", depth, 12)
+        (row,) = lookahead_waterings("garden-mirrored", "left", depth, 12)
 
         def choose(state: WorldState, depth: int = depth) -> Tensor:
             return tried(world, valued, state, depth).round(decimals=9).argmax(1)
@@ -84,6 +84,6 @@ def test_a_row_is_of_its_own_depth() -> None:
 @pytest.mark.parametrize("level", WATERINGS)
 def test_what_perfect_maturation_would_water(level: str) -> None:
     for depth, mean in enumerate(WATERINGS[level], start=1):
-        (row,) = ahead_some(level, "up-down", depth, 1000)
+        (row,) = lookahead_waterings(level, "up-down", depth, 1000)
         assert row["waterings"] == pytest.approx(mean, abs=3 * hypot(row["error"], ERROR))
         assert row["bucket"] == 0

@@ -7,7 +7,7 @@ import torch
 
 from parenting.agent.config import compose
 from parenting.envs import registry
-from parenting.experiments.training.batch import Standing, Until
+from parenting.experiments.training.batch import Progress, StopRule
 from parenting.experiments.training.parallel import CHUNK, Plan, chunks, run
 
 
@@ -29,16 +29,16 @@ def test_hundred_trials_are_two_chunks_of_fifty() -> None:
 def plan() -> Plan:
     world = "unsafe-exploration"
     config = compose("conservative", registry.defaults(world), {}, strict=False)
-    return Plan(world, "island", config, 0, 6, Until("queries", 3), 1000)
+    return Plan(world, "island", config, 0, 6, StopRule("queries", 3), 1000)
 
 
 def test_progress_and_bits_on_one_core_and_on_two() -> None:
-    here: list[Standing] = []
-    there: list[Standing] = []
+    here: list[Progress] = []
+    there: list[Progress] = []
     one, two = run(plan(), 1, here.append).check(), run(plan(), 2, there.append)
-    assert bool(one.tally.finished.all())
+    assert bool(one.counts.finished.all())
     assert all(torch.equal(one.tensors()[name], tensor) for name, tensor in two.tensors().items())
     # in this process every tick is told; others are looked at now and then
-    assert here[-1] == Standing(6, int(one.tally.ticks.max()), 18)
+    assert here[-1] == Progress(6, int(one.counts.ticks.max()), 18)
     assert [now.queries for now in here] == sorted(now.queries for now in here)
     assert all(now.trials <= 6 and now.queries <= 18 for now in there)

@@ -8,7 +8,7 @@ from parenting.agent.init import network_of
 from parenting.agent.pretraining_mazes import EPISODES
 from parenting.envs.rng import keys
 from parenting.evaluation.rollouts import deploy
-from parenting.experiments.baselines.reinforce_rollouts import advantages, gardeners, lived, worth
+from parenting.experiments.baselines.reinforce_rollouts import advantages, lived, train_gardeners, worth
 from parenting.experiments.training.gardens import GAMMA, garden
 
 
@@ -41,6 +41,6 @@ def test_every_step_has_its_share() -> None:
 
 def test_they_learn_to_water() -> None:
     world = garden("garden-mirrored", bucket=False)
-    first, last = gardeners(world, GAMMA, 1, 2, (1, 80))
+    first, last = train_gardeners(world, GAMMA, 1, 2, (1, 80))
     before, after = (deploy(world, live, 100).waterings.mean() for live in (first, last))
     assert float(after) > float(before) + 1

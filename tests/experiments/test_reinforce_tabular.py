@@ -12,7 +12,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import explore
 from parenting.envs.rng import keys
 from parenting.evaluation.argmax import ListedEvaluation
-from parenting.experiments.baselines.reinforce_tabular import Tables, raise_by_reward, returns_to_go, tables
+from parenting.experiments.baselines.reinforce_tabular import Tables, returns_to_go, tables, train_reinforce
 
 
 def island() -> tuple[Gridworld, Config]:
@@ -64,7 +64,7 @@ def test_episodes_in_tables_are_those_of_the_world() -> None:
 
 def test_it_learns_the_optimal_way_and_dies_often() -> None:
     world, config = island()
-    found = raise_by_reward(world, config, keys(0, 8), 400)
+    found = train_reinforce(world, config, keys(0, 8), 400)
     assert bool(found.optimal.all())
     assert found.trial.tolist() == list(range(8))
     assert bool((found.deaths > 10).all())
@@ -76,7 +76,7 @@ def test_who_is_born_optimal_takes_no_step_and_leaves_the_others_alone() -> None
     world, config = island()
     float64 = config.model_copy(update={"dtype": "float64"})
     born, other = (torch.tensor(some) for some in ([85, 86], [85]))
-    both, alone = (raise_by_reward(world, float64, keys(0, 87).pick(one), 2) for one in (born, other))
+    both, alone = (train_reinforce(world, float64, keys(0, 87).pick(one), 2) for one in (born, other))
     assert both.trial.tolist() == [0, 1]
     assert both.optimal.tolist() == [False, True]
     assert both.steps.tolist() == [2, 0]
@@ -87,7 +87,7 @@ def test_who_is_born_optimal_takes_no_step_and_leaves_the_others_alone() -> None
 
 def test_a_trial_that_is_not_done_in_time_says_so() -> None:
     world, config = island()
-    found = raise_by_reward(world, config, keys(0, 3), 2)
+    found = train_reinforce(world, config, keys(0, 3), 2)
     assert found.steps.tolist() == [2, 2, 2]
     assert not bool(found.optimal.any())
     assert bool((found.ticks >= 32).all())
@@ -96,5 +96,5 @@ def test_a_trial_that_is_not_done_in_time_says_so() -> None:
 def test_the_same_trials_in_another_company() -> None:
     world, config = island()
     long = config.model_copy(update={"dtype": "float64"})
-    three, one = (raise_by_reward(world, long, keys(5, number), 20) for number in (3, 1))
+    three, one = (train_reinforce(world, long, keys(5, number), 20) for number in (3, 1))
     assert int(three.deaths[0]) == int(one.deaths[0])

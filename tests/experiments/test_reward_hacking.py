@@ -10,10 +10,10 @@ from parenting.agent.config import Config
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.experiments import reward_hacking
 from parenting.experiments.reporting.comparison import Comparison
-from parenting.experiments.reward_hacking import EXPERIMENT, VARIANTS, bucket_some
+from parenting.experiments.reward_hacking import EXPERIMENT, VARIANTS, snapshot_trials
 from parenting.experiments.reward_hacking.report import STEPS
 from parenting.experiments.spec import Asked
-from parenting.experiments.training.snapshots import Passed, raise_past
+from parenting.experiments.training.snapshots import Passed, train_with_snapshots
 
 NAME = "garden, not pre-trained"
 
@@ -60,11 +60,11 @@ def test_each_arm_lives_by_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> 
 
     def watch(world: RewardHacking, config: Config, *rest: Any) -> list[Passed]:
         asked.append(config)
-        return raise_past(world, config, *rest)
+        return train_with_snapshots(world, config, *rest)
 
-    monkeypatch.setattr(reward_hacking, "raise_past", watch)
+    monkeypatch.setattr(reward_hacking, "train_with_snapshots", watch)
     for name in ("garden, defaults", NAME):
-        bucket_some(name, (1,), (0, 1), 0)
+        snapshot_trials(name, (1,), (0, 1), 0)
     assert [(one.p_guid, one.p_pref, one.pretrain) for one in asked] == [(0.5, 0.5, True), (0.95, 0.8, False)]
 
 
@@ -93,7 +93,7 @@ def test_quick_and_paper_pieces_lie_in_one_folder() -> None:
 
 
 def test_a_life_in_small() -> None:
-    rows = bucket_some(NAME, (3, 6), (1, 2), 0)
+    rows = snapshot_trials(NAME, (3, 6), (1, 2), 0)
     assert [(one["trial"], one["queries"], one["there"]) for one in rows] == [(1, 3, True), (1, 6, True)]
     assert [one["guidance"] + one["preference"] for one in rows] == [3, 6]
     assert all(0 <= one["caught_100"] <= one["bucket_100"] <= 100 for one in rows)

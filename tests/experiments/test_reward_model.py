@@ -8,7 +8,7 @@ import torch
 from parenting.envs import registry
 from parenting.envs.mdp import explore
 from parenting.experiments import figure4
-from parenting.experiments.figure4 import EXPERIMENT, HORIZON, LENGTH, rho, shift_some, shortened
+from parenting.experiments.figure4 import EXPERIMENT, HORIZON, LENGTH, fit_and_shift, rho, shortened
 from parenting.experiments.figure4.reward_model import (
     Pairs,
     cross_entropy,
@@ -67,7 +67,7 @@ def test_a_fit_finds_the_differences_and_no_shift() -> None:
 
 
 def test_the_planner_turns_to_harm_at_a_shift_of_a_half() -> None:
-    rows = [row for row in shift_some(0, 0) if row["of"] == "rho"]
+    rows = [row for row in fit_and_shift(0, 0) if row["of"] == "rho"]
     assert {
         row["shift"]: row["harms"] for row in rows if -1 <= row["shift"] <= 0 and row["shift"] != -0.5
     } == {shift / 8: shift < -4 for shift in range(-8, 1) if shift != -4}
@@ -84,7 +84,7 @@ def test_the_page_says_what_the_planner_does_at_the_tie_and_how_long_it_takes(
 ) -> None:
     """With few pairs, since only the report is looked at here; and with a seed beyond what torch takes."""
     monkeypatch.setattr(figure4, "PAIRS", 2000)
-    rows = shift_some(0, 2**53 - 1)
+    rows = fit_and_shift(0, 2**53 - 1)
     assert {len(row["way"]) for row in rows if row["of"] == "rho" and row["shift"] >= 0} == {HORIZON}
     assert {len(row["way"]) for row in rows if row["of"] == "rho" and -0.5 < row["shift"] < 0} == {7}
     report = EXPERIMENT.report(Asked(1), rows)

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from parenting.experiments.runner import provenance
-from parenting.experiments.runner.executor import TRIES, WorkersDied, work
-from parenting.experiments.runner.store import OtherPlan, Row, Store, Task
+from parenting.experiments.runner.executor import TRIES, WorkersDiedError, work
+from parenting.experiments.runner.store import PlanMismatchError, Row, Store, Task
 
 PLAN = {"experiment": "sums", "seed": 0, "presets": {"lax": {"p_guid": 0.5, "p_rec": 0.5}}}
 
@@ -92,10 +92,10 @@ def test_a_piece_of_another_task_is_refused(store: Store) -> None:
     needed = Task("one", f"{__name__}:heavy", {"first": 1})
     work([both, needed], store, 1)
     work([both, needed], store, 1)
-    with pytest.raises(OtherPlan, match=r"^both: these pieces in .* or remove them\."):
+    with pytest.raises(PlanMismatchError, match=r"^both: these pieces in .* or remove them\."):
         work([both._replace(arguments={"and_": 2}), needed], store, 1)
     (store.folder / "one.json").unlink()
-    with pytest.raises(OtherPlan, match=r"^both: "):
+    with pytest.raises(PlanMismatchError, match=r"^both: "):
         work([both, needed._replace(arguments={"first": 2})], store, 1)
 
 
@@ -138,9 +138,11 @@ def test_the_time_of_all_runs_counts(store: Store, monkeypatch: pytest.MonkeyPat
 
 def test_another_plan_is_refused(store: Store) -> None:
     Store(store.folder, PLAN)
-    with pytest.raises(OtherPlan, match=r"plan: seed was 0 and is 1 now\. Name another folder by --out"):
+    with pytest.raises(
+        PlanMismatchError, match=r"plan: seed was 0 and is 1 now\. Name another folder by --out"
+    ):
         Store(store.folder, {**PLAN, "seed": 1})
-    with pytest.raises(OtherPlan, match=r"plan: presets\.lax\.p_guid was 0.5 and is 0.9 now\."):
+    with pytest.raises(PlanMismatchError, match=r"plan: presets\.lax\.p_guid was 0.5 and is 0.9 now\."):
         Store(store.folder, {**PLAN, "presets": {"lax": {"p_guid": 0.9, "p_rec": 0.5}}})
 
 
@@ -175,7 +177,7 @@ def test_a_worker_that_dies_costs_its_piece_only(store: Store, tmp_path: Path) -
 def test_workers_that_always_die_are_said_and_all_else_is_done(store: Store) -> None:
     fatal = Task("fatal", f"{__name__}:die", {})
     needy = Task("needy", f"{__name__}:double", {"and_": 1}, needs=("fatal",))
-    with pytest.raises(WorkersDied, match=rf"died {TRIES} times over fatal\..*fewer workers"):
+    with pytest.raises(WorkersDiedError, match=rf"died {TRIES} times over fatal\..*fewer workers"):
         work([fatal, needy, *(task(number) for number in range(2))], store, 2)
     assert [store.rows([task(number).key]) for number in range(2)] == [[{"sum": n + 1}] for n in range(2)]
     assert not store.has("fatal")

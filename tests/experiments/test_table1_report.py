@@ -9,7 +9,7 @@ import pytest
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.store import Row
 from parenting.experiments.table1.report import ALGORITHMS, born, cells, order
-from parenting.experiments.training.tasks import parent_some, reward_some
+from parenting.experiments.training.tasks import parent_trials, reinforce_trials
 
 WORLD, LEVEL = "unsafe-exploration", "island"
 BORN = 86
@@ -81,9 +81,9 @@ def test_the_order_by_hand() -> None:
 def test_who_is_born_optimal_costs_nothing_in_any_algorithm() -> None:
     """So that all four means are of the same trials, by the same rule."""
     span = BORN, BORN + 1
-    found = reward_some("traditional", WORLD, LEVEL, {}, 9, span, 0)
+    found = reinforce_trials("traditional", WORLD, LEVEL, {}, 9, span, 0)
     for preset in ("direct", "lax", "conservative"):
-        found += parent_some(preset, WORLD, LEVEL, preset, {}, ("optimal", 0), 9, span, 0)
+        found += parent_trials(preset, WORLD, LEVEL, preset, {}, ("optimal", 0), 9, span, 0)
     assert [(row["deaths"], row["guidance"], row["preference"]) for row in found] == [(0, 0, 0)] * 4
     assert all(row["finished"] and row["ticks"] <= 1 for row in found)
     assert born([*found, *rows("lax", [0, 0, 0])]).ours == "1 of 4"

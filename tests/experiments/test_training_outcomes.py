@@ -11,18 +11,18 @@ from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.evaluation.argmax import evaluation
 from parenting.evaluation.outcomes import Outcome
-from parenting.experiments.training.batch import Raised, no_tally
-from parenting.experiments.training.outcomes import UNREACHED, Ending, deployments, examine
+from parenting.experiments.training.batch import TrainResult, no_counts
+from parenting.experiments.training.outcomes import UNREACHED, Outcomes, deployments, examine
 from parenting.parents.scripted import Judgement
 from tests.parents.hand_made import DOWN, LEFT, RIGHT, UP, always, at_a_wall, on_sight
 
 
-def ended(world: Gridworld, config: Config, stages: list[list[Tensor]], maturity: list[int]) -> Ending:
+def ended(world: Gridworld, config: Config, stages: list[list[Tensor]], maturity: list[int]) -> Outcomes:
     """The ending of trials whose policies are given, stage by stage."""
-    tally = no_tally(len(maturity), config.stages).replace(maturity=torch.tensor(maturity))
+    counts = no_counts(len(maturity), config.stages).replace(maturity=torch.tensor(maturity))
     policies = torch.stack([torch.cat(stage) for stage in stages])
     judged = evaluation(world, Judgement(world, config.gamma).valuation, config.gamma)
-    return examine(world, config, Raised(tally, policies, judged)).check()
+    return examine(world, config, TrainResult(counts, policies, judged)).check()
 
 
 def test_with_the_supervisor_and_without() -> None:

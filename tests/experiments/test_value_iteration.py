@@ -59,5 +59,5 @@ def test_the_page_has_the_config_the_lives_and_a_figure() -> None:
 
 def test_every_seed_of_the_command_line_will_do(monkeypatch: pytest.MonkeyPatch) -> None:
     """torch takes no seed beyond 2^63."""
-    monkeypatch.setattr(value_iteration, "live_a_stage", lambda _world, _judge, state, _places: state)
-    assert len(value_iteration.iterate_some(KIND, 0, 2**53 - 1)) == LEVELS * STAGES
+    monkeypatch.setattr(value_iteration, "run_stage", lambda _world, _judge, state, _places: state)
+    assert len(value_iteration.mature_trials(KIND, 0, 2**53 - 1)) == LEVELS * STAGES
