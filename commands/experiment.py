@@ -119,7 +119,7 @@ def _asked(
 
     try:
         found = [experiment(name) for name in names]
-    except UnknownExperiment as error:
+    except UnknownExperimentError as error:
         raise UsageError(f"{error} Or: all, report.") from None
     return [(one, Asked(trials or one.trials[scale], seed, scale, device)) for one in found]
 
@@ -140,7 +140,7 @@ def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | 
             rows = work(tasks, store, workers, cluster, told)
         commits = store.commits([task.key for task in tasks])
         results = publish(one, asked, rows, out, Work(commits, store.seconds(), workers))
-    except (BrokenPiece, NoCluster, NoGpu, OtherPlan, WorkersDied) as error:
+    except (CorruptResultError, NoClusterError, NoGpuError, PlanMismatchError, WorkersDiedError) as error:
         raise UsageError(str(error)) from None
     except OSError as error:
         raise UsageError(_at(out, error)) from None
