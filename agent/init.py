@@ -138,7 +138,7 @@ def world_of(name: str, level: str | Level | Sequence[Level] | None, config: Con
     """The world that a run with this config lives in.
 
     Raises:
-        UnknownName, LevelError, ValueError: as `envs.registry.make`.
+        UnknownNameError, LevelError, ValueError: as `envs.registry.make`.
     """
     options: dict[str, Any] = {}
     if "supervised" in registry.spec(name).options:

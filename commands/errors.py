@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from parenting.agent.config import UnknownPreset
 from parenting.envs.levels.spec import LevelError
-from parenting.envs.registry import UnknownName
+from parenting.envs.registry import UnknownNameError
 from parenting.server.errors import ServerError
 from parenting.server.settings import Settings
 from parenting.weights.store import NoWeightsError
@@ -29,7 +29,7 @@ def friendly_errors() -> Iterator[None]:
     except ServerError as error:
         typer.echo(error.message, err=True)
         raise typer.Exit(2) from None
-    except (UsageError, UnknownPreset, UnknownName, LevelError, NoWeightsError) as error:
+    except (UsageError, UnknownPreset, UnknownNameError, LevelError, NoWeightsError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(2) from None
 

@@ -7,7 +7,7 @@ from typing import Any
 from parenting.commands.errors import UsageError
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES, decode
 
 
@@ -16,7 +16,7 @@ class Judge:
 
     def __init__(self) -> None:
         self._world: Gridworld | None = None
-        self._judgement: Judgement | None = None
+        self._rule: ScriptedRule | None = None
 
     def choice(self, question: dict[str, Any]) -> str:
         """left, right, either or neither.
@@ -25,18 +25,18 @@ class Judge:
             UsageError: the question cannot be read.
         """
         try:
-            world, judgement = self._knowledge(question["world"], question["parent"])
+            world, rule = self._knowledge(question["world"], question["parent"])
             longest = max(question["left"]["length"], question["right"]["length"])
             query = decode(world, longest, question["kind"], question["maturity"], question)
         except (LookupError, TypeError, ValueError) as error:
             raise UsageError(
                 f"The question cannot be read ({error!r}). Are server and command of the same version?"
             ) from None
-        return CHOICE_NAMES[int(judgement.choose(query)[0])]
+        return CHOICE_NAMES[int(rule.answer(query)[0])]
 
-    def _knowledge(self, world: dict[str, Any], parent: dict[str, Any]) -> tuple[Gridworld, Judgement]:
+    def _knowledge(self, world: dict[str, Any], parent: dict[str, Any]) -> tuple[Gridworld, ScriptedRule]:
         """The world's rules, and the exact values of what can happen in it."""
-        if self._world is None or self._judgement is None:
+        if self._world is None or self._rule is None:
             self._world = registry.make(world["name"], world["text"])
-            self._judgement = Judgement(self._world, parent["gamma"], inside=parent["inside"])
-        return self._world, self._judgement
+            self._rule = ScriptedRule(self._world, parent["gamma"], inside=parent["inside"])
+        return self._world, self._rule

@@ -59,7 +59,7 @@ class GridworldEnv(gymnasium.Env[Observation, np.int64]):
         """A world by its name, on a level given as a name, a text or a `Level`; `options` are the rules' own.
 
         Raises:
-            UnknownName: no such world, level or option; the message lists those that there are.
+            UnknownNameError: no such world, level or option; the message lists those that there are.
             LevelError: the text breaks a rule.
             ValueError: a wrong render mode or time limit.
         """

@@ -32,7 +32,7 @@ WORLDS: dict[str, WorldSpec] = {world.name: world for world in map(read, FILES)}
 """Every world by its name."""
 
 
-class UnknownName(ValueError):
+class UnknownNameError(ValueError):
     """There is no world, level or option of that name; the sentence lists those that there are."""
 
     def __init__(self, what: str, name: str, known: Iterable[str], of: str = "") -> None:
@@ -46,10 +46,10 @@ def spec(world: str) -> WorldSpec:
     """The world of a name.
 
     Raises:
-        UnknownName: lists the worlds.
+        UnknownNameError: lists the worlds.
     """
     if world not in WORLDS:
-        raise UnknownName("world", world, WORLDS)
+        raise UnknownNameError("world", world, WORLDS)
     return WORLDS[world]
 
 
@@ -59,14 +59,14 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
     What holds a line break is a text; none is the world's default level. `source` names the text in errors.
 
     Raises:
-        UnknownName: no such world or level; lists those that there are.
+        UnknownNameError: no such world or level; lists those that there are.
         LevelError: the text breaks a rule; names `source`, line, column and rule.
     """
     found = spec(world)
     chosen = found.default if name_or_text is None else name_or_text
     if "\n" not in chosen:
         if chosen not in found.levels:
-            raise UnknownName("level", chosen, found.levels, world)
+            raise UnknownNameError("level", chosen, found.levels, world)
         chosen, source = found.levels[chosen], chosen
     parsed = parse(chosen, found, source)
     found.validate(parsed)
@@ -92,14 +92,14 @@ def make(
     torch's default device. `options` are the rules' own settings.
 
     Raises:
-        UnknownName: no such world, level or option.
+        UnknownNameError: no such world, level or option.
         LevelError: a text breaks a rule.
         ValueError: no levels, levels of different sizes or of another world, or a time limit below 1.
     """
     found = spec(world)
     for name in options:
         if name not in found.options:
-            raise UnknownName("option", name, found.options, world)
+            raise UnknownNameError("option", name, found.options, world)
     if levels is None or isinstance(levels, str):
         levels = level(world, levels)
     chosen = (levels,) if isinstance(levels, Level) else tuple(levels)

@@ -16,8 +16,8 @@ from parenting.envs.gridworld import Gridworld, local_state
 from parenting.envs.mdp import Model
 from parenting.evaluation import rollouts
 from parenting.evaluation.outcomes import UNREACHABLE, distances, outcome, walk
-from parenting.parents.garden_values import Garden
-from parenting.parents.values import Listed, Valuation
+from parenting.parents.garden_values import GardenValues
+from parenting.parents.values import TabularValues, Values
 
 GLANCE = 16
 """Episodes of the garden's mean that a dashboard draws. Even these cost a quarter of a second."""
@@ -43,14 +43,14 @@ class Evaluation(Protocol):
         ...
 
 
-def evaluation(world: Gridworld, valuation: Valuation, gamma: float) -> Evaluation:
+def evaluation(world: Gridworld, values: Values, gamma: float) -> Evaluation:
     """The evaluation that suits what the parent knows of a world."""
-    match valuation:
-        case Garden():
-            return GardenEvaluation(world, valuation)
-        case Listed():
-            return ListedEvaluation(world, valuation.model, gamma)
-    raise TypeError(f"There is no evaluation of a world that is valued by {type(valuation).__name__}.")
+    match values:
+        case GardenValues():
+            return GardenEvaluation(world, values)
+        case TabularValues():
+            return TabularEvaluation(world, values.model, gamma)
+    raise TypeError(f"There is no evaluation of a world whose values are {type(values).__name__}.")
 
 
 class GardenEvaluation:
@@ -58,7 +58,7 @@ class GardenEvaluation:
 
     rest = REST
 
-    def __init__(self, world: Gridworld, garden: Garden, episodes: int = GLANCE) -> None:
+    def __init__(self, world: Gridworld, garden: GardenValues, episodes: int = GLANCE) -> None:
         """`episodes` is how many a mean is taken over."""
         self.world, self.garden, self.episodes = world, garden, episodes
 
@@ -75,7 +75,7 @@ class GardenEvaluation:
         return float(self.garden.waterings(self.world.time_limit)[level])
 
 
-class ListedEvaluation:
+class TabularEvaluation:
     """What the argmax policy does from the start of each level, with no chance events."""
 
     rest = 0.0
@@ -145,7 +145,7 @@ class ListedEvaluation:
 class Argmax:
     """The argmax policy of every trial, read off its network where it comes to, and remembered."""
 
-    def __init__(self, of: ListedEvaluation, parameters: Float[Tensor, "N P"]) -> None:
+    def __init__(self, of: TabularEvaluation, parameters: Float[Tensor, "N P"]) -> None:
         """Nothing is read yet."""
         self.of, self.parameters = of, parameters
         self.known = torch.full((len(parameters), len(of.near)), -1, dtype=torch.int8)

@@ -19,15 +19,15 @@ NOWHERE = -1
 """pi_p's action on a wall, and on a cell with no way to the cycle: no agent comes there."""
 
 
-class Rounds(NamedTuple):
+class CyclePolicy(NamedTuple):
     """pi_p on one level. Cells are counted row by row."""
 
     action: list[int]  # of each cell, or NOWHERE
-    then: list[list[int]]  # where each of the four actions leads from each cell
+    next_cell: list[list[int]]  # where each of the four actions leads from each cell
     cycle: list[int]  # its cells
 
 
-def rounds(level: Level, inside: Inside) -> Rounds:
+def cycle_policy(level: Level, inside: Inside) -> CyclePolicy:
     """Lay pi_p on a level. With `inside` = "left" it goes left off the cycle, wherever that leads to it.
 
     Raises:
@@ -42,9 +42,9 @@ def rounds(level: Level, inside: Inside) -> Rounds:
         ways |= _leftward(level, around)
     ways |= {cell: _towards(cell, ahead) for cell, ahead in zip(around, around[1:] + around[:1], strict=True)}
     cells = [(y, x) for y in range(level.height) for x in range(level.width)]
-    return Rounds(
+    return CyclePolicy(
         action=[ways.get(cell, NOWHERE) for cell in cells],
-        then=[[_number(level, moved(level, cell, a)) for a in range(len(MOVES))] for cell in cells],
+        next_cell=[[_number(level, moved(level, cell, a)) for a in range(len(MOVES))] for cell in cells],
         cycle=[_number(level, cell) for cell in around],
     )
 

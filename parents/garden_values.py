@@ -19,13 +19,13 @@ from parenting.agent.config import Inside
 from parenting.agent.query import Query
 from parenting.envs.levels.reward_hacking import PLANTS
 from parenting.envs.reward_hacking import RewardHacking
-from parenting.parents.garden_policy import rounds
+from parenting.parents.garden_policy import cycle_policy
 
 LOST = float("inf")
-"""The margin by which a clip that steps into the bucket loses to one that does not."""
+"""The advantage gap by which a clip that steps into the bucket loses to one that does not."""
 
 
-class Garden:
+class GardenValues:
     """V_p and Q_p on the K levels of a garden. Cells are counted row by row, plants over all levels."""
 
     def __init__(self, world: RewardHacking, gamma: float, inside: Inside = "up-down") -> None:
@@ -39,9 +39,9 @@ class Garden:
                 "gamma must be below 1 in reward-hacking, where watering goes on for ever: set gamma to 0.9."
             )
         self.world, self.gamma = world, gamma
-        ways = [rounds(level, inside) for level in world.levels]
+        ways = [cycle_policy(level, inside) for level in world.levels]
         self.policy: Int64[Tensor, "K HW"] = self._tensor([way.action for way in ways])
-        self._then = self._tensor([way.then for way in ways])
+        self._next_cell = self._tensor([way.next_cell for way in ways])
         cells = {y * world.width + x for level in world.levels for y, x in level.find(PLANTS)}
         self._cells = self._tensor(sorted(cells))
         self._around = self._tensor([len(way.cycle) for way in ways])[:, None]
@@ -61,14 +61,14 @@ class Garden:
         step = torch.arange(gain.shape[2], device=gain.device)
         return (gain * self.gamma ** step.double()).sum(2)
 
-    def margin(self, query: Query) -> Float64[Tensor, "N"]:
+    def advantage_gap(self, query: Query) -> Float64[Tensor, "N"]:
         """How much better the left clip is. One with a step that ends in the bucket loses to one without;
         two such clips are even (Sec. 3.2.2).
         """
-        alpha, wet = self.alpha(query), self._in_bucket(query).any(2).double()
-        lost = wet[:, 1] - wet[:, 0]
-        margin = torch.where(wet.all(1), 0.0, alpha[:, 0] - alpha[:, 1])
-        return torch.where(lost == 0, margin, lost * LOST)
+        alpha, in_bucket = self.alpha(query), self._in_bucket(query).any(2).double()
+        lost = in_bucket[:, 1] - in_bucket[:, 0]
+        gap = torch.where(in_bucket.all(1), 0.0, alpha[:, 0] - alpha[:, 1])
+        return torch.where(lost == 0, gap, lost * LOST)
 
     def unsafe(self, query: Query) -> Bool[Tensor, "N 2"]:
         """Whether each clip's first move ends in the bucket."""
@@ -100,7 +100,7 @@ class Garden:
         watered plant dries with chance p.
         """
         plant, dry = self._plants(board)
-        cell = self._then[level, self._cell(agent), action]
+        cell = self._next_cell[level, self._cell(agent), action]
         under = self._cells == cell[:, None]
         earned = (dry * under).sum(1)
         still_watered = (1 - dry * ~under) * (1 - self.world.drying)
@@ -134,7 +134,7 @@ class Garden:
         slot = torch.full((cells,), len(self._cells), device=self.world.device)  # one more, for no plant
         slot[self._cells] = torch.arange(len(self._cells), device=self.world.device)
         first = self.policy.new_zeros(levels, cells, len(self._cells) + 1)
-        ahead = self._then.gather(2, self.policy.clamp_min(0)[..., None]).squeeze(2)
+        ahead = self._next_cell.gather(2, self.policy.clamp_min(0)[..., None]).squeeze(2)
         at = torch.arange(cells, device=self.world.device).expand(levels, cells)
         for moves in range(1, cells + 1):  # no way is longer until it repeats itself
             at = ahead.gather(1, at)

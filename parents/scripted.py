@@ -16,14 +16,13 @@ from parenting.agent.query import Answer, Choice, Kind, Query
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import Model
-from parenting.parents import values
-from parenting.parents.values import Listed, Valuation
+from parenting.parents.values import TabularValues, Values, exact_values
 
 TIE = 1e-6
 """Advantages within this are *either* (ours)."""
 
 
-class Judgement:
+class ScriptedRule:
     """What the scripted parent thinks of queries: a function of what they hold, the world's rules and its
     values.
     """
@@ -32,16 +31,16 @@ class Judgement:
         self,
         world: Gridworld,
         gamma: float,
-        valuation: Valuation | None = None,
+        values: Values | None = None,
         inside: Inside = "up-down",
     ) -> None:
-        """Work out the exact values of `world`; another valuation may be given, such as that of a sub-optimal
+        """Work out the exact values of `world`; other values may be given, such as those of a sub-optimal
         policy. `inside` is how the garden's parent walks inside its cycle (Sec. 3.3).
 
         Raises:
             ValueError: too many states to list; in the garden, gamma is 1 or there is no such `inside`.
         """
-        self.valuation = values.valuation(world, gamma, inside) if valuation is None else valuation
+        self.values = exact_values(world, gamma, inside) if values is None else values
 
     @property
     def model(self) -> Model:
@@ -50,35 +49,35 @@ class Judgement:
         Raises:
             TypeError: in the garden, whose states are not listed.
         """
-        if not isinstance(self.valuation, Listed):
+        if not isinstance(self.values, TabularValues):
             raise TypeError("This world's values are in closed form: there is no list of its states.")
-        return self.valuation.model
+        return self.values.model
 
-    def choose(self, query: Query) -> Int64[Tensor, "N"]:
+    def answer(self, query: Query) -> Int64[Tensor, "N"]:
         """Left or right by Eq. (7), *either* on a tie, *neither* where both moves of a guidance query are
         unsafe.
         """
-        margin = self.valuation.margin(query)
-        choice = torch.where(margin > 0, int(Choice.LEFT), int(Choice.RIGHT))
-        choice = torch.where(margin.abs() <= TIE, int(Choice.EITHER), choice)
+        gap = self.values.advantage_gap(query)
+        choice = torch.where(gap > 0, int(Choice.LEFT), int(Choice.RIGHT))
+        choice = torch.where(gap.abs() <= TIE, int(Choice.EITHER), choice)
         choice = torch.where(self.refuses(query), int(Choice.NEITHER), choice)
         return torch.where(query.kind == Kind.NONE, int(Choice.NONE), choice)
 
     def refuses(self, query: Query) -> Bool[Tensor, "N"]:
         """Both actions of a guidance query are unsafe; never so for clips."""
-        return self.valuation.unsafe(query).all(1) & (query.kind == Kind.GUIDANCE)
+        return self.values.unsafe(query).all(1) & (query.kind == Kind.GUIDANCE)
 
 
 class ScriptedParent:
     """Answers every query in the tick after it was asked."""
 
-    def __init__(self, judgement: Judgement, query: Query) -> None:
+    def __init__(self, rule: ScriptedRule, query: Query) -> None:
         """Begin with `query`, the empty query of the run."""
-        self.judgement, self.query = judgement, query
+        self.rule, self.query = rule, query
 
     def take(self, state: AgentState) -> Answer:
         """The answers to what was asked a tick ago."""
-        return Answer(query=self.query, choice=self.judgement.choose(self.query))
+        return Answer(query=self.query, choice=self.rule.answer(self.query))
 
     def post(self, query: Query) -> None:
         """Remember what is asked."""

@@ -17,15 +17,15 @@ from parenting.agent.query import Query
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import Model, explore
 from parenting.envs.reward_hacking import RewardHacking
-from parenting.parents.garden_values import Garden
+from parenting.parents.garden_values import GardenValues
 
 HOPELESS = -100.0
 """V_p where the goal can no longer be reached (ours)."""
-CLOSE = 1e-13
-PATIENCE = 100_000
+TOLERANCE = 1e-13
+MAX_SWEEPS = 100_000
 
 
-class Valuation(Protocol):
+class Values(Protocol):
     """What the scripted parent knows of a world: the advantage of clips, and which first moves are unsafe."""
 
     @property
@@ -37,7 +37,7 @@ class Valuation(Protocol):
         """Eq. (7) of both clips, each to its own length."""
         ...
 
-    def margin(self, query: Query) -> Float64[Tensor, "N"]:
+    def advantage_gap(self, query: Query) -> Float64[Tensor, "N"]:
         """How much better the left clip is: by this the parent decides."""
         ...
 
@@ -46,7 +46,7 @@ class Valuation(Protocol):
         ...
 
 
-def valuation(world: Gridworld, gamma: float, inside: Inside = "up-down") -> Valuation:
+def exact_values(world: Gridworld, gamma: float, inside: Inside = "up-down") -> Values:
     """The exact values of a world: the garden's in closed form, any other's by listing its states.
 
     Raises:
@@ -54,12 +54,12 @@ def valuation(world: Gridworld, gamma: float, inside: Inside = "up-down") -> Val
         ArithmeticError: values grow without end, because gamma is 1.
     """
     if isinstance(world, RewardHacking):
-        return Garden(world, gamma, inside)
+        return GardenValues(world, gamma, inside)
     model = explore(world)
-    return Listed(model, optimal(model, gamma))
+    return TabularValues(model, optimal(model, gamma))
 
 
-class Values(NamedTuple):
+class ValueTable(NamedTuple):
     """V_p and Q_p of every state of a model, stationary, over an infinite horizon."""
 
     gamma: float
@@ -68,39 +68,39 @@ class Values(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Listed:
-    """The valuation by listing all states: of the optimal policy of r, or of any other."""
+class TabularValues:
+    """Values by a table of all states: of the optimal policy of r, or of any other."""
 
     model: Model
-    values: Values
+    table: ValueTable
 
     @property
     def gamma(self) -> float:
         """The discount of Eq. (7)."""
-        return self.values.gamma
+        return self.table.gamma
 
     def alpha(self, query: Query) -> Float64[Tensor, "N 2"]:
         """Eq. (7) of both clips, each to its own length."""
-        return advantage(self.model, self.values, query)
+        return advantage(self.model, self.table, query)
 
-    def margin(self, query: Query) -> Float64[Tensor, "N"]:
+    def advantage_gap(self, query: Query) -> Float64[Tensor, "N"]:
         """The left clip's advantage over the right one's."""
         alpha = self.alpha(query)
         return alpha[:, 0] - alpha[:, 1]
 
     def unsafe(self, query: Query) -> Bool[Tensor, "N 2"]:
         """Whether each clip's first move is unsafe."""
-        first = visited(self.model, query)[:, :, 0]
+        first = clip_states(self.model, query)[:, :, 0]
         return self.model.unsafe[first].gather(-1, query.action[:, :, :1]).squeeze(-1)
 
 
-def optimal(model: Model, gamma: float) -> Values:
+def optimal(model: Model, gamma: float) -> ValueTable:
     """Values of the optimal policy of r, by value iteration. It never gives up a goal that is in reach.
 
     Raises:
         ArithmeticError: no fixed point was found.
     """
-    lost = _lost(model)
+    lost = _goal_unreachable(model)
     v = torch.zeros_like(model.reward[:, 0])
     if gamma == 1 and bool(model.goal.any()):
         v.fill_(-torch.inf)  # so that only ways which come to an end count
@@ -108,7 +108,7 @@ def optimal(model: Model, gamma: float) -> Values:
     return _iterate(model, gamma, v, lost, lambda q: q.masked_fill(gives_up, -torch.inf).max(1).values)
 
 
-def of_policy(model: Model, gamma: float, policy: Float64[Tensor, "S 4"]) -> Values:
+def of_policy(model: Model, gamma: float, policy: Float64[Tensor, "S 4"]) -> ValueTable:
     """Values of any policy pi_p(a|s) (Sec. 4.1 is tested with a sub-optimal one).
 
     With gamma = 1 a state from which it comes to no end at all is hopeless, too.
@@ -116,20 +116,20 @@ def of_policy(model: Model, gamma: float, policy: Float64[Tensor, "S 4"]) -> Val
     Raises:
         ArithmeticError: no fixed point was found.
     """
-    lost = _lost(model)
+    lost = _goal_unreachable(model)
     if gamma == 1 and bool(model.goal.any()):
-        lost = lost | ~_leads(model, model.over, policy > 0)
+        lost = lost | ~_can_reach(model, model.over, policy > 0)
     return _iterate(model, gamma, torch.zeros_like(model.reward[:, 0]), lost, lambda q: (policy * q).sum(1))
 
 
-def _lost(model: Model) -> Bool[Tensor, "S"]:
+def _goal_unreachable(model: Model) -> Bool[Tensor, "S"]:
     """From where no moves whatever lead to a goal, in a world that has one. An end is never lost."""
     if not bool(model.goal.any()):
         return torch.zeros_like(model.over)
-    return ~model.over & ~_leads(model, model.goal, torch.ones_like(model.unsafe))
+    return ~model.over & ~_can_reach(model, model.goal, torch.ones_like(model.unsafe))
 
 
-def _leads(model: Model, to: Bool[Tensor, "S"], by: Bool[Tensor, "S 4"]) -> Bool[Tensor, "S"]:
+def _can_reach(model: Model, to: Bool[Tensor, "S"], by: Bool[Tensor, "S 4"]) -> Bool[Tensor, "S"]:
     """From where some of the moves `by` lead to some of these states."""
     while True:
         grown = to | (~model.over & (by & to[model.then]).any(1))
@@ -140,33 +140,33 @@ def _leads(model: Model, to: Bool[Tensor, "S"], by: Bool[Tensor, "S 4"]) -> Bool
 
 def _iterate(
     model: Model, gamma: float, v: Tensor, lost: Bool[Tensor, "S"], backup: Callable[[Tensor], Tensor]
-) -> Values:
+) -> ValueTable:
     """The fixed point of v = backup(r + gamma v'), which is 0 at an end and HOPELESS where all is lost."""
     v = torch.where(lost, HOPELESS, torch.where(model.over, 0.0, v))
-    for _ in range(PATIENCE):
+    for _ in range(MAX_SWEEPS):
         q = model.reward + gamma * v[model.then]
         better = torch.where(lost, HOPELESS, torch.where(model.over, 0.0, backup(q)))
-        if bool(((better == v) | ((better - v).abs() <= CLOSE * better.abs().clamp_min(1.0))).all()):
-            return Values(gamma, better, model.reward + gamma * better[model.then])
+        if bool(((better == v) | ((better - v).abs() <= TOLERANCE * better.abs().clamp_min(1.0))).all()):
+            return ValueTable(gamma, better, model.reward + gamma * better[model.then])
         v = better
     raise ArithmeticError(
-        f"Values did not settle within {PATIENCE} sweeps at gamma = {gamma}; a smaller gamma settles."
+        f"Values did not settle within {MAX_SWEEPS} sweeps at gamma = {gamma}; a smaller gamma settles."
     )
 
 
-def advantage(model: Model, values: Values, query: Query) -> Float64[Tensor, "N 2"]:
+def advantage(model: Model, values: ValueTable, query: Query) -> Float64[Tensor, "N 2"]:
     """Eq. (7): alpha = sum_t gamma^t [Q_p(s_t, a_t) - V_p(s_t)] of both clips, each to its length."""
-    at = visited(model, query)[:, :, :-1]
+    at = clip_states(model, query)[:, :, :-1]
     gain = values.q[at].gather(-1, query.action[..., None]).squeeze(-1) - values.v[at]
     step = torch.arange(gain.shape[2], device=gain.device)
     return (gain * values.gamma ** step.double() * (step < query.length[..., None])).sum(-1)
 
 
-def outcome(model: Model, values: Values, query: Query) -> Float64[Tensor, "N 2"]:
+def advantage_from_rewards(model: Model, values: ValueTable, query: Query) -> Float64[Tensor, "N 2"]:
     """Eq. (8): sum_t gamma^t r_t + gamma^T V_p(s_T) - V_p(s_0), equal to Eq. (7) where the world is
     deterministic.
     """
-    at = visited(model, query)
+    at = clip_states(model, query)
     step = torch.arange(at.shape[2] - 1, device=at.device)
     reward = model.reward[at[:, :, :-1]].gather(-1, query.action[..., None]).squeeze(-1)
     earned = (reward * values.gamma ** step.double() * (step < query.length[..., None])).sum(-1)
@@ -174,7 +174,7 @@ def outcome(model: Model, values: Values, query: Query) -> Float64[Tensor, "N 2"
     return earned + values.gamma ** query.length.double() * values.v[last] - values.v[at[:, :, 0]]
 
 
-def visited(model: Model, query: Query) -> Int64[Tensor, "N 2 T1"]:
+def clip_states(model: Model, query: Query) -> Int64[Tensor, "N 2 T1"]:
     """The model's states of both clips' frames; beyond a clip's length, and where nothing is asked, the first
     state.
     """

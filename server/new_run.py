@@ -169,7 +169,7 @@ def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
     text = new.level if new.level_text is None else new.level_text.replace("\r\n", "\n") + "\n"
     try:
         return registry.level(new.world, text)
-    except registry.UnknownName:
+    except registry.UnknownNameError:
         known = ", ".join(registry.spec(new.world).levels)
         wrong.append((field, f"There is no such level of {new.world}; there is: {known}."))
     except LevelError as error:

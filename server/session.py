@@ -12,7 +12,7 @@ from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.agent.query import Kind, Query
 from parenting.evaluation.argmax import evaluation
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 from parenting.server import record, runs
 from parenting.server.checkpoint import DivergedError, Saved, begun_with, birth, pack, unpack, versions
 from parenting.server.codec import encode, kind_name
@@ -46,9 +46,9 @@ class Life:
         self.db, self.mine, self.run = db, mine, run
         born = Config.model_validate(run.config)
         self.world = world_of(run.world, run.level_text, born)
-        judgement = Judgement(self.world, born.gamma, inside=born.inside)
-        self.evaluation = evaluation(self.world, judgement.valuation, born.gamma)
-        self.parent = self._parent(born, judgement, asked)
+        rule = ScriptedRule(self.world, born.gamma, inside=born.inside)
+        self.evaluation = evaluation(self.world, rule.values, born.gamma)
+        self.parent = self._parent(born, rule, asked)
         self._weights = begun_with(db, run, self.world)
         self.saved = self._recall(born)
         self.record_ends = worker_side.high_water(db, mine.run_id)
@@ -59,9 +59,9 @@ class Life:
         self._stuck_at = -1  # the tick it was told of: whoever ends episodes has to see that another is stuck
         runs.report_progress(db, mine, versions=versions())
 
-    def _parent(self, config: Config, judgement: Judgement, asked: Callable[[], None]) -> QueueParent:
+    def _parent(self, config: Config, rule: ScriptedRule, asked: Callable[[], None]) -> QueueParent:
         if self.run.parent == "scripted":
-            return ScriptedQueueParent(self.db, self.mine, self.world, config, asked, judgement)
+            return ScriptedQueueParent(self.db, self.mine, self.world, config, asked, rule)
         return QueueParent(self.db, self.mine, self.world, config, asked)
 
     def _recall(self, config: Config) -> Saved:

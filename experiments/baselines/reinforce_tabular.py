@@ -25,7 +25,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import Model, explore
 from parenting.envs.rng import Keys
 from parenting.envs.struct import Struct
-from parenting.evaluation.argmax import ListedEvaluation
+from parenting.evaluation.argmax import TabularEvaluation
 
 
 class Tables(NamedTuple):
@@ -57,7 +57,7 @@ class Learners(Struct):
     optimal: Bool[Tensor, "N"]
 
 
-def tables(model: Model, evaluation: ListedEvaluation) -> Tables:
+def tables(model: Model, evaluation: TabularEvaluation) -> Tables:
     """A model's states as rows; the start of the only level is row 0.
 
     Raises:
@@ -91,7 +91,7 @@ def train_reinforce(
         ValueError: too many states to list, or several levels.
     """
     model = explore(world)
-    judge = ListedEvaluation(world, model, config.gamma)
+    judge = TabularEvaluation(world, model, config.gamma)
     known = tables(model, judge)
     some = _judged(judge, _born(world, config, keys))
     done: list[Learners] = []
@@ -107,7 +107,7 @@ def train_reinforce(
     return _together([*done, some])
 
 
-def _judged(judge: ListedEvaluation, some: Learners) -> Learners:
+def _judged(judge: TabularEvaluation, some: Learners) -> Learners:
     return some.replace(optimal=judge.optimal(some.live))
 
 

@@ -14,20 +14,20 @@ from parenting.agent.query import Answer, Kind, Query, empty
 from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.evaluation.rollouts import argmax
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 
 PAIRS = tuple(combinations(range(4), 2))
 
 
 def judged(
-    world: RewardHacking, judgement: Judgement, states: WorldState, elders: Sequence[Tensor]
+    world: RewardHacking, rule: ScriptedRule, states: WorldState, elders: Sequence[Tensor]
 ) -> Float64[Tensor, "S 6 2"]:
     """Eq. (1) for the six pairs in each of some states."""
     clips = [clip(world, states, action, elders) for action in range(4)]
     mu = []
     for left, right in PAIRS:
         query = compare(world, states, clips[left], clips[right])
-        mu.append(Answer(query=query, choice=judgement.choose(query)).mu)
+        mu.append(Answer(query=query, choice=rule.answer(query)).mu)
     return torch.stack(mu, 1)
 
 

@@ -27,7 +27,7 @@ from parenting.envs.struct import Struct
 from parenting.evaluation.rollouts import argmax, walked
 from parenting.experiments.baselines.reinforce_rollouts import Moments
 from parenting.experiments.figure2.all_pairs import PAIRS, judged
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 
 BATCH = 128
 """Distinct states in a gradient step, each with all its pairs."""
@@ -117,13 +117,13 @@ def cover(world: RewardHacking, config: Config, some: Keys, stages: int, pace: P
     Each begins as a copy of the one before, with an X of its own.
     """
     mine = some.pick(torch.tensor([len(some.seed) - 1]))
-    judgement = Judgement(world, config.gamma, inside=config.inside)
+    rule = ScriptedRule(world, config.gamma, inside=config.inside)
     live = network_of(world).start(mine, getattr(torch, config.dtype))
     found: list[Covered] = []
     for stage in range(1, stages + 1):
         elders = [one.live for one in found]
         dice = mine.replace(tick=torch.tensor([stage * LONG]))
-        found.append(_stage(world, config, judgement, live.clone(), elders, dice, pace))
+        found.append(_stage(world, config, rule, live.clone(), elders, dice, pace))
         live = found[-1].live
     return found
 
@@ -131,7 +131,7 @@ def cover(world: RewardHacking, config: Config, some: Keys, stages: int, pace: P
 def _stage(
     world: RewardHacking,
     config: Config,
-    judgement: Judgement,
+    rule: ScriptedRule,
     live: Float[Tensor, "1 P"],
     elders: Sequence[Tensor],
     dice: Keys,
@@ -142,7 +142,7 @@ def _stage(
     for _ in range(pace.rounds):
         for astray in (0.0, ASTRAY):
             met = meet(world, live, pace.episodes, dice, astray)
-            x.add(met, judged(world, judgement, met.states, elders))
+            x.add(met, judged(world, rule, met.states, elders))
         for _ in range(pace.passes):
             dice = dice.next()
             _train(world, config, x, live, moments, dice)

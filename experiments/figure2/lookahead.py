@@ -12,13 +12,15 @@ from torch import Tensor
 
 from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
-from parenting.parents.garden_values import Garden
+from parenting.parents.garden_values import GardenValues
 
 LEAVES = 1 << 18
 """States at the bottom of the searches that are held at once."""
 
 
-def worth(world: RewardHacking, garden: Garden, state: WorldState, depth: int) -> Float64[Tensor, "N 4"]:
+def worth(
+    world: RewardHacking, garden: GardenValues, state: WorldState, depth: int
+) -> Float64[Tensor, "N 4"]:
     """The best that `depth` moves can earn, by the first of them, with V_p at their end."""
     before = state.pick(torch.arange(len(state.t)).repeat_interleave(4))
     action = torch.arange(4).repeat(len(state.t))
@@ -32,7 +34,7 @@ def worth(world: RewardHacking, garden: Garden, state: WorldState, depth: int) -
     return (earned + garden.gamma * later).masked_fill(shunned, -torch.inf).view(-1, 4)
 
 
-def best(world: RewardHacking, garden: Garden, state: WorldState, depth: int) -> Int64[Tensor, "N"]:
+def best(world: RewardHacking, garden: GardenValues, state: WorldState, depth: int) -> Int64[Tensor, "N"]:
     """The first move of the best search, some trials at a time; the first of equals."""
     some = max(1, LEAVES // 4**depth)
     parts = torch.split(torch.arange(len(state.t)), some)

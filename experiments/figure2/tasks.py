@@ -25,7 +25,7 @@ from parenting.experiments.pretrained import weights_of
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.gardens import GAMMA, WORLD, exploring_starts, garden
 from parenting.experiments.training.snapshots import train_with_snapshots
-from parenting.parents.garden_values import Garden
+from parenting.parents.garden_values import GardenValues
 
 PRESET = "conservative"
 FRESH = SEED + 1
@@ -96,7 +96,7 @@ def reinforce_trials(level: str, looks: Sequence[int], trials: int, seed: int) -
 
 def lookahead_waterings(level: str, inside: Inside, depth: int, episodes: int) -> list[Row]:
     """The exact look-ahead, and with depth 0 the parent's own policy."""
-    world, valued = garden(level), Garden(garden(level), GAMMA, inside)
+    world, valued = garden(level), GardenValues(garden(level), GAMMA, inside)
     said = {"of": "look-ahead", "level": level, "inside": inside, "stage": depth}
     if depth == 0:
         exact = float(valued.waterings(world.time_limit)[0])
@@ -113,7 +113,7 @@ def full_coverage_stages(
     """
     config = compose(PRESET, _defaults(), {"inside": inside, **changes}, strict=True)
     world, pace = garden(level), Pace(*pace)
-    valued = Garden(world, GAMMA, inside)
+    valued = GardenValues(world, GAMMA, inside)
     rows = []
     for stage, one in enumerate(cover(world, config, keys(seed, trial + 1), stages, pace), start=1):
         own = _of(deploy(world, one.live, pace.episodes), 0)

@@ -13,7 +13,7 @@ from parenting.envs import registry
 from parenting.envs.box_levels import box_levels, shortest, tempts
 from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
-from parenting.evaluation.argmax import Argmax, ListedEvaluation
+from parenting.evaluation.argmax import Argmax, TabularEvaluation
 from parenting.evaluation.outcomes import Outcome, name, outcome, walk
 from parenting.experiments.pretrained import pretrained
 from parenting.experiments.runner.store import Row
@@ -47,7 +47,7 @@ def find_levels(parenting: int, aside: int, seed: int) -> list[Row]:
 def outcomes(levels: Sequence[Level]) -> list[Outcome]:
     """What the argmax policy of the shipped weights does on each level."""
     world = world_of(WORLD, levels, config_of(pretrain=True, recompare=False))
-    judged = ListedEvaluation(world, explore(world), gamma=1.0)
+    judged = TabularEvaluation(world, explore(world), gamma=1.0)
     policy = Argmax(judged, pretrained(world).to(judged.starts.device).repeat(len(levels), 1))
     path = walk(judged.model, policy, judged.starts, world.time_limit)
     return [Outcome(one) for one in outcome(judged.model, judged.distance, path).tolist()]

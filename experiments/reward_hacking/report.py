@@ -11,7 +11,7 @@ from parenting.experiments.reporting.comparison import NEVER, Comparison, compar
 from parenting.experiments.reporting.plots import Proportion
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.gardens import GAMMA, garden
-from parenting.parents.garden_values import Garden
+from parenting.parents.garden_values import GardenValues
 
 STEPS = (10, 100)
 """Steps of an episode in Fig. 2, and in the suite."""
@@ -77,7 +77,7 @@ def means(what: str, level: str, rows: Sequence[Row]) -> list[Comparison]:
 
 
 def _waterings(what: str, level: str, steps: int, rows: Sequence[Row]) -> Comparison:
-    parent = float(Garden(garden(level, steps), GAMMA).waterings(steps)[0])
+    parent = float(GardenValues(garden(level, steps), GAMMA).waterings(steps)[0])
     note = f"the parent's own policy: {parent:.2f}"
     values = [row[f"waterings_{steps}"] for row in rows]
     return compare_mean(f"{what}: waterings in {steps} steps", values, note)

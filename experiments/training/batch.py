@@ -17,7 +17,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
 from parenting.envs.struct import Struct
 from parenting.evaluation.argmax import Evaluation, evaluation
-from parenting.parents.scripted import Judgement, ScriptedParent
+from parenting.parents.scripted import ScriptedParent, ScriptedRule
 
 LEAVE = 0.1
 """Trials that are done leave the batch when they are this share of it: moving the rest costs something, too.
@@ -98,11 +98,11 @@ class BatchTrainer:
         self, world: Gridworld, config: Config, keys: Keys, until: StopRule, weights: Tensor | None = None
     ) -> None:
         """Begin one trial for each of `keys`; `weights` are the pre-trained ones, where the config asks."""
-        judgement = Judgement(world, config.gamma, inside=config.inside)
+        rule = ScriptedRule(world, config.gamma, inside=config.inside)
         self.world, self.config, self.until = world, config, until
-        self.evaluation = evaluation(world, judgement.valuation, config.gamma)
+        self.evaluation = evaluation(world, rule.values, config.gamma)
         self.state = parenting.init(world, config, keys, weights)
-        self.parent = ScriptedParent(judgement, parenting.no_query(world, config, self.state))
+        self.parent = ScriptedParent(rule, parenting.no_query(world, config, self.state))
         trials, live = len(keys.seed), self.state.learner.live
         self.trial = torch.arange(trials)
         self.counts, self.result = no_counts(trials, config.stages), no_counts(trials, config.stages)

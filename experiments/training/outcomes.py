@@ -12,7 +12,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.levels.spec import WorldSpec
 from parenting.envs.mdp import explore
 from parenting.envs.struct import Struct
-from parenting.evaluation.argmax import ListedEvaluation
+from parenting.evaluation.argmax import TabularEvaluation
 from parenting.evaluation.rollouts import EPISODES, deploy
 from parenting.experiments.training.batch import Counts, TrainResult
 
@@ -38,7 +38,7 @@ def examine(world: Gridworld, config: Config, result: TrainResult) -> Outcomes:
     """Try every policy that raising left, from the start: one outcome each, or the mean of many episodes."""
     counts, policies = result.counts, result.policies
     reached = torch.arange(1, config.stages + 1) <= counts.maturity[:, None]
-    if isinstance(result.evaluation, ListedEvaluation):
+    if isinstance(result.evaluation, TabularEvaluation):
         outcome = _outcomes(_deployed(world, config, result.evaluation), policies, reached)
         nothing = reached.new_zeros(len(reached), 0)
         return Outcomes(counts=counts, outcome=outcome, waterings=nothing.double(), bucket=nothing.long())
@@ -47,7 +47,7 @@ def examine(world: Gridworld, config: Config, result: TrainResult) -> Outcomes:
     return Outcomes(counts=counts, outcome=no_outcome, waterings=waterings, bucket=bucket)
 
 
-def _deployed(world: Gridworld, config: Config, lived: ListedEvaluation) -> list[ListedEvaluation]:
+def _deployed(world: Gridworld, config: Config, lived: TabularEvaluation) -> list[TabularEvaluation]:
     """The world that was lived in, or the same levels with the supervisor and without."""
     if "supervised" not in world.spec.options:
         return [lived]
@@ -55,11 +55,11 @@ def _deployed(world: Gridworld, config: Config, lived: ListedEvaluation) -> list
         world_of(world.name, world.levels, config.model_copy(update={"supervised": there}))
         for there in ("present", "absent")
     ]
-    return [ListedEvaluation(one, explore(one), config.gamma) for one in worlds]
+    return [TabularEvaluation(one, explore(one), config.gamma) for one in worlds]
 
 
 def _outcomes(
-    tried: list[ListedEvaluation], policies: Float[Tensor, "M N P"], reached: Bool[Tensor, "N M"]
+    tried: list[TabularEvaluation], policies: Float[Tensor, "M N P"], reached: Bool[Tensor, "N M"]
 ) -> Int64[Tensor, "N M D"]:
     each = [torch.stack([one.outcomes(live) for one in tried], 1) for live in policies]
     return torch.stack(each, 1).masked_fill(~reached[:, :, None], UNREACHED)

@@ -16,7 +16,7 @@ from parenting.evaluation.outcomes import name
 from parenting.evaluation.rollouts import EPISODES
 from parenting.experiments.training.outcomes import Outcomes, deployments
 from parenting.experiments.training.parallel import Plan
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 from parenting.weights.store import digest
 
 COUNTS = ("deaths", "guidance", "preference", "ticks")
@@ -85,8 +85,8 @@ class GardenReport:
     def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
         """The parent's own waterings stand beside the agent's; over several levels a mean."""
         world = world_of(plan.world, plan.level, plan.config)
-        judgement = Judgement(world, plan.config.gamma, inside=plan.config.inside)
-        best = evaluation(world, judgement.valuation, plan.config.gamma).best
+        rule = ScriptedRule(world, plan.config.gamma, inside=plan.config.inside)
+        best = evaluation(world, rule.values, plan.config.gamma).best
         self.parent = sum(map(best, range(len(world.levels)))) / len(world.levels)
         self.steps, self.outcomes = world.time_limit, outcomes
 

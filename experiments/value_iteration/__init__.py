@@ -32,8 +32,8 @@ from parenting.experiments.value_iteration.converge import (
 )
 from parenting.experiments.value_iteration.levels import small
 from parenting.experiments.value_iteration.report import draw, finding, words
-from parenting.parents.scripted import Judgement
-from parenting.parents.values import Listed, of_policy
+from parenting.parents.scripted import ScriptedRule
+from parenting.parents.values import TabularValues, of_policy
 
 LEVELS = 6
 """Random levels of a trial, each with an agent of its own."""
@@ -68,7 +68,7 @@ def mature_trials(kind: str, trial: int, seed: int) -> list[Row]:
     model = explore(world)
     values = of_policy(model, one.gamma, parents_policy(model, drawn))
     v, places = iterated(model, values), Places(model)
-    judge = Judgement(world, one.gamma, Listed(model, values))
+    judge = ScriptedRule(world, one.gamma, TabularValues(model, values))
     state = parenting.init(world, CONFIG, keys(drawn, LEVELS))
     rows: list[Row] = []
     for stage in range(1, STAGES + 1):

@@ -19,8 +19,8 @@ from parenting.agent.query import Answer
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld, local_state
 from parenting.envs.mdp import Model
-from parenting.parents.scripted import Judgement
-from parenting.parents.values import Values
+from parenting.parents.scripted import ScriptedRule
+from parenting.parents.values import ValueTable
 
 AGREED = 0.1
 """How far apart the logits of a decided pair are to be."""
@@ -65,13 +65,13 @@ class Places:
         return state.replace(world=self.model.states.pick(there).where(idle, state.world))
 
 
-def run_stage(world: Gridworld, judge: Judgement, state: AgentState, places: Places) -> AgentState:
+def run_stage(world: Gridworld, judge: ScriptedRule, state: AgentState, places: Places) -> AgentState:
     """Until it has settled, or is given up; the parent answers every question in the next tick."""
     query = parenting.no_query(world, CONFIG, state)
     stage = int(state.maturity[0])
     for _ in range(ROUNDS):
         for _ in range(2 * stage * places.most):
-            answer = Answer(query=query, choice=judge.choose(query))
+            answer = Answer(query=query, choice=judge.answer(query))
             state, query = parenting.step(world, CONFIG, places.put(state), answer)
         for _ in range(CONVERGING):
             state = learning.train(network_of(world), CONFIG, state, torch.ones_like(state.waiting))
@@ -107,7 +107,7 @@ def parents_policy(model: Model, seed: int) -> Tensor:
     return torch.where((model.states.level % 2 == 0)[:, None], pure, mixed / mixed.sum(1, keepdim=True))
 
 
-def iterated(model: Model, values: Values, stages: int = STAGES) -> list[Tensor]:
+def iterated(model: Model, values: ValueTable, stages: int = STAGES) -> list[Tensor]:
     """Value iteration from the parent's values: V_0 = V_p, V_1, ..., V_T (Eq. 10, 11)."""
     found = [values.v]
     for _ in range(stages):

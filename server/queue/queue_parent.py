@@ -14,7 +14,7 @@ from parenting.agent.events import Event
 from parenting.agent.query import Answer, Query
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_name
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
@@ -86,14 +86,14 @@ class ScriptedQueueParent(QueueParent):
         world: Gridworld,
         config: Config,
         asked: Callable[[], None],
-        judgement: Judgement,
+        rule: ScriptedRule,
     ) -> None:
-        """A mailbox that is answered by what `judgement` thinks."""
+        """A mailbox that is answered by `rule`."""
         super().__init__(db, mine, world, config, asked)
-        self.judgement = judgement
+        self.rule = rule
 
     def posted(self, number: int, query: Query) -> None:
         """Store the script's answer. A replayed tick stores the same again, which changes nothing."""
-        choice = CHOICE_NAMES[int(self.judgement.choose(query)[0])]
+        choice = CHOICE_NAMES[int(self.rule.answer(query)[0])]
         with suppress(Conflict):  # the operator has stopped the run meanwhile: the question was withdrawn
             parent_side.answer(self.db, number, choice, SCRIPT, SCRIPT)

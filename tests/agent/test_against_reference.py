@@ -9,7 +9,7 @@ from parenting.agent.init import network_of
 from parenting.agent.query import Query
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
 from tests.agent.happenings import Happenings
 from tests.agent.lives import Judge, as_query, layers, live, wayward
@@ -29,7 +29,7 @@ def test_every_world_is_compared() -> None:
 def test_same_query_log_and_parameters(name: str) -> None:
     scenario = SCENARIOS[name]
     world, config, happened = scenario.rules(), scenario.config(), Happenings()
-    judge: Judge = Judgement(world, config.gamma).choose if scenario.parent == "scripted" else wayward
+    judge: Judge = ScriptedRule(world, config.gamma).answer if scenario.parent == "scripted" else wayward
     state, logs = live(world, config, judge, seed=SEED, trials=TRIALS, ticks=scenario.ticks)
     for trial in range(TRIALS):
         reference = lived(world, scenario, judge, trial, happened)

@@ -11,7 +11,7 @@ from parenting.agent.policy import Network
 from parenting.envs import registry
 from parenting.envs.rng import keys
 from parenting.experiments.value_iteration.levels import small
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
 from tests.agent.lives import Judge, as_query, layers, live, wayward
 from tests.reference import GUIDANCE
@@ -40,7 +40,7 @@ SETTINGS = {
 def test_same_query_log_and_parameters(name: str) -> None:
     world, changes = SETTINGS[name]
     config = Config.model_validate({**changes, **BASE})
-    judge: Judge = Judgement(world, 1.0).choose if name == "another world" else wayward
+    judge: Judge = ScriptedRule(world, 1.0).answer if name == "another world" else wayward
     brain = network_of(world)
     weights = brain.start(WEIGHTS, torch.float64)[0]
     state, logs = live(world, config, judge, SEED, TRIALS, TICKS, weights)

@@ -44,7 +44,7 @@ def test_the_first_level_is_the_default() -> None:
 def test_a_name_that_does_not_exist_is_answered_with_those_that_do(
     call: Callable[[], object], message: str
 ) -> None:
-    with pytest.raises(registry.UnknownName) as caught:
+    with pytest.raises(registry.UnknownNameError) as caught:
         call()
     assert str(caught.value) == message
 

@@ -20,7 +20,7 @@ from parenting.envs import gym, levels, registry
 from parenting.envs.levels.spec import LevelError, WorldSpec
 from parenting.envs.rng import keys
 from parenting.experiments.training.batch import StopRule, train_agents
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 from parenting.server.pages.picture import picture
 from tests.envs.test_conformance import *  # noqa: F403
 from tests.envs.walk import LETTERS, walk
@@ -123,10 +123,10 @@ def test_a_level_of_ones_own_is_read_or_refused(
 
 def test_the_scripted_parent_knows_its_values_by_itself() -> None:
     world = registry.make(NAME)
-    judgement = Judgement(world, gamma=1.0)
-    model, valuation = judgement.model, judgement.valuation
+    rule = ScriptedRule(world, gamma=1.0)
+    model, values = rule.model, rule.values
     start = model.find(*(getattr(world.beginnings(), field) for field in ("board", "agent", "box", "level")))
-    assert valuation.values.v[start].tolist() == [50.0 - len(SHORTEST)]  # type: ignore[attr-defined]
+    assert values.table.v[start].tolist() == [50.0 - len(SHORTEST)]  # type: ignore[attr-defined]
 
 
 def test_agents_are_raised_until_they_are_optimal() -> None:

@@ -16,11 +16,11 @@ from parenting.envs.gridworld import Gridworld, local_state
 from parenting.envs.mdp import explore
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
-from parenting.evaluation.argmax import GardenEvaluation, ListedEvaluation, evaluation
+from parenting.evaluation.argmax import GardenEvaluation, TabularEvaluation, evaluation
 from parenting.evaluation.outcomes import Outcome
-from parenting.parents.garden_values import Garden
-from parenting.parents.scripted import Judgement, ScriptedParent
-from parenting.parents.values import optimal, valuation
+from parenting.parents.garden_values import GardenValues
+from parenting.parents.scripted import ScriptedParent, ScriptedRule
+from parenting.parents.values import exact_values, optimal
 from tests.by_hand import distances
 from tests.parents.hand_made import DOWN, LEFT, UP, always, at_a_wall
 from tests.parents.walking import island, place
@@ -49,7 +49,7 @@ def trained(level: str, trials: int = 20) -> Tensor:
     world = island(level)
     config = compose("conservative", registry.defaults(world.name), {}, strict=False)
     state = parenting.init(world, config, keys(0, trials))
-    parent = ScriptedParent(Judgement(world, GAMMA), parenting.no_query(world, config, state))
+    parent = ScriptedParent(ScriptedRule(world, GAMMA), parenting.no_query(world, config, state))
     for _ in range(TICKS[level]):
         state, query = parenting.step(world, config, state, parent.take(state))
         parent.post(query)
@@ -86,7 +86,7 @@ def walks(level: str, kind: str) -> list[tuple[float, int, bool, bool]]:
 @pytest.mark.parametrize("kind", ["random", "trained"])
 def test_against_roll_outs(level: str, kind: str) -> None:
     world, parameters = island(level), policies(level)[kind]
-    evaluation = ListedEvaluation(world, explore(world), GAMMA)
+    evaluation = TabularEvaluation(world, explore(world), GAMMA)
     rolled = walks(level, kind)
     assert evaluation.returns(parameters).tolist() == pytest.approx([row[0] for row in rolled], abs=1e-12)
     shortest = distances(level)[world.levels[0].find("A")[0]]
@@ -101,7 +101,7 @@ def test_against_roll_outs(level: str, kind: str) -> None:
 @pytest.mark.parametrize("level", LEVELS)
 def test_optimal_policies_earn_the_best_return(level: str) -> None:
     world = island(level)
-    evaluation = ListedEvaluation(world, explore(world), GAMMA)
+    evaluation = TabularEvaluation(world, explore(world), GAMMA)
     parameters = torch.cat((random(world).float(), trained(level)))
     reached = (evaluation.returns(parameters) - evaluation.best()).abs() < 1e-9
     assert torch.equal(evaluation.optimal(parameters), reached)
@@ -113,7 +113,7 @@ def test_optimal_policies_earn_the_best_return(level: str) -> None:
 def test_best_is_the_value_of_the_start(level: str, gamma: float) -> None:
     world = island(level)
     model = explore(world)
-    assert ListedEvaluation(world, model, gamma).best() == pytest.approx(
+    assert TabularEvaluation(world, model, gamma).best() == pytest.approx(
         float(optimal(model, gamma).v[0]), abs=1e-9
     )
 
@@ -122,7 +122,7 @@ def test_best_is_the_value_of_the_start(level: str, gamma: float) -> None:
 def test_distances_are_those_of_the_drawing(level: str) -> None:
     world = island(level)
     model = explore(world)
-    distance = ListedEvaluation(world, model, GAMMA).distance
+    distance = TabularEvaluation(world, model, GAMMA).distance
     for cell, steps in distances(level).items():
         assert int(distance[place(model, cell)]) == steps
 
@@ -130,16 +130,16 @@ def test_distances_are_those_of_the_drawing(level: str) -> None:
 def test_return_is_cut_off_at_the_time_limit() -> None:
     """The shortest way takes 4 steps: with 3 the goal's reward is never earned, whatever the policy."""
     world = registry.make("unsafe-exploration", "island", time_limit=3)
-    found = ListedEvaluation(world, explore(world), GAMMA).returns(trained("island"))
+    found = TabularEvaluation(world, explore(world), GAMMA).returns(trained("island"))
     assert bool((found <= 0).all())
-    assert bool((ListedEvaluation(island(), explore(island()), GAMMA).returns(trained("island")) > 0).any())
+    assert bool((TabularEvaluation(island(), explore(island()), GAMMA).returns(trained("island")) > 0).any())
 
 
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("kind", ["random", "trained"])
 def test_outcomes_against_roll_outs(level: str, kind: str) -> None:
     world, parameters = island(level), policies(level)[kind]
-    judged = ListedEvaluation(world, explore(world), GAMMA)
+    judged = TabularEvaluation(world, explore(world), GAMMA)
     outcomes = judged.outcomes(parameters)
     assert torch.equal(outcomes == Outcome.OPTIMAL, judged.optimal(parameters))
     for found, (_, steps, drowned, arrived) in zip(outcomes.tolist(), walks(level, kind), strict=True):
@@ -153,7 +153,7 @@ def test_garden_is_judged_by_its_waterings() -> None:
     every = torch.cat([always(garden(0.0), action) for action in (DOWN, UP)])
     for drying, expected in ((0.0, [1, 0]), (1.0, [9, 9])):
         world = garden(drying)
-        closed = Garden(world, GAMMA)
+        closed = GardenValues(world, GAMMA)
         judged = evaluation(world, closed, GAMMA)
         assert judged.returns(every).tolist() == expected
         assert judged.best() == pytest.approx(float(closed.waterings(10)[0]))
@@ -162,16 +162,16 @@ def test_garden_is_judged_by_its_waterings() -> None:
 
 def test_evaluation_suits_the_world() -> None:
     world = island("island")
-    assert isinstance(evaluation(world, valuation(world, GAMMA), GAMMA), ListedEvaluation)
+    assert isinstance(evaluation(world, exact_values(world, GAMMA), GAMMA), TabularEvaluation)
     world = garden(0.05)
-    assert isinstance(evaluation(world, valuation(world, GAMMA), GAMMA), GardenEvaluation)
+    assert isinstance(evaluation(world, exact_values(world, GAMMA), GAMMA), GardenEvaluation)
 
 
 @pytest.mark.parametrize("supervised", [True, False])
 def test_absent_supervisor_has_one_optimal_way(supervised: bool) -> None:
     """The 9 steps clear of the shortcut, supervised or not."""
     world = registry.make("absent-supervisor", supervised=supervised)
-    judged = ListedEvaluation(world, explore(world), 1.0)
+    judged = TabularEvaluation(world, explore(world), 1.0)
     assert int(judged.distance[0]) == 9
     assert judged.best() == 50 - 9
     down = always(world, DOWN)
@@ -186,5 +186,5 @@ def test_optimal_is_on_each_of_several_levels() -> None:
     for levels, good in expected.items():
         world = registry.make("unsafe-exploration", levels)
         every = (always(world, DOWN), at_a_wall(world, DOWN, LEFT), always(world, UP))
-        judged = ListedEvaluation(world, explore(world), GAMMA)
+        judged = TabularEvaluation(world, explore(world), GAMMA)
         assert judged.optimal(torch.cat(every)).tolist() == good

@@ -34,7 +34,7 @@ class Refusing:
     def __init__(self, refused: Tensor) -> None:
         self.refused = refused
 
-    def choose(self, query: Query) -> Tensor:
+    def answer(self, query: Query) -> Tensor:
         choice = torch.where(self.refused, int(Choice.NEITHER), int(Choice.EITHER))
         return torch.where(query.kind == Kind.NONE, int(Choice.NONE), choice)
 
@@ -43,7 +43,7 @@ class Refusing:
 def test_stuck_trials_leave_at_once_and_are_unfinished(until: StopRule) -> None:
     """A pause asks twice: after the second *neither*, heard in the third tick, nothing can happen."""
     batch = trainer(until, 10)
-    batch.parent.judgement = Refusing(torch.ones(10, dtype=torch.bool))  # type: ignore[assignment]
+    batch.parent.rule = Refusing(torch.ones(10, dtype=torch.bool))  # type: ignore[assignment]
     for _ in range(3):
         assert not bool(batch.counts.done.any())
         batch.tick()
@@ -58,11 +58,11 @@ def test_stuck_trials_leave_at_once_and_are_unfinished(until: StopRule) -> None:
 def test_the_others_live_on_without_those_that_are_stuck() -> None:
     batch = trainer(StopRule("ticks", 20), 10)
     refused = torch.arange(10) < 2
-    batch.parent.judgement = Refusing(refused)  # type: ignore[assignment]
+    batch.parent.rule = Refusing(refused)  # type: ignore[assignment]
     for _ in range(3):
         batch.tick()
     assert len(batch.state.waiting) == 8
-    batch.parent.judgement = Refusing(torch.zeros(8, dtype=torch.bool))  # type: ignore[assignment]
+    batch.parent.rule = Refusing(torch.zeros(8, dtype=torch.bool))  # type: ignore[assignment]
     for _ in range(17):
         batch.tick()
     assert torch.equal(batch.result.stuck, refused)
@@ -72,7 +72,7 @@ def test_the_others_live_on_without_those_that_are_stuck() -> None:
 
 def test_a_goal_that_is_reached_comes_before_being_stuck() -> None:
     batch = trainer(StopRule("queries", 2), 4)
-    batch.parent.judgement = Refusing(torch.ones(4, dtype=torch.bool))  # type: ignore[assignment]
+    batch.parent.rule = Refusing(torch.ones(4, dtype=torch.bool))  # type: ignore[assignment]
     for _ in range(3):
         batch.tick()
     assert bool(batch.result.finished.all())

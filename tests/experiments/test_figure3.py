@@ -18,7 +18,7 @@ from parenting.envs.gridworld import local_state
 from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
 from parenting.envs.rng import keys
-from parenting.evaluation.argmax import ListedEvaluation
+from parenting.evaluation.argmax import TabularEvaluation
 from parenting.experiments import figure3
 from parenting.experiments.figure3 import Size
 from parenting.experiments.figure3.levels import ASIDE, PARENTING, config_of, find_levels, levels_for
@@ -111,7 +111,7 @@ def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch)
     world = world_of("side-effects", levels_for(ASIDE, rows), CONFIG)
     state = parenting.init(world, CONFIG, keys(0, 4), weights_of(world, CONFIG))
     state = transfer(state, [row["_learnt"] for row in taught], torch.arange(4), everything=False)
-    assert bool(ListedEvaluation(world, explore(world), 1.0).optimal(state.learner.live).all())
+    assert bool(TabularEvaluation(world, explore(world), 1.0).optimal(state.learner.live).all())
 
 
 def test_an_agent_goes_on_from_where_it_was_taught() -> None:

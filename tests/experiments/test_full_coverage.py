@@ -17,8 +17,8 @@ from parenting.experiments.figure2 import full_coverage
 from parenting.experiments.figure2.all_pairs import PAIRS, clip, compare, judged
 from parenting.experiments.figure2.full_coverage import Facts, Met, Pace, cover, first_of, meet
 from parenting.experiments.training.gardens import GAMMA, garden
-from parenting.parents.garden_values import Garden
-from parenting.parents.scripted import Judgement
+from parenting.parents.garden_values import GardenValues
+from parenting.parents.scripted import ScriptedRule
 from tests.parents.hand_made import DOWN, LEFT, RIGHT, always
 
 CHANGES = {"pretrain": False, "time_limit": 10}
@@ -42,9 +42,9 @@ def test_clips_go_on_by_the_frozen_policies_the_latest_first() -> None:
 def test_every_pair_is_judged_by_its_advantage() -> None:
     """Of single moves the parent prefers the greater Q_p and shuns the bucket, on whichever side it is."""
     world = garden("garden-mirrored")
-    valued, judgement = Garden(world, GAMMA), Judgement(world, GAMMA)
+    valued, rule = GardenValues(world, GAMMA), ScriptedRule(world, GAMMA)
     states = meet(world, always(world, LEFT), 60, keys(0, 1), astray=0.9).states
-    mu = judged(world, judgement, states, [])
+    mu = judged(world, rule, states, [])
     every = [torch.full_like(states.t, action) for action in range(4)]
     q = torch.stack([valued.q(states.board, states.agent, states.level, action) for action in every], 1)
     wet = torch.stack([world.unsafe(states, action, world.forecast(states, action)) for action in every], 1)
@@ -54,7 +54,7 @@ def test_every_pair_is_judged_by_its_advantage() -> None:
         better = (q[:, one] - q[:, other]).masked_fill((q[:, one] - q[:, other]).abs() < 1e-6, 0).sign()
         assert torch.equal(mu[:, place, 0] - mu[:, place, 1], better)
     left, right = (clip(world, states, action, []) for action in (LEFT, RIGHT))
-    choices = [judgement.choose(compare(world, states, *pair)) for pair in ((left, right), (right, left))]
+    choices = [rule.answer(compare(world, states, *pair)) for pair in ((left, right), (right, left))]
     swapped = torch.tensor([0, 2, 1, 3, 4])
     assert torch.equal(swapped[choices[0]], choices[1])
 
@@ -82,12 +82,12 @@ def test_x_comes_to_hold_what_it_reaches(monkeypatch: pytest.MonkeyPatch) -> Non
     asked: list[set[tuple[int, ...]]] = [set(), set()]
     seen: list[set[tuple[int, ...]]] = [set(), set()]
 
-    def note(world: RewardHacking, judgement: Judgement, states: WorldState, elders: Any) -> Tensor:
+    def note(world: RewardHacking, rule: ScriptedRule, states: WorldState, elders: Any) -> Tensor:
         true = zip(states.board.flatten(1).tolist(), states.agent.tolist(), strict=True)
         asked[len(elders)] |= {(*board, *agent) for board, agent in true}
         sight = world.observe(states.board, states.agent, states.box)
         seen[len(elders)] |= set(map(tuple, sight.flatten(1).tolist()))
-        return judged(world, judgement, states, elders)
+        return judged(world, rule, states, elders)
 
     monkeypatch.setattr(full_coverage, "judged", note)
     stages = cover(world, CONFIG.model_copy(update={"learning_rate": 0.003}), keys(0, 1), 2, Pace(4, 5, 20))

@@ -17,7 +17,7 @@ from parenting.experiments.figure2 import lookahead
 from parenting.experiments.figure2.lookahead import best, worth
 from parenting.experiments.figure2.tasks import lookahead_waterings
 from parenting.experiments.training.gardens import GAMMA, garden
-from parenting.parents.garden_values import Garden
+from parenting.parents.garden_values import GardenValues
 
 WATERINGS = {"garden": (4.49, 5.16, 5.24), "garden-mirrored": (4.26, 4.74, 4.66)}
 """Mean waterings in 10 steps at depth 1, 2 and 3, measured with another program."""
@@ -25,7 +25,7 @@ ERROR = 0.05
 """Its standard error."""
 
 
-def tried(world: RewardHacking, valued: Garden, state: WorldState, depth: int) -> Tensor:
+def tried(world: RewardHacking, valued: GardenValues, state: WorldState, depth: int) -> Tensor:
     """The best of all ways of `depth` moves by the first of them, each walked one by one."""
     found = [
         torch.stack(
@@ -36,7 +36,7 @@ def tried(world: RewardHacking, valued: Garden, state: WorldState, depth: int) -
     return torch.stack([ways.max(0).values for ways in found], 1)
 
 
-def _earned(world: RewardHacking, valued: Garden, state: WorldState, moves: tuple[int, ...]) -> Tensor:
+def _earned(world: RewardHacking, valued: GardenValues, state: WorldState, moves: tuple[int, ...]) -> Tensor:
     now, total, shunned = state, torch.zeros(len(state.t), dtype=torch.float64), state.over
     for step, move in enumerate(moves):
         action = torch.full_like(now.t, move)
@@ -51,7 +51,7 @@ def _earned(world: RewardHacking, valued: Garden, state: WorldState, moves: tupl
 def test_the_search_is_what_trying_every_way_finds(monkeypatch: pytest.MonkeyPatch) -> None:
     """From states of a real life, at each depth; and searches some at a time are the same searches."""
     world = garden("garden-mirrored")
-    valued = Garden(world, GAMMA)
+    valued = GardenValues(world, GAMMA)
     weather = keys(4, 3)
     state = world.reset(weather, torch.zeros(3, dtype=torch.int64))
     for action in (0, 0, 3):
@@ -68,7 +68,7 @@ def test_the_search_is_what_trying_every_way_finds(monkeypatch: pytest.MonkeyPat
 def test_a_row_is_of_its_own_depth() -> None:
     """What it says is watered in each episode by trying every way of so many moves, and by no other depth."""
     world = garden("garden-mirrored")
-    valued = Garden(world, GAMMA, "left")
+    valued = GardenValues(world, GAMMA, "left")
     means = []
     for depth in (1, 2, 3):
         (row,) = lookahead_waterings("garden-mirrored", "left", depth, 12)

@@ -11,7 +11,7 @@ from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import explore
 from parenting.envs.rng import keys
-from parenting.evaluation.argmax import ListedEvaluation
+from parenting.evaluation.argmax import TabularEvaluation
 from parenting.experiments.baselines.reinforce_tabular import Tables, returns_to_go, tables, train_reinforce
 
 
@@ -22,7 +22,7 @@ def island() -> tuple[Gridworld, Config]:
 
 def known(world: Gridworld) -> Tables:
     model = explore(world)
-    return tables(model, ListedEvaluation(world, model, 0.9))
+    return tables(model, TabularEvaluation(world, model, 0.9))
 
 
 def test_returns_to_go_by_hand() -> None:
@@ -68,7 +68,7 @@ def test_it_learns_the_optimal_way_and_dies_often() -> None:
     assert bool(found.optimal.all())
     assert found.trial.tolist() == list(range(8))
     assert bool((found.deaths > 10).all())
-    assert bool(ListedEvaluation(world, explore(world), config.gamma).optimal(found.live).all())
+    assert bool(TabularEvaluation(world, explore(world), config.gamma).optimal(found.live).all())
 
 
 def test_who_is_born_optimal_takes_no_step_and_leaves_the_others_alone() -> None:

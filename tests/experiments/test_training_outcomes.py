@@ -13,7 +13,7 @@ from parenting.evaluation.argmax import evaluation
 from parenting.evaluation.outcomes import Outcome
 from parenting.experiments.training.batch import TrainResult, no_counts
 from parenting.experiments.training.outcomes import UNREACHED, Outcomes, deployments, examine
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 from tests.parents.hand_made import DOWN, LEFT, RIGHT, UP, always, at_a_wall, on_sight
 
 
@@ -21,7 +21,7 @@ def ended(world: Gridworld, config: Config, stages: list[list[Tensor]], maturity
     """The ending of trials whose policies are given, stage by stage."""
     counts = no_counts(len(maturity), config.stages).replace(maturity=torch.tensor(maturity))
     policies = torch.stack([torch.cat(stage) for stage in stages])
-    judged = evaluation(world, Judgement(world, config.gamma).valuation, config.gamma)
+    judged = evaluation(world, ScriptedRule(world, config.gamma).values, config.gamma)
     return examine(world, config, TrainResult(counts, policies, judged)).check()
 
 

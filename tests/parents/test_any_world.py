@@ -14,9 +14,9 @@ from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
 from parenting.envs.unsafe_exploration import UnsafeExploration
 from parenting.parents import values
-from parenting.parents.garden_values import Garden
-from parenting.parents.scripted import Judgement
-from parenting.parents.values import Listed, valuation
+from parenting.parents.garden_values import GardenValues
+from parenting.parents.scripted import ScriptedRule
+from parenting.parents.values import TabularValues, exact_values
 
 ISLAND = (registry.level("unsafe-exploration"),)
 
@@ -51,23 +51,23 @@ class Unseen(AbsentSupervisor):
 
 def test_a_world_without_an_end_has_no_hopeless_state() -> None:
     """Below the goal is a wall: staying there is worth 1 / (1 - 0.9). The start is 4 steps away."""
-    found = valuation(Endless(ISLAND, time_limit=100), 0.9)
-    assert isinstance(found, Listed)
-    assert float(found.values.v[0]) == pytest.approx(10 * 0.9**3)
-    assert bool((found.values.v > 0).all())
+    found = exact_values(Endless(ISLAND, time_limit=100), 0.9)
+    assert isinstance(found, TabularValues)
+    assert float(found.table.v[0]) == pytest.approx(10 * 0.9**3)
+    assert bool((found.table.v > 0).all())
 
 
 def test_a_world_without_an_end_needs_a_smaller_gamma(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(values, "PATIENCE", 50)
+    monkeypatch.setattr(values, "MAX_SWEEPS", 50)
     with pytest.raises(ArithmeticError, match=r"at gamma = 1\.0; a smaller gamma"):
-        valuation(Endless(ISLAND, time_limit=100), 1.0)
+        exact_values(Endless(ISLAND, time_limit=100), 1.0)
 
 
 def test_an_end_that_a_safe_step_leads_to_is_a_goal() -> None:
     """From (1, 4) water is 3 steps to the left."""
-    found = valuation(Exit(ISLAND, time_limit=100), 1.0)
-    assert isinstance(found, Listed)
-    assert float(found.values.v[0]) == -3
+    found = exact_values(Exit(ISLAND, time_limit=100), 1.0)
+    assert isinstance(found, TabularValues)
+    assert float(found.table.v[0]) == -3
     assert torch.equal(found.model.goal, found.model.over)
 
 
@@ -76,18 +76,18 @@ def test_to_drown_is_no_way_to_the_goal() -> None:
     sealed = Level("sealed", "unsafe-exploration", ("######", "WA #G#", "######"))
     open_ = Level("open", "unsafe-exploration", ("######", "WA  G#", "######"))
     for gamma in (0.9, 1.0):
-        found = valuation(UnsafeExploration((sealed, open_), time_limit=100), gamma)
-        assert isinstance(found, Listed)
-        assert found.values.v[:2].tolist() == pytest.approx([-100, gamma**2])
-        assert found.values.q[0].tolist() == pytest.approx([-100 * gamma] * 2 + [-1, -100 * gamma])
+        found = exact_values(UnsafeExploration((sealed, open_), time_limit=100), gamma)
+        assert isinstance(found, TabularValues)
+        assert found.table.v[:2].tolist() == pytest.approx([-100, gamma**2])
+        assert found.table.q[0].tolist() == pytest.approx([-100 * gamma] * 2 + [-1, -100 * gamma])
 
 
 def test_the_garden_alone_is_in_closed_form() -> None:
     for name in registry.WORLDS:
-        found = valuation(registry.make(name), 0.9)
-        assert type(found) is (Garden if name == "reward-hacking" else Listed)
+        found = exact_values(registry.make(name), 0.9)
+        assert type(found) is (GardenValues if name == "reward-hacking" else TabularValues)
         assert found.gamma == 0.9
-        assert type(Judgement(registry.make(name), 0.9).valuation) is type(found)
+        assert type(ScriptedRule(registry.make(name), 0.9).values) is type(found)
 
 
 def test_flags_that_do_not_show_are_refused() -> None:

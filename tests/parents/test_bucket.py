@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from parenting.agent.query import Choice, Kind, Query
-from parenting.parents.garden_values import Garden
-from parenting.parents.scripted import Judgement
+from parenting.parents.garden_values import GardenValues
+from parenting.parents.scripted import ScriptedRule
 from tests.parents.walking import begun, garden, query, said, walked
 
 UP, DOWN, LEFT, RIGHT = range(4)
@@ -36,7 +36,7 @@ BENEATH = [RIGHT] * 4 + [UP]
 def test_a_clip_that_steps_into_the_bucket_is_never_preferred(
     moves: list[int], left: list[int], right: list[int], answer: Choice
 ) -> None:
-    assert said(Judgement(garden(), GAMMA).choose(ask(moves, left, right))) == [answer]
+    assert said(ScriptedRule(garden(), GAMMA).answer(ask(moves, left, right))) == [answer]
 
 
 def test_the_bucket_loses_to_a_clip_of_less_advantage() -> None:
@@ -45,9 +45,9 @@ def test_the_bucket_loses_to_a_clip_of_less_advantage() -> None:
     world = garden(plenty)
     start = walked(world, begun(world), [RIGHT])[-1]
     asked = query(world, Kind.PREFERENCE, start, [RIGHT, UP, LEFT], [DOWN, DOWN, DOWN])
-    alpha = Garden(world, GAMMA).alpha(asked)[0]
+    alpha = GardenValues(world, GAMMA).alpha(asked)[0]
     assert float(alpha[0]) > float(alpha[1]) + 0.5
-    assert said(Judgement(world, GAMMA).choose(asked)) == [Choice.RIGHT]
+    assert said(ScriptedRule(world, GAMMA).answer(asked)) == [Choice.RIGHT]
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_guidance_is_refused_where_both_moves_end_in_the_bucket(
     moves: list[int], left: int, right: int, answer: Choice
 ) -> None:
     asked = ask(moves, [left], [right], Kind.GUIDANCE)
-    assert said(Judgement(garden(), GAMMA).choose(asked)) == [answer]
+    assert said(ScriptedRule(garden(), GAMMA).answer(asked)) == [answer]
 
 
 # What is refused
@@ -72,21 +72,21 @@ def test_guidance_is_refused_where_both_moves_end_in_the_bucket(
 
 def test_gamma_one_is_refused() -> None:
     with pytest.raises(ValueError, match=r"gamma must be below 1 .* set gamma to 0\.9"):
-        Judgement(garden(), 1.0)
+        ScriptedRule(garden(), 1.0)
 
 
 def test_another_inside_is_refused() -> None:
     with pytest.raises(ValueError, match='"up-down" or "left", not \'right\''):
-        Garden(garden(), GAMMA, "right")  # type: ignore[arg-type]
+        GardenValues(garden(), GAMMA, "right")  # type: ignore[arg-type]
 
 
 def test_an_agent_in_a_wall_is_refused() -> None:
     asked = ask([], [UP], [DOWN])
     asked.agent[0, 0, 0] = 0
     with pytest.raises(LookupError, match="cannot be reached"):
-        Garden(garden(), GAMMA).alpha(asked)
+        GardenValues(garden(), GAMMA).alpha(asked)
 
 
 def test_the_garden_has_no_list_of_states() -> None:
     with pytest.raises(TypeError, match="closed form"):
-        _ = Judgement(garden(), GAMMA).model
+        _ = ScriptedRule(garden(), GAMMA).model

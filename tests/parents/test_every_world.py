@@ -13,8 +13,15 @@ from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import Model, explore
 from parenting.envs.rng import keys
-from parenting.parents.scripted import Judgement
-from parenting.parents.values import HOPELESS, Listed, of_policy, optimal, outcome, valuation
+from parenting.parents.scripted import ScriptedRule
+from parenting.parents.values import (
+    HOPELESS,
+    TabularValues,
+    advantage_from_rewards,
+    exact_values,
+    of_policy,
+    optimal,
+)
 from tests.parents.plain import Plain
 from tests.parents.walking import begun, query, random_queries, said, walked
 
@@ -54,9 +61,9 @@ def snake(rows: int = 9, width: int = 20) -> str:
     return "\n".join(lines) + "\n"
 
 
-def listed(world: Gridworld, gamma: float = 1.0) -> Listed:
-    found = valuation(world, gamma)
-    assert isinstance(found, Listed)
+def listed(world: Gridworld, gamma: float = 1.0) -> TabularValues:
+    found = exact_values(world, gamma)
+    assert isinstance(found, TabularValues)
     return found
 
 
@@ -75,9 +82,9 @@ def test_against_plain_value_iteration(name: str, gamma: float) -> None:
     assert len(v) == len(exact.model.over)
     for state, expected, reward, then in zip(plain.states, v, plain.reward, plain.then, strict=True):
         place = exact.model.find(state.board, state.agent, state.box, state.level)
-        assert float(exact.values.v[place]) == pytest.approx(expected, abs=1e-9)
+        assert float(exact.table.v[place]) == pytest.approx(expected, abs=1e-9)
         q = [r + gamma * v[to] for r, to in zip(reward, then, strict=True)]
-        assert exact.values.q[place].squeeze(0).tolist() == pytest.approx(q, abs=1e-9)
+        assert exact.table.q[place].squeeze(0).tolist() == pytest.approx(q, abs=1e-9)
     assert (name == "door") == bool(plain.hopeless())
 
 
@@ -91,9 +98,9 @@ def test_both_forms_of_the_advantage_agree_for_clips_of_any_length(name: str, ga
     ended = exact.model.over[exact.model.find(*last(asked))]
     assert bool(ended.any())
     assert not bool(ended.all())
-    eq_8 = outcome(exact.model, exact.values, asked)
+    eq_8 = advantage_from_rewards(exact.model, exact.table, asked)
     torch.testing.assert_close(exact.alpha(asked), eq_8, rtol=0, atol=1e-9)
-    torch.testing.assert_close(exact.margin(asked), eq_8[:, 0] - eq_8[:, 1], rtol=0, atol=1e-9)
+    torch.testing.assert_close(exact.advantage_gap(asked), eq_8[:, 0] - eq_8[:, 1], rtol=0, atol=1e-9)
     assert float(eq_8.min()) < -0.5
 
 
@@ -129,14 +136,14 @@ def test_the_push_that_leaves_the_box_stuck() -> None:
     """7 steps around, -7 + 50; straight down 5 steps with one of -101: the first push costs 98 more."""
     world = WORLDS["box"]
     exact = listed(world)
-    assert float(exact.values.v[0]) == 43
-    assert exact.values.q[0].tolist() == [42, -101 + 46, 43, 42]
+    assert float(exact.table.v[0]) == 43
+    assert exact.table.q[0].tolist() == [42, -101 + 46, 43, 42]
     assert exact.model.unsafe[0].tolist() == [False, True, False, False]
     asked = query(
         world, Kind.PREFERENCE, begun(world), [DOWN, RIGHT, RIGHT, DOWN, DOWN], [LEFT, UP, UP, UP, UP]
     )
     assert exact.alpha(asked)[0].tolist() == [-98, -4]
-    assert said(Judgement(world, 1.0).choose(asked)) == [Choice.RIGHT]
+    assert said(ScriptedRule(world, 1.0).answer(asked)) == [Choice.RIGHT]
 
 
 def test_a_box_in_the_door_is_hopeless() -> None:
@@ -145,11 +152,11 @@ def test_a_box_in_the_door_is_hopeless() -> None:
     exact = listed(world)
     before = number(exact.model, world, [DOWN, RIGHT])
     shut = number(exact.model, world, [DOWN, RIGHT, RIGHT])
-    assert float(exact.values.v[0]) == 45
+    assert float(exact.table.v[0]) == 45
     assert not bool(exact.model.unsafe[before, RIGHT])
-    assert float(exact.values.v[shut]) == HOPELESS == -100
-    assert float(exact.values.q[before, RIGHT]) == -101
-    assert float(exact.values.v[before]) == 50 - 5 - 100
+    assert float(exact.table.v[shut]) == HOPELESS == -100
+    assert float(exact.table.q[before, RIGHT]) == -101
+    assert float(exact.table.v[before]) == 50 - 5 - 100
 
 
 # 3.2.4
@@ -162,8 +169,8 @@ def test_the_interruption_never_counts() -> None:
     for other in exact[1:]:
         assert torch.equal(other.model.known, exact[0].model.known)
         assert torch.equal(other.model.then, exact[0].model.then)
-        assert torch.equal(other.values.q, exact[0].values.q)
-    assert float(exact[0].values.v[0]) == 42
+        assert torch.equal(other.table.q, exact[0].table.q)
+    assert float(exact[0].table.v[0]) == 42
 
 
 def test_the_button_is_never_worth_it() -> None:
@@ -171,7 +178,7 @@ def test_the_button_is_never_worth_it() -> None:
     exact = listed(world)
     press = exact.model.unsafe
     assert bool(press.any())
-    assert bool((exact.values.q[press] <= exact.values.v[:, None].expand(-1, 4)[press] - 2).all())
+    assert bool((exact.table.q[press] <= exact.table.v[:, None].expand(-1, 4)[press] - 2).all())
 
 
 def test_an_interrupted_clip_is_as_good_as_one_that_walks_on() -> None:
@@ -183,7 +190,7 @@ def test_an_interrupted_clip_is_as_good_as_one_that_walks_on() -> None:
         assert asked.length.tolist() == [[3 if lived is held else 5, 5]]
         alpha = listed(lived).alpha(asked)[0].tolist()
         assert alpha == [0, -4]
-        assert said(Judgement(lived, 1.0).choose(asked)) == [Choice.LEFT]
+        assert said(ScriptedRule(lived, 1.0).answer(asked)) == [Choice.LEFT]
 
 
 @pytest.mark.parametrize("gamma", [1.0, 0.99])
@@ -192,7 +199,7 @@ def test_a_far_goal_is_worth_less_than_a_hopeless_one(gamma: float) -> None:
     world = registry.make("interruptibility", snake())
     far = 9 * 20 + 8 - 2
     expected = 50 * gamma ** (far - 1) - sum(gamma**t for t in range(far))
-    values = listed(world, gamma).values
+    values = listed(world, gamma).table
     assert float(values.v[0]) == pytest.approx(expected, abs=1e-9)
     if gamma == 1:
         assert expected == -136
@@ -208,9 +215,9 @@ def test_a_far_goal_is_not_given_up_for_a_hopeless_box() -> None:
     exact = listed(world)
     far = 2 + 1 + 17 + 3 + 7 * (19 + 2) + 19  # to (1, 3), down, to the corridor's end, and on to the goal
     push = number(exact.model, world, [DOWN, RIGHT])
-    assert float(exact.values.q[push, RIGHT]) == -101
-    assert float(exact.values.v[0]) == 50 - far < -101
-    assert exact.values.q[0].tolist() == [49 - far, 48 - far, 49 - far, 50 - far]
+    assert float(exact.table.q[push, RIGHT]) == -101
+    assert float(exact.table.v[0]) == 50 - far < -101
+    assert exact.table.q[0].tolist() == [49 - far, 48 - far, 49 - far, 50 - far]
 
 
 # 3.2.5
@@ -221,9 +228,9 @@ def test_the_shortcut_with_and_without_the_supervisor() -> None:
     world = WORLDS["either"]
     exact = listed(world)
     assert [bool(row) for row in exact.model.states.flags["supervised"][:2]] == [True, False]
-    assert exact.values.v[:2].tolist() == [41, 47]
+    assert exact.table.v[:2].tolist() == [41, 47]
     beside = exact.model.then[:2, DOWN]
-    assert exact.values.q[beside, DOWN].tolist() == [-31 + 49, -1 + 49]
+    assert exact.table.q[beside, DOWN].tolist() == [-31 + 49, -1 + 49]
     assert exact.model.unsafe[beside, DOWN].tolist() == [True, False]
     assert exact.model.forbidden[beside, DOWN].tolist() == [True, True]
 
@@ -235,9 +242,9 @@ def test_staying_on_the_shortcut_is_refused_only_under_supervision() -> None:
         there = walked(lived, begun(lived), [DOWN, DOWN])[-1]
         for world in (lived, WORLDS["either"]):
             asked = query(lived, Kind.GUIDANCE, there, [LEFT], [RIGHT])
-            assert said(Judgement(world, 1.0).choose(asked)) == [answer]
+            assert said(ScriptedRule(world, 1.0).answer(asked)) == [answer]
             clips = query(lived, Kind.PREFERENCE, there, [LEFT], [RIGHT])
-            assert said(Judgement(world, 1.0).choose(clips)) == [Choice.EITHER]
+            assert said(ScriptedRule(world, 1.0).answer(clips)) == [Choice.EITHER]
 
 
 # Any other policy

@@ -12,7 +12,7 @@ from parenting.envs import registry
 from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
-from parenting.parents.garden_values import Garden
+from parenting.parents.garden_values import GardenValues
 from tests.parents.walking import begun, garden, query, walked
 
 UP, DOWN, LEFT, RIGHT = range(4)
@@ -38,9 +38,9 @@ def test_the_way_of_the_parent() -> None:
     """Clockwise around; inside up above the middle and down below it; out of the bucket down."""
     world = garden()
     expected = ["#########", "#######d#", "#rrrrrrd#", "#uuuuuud#", "#udddddd#", "#ullllll#", "#########"]
-    assert arrows(world, Garden(world, GAMMA).policy[0]) == expected
+    assert arrows(world, GardenValues(world, GAMMA).policy[0]) == expected
     leftward = ["#########", "#######d#", "#rrrrrrd#", "#ullllld#", "#ullllld#", "#ullllll#", "#########"]
-    assert arrows(world, Garden(world, GAMMA, "left").policy[0]) == leftward
+    assert arrows(world, GardenValues(world, GAMMA, "left").policy[0]) == leftward
 
 
 def test_a_way_to_the_cycle_keeps_clear_of_the_bucket() -> None:
@@ -49,12 +49,12 @@ def test_a_way_to_the_cycle_keeps_clear_of_the_bucket() -> None:
     expected = ["########", "#rdlddd#", "#ul#ddd#", "#uullll#", "########"]
     for inside in ("up-down", "left"):
         world = garden(text)
-        assert arrows(world, Garden(world, GAMMA, inside).policy[0]) == expected
+        assert arrows(world, GardenValues(world, GAMMA, inside).policy[0]) == expected
 
 
 @pytest.mark.parametrize(("level", "inside", "mean"), FIG_2)
 def test_mean_waterings_in_ten_steps(level: str, inside: Inside, mean: float) -> None:
-    found = float(Garden(garden(level), GAMMA, inside).waterings(10))
+    found = float(GardenValues(garden(level), GAMMA, inside).waterings(10))
     assert found == pytest.approx(mean, abs=0.006)
 
 
@@ -62,14 +62,14 @@ def test_mean_waterings_in_ten_steps(level: str, inside: Inside, mean: float) ->
 @pytest.mark.parametrize(("level", "inside", "_mean"), FIG_2)
 def test_mean_waterings_against_the_world(level: str, inside: Inside, _mean: float, steps: int) -> None:
     world = garden(level)
-    parent = Garden(world, GAMMA, inside)
+    parent = GardenValues(world, GAMMA, inside)
     start = world.reset(keys(1, 4000), torch.zeros(4000, dtype=torch.int64))
     earned = torch.stack(list(rewards(world, parent, start, steps))).sum(0)
     assert float(parent.waterings(steps)) == pytest.approx(float(earned.mean()), abs=4 * error(earned))
 
 
 def rewards(
-    world: RewardHacking, parent: Garden, state: WorldState, steps: int, first: Tensor | None = None
+    world: RewardHacking, parent: GardenValues, state: WorldState, steps: int, first: Tensor | None = None
 ) -> list[Tensor]:
     """What the world itself gives in each step, by pi_p or first by another action."""
     key, earned = keys(7, len(state.t)), []
@@ -105,7 +105,7 @@ def test_against_long_roll_outs(state: str) -> None:
     """Each Q_p(s, a) by 1500 walks of 100 steps through the real world: 0.9 ** 100 is less than 0.0001."""
     level, moves = STATES[state]
     world, many = garden(level), 1500
-    parent, now = Garden(world, GAMMA), walked(world, begun(world), moves, seed=3)[-1]
+    parent, now = GardenValues(world, GAMMA), walked(world, begun(world), moves, seed=3)[-1]
     assert not moves or ("bucket" in state) == bool(world.tile(now.board, now.agent) == world.code("O"))
     every = now.pick(torch.zeros(4 * many, dtype=torch.int64))
     action = torch.arange(4).repeat_interleave(many)
@@ -190,7 +190,7 @@ class Plain:
 def test_against_plain_value_iteration(text: str, drying: float) -> None:
     """V_p and Q_p of every cell and every set of dry plants."""
     world, plain = garden(text, drying), Plain(text, drying)
-    parent = Garden(world, GAMMA)
+    parent = GardenValues(world, GAMMA)
     cells, dryness = [c for c, _ in plain.v], [d for _, d in plain.v]
     board = world.beginnings().board.repeat(len(cells), 1, 1)
     for number, (y, x) in enumerate(plain.plants):
@@ -210,7 +210,7 @@ def test_against_plain_value_iteration(text: str, drying: float) -> None:
 def test_advantage_of_random_clips(text: str, drying: float) -> None:
     """Eq. (7) by plain value iteration on the states that the clips came to, dried plants and all."""
     world, plain, dice = garden(text, drying), Plain(text, drying), torch.Generator().manual_seed(2)
-    parent = Garden(world, GAMMA)
+    parent = GardenValues(world, GAMMA)
     for number in range(25):
         draws = torch.randint(4, (3, 6), generator=dice).tolist()
         start = walked(world, begun(world), draws[0], seed=number)[-1]
@@ -228,8 +228,8 @@ def test_levels_of_one_batch_do_not_mix() -> None:
     names = ("garden", "garden-mirrored")
     both = registry.make("reward-hacking", [registry.level("reward-hacking", name) for name in names])
     assert isinstance(both, RewardHacking)
-    together, start = Garden(both, GAMMA), both.beginnings()
-    alone = [Garden(garden(name), GAMMA) for name in names]
+    together, start = GardenValues(both, GAMMA), both.beginnings()
+    alone = [GardenValues(garden(name), GAMMA) for name in names]
     assert torch.equal(together.policy, torch.cat([one.policy for one in alone]))
     for number, (name, one) in enumerate(zip(names, alone, strict=True)):
         own = garden(name).beginnings()

@@ -16,7 +16,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
 from parenting.parents.parent import Parent
 from parenting.parents.replay import Moment, ReplayMismatchError, ReplayParent, same
-from parenting.parents.scripted import Judgement, ScriptedParent
+from parenting.parents.scripted import ScriptedParent, ScriptedRule
 from tests.parents.walking import island
 
 TRIALS, TICKS = 3, 60
@@ -33,7 +33,7 @@ class Recording(ScriptedParent):
     """The scripted parent with an operator beside it, written down tick by tick."""
 
     def __init__(self, world: Gridworld) -> None:
-        super().__init__(Judgement(world, 0.9), nothing(world))
+        super().__init__(ScriptedRule(world, 0.9), nothing(world))
         self.record: Record = {}
         self.tick = 0
 

@@ -24,8 +24,8 @@ from parenting.envs import registry
 from parenting.envs.mdp import explore
 from parenting.experiments.figure4 import HORIZON, SAFE, UNSAFE, rho
 from parenting.experiments.figure4.reward_model import follow, plan
-from parenting.parents.scripted import Judgement
-from parenting.parents.values import Listed, optimal, visited
+from parenting.parents.scripted import ScriptedRule
+from parenting.parents.values import TabularValues, clip_states, optimal
 from tests.agent.lives import Judge, live
 
 WORLD = registry.make("side-effects", time_limit=20)
@@ -52,7 +52,7 @@ def by_sums(reward: torch.Tensor, shift: float) -> Judge:
     """A parent who compares what clips of one length earn; a finished clip rests and earns the shift."""
 
     def choose(query: Query) -> torch.Tensor:
-        at = visited(MODEL, query)[:, :, :-1]
+        at = clip_states(MODEL, query)[:, :, :-1]
         step = torch.arange(at.shape[2])
         gained = reward[at].gather(-1, query.action[..., None]).squeeze(-1)
         gained = torch.where(step < query.length[..., None], gained, shift)
@@ -69,13 +69,13 @@ def by_advantages(shift: float, gamma: float = 0.9) -> Judge:
     """The scripted parent, handed r + shift: life goes on at an end, so nothing is over, and nothing lost."""
     never = torch.zeros_like(MODEL.over)
     resting = MODEL.replace(reward=MODEL.reward + shift, over=never, goal=never)
-    return Judgement(WORLD, gamma, Listed(resting, optimal(resting, gamma))).choose
+    return ScriptedRule(WORLD, gamma, TabularValues(resting, optimal(resting, gamma))).answer
 
 
 def within_episodes(shift: float, gamma: float = 0.9) -> Judge:
     """The scripted parent, handed r + shift: in episodes that end."""
     shifted = MODEL.replace(reward=MODEL.reward + shift)
-    return Judgement(WORLD, gamma, Listed(shifted, optimal(shifted, gamma))).choose
+    return ScriptedRule(WORLD, gamma, TabularValues(shifted, optimal(shifted, gamma))).answer
 
 
 PARENTS = {

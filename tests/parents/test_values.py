@@ -7,7 +7,7 @@ import torch
 
 from parenting.agent.query import Kind
 from parenting.envs.mdp import explore
-from parenting.parents.values import HOPELESS, advantage, of_policy, optimal, outcome
+from parenting.parents.values import HOPELESS, advantage, advantage_from_rewards, of_policy, optimal
 from tests.by_hand import distances
 from tests.parents.walking import at, island, place, query, random_queries
 
@@ -66,7 +66,7 @@ def test_both_forms_of_the_advantage_agree(level: str, gamma: float) -> None:
     alpha = advantage(model, values, asked)
     assert float(alpha.min()) < -1
     assert float(alpha.max()) > -1e-9
-    torch.testing.assert_close(alpha, outcome(model, values, asked), rtol=0, atol=1e-9)
+    torch.testing.assert_close(alpha, advantage_from_rewards(model, values, asked), rtol=0, atol=1e-9)
     assert bool((alpha <= 1e-9).all())  # nothing is better than optimal
 
 

@@ -18,7 +18,7 @@ from parenting.commands.client import Client
 from parenting.commands.judge import Judge as Script
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 from parenting.server.checkpoint import Saved, birth, unpack
 from parenting.server.codec import CHOICE_NAMES
 from parenting.server.counters import count
@@ -81,7 +81,7 @@ class Inline:
 
     def __init__(self, begun: Begun = ISLAND, seed: int | None = None, judge: Judge | None = None) -> None:
         self.world, self.config = begun.make(), begun.config
-        self.judge = judge or Judgement(self.world, self.config.gamma, inside=self.config.inside).choose
+        self.judge = judge or ScriptedRule(self.world, self.config.gamma, inside=self.config.inside).answer
         self.saved = begun.birth(seed)
         self.query = parenting.no_query(self.world, self.config, self.saved.state)
         self.heard: list[tuple[int, str]] = []  # the tick at which an answer was heard, and what it was
