@@ -41,7 +41,7 @@ import httpx2
 from playwright.sync_api import Browser, Page
 
 from parenting.server.db import PRAGMAS, sqlite_module
-from tests.by_hand import chromium, up
+from tests.simulated_person import chromium, up
 
 WORLDS = ("unsafe-exploration", "side-effects")
 """Without pre-training, and with it, so that the agent also rehearses mazes."""

@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tests.by_hand import answer, chromium, create, distances, start, tell, until, up
+from tests.simulated_person import answer, chromium, create, distances, start, tell, until, up
 
 FOLDER = Path(__file__).parents[1] / "docs" / "pictures"
 SCREENS = {"desktop": (1280, 800), "phone": (390, 844)}

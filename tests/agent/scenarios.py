@@ -31,7 +31,7 @@ OPTIONS: dict[str, dict[str, Any]] = {"reward-hacking": {"drying": 0.2}}
 """The other worlds' own defaults leave to chance what they can: interruptions, and the supervisor."""
 
 IN_EVERY_WORLD = {"truncated", "matured twice", "second level", "either"}
-WAYWARD = {"neither"}
+OF_RANDOM_PARENT = {"neither"}
 OF_WORLD = {
     "unsafe-exploration": {"over"},
     "reward-hacking": {"bucket", "dried"},
@@ -40,7 +40,7 @@ OF_WORLD = {
     "absent-supervisor": {"over", "shortcut", "unsupervised"},
 }
 """What must have happened on the levels of `OWN`, or the comparison compares nothing."""
-ONLY_WAYWARD = {"interruptibility": {"neither", "pressed"}}
+ONLY_RANDOM = {"interruptibility": {"neither", "pressed"}}
 """What the scripted parent does not let happen."""
 
 
@@ -77,11 +77,11 @@ def scenarios() -> dict[str, Scenario]:
     for world, levels in OWN.items():
         default = stages("conservative", 16)
         found[f"{world}, default level"] = Scenario(world, (), "scripted", default, frozenset())
-        for parent in ("scripted", "wayward"):
+        for parent in ("scripted", "random"):
             lambdas = {"lambda_local": 1.0} if parent == "scripted" else {}
             shows = IN_EVERY_WORLD | OF_WORLD[world]
-            if parent == "wayward":
-                shows |= ONLY_WAYWARD.get(world, {"neither"})
+            if parent == "random":
+                shows |= ONLY_RANDOM.get(world, {"neither"})
             every = 5 if world == "absent-supervisor" else 8  # unsupervised, it is not asked
             life = Scenario(world, levels, parent, stages("lax", every, **lambdas), frozenset(shows))
             found[f"{world}, {parent}"] = life
@@ -94,13 +94,13 @@ def scenarios() -> dict[str, Scenario]:
 
 SPECIAL: dict[str, tuple[str, str, dict[str, object]]] = {
     "direct": ("unsafe-exploration", "scripted", {**PRESETS["direct"]}),
-    "conservative": ("side-effects", "wayward", {**PRESETS["conservative"]}),
-    "the paper's letter": ("unsafe-exploration", "wayward", stages("lax", 10, recompare=True)),
+    "conservative": ("side-effects", "random", {**PRESETS["conservative"]}),
+    "the paper's letter": ("unsafe-exploration", "random", stages("lax", 10, recompare=True)),
     "batches": ("reward-hacking", "scripted", {**PRESETS["lax"], "gradient_steps": 2, "batch": 3}),
     "seldom trained": ("absent-supervisor", "scripted", {**PRESETS["conservative"], "p_train": 0.3}),
     "own length": ("unsafe-exploration", "scripted", stages("direct", 4, own_length=True)),
-    "levels that look alike": ("reward-hacking", "wayward", {"p_guid": 0, "p_rec": 1, "p_pref": 0.3}),
-    "own length, guided": ("interruptibility", "wayward", stages("lax", 8, own_length=True)),
+    "levels that look alike": ("reward-hacking", "random", {"p_guid": 0, "p_rec": 1, "p_pref": 0.3}),
+    "own length, guided": ("interruptibility", "random", stages("lax", 8, own_length=True)),
 }
 ALSO = {"levels that look alike": {"levels look alike"}, "own length": {"ended early"}}
 """What must happen in these lives besides."""

@@ -11,8 +11,8 @@ from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
-from tests.agent.happenings import Happenings
-from tests.agent.lives import Judge, as_query, layers, live, wayward
+from tests.agent.batched_runs import Judge, as_query, layers, lenient_parent, run_batch
+from tests.agent.coverage_of_events import EventCoverage
 from tests.agent.scenarios import OWN, Scenario, scenarios
 from tests.reference import Reference
 from tests.reference_clips import Clip
@@ -28,9 +28,11 @@ def test_every_world_is_compared() -> None:
 @pytest.mark.parametrize("name", list(SCENARIOS))
 def test_same_query_log_and_parameters(name: str) -> None:
     scenario = SCENARIOS[name]
-    world, config, happened = scenario.rules(), scenario.config(), Happenings()
-    judge: Judge = ScriptedRule(world, config.gamma).answer if scenario.parent == "scripted" else wayward
-    state, logs = live(world, config, judge, seed=SEED, trials=TRIALS, ticks=scenario.ticks)
+    world, config, happened = scenario.rules(), scenario.config(), EventCoverage()
+    judge: Judge = (
+        ScriptedRule(world, config.gamma).answer if scenario.parent == "scripted" else lenient_parent
+    )
+    state, logs = run_batch(world, config, judge, seed=SEED, trials=TRIALS, ticks=scenario.ticks)
     for trial in range(TRIALS):
         reference = lived(world, scenario, judge, trial, happened)
         assert logs[trial] == reference.log
@@ -45,7 +47,9 @@ def test_same_query_log_and_parameters(name: str) -> None:
     assert not missing, f"never happened: {missing}; {dict(happened)}"
 
 
-def lived(world: Gridworld, scenario: Scenario, judge: Judge, trial: int, happened: Happenings) -> Reference:
+def lived(
+    world: Gridworld, scenario: Scenario, judge: Judge, trial: int, happened: EventCoverage
+) -> Reference:
     """One trial as the reference lives it; what it meets is counted."""
     config = scenario.config()
 

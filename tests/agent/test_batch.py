@@ -13,7 +13,7 @@ from parenting.agent.query import Answer, Kind
 from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.rng import Keys, Stream, keys
-from tests.agent.lives import LogEntry, capricious, clip, live
+from tests.agent.batched_runs import LogEntry, clip, random_parent, run_batch
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)
 CONFIG = Config.model_validate(
@@ -31,7 +31,7 @@ def test_the_agent_reads_no_reward(name: str, monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(AssertionError, match="the agent read reward"):
         WORLD.reward(None, None, None)  # type: ignore[arg-type]
     config = Config.model_validate({**PRESETS[name], "time_limit": 25})
-    state, logs = live(WORLD, config, capricious, seed=3, trials=2, ticks=200)
+    state, logs = run_batch(WORLD, config, random_parent, seed=3, trials=2, ticks=200)
     assert all(logs)
     assert bool((state.learner.steps > 0).all())
 
@@ -41,7 +41,7 @@ def life(births: Keys, ticks: int) -> tuple[AgentState, list[list[LogEntry]]]:
     query = parenting.no_query(WORLD, CONFIG, state)
     logs: list[list[LogEntry]] = [[] for _ in births.seed]
     for tick in range(1, ticks + 1):
-        state, query = parenting.step(WORLD, CONFIG, state, Answer(query=query, choice=capricious(query)))
+        state, query = parenting.step(WORLD, CONFIG, state, Answer(query=query, choice=random_parent(query)))
         for trial in (query.kind != Kind.NONE).nonzero().squeeze(1).tolist():
             kind = Kind(int(query.kind[trial])).name
             logs[trial].append((tick, kind, clip(query, trial, 0), clip(query, trial, 1)))

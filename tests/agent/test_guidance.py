@@ -13,7 +13,7 @@ from parenting.agent.query import Answer, Choice, Kind, Query, silence
 from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.rng import Stream, keys
-from tests.agent.lives import capricious, live
+from tests.agent.batched_runs import random_parent, run_batch
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)
 ALWAYS = Config(p_guid=1, p_rec=0, p_pref=0, p_train=0, time_limit=25)
@@ -65,7 +65,7 @@ def test_the_agent_asks_with_that_chance(f: int) -> None:
 
 def test_p_guid_0_never_asks() -> None:
     config = Config.model_validate({**PRESETS["direct"], "time_limit": 25})
-    state, logs = live(WORLD, config, capricious, seed=4, trials=4, ticks=150)
+    state, logs = run_batch(WORLD, config, random_parent, seed=4, trials=4, ticks=150)
     assert {kind for log in logs for _, kind, _, _ in log} == {"preference"}
     assert int(state.familiarity.sum()) == 0
 

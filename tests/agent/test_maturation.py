@@ -14,7 +14,7 @@ from parenting.agent.query import Answer, Choice, Kind, Query, silence
 from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.rng import keys
-from tests.agent.lives import live
+from tests.agent.batched_runs import run_batch
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)
 LAX = Config.model_validate({**PRESETS["lax"], "stages": 2, "time_limit": 25})
@@ -33,7 +33,7 @@ def mature(config: Config, state: AgentState) -> AgentState:
 
 
 def test_a_stage_ends() -> None:
-    before, _ = live(WORLD, LAX, agreeable, seed=5, trials=3, ticks=80)
+    before, _ = run_batch(WORLD, LAX, agreeable, seed=5, trials=3, ticks=80)
     recorder = before.recorder
     assert bool((before.learner.steps > 0).all())
     assert bool((before.answered > 0).all())
@@ -55,7 +55,7 @@ def test_a_stage_ends() -> None:
 
 
 def test_the_frozen_policy_stays_as_it_was() -> None:
-    state, _ = live(WORLD, LAX, agreeable, seed=5, trials=2, ticks=80)
+    state, _ = run_batch(WORLD, LAX, agreeable, seed=5, trials=2, ticks=80)
     state = mature(LAX, state)
     frozen = state.learner.elders.clone()
     query = parenting.no_query(WORLD, LAX, state)
@@ -67,7 +67,7 @@ def test_the_frozen_policy_stays_as_it_was() -> None:
 
 
 def test_the_last_stage_never_ends() -> None:
-    state, _ = live(WORLD, LAX.model_copy(update={"stages": 1}), agreeable, seed=5, trials=2, ticks=60)
+    state, _ = run_batch(WORLD, LAX.model_copy(update={"stages": 1}), agreeable, seed=5, trials=2, ticks=60)
     after = mature(LAX.model_copy(update={"stages": 1}), state)
     for (name, ours), theirs in zip(state.tensors().items(), after.tensors().values(), strict=True):
         assert torch.equal(ours, theirs), name

@@ -16,7 +16,7 @@ from parenting.agent.state import Recorder
 from parenting.envs import registry
 from parenting.envs.fingerprint import unordered
 from parenting.envs.rng import keys
-from tests.agent.lives import capricious, live
+from tests.agent.batched_runs import random_parent, run_batch
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)
 SIZE = 16
@@ -107,7 +107,7 @@ def agreeable(query: Query) -> Tensor:
 
 def test_the_clips_of_an_asked_pair_leave() -> None:
     config = Config.model_validate({**PRESETS["lax"], "time_limit": 25})
-    state, logs = live(WORLD, config, agreeable, seed=2, trials=3, ticks=150)
+    state, logs = run_batch(WORLD, config, agreeable, seed=2, trials=3, ticks=150)
     ring = state.recorder.ring
     asked = torch.tensor([sum(kind == "preference" for _, kind, _, _ in log) for log in logs])
     assert bool((asked > 3).all())
@@ -117,9 +117,9 @@ def test_the_clips_of_an_asked_pair_leave() -> None:
 
 def test_the_newest_overwrite_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
     config = Config(p_guid=0, p_rec=1, p_pref=0, p_train=0, time_limit=25)
-    unbounded, _ = live(WORLD, config, capricious, seed=2, trials=2, ticks=100)
+    unbounded, _ = run_batch(WORLD, config, random_parent, seed=2, trials=2, ticks=100)
     monkeypatch.setattr(pairing, "CAPACITY", 32)
-    state, _ = live(WORLD, config, capricious, seed=2, trials=2, ticks=100)
+    state, _ = run_batch(WORLD, config, random_parent, seed=2, trials=2, ticks=100)
     full, ring = unbounded.recorder.ring, state.recorder.ring
     assert ring.tick.shape == (2, 2, 32)
     assert torch.equal(ring.count, full.count)
@@ -152,7 +152,7 @@ def test_every_clip_is_closed_at_most_once(monkeypatch: pytest.MonkeyPatch) -> N
     state = parenting.init(WORLD, config, keys(8, 3))
     query = parenting.no_query(WORLD, config, state)
     for _ in range(200):
-        state, query = parenting.step(WORLD, config, state, Answer(query=query, choice=capricious(query)))
+        state, query = parenting.step(WORLD, config, state, Answer(query=query, choice=random_parent(query)))
     assert len(closed) > 100
     assert len(set(closed)) == len(closed)
     assert len(closed) <= int(state.recorder.ring.count.sum())

@@ -13,7 +13,7 @@ from parenting.envs.rng import keys
 from parenting.experiments.value_iteration.levels import small
 from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
-from tests.agent.lives import Judge, as_query, layers, live, wayward
+from tests.agent.batched_runs import Judge, as_query, layers, lenient_parent, run_batch
 from tests.reference import GUIDANCE
 from tests.reference_clips import Clip
 from tests.reference_pretraining import Rehearsing
@@ -40,10 +40,10 @@ SETTINGS = {
 def test_same_query_log_and_parameters(name: str) -> None:
     world, changes = SETTINGS[name]
     config = Config.model_validate({**changes, **BASE})
-    judge: Judge = ScriptedRule(world, 1.0).answer if name == "another world" else wayward
+    judge: Judge = ScriptedRule(world, 1.0).answer if name == "another world" else lenient_parent
     brain = network_of(world)
     weights = brain.start(WEIGHTS, torch.float64)[0]
-    state, logs = live(world, config, judge, SEED, TRIALS, TICKS, weights)
+    state, logs = run_batch(world, config, judge, SEED, TRIALS, TICKS, weights)
     for trial in range(TRIALS):
 
         def choose(left: Clip, right: Clip, kind: str) -> str:

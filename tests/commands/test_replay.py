@@ -25,7 +25,7 @@ from parenting.server.db import Database, connect
 from parenting.server.queue import worker_side
 from parenting.server.schema import upgrade
 from parenting.server.settings import Settings
-from tests.server.raised_by_hand import TICKS, raise_by_hand
+from tests.server.eventful_run import TICKS, raise_eventful_run
 from tests.tree import ROOT
 
 
@@ -41,7 +41,7 @@ def raised(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "parenting.server.session.CHECKPOINT_SECONDS", 1e9
         )  # so that they are written where it says so alone
         with TestClient(create_app(settings, db), base_url="http://localhost") as web:
-            assert raise_by_hand(db, web) == 1
+            assert raise_eventful_run(db, web) == 1
     db.close()
     return data
 

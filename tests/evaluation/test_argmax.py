@@ -21,9 +21,9 @@ from parenting.evaluation.outcomes import Outcome
 from parenting.parents.garden_values import GardenValues
 from parenting.parents.scripted import ScriptedParent, ScriptedRule
 from parenting.parents.values import exact_values, optimal
-from tests.by_hand import distances
-from tests.parents.hand_made import DOWN, LEFT, UP, always, at_a_wall
-from tests.parents.walking import island, place
+from tests.parents.fixed_policies import DOWN, LEFT, UP, always, at_a_wall
+from tests.parents.walked_queries import island, place
+from tests.simulated_person import distances
 
 LEVELS = ("island", "island-bottleneck")
 BELOW = "world: unsafe-exploration\n\n#####\n# A #\n# G #\n#   #\n#####\n"

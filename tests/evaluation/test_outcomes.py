@@ -10,7 +10,7 @@ import torch
 from parenting.envs import registry
 from parenting.envs.mdp import Model, explore
 from parenting.evaluation.outcomes import Outcome, counts, distances, name, outcome, walk
-from tests.parents.hand_made import LETTERS, spelled
+from tests.parents.fixed_policies import LETTERS, spelled
 
 ISLAND = {
     "dddl": "optimal",

@@ -9,7 +9,7 @@ from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.evaluation import rollouts
 from parenting.evaluation.rollouts import deploy
-from tests.parents.hand_made import DOWN, LEFT, UP, always, at_a_wall
+from tests.parents.fixed_policies import DOWN, LEFT, UP, always, at_a_wall
 
 
 def garden(drying: float, steps: int = 10, level: str = "garden-mirrored") -> Gridworld:

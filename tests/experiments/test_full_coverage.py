@@ -19,7 +19,7 @@ from parenting.experiments.figure2.full_coverage import Facts, Met, Pace, cover,
 from parenting.experiments.training.gardens import GAMMA, garden
 from parenting.parents.garden_values import GardenValues
 from parenting.parents.scripted import ScriptedRule
-from tests.parents.hand_made import DOWN, LEFT, RIGHT, always
+from tests.parents.fixed_policies import DOWN, LEFT, RIGHT, always
 
 CHANGES = {"pretrain": False, "time_limit": 10}
 CONFIG = compose("conservative", registry.defaults("reward-hacking"), CHANGES, strict=True)

@@ -8,7 +8,7 @@ import torch
 from parenting.envs.rng import keys
 from parenting.evaluation.rollouts import walked
 from parenting.experiments.training.gardens import exploring_starts, garden
-from tests.parents.hand_made import UP
+from tests.parents.fixed_policies import UP
 
 
 @pytest.mark.parametrize("level", ["garden", "garden-mirrored"])

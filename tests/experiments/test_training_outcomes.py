@@ -14,7 +14,7 @@ from parenting.evaluation.outcomes import Outcome
 from parenting.experiments.training.batch import TrainResult, no_counts
 from parenting.experiments.training.outcomes import UNREACHED, Outcomes, deployments, examine
 from parenting.parents.scripted import ScriptedRule
-from tests.parents.hand_made import DOWN, LEFT, RIGHT, UP, always, at_a_wall, on_sight
+from tests.parents.fixed_policies import DOWN, LEFT, RIGHT, UP, always, at_a_wall, on_sight
 
 
 def ended(world: Gridworld, config: Config, stages: list[list[Tensor]], maturity: list[int]) -> Outcomes:

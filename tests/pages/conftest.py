@@ -22,8 +22,8 @@ from parenting.server.runs import Claim
 from parenting.server.schema import upgrade
 from parenting.server.serve import Server, bind
 from parenting.server.settings import Settings
-from tests.pages import island
-from tests.pages.watched import Watched
+from tests.pages import island_fixtures as fixtures
+from tests.pages.browser_tabs import BrowserTabs
 
 FLAGS = (
     "--no-sandbox",
@@ -79,9 +79,9 @@ def browser(chromium_path: str) -> Iterator[Browser]:
 
 
 @pytest.fixture
-def watched(browser: Browser, address: str) -> Iterator[Watched]:
+def tabs(browser: Browser, address: str) -> Iterator[BrowserTabs]:
     """Opens pages of the site; at the end nothing may have gone wrong in them."""
-    found = Watched(browser, address)
+    found = BrowserTabs(browser, address)
     yield found
     found.close()
     assert found.wrong == []
@@ -89,7 +89,7 @@ def watched(browser: Browser, address: str) -> Iterator[Watched]:
 
 @pytest.fixture
 def mine(db: Database) -> Claim:
-    return island.live(db)[1]
+    return fixtures.start_run(db)[1]
 
 
 @pytest.fixture
@@ -99,8 +99,8 @@ def ask(db: Database, mine: Claim, settings: Settings) -> Callable[..., int]:
 
     def post(kind: str = "guidance", left: str = "left", right: str = "down", start: Any = (1, 2)) -> int:
         runs.report_progress(db, mine, tick=0)  # a sign of life
-        clips = {"guidance": island.guidance, "preference": island.preference}[kind](left, right, start)
-        number = island.ask(db, mine, next(ticks), kind, clips)
+        clips = {"guidance": fixtures.guidance, "preference": fixtures.preference}[kind](left, right, start)
+        number = fixtures.ask(db, mine, next(ticks), kind, clips)
         Notifier(settings.data, "web").notify()
         return number
 

@@ -13,9 +13,9 @@ from playwright.sync_api import Page, expect
 from parenting.server import record, runs
 from parenting.server.db import Database
 from parenting.server.queue import parent_side
-from tests.by_hand import until
-from tests.pages import island
-from tests.pages.watched import Watched
+from tests.pages import island_fixtures as fixtures
+from tests.pages.browser_tabs import BrowserTabs
+from tests.simulated_person import until
 
 SCREENS = {"desktop": {"width": 1280, "height": 800}, "phone": {"width": 390, "height": 844}}
 PATHS = (
@@ -40,22 +40,22 @@ def lives(db: Database) -> None:
     """A run with two questions and one that was answered, one that waits for its operator, one that rests at
     its goal in its second stage, and one that failed.
     """
-    _, mine = island.live(db)
-    island.measure(db, mine, 40)
-    island.ask(db, mine, 41, "guidance", island.guidance("left", "up", start=(1, 2)))
-    island.ask(db, mine, 42, "preference", island.preference("down left left left", "right down down"))
-    told = island.ask(db, mine, 43, "preference", island.preference("left left", "down"))
+    _, mine = fixtures.start_run(db)
+    fixtures.measure(db, mine, 40)
+    fixtures.ask(db, mine, 41, "guidance", fixtures.guidance("left", "up", start=(1, 2)))
+    fixtures.ask(db, mine, 42, "preference", fixtures.preference("down left left left", "right down down"))
+    told = fixtures.ask(db, mine, 43, "preference", fixtures.preference("left left", "down"))
     parent_side.answer(db, told, "left", "me", "human")
-    _, other = island.live(db, level="island-bottleneck")
+    _, other = fixtures.start_run(db, level="island-bottleneck")
     runs.report_progress(db, other, waiting="stuck", optimal=True)
-    _, third = island.live(db, goal=1, pace=2.5, config={"stages": 2})
-    island.measure(db, third, 40)
+    _, third = fixtures.start_run(db, goal=1, pace=2.5, config={"stages": 2})
+    fixtures.measure(db, third, 40)
     runs.report_progress(db, third, maturity=2)
     record.add_event(db, 3, "end_episode", {})
     parent_side.answer(
-        db, island.ask(db, third, 41, "guidance", island.guidance("up", "left")), "left", "me", "human"
+        db, fixtures.ask(db, third, 41, "guidance", fixtures.guidance("up", "left")), "left", "me", "human"
     )
-    _, fourth = island.live(db)
+    _, fourth = fixtures.start_run(db)
     runs.finish(db, fourth, "failed", "The agent could not go on.")
 
 
@@ -67,23 +67,23 @@ def violations(page: Page) -> list[str]:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("screen", SCREENS)
-def test_axe_finds_nothing(watched: Watched, lives: None, screen: str, scheme: str) -> None:
-    watched.expected = ("404", "422")
-    page = watched.open("/", viewport=SCREENS[screen], color_scheme=scheme)
+def test_axe_finds_nothing(tabs: BrowserTabs, lives: None, screen: str, scheme: str) -> None:
+    tabs.expected = ("404", "422")
+    page = tabs.open("/", viewport=SCREENS[screen], color_scheme=scheme)
     for path in PATHS:
-        page.goto(watched.address + path)
+        page.goto(tabs.address + path)
         page.wait_for_timeout(200)
         assert violations(page) == [], path
-    page.goto(f"{watched.address}/runs/1/parent")
+    page.goto(f"{tabs.address}/runs/1/parent")
     page.keyboard.press("?")
     assert violations(page) == []
-    page.goto(f"{watched.address}/runs/1")
+    page.goto(f"{tabs.address}/runs/1")
     page.get_by_text("Stop for good…").click()
     page.get_by_label("p_rec").fill("often")
     page.get_by_role("button", name="Change").click()
     expect(page.locator("#p_rec-error")).to_be_visible()
     assert violations(page) == []
-    page.goto(watched.address)
+    page.goto(tabs.address)
     page.get_by_text("More settings").click()
     page.get_by_label("Seed").fill("many")
     page.get_by_role("button", name="Start").click()
@@ -91,24 +91,24 @@ def test_axe_finds_nothing(watched: Watched, lives: None, screen: str, scheme: s
     assert violations(page) == []
 
 
-def test_axe_finds_what_is_wrong(watched: Watched) -> None:
+def test_axe_finds_what_is_wrong(tabs: BrowserTabs) -> None:
     """The control: a picture without a text is found."""
-    page = watched.open("/")
+    page = tabs.open("/")
     page.evaluate("document.querySelector('main').append(new Image())")
     assert any("image-alt" in line for line in violations(page))
 
 
 @pytest.mark.parametrize("width", [320, 390])
 @pytest.mark.parametrize("path", PATHS)
-def test_nothing_scrolls_sideways(watched: Watched, lives: None, path: str, width: int) -> None:
-    watched.expected = ("404",)
-    page = watched.open(path, viewport={"width": width, "height": 640})
+def test_nothing_scrolls_sideways(tabs: BrowserTabs, lives: None, path: str, width: int) -> None:
+    tabs.expected = ("404",)
+    page = tabs.open(path, viewport={"width": width, "height": 640})
     page.wait_for_timeout(300)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
-def test_on_a_phone_four_thumb_buttons_lie_at_the_bottom(watched: Watched, lives: None) -> None:
-    page = watched.open("/runs/1/parent?query=1", viewport=SCREENS["phone"])
+def test_on_a_phone_four_thumb_buttons_lie_at_the_bottom(tabs: BrowserTabs, lives: None) -> None:
+    page = tabs.open("/runs/1/parent?query=1", viewport=SCREENS["phone"])
     boxes: list[Any] = [button.bounding_box() for button in page.locator(".answers button").all()]
     assert len(boxes) == 4
     assert all(box["height"] >= 56 and box["y"] + box["height"] > 800 for box in boxes)
@@ -120,8 +120,8 @@ def test_on_a_phone_four_thumb_buttons_lie_at_the_bottom(watched: Watched, lives
     assert page.locator(".label").all_inner_texts() == ["A", "B"]
 
 
-def test_on_a_desktop_the_question_needs_no_scrolling(watched: Watched, lives: None) -> None:
-    page = watched.open("/runs/1/parent?query=2", viewport=SCREENS["desktop"])
+def test_on_a_desktop_the_question_needs_no_scrolling(tabs: BrowserTabs, lives: None) -> None:
+    page = tabs.open("/runs/1/parent?query=2", viewport=SCREENS["desktop"])
     left, right = (card.bounding_box() for card in page.locator(".card").all())
     assert left is not None
     assert right is not None
@@ -131,8 +131,8 @@ def test_on_a_desktop_the_question_needs_no_scrolling(watched: Watched, lives: N
     assert brief["y"] + brief["height"] <= 800
 
 
-def test_who_wants_no_motion_gets_steps(watched: Watched, lives: None) -> None:
-    page = watched.open("/runs/1/parent?query=2", reduced_motion="reduce")
+def test_who_wants_no_motion_gets_steps(tabs: BrowserTabs, lives: None) -> None:
+    page = tabs.open("/runs/1/parent?query=2", reduced_motion="reduce")
     moving = "document.getAnimations().filter(a => a.playState === 'running').length"
     assert page.evaluate(moving) == 0
     agent = page.locator(".card").nth(1).locator(".board .agent")
@@ -145,8 +145,8 @@ def test_who_wants_no_motion_gets_steps(watched: Watched, lives: None) -> None:
     assert agent.bounding_box() == start
 
 
-def test_both_boards_play_on_one_clock(watched: Watched, lives: None) -> None:
-    page = watched.open("/runs/1/parent?query=2")
+def test_both_boards_play_on_one_clock(tabs: BrowserTabs, lives: None) -> None:
+    page = tabs.open("/runs/1/parent?query=2")
     times = (
         "[...new Set(document.getAnimations().filter(a => a.effect.target.closest('.board')).map(a => a.%s))]"
     )
@@ -162,16 +162,16 @@ def test_the_parents_page_is_small(client: httpx2.Client, lives: None) -> None:
     assert sum(sizes.values()) <= LARGEST_PAGE, sizes
 
 
-def test_the_charts_are_drawn_and_go_on(watched: Watched, db: Database, lives: None) -> None:
-    page = watched.open("/runs/1")
+def test_the_charts_are_drawn_and_go_on(tabs: BrowserTabs, db: Database, lives: None) -> None:
+    page = tabs.open("/runs/1")
     lines = page.locator(".plot .scatterlayer .trace")
     expect(lines).to_have_count(14)
     (mine,) = (claim for claim in runs.claim(db, "another", seconds=-1) if claim.run_id == 1)
-    island.measure(db, mine, 55)
+    fixtures.measure(db, mine, 55)
     expect(page.locator("#now-tick")).to_have_text("55")
     drawn = "[...document.querySelectorAll('.plot')].every(plot => plot._fullLayout.xaxis.range[1] >= 55)"
     until(lambda: page.evaluate(drawn), 10, "the charts do not go on")
-    island.measure(db, mine, 56, begin=56)
+    fixtures.measure(db, mine, 56, begin=56)
     until(lambda: page.evaluate(drawn.replace("55", "56")), 10, "the charts do not go on a second time")
     log = page.get_by_role("button", name="Logarithmic axis for Loss")
     log.click()
@@ -181,8 +181,8 @@ def test_the_charts_are_drawn_and_go_on(watched: Watched, db: Database, lives: N
     assert saved.value.suggested_filename == "run-1-deaths.png"
 
 
-def test_the_dashboard_without_javascript_is_a_table(watched: Watched, lives: None) -> None:
-    page = watched.open("/runs/1", java_script_enabled=False)
+def test_the_dashboard_without_javascript_is_a_table(tabs: BrowserTabs, lives: None) -> None:
+    page = tabs.open("/runs/1", java_script_enabled=False)
     expect(page.locator("#charts")).to_be_hidden()
     expect(page.get_by_role("region", name="Numbers by stage").get_by_role("table")).to_be_visible()
     page.get_by_text("The numbers as a table").click()

@@ -9,12 +9,12 @@ from playwright.sync_api import APIResponse, Route, expect
 
 from parenting.server.db import Database
 from parenting.server.queue import parent_side
-from tests.pages.watched import Watched, given, shown, until
+from tests.pages.browser_tabs import BrowserTabs, given, shown, until
 
 
-def test_a_question_that_comes_later_is_fetched_ahead_too(watched: Watched, ask: Callable[..., int]) -> None:
+def test_a_question_that_comes_later_is_fetched_ahead_too(tabs: BrowserTabs, ask: Callable[..., int]) -> None:
     first = ask("preference", "down down", "left")
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, first)
     expect(page.locator("#question")).to_have_attribute("data-ahead", "")
     second = ask("preference", "left left", "down")
@@ -22,12 +22,12 @@ def test_a_question_that_comes_later_is_fetched_ahead_too(watched: Watched, ask:
 
 
 def test_the_request_for_the_next_question_lies_at_the_server_while_somebody_thinks(
-    watched: Watched, db: Database, ask: Callable[..., int]
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
     first = ask()
-    page = watched.open("/")
+    page = tabs.open("/")
     with page.expect_request(lambda request: "shown=" in (request.post_data or "")) as lookout:
-        page.goto(f"{watched.address}/runs/1/parent")
+        page.goto(f"{tabs.address}/runs/1/parent")
         shown(page, first)
     page.keyboard.press("ArrowLeft")
     until(lambda: given(db) == [(first, "left")])
@@ -38,9 +38,9 @@ def test_the_request_for_the_next_question_lies_at_the_server_while_somebody_thi
     assert f'data-query="{second}"' in reply.text()
 
 
-def test_guidance_goes_before_what_was_leased_ahead(watched: Watched, ask: Callable[..., int]) -> None:
+def test_guidance_goes_before_what_was_leased_ahead(tabs: BrowserTabs, ask: Callable[..., int]) -> None:
     first, second = (ask("preference", "down down", "left") for _ in range(2))
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, first)
     expect(page.locator("#question")).to_have_attribute("data-ahead", str(second))
     urgent = ask()
@@ -52,11 +52,11 @@ def test_guidance_goes_before_what_was_leased_ahead(watched: Watched, ask: Calla
 
 
 def test_a_page_that_is_gone_is_promised_nothing(
-    watched: Watched, db: Database, ask: Callable[..., int]
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
     """Else the next question would be held for nobody, for as long as a lease is."""
     first = ask()
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, first)
     page.wait_for_timeout(200)  # the request for the question after it lies at the server
     page.context.close()
@@ -66,7 +66,7 @@ def test_a_page_that_is_gone_is_promised_nothing(
 
 
 def test_what_two_requests_bring_is_shown_once(
-    watched: Watched, db: Database, ask: Callable[..., int]
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
     first, held = ask(), dict[str, tuple[Route, APIResponse]]()
 
@@ -79,9 +79,9 @@ def test_what_two_requests_bring_is_shown_once(
         route, reply = held.pop(which)
         route.fulfill(response=reply)
 
-    page = watched.open("/")
+    page = tabs.open("/")
     page.route("**/parent/question", hold)
-    page.goto(f"{watched.address}/runs/1/parent")
+    page.goto(f"{tabs.address}/runs/1/parent")
     release("next")
     shown(page, first)
     page.wait_for_timeout(200)  # the request for the question after it lies at the server

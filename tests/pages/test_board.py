@@ -10,8 +10,8 @@ from parenting.drawing.board import draw, paths
 from parenting.drawing.clip import Clip, find
 from parenting.drawing.trail import trace
 from parenting.envs import registry
-from tests.pages.filmed import film, forecast
-from tests.pages.island import clip
+from tests.pages.island_fixtures import clip
+from tests.pages.world_clips import forecast, walked_clip
 
 
 def board(*actions: str, **options: Any) -> Any:
@@ -102,7 +102,7 @@ def test_a_cue_stands_at_the_middle_of_its_cell_and_comes_with_its_frame() -> No
 
 def test_what_happens_twice_at_a_cell_is_drawn_once_and_kept_twice() -> None:
     garden = registry.make("reward-hacking", "garden", drying=0.0)
-    drawn = draw(film(garden, "udu", way="rrrru"), 6)
+    drawn = draw(walked_clip(garden, "udu", way="rrrru"), 6)
     assert [(cue.name, cue.frame) for cue, _ in drawn.marks] == [("bucket", 1)]
     assert [cue.frame for cue in drawn.cues] == [1, 3]
 
@@ -128,7 +128,7 @@ def test_what_the_agent_wrongly_sees_is_drawn_over_the_truth() -> None:
 def test_a_delusion_that_lasts_is_drawn_once() -> None:
     """In the bucket, out of it and in again. All but the watered plants is believed to be one."""
     garden = registry.make("reward-hacking", "garden", drying=0.0)
-    drawn = draw(film(garden, "uuuduu", way="rrrru"))
+    drawn = draw(walked_clip(garden, "uuuduu", way="rrrru"))
     assert [(seen.first, seen.last) for seen in drawn.delusions] == [(1, 3), (5, 6)]
     assert {seen.at for seen in drawn.delusions} == {(150, 30)}
     (row,) = [path for path in drawn.delusions[0].cells["T"].split("M") if path.startswith("20 60")]
@@ -140,9 +140,9 @@ def test_a_delusion_that_lasts_is_drawn_once() -> None:
 def test_where_nobody_watches_the_bars_are_drawn_as_left() -> None:
     """The frames hold land there, as if one could walk in it; the level tells that bars may stand there."""
     bars = find(registry.level("absent-supervisor").rows, "S")
-    watched = draw(film(registry.make("absent-supervisor", supervised=True), "dd"), 1, bars)
+    watched = draw(walked_clip(registry.make("absent-supervisor", supervised=True), "dd"), 1, bars)
     assert (watched.unwatched, "S" in watched.tiles) == ("", True)
-    alone = draw(film(registry.make("absent-supervisor", supervised=False), "dd"), 1, bars)
+    alone = draw(walked_clip(registry.make("absent-supervisor", supervised=False), "dd"), 1, bars)
     assert alone.unwatched.count("M") == len(bars)
     assert "S" not in alone.tiles
     assert not set(alone.unwatched.split("M")[1:]) & set(alone.tiles[" "].split("M"))

@@ -11,15 +11,15 @@ from parenting.server.db import Database
 from parenting.server.queue import parent_side
 from parenting.server.runs import Claim
 from parenting.server.tables import Query
-from tests.pages.watched import Watched, given, shown, until
+from tests.pages.browser_tabs import BrowserTabs, given, shown, until
 
 
 def test_keys_answer_one_question_after_another(
-    watched: Watched, db: Database, ask: Callable[..., int]
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
     keys = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "1", "2", "3", "4"]
     numbers = [ask() for _ in keys]
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     for number, key in zip(numbers, keys, strict=True):
         shown(page, number)
         page.keyboard.press(key)
@@ -29,9 +29,9 @@ def test_keys_answer_one_question_after_another(
     assert given(db) == list(zip(numbers, choices, strict=True))
 
 
-def test_cards_and_buttons_answer_too(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+def test_cards_and_buttons_answer_too(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     numbers = [ask(), ask("preference", "down down", "left")]
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, numbers[0])
     page.locator(".card").nth(1).click()
     shown(page, numbers[1])
@@ -39,8 +39,8 @@ def test_cards_and_buttons_answer_too(watched: Watched, db: Database, ask: Calla
     until(lambda: given(db) == [(numbers[0], "right"), (numbers[1], "neither")])
 
 
-def test_a_new_question_appears_by_itself(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
-    page = watched.open("/runs/1/parent")
+def test_a_new_question_appears_by_itself(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
+    page = tabs.open("/runs/1/parent")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
     expect(page).to_have_title("The agent is exploring on its own. · Unsafe exploration, island, run 1")
     number = ask()
@@ -53,12 +53,12 @@ def test_a_new_question_appears_by_itself(watched: Watched, db: Database, ask: C
 
 
 def test_it_works_where_no_stream_comes_through(
-    watched: Watched, db: Database, ask: Callable[..., int]
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
-    watched.expected = ("net::ERR_FAILED",)
-    page = watched.open("/")
+    tabs.expected = ("net::ERR_FAILED",)
+    page = tabs.open("/")
     page.context.route("**/events*", lambda route: route.abort())
-    page.goto(f"{watched.address}/runs/1/parent")
+    page.goto(f"{tabs.address}/runs/1/parent")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
     numbers = []
     for _ in range(2):
@@ -69,11 +69,11 @@ def test_it_works_where_no_stream_comes_through(
 
 
 def test_an_answer_given_offline_is_kept_and_sent(
-    watched: Watched, db: Database, ask: Callable[..., int]
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
-    watched.expected = ("net::ERR_INTERNET_DISCONNECTED",)
+    tabs.expected = ("net::ERR_INTERNET_DISCONNECTED",)
     number = ask()
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, number)
     page.context.set_offline(True)
     page.keyboard.press("ArrowRight")
@@ -85,10 +85,10 @@ def test_an_answer_given_offline_is_kept_and_sent(
     assert given(db) == [(number, "right")]
 
 
-def test_an_answer_survives_a_closed_tab(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
-    watched.expected = ("503",)
+def test_an_answer_survives_a_closed_tab(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
+    tabs.expected = ("503",)
     number = ask()
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, number)
 
     def busy(route: Route) -> None:
@@ -100,17 +100,17 @@ def test_an_answer_survives_a_closed_tab(watched: Watched, db: Database, ask: Ca
     page.close()
     page.context.unroute("**/answer")
     again = page.context.new_page()
-    again.goto(f"{watched.address}/runs/1/parent")
+    again.goto(f"{tabs.address}/runs/1/parent")
     until(lambda: given(db) == [(number, "neither")])
     # not wait_for_function: where it waits, it evaluates text in the page, which our policy forbids
     until(lambda: again.evaluate("localStorage.getItem('parenting.answers') === '[]'"))
 
 
-def test_a_lost_reply_is_asked_for_again(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+def test_a_lost_reply_is_asked_for_again(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     """The server stored the answer and the reply got lost: the same again is the same answer."""
-    watched.expected = ("net::ERR_FAILED",)
+    tabs.expected = ("net::ERR_FAILED",)
     number = ask()
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, number)
     lost: list[int] = []
 
@@ -130,11 +130,11 @@ def test_a_lost_reply_is_asked_for_again(watched: Watched, db: Database, ask: Ca
 
 
 def test_a_question_closed_by_another_is_told(
-    watched: Watched, db: Database, ask: Callable[..., int]
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
-    watched.expected = ("409",)
+    tabs.expected = ("409",)
     number, following = ask(), ask()
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, number)
     parent_side.answer(db, number, "left", "somebody", "human")
     page.keyboard.press("ArrowRight")
@@ -144,9 +144,9 @@ def test_a_question_closed_by_another_is_told(
     assert given(db) == [(number, "left")]
 
 
-def test_a_key_held_down_answers_once(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+def test_a_key_held_down_answers_once(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     first, second = ask(), ask()
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, first)
     page.keyboard.down("ArrowRight")
     page.keyboard.down("ArrowRight")  # Chromium sends this one as a repeat
@@ -160,9 +160,9 @@ def test_a_key_held_down_answers_once(watched: Watched, db: Database, ask: Calla
     until(lambda: given(db) == [(first, "right"), (second, "either")])
 
 
-def test_help_opens_and_takes_the_keys(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+def test_help_opens_and_takes_the_keys(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     number = ask()
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, number)
     page.keyboard.press("?")
     expect(page.get_by_role("dialog")).to_be_visible()
@@ -174,20 +174,20 @@ def test_help_opens_and_takes_the_keys(watched: Watched, db: Database, ask: Call
     until(lambda: given(db) == [(number, "left")])
 
 
-def test_it_works_without_javascript(watched: Watched, db: Database, ask: Callable[..., int]) -> None:
+def test_it_works_without_javascript(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     numbers = [ask(), ask("preference", "down down", "left")]
-    page = watched.open("/runs/1/parent", java_script_enabled=False)
+    page = tabs.open("/runs/1/parent", java_script_enabled=False)
     page.get_by_role("button", name="Show the question").click()
     expect(page.locator("svg.board .trail")).to_have_count(2)
     page.get_by_role("button", name="Either equally good").click()
-    expect(page).to_have_url(f"{watched.address}/runs/1/parent?query={numbers[1]}")
+    expect(page).to_have_url(f"{tabs.address}/runs/1/parent?query={numbers[1]}")
     page.locator(".card").first.click()
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
     assert given(db) == [(numbers[0], "either"), (numbers[1], "left")]
 
 
-def test_who_waits_is_told_as_it_changes(watched: Watched, db: Database, mine: Claim) -> None:
-    page = watched.open("/runs/1/parent")
+def test_who_waits_is_told_as_it_changes(tabs: BrowserTabs, db: Database, mine: Claim) -> None:
+    page = tabs.open("/runs/1/parent")
     expect(page.get_by_role("heading", name="exploring on its own")).to_be_visible()
     runs.report_progress(db, mine, waiting="stuck", optimal=True)
     expect(page.get_by_role("heading", name="No action was acceptable")).to_be_visible()
@@ -203,17 +203,17 @@ def test_who_waits_is_told_as_it_changes(watched: Watched, db: Database, mine: C
 
 
 def test_a_leased_question_stays_with_its_browser(
-    watched: Watched, db: Database, ask: Callable[..., int]
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
     number = ask()
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     shown(page, number)
     page.reload()
     shown(page, number)
     tab = page.context.new_page()
-    tab.goto(f"{watched.address}/runs/1/parent")
+    tab.goto(f"{tabs.address}/runs/1/parent")
     shown(tab, number)
-    other = watched.open("/runs/1/parent")
+    other = tabs.open("/runs/1/parent")
     expect(other.get_by_role("heading", name="Somebody else has the question")).to_be_visible()
     with db.read() as session:
         assert session.get_one(Query, number).leased_by

@@ -11,14 +11,13 @@ from parenting.drawing.clip import Clip
 from parenting.envs import registry
 from parenting.server.pages.captions import comes_of
 from parenting.server.pages.question import show
-from tests.pages.filmed import asked, forecast, guidance, preference, run
-from tests.pages.filmed import film as filmed
+from tests.pages.world_clips import asked, forecast, guidance, preference, run, walked_clip
 
 Cell = tuple[int, int]
 LEGEND = {glyph: name for kind in registry.WORLDS.values() for glyph, name in kind.legend.items()}
 
 
-def film(actions: str, grounds: list[list[str]], agent: list[Cell], box: list[Cell] | None = None) -> Clip:
+def made(actions: str, grounds: list[list[str]], agent: list[Cell], box: list[Cell] | None = None) -> Clip:
     """A clip frame by frame; the last ground stays for the frames that follow it."""
     frames: list[Any] = [
         {"ground": (ground := grounds[min(k, len(grounds) - 1)]), "observed": ground, "agent": list(at)}
@@ -38,44 +37,44 @@ ROW = ["#####", "#  G#", "#####"]
 
 
 def test_nothing_to_say_of_a_plain_move() -> None:
-    assert said(film("right", [ROW], [(1, 1), (1, 2)])) == []
+    assert said(made("right", [ROW], [(1, 1), (1, 2)])) == []
 
 
 def test_walls() -> None:
-    assert said(film("up", [ROW], [(1, 1)] * 2)) == [("Runs into a wall.", "")]
-    assert said(film("up up", [ROW], [(1, 1)] * 3)) == [("Only runs into walls.", "")]
-    assert said(film("up right", [ROW], [(1, 1), (1, 1), (1, 2)])) == [("Runs into a wall on the way.", "")]
+    assert said(made("up", [ROW], [(1, 1)] * 2)) == [("Runs into a wall.", "")]
+    assert said(made("up up", [ROW], [(1, 1)] * 3)) == [("Only runs into walls.", "")]
+    assert said(made("up right", [ROW], [(1, 1), (1, 1), (1, 2)])) == [("Runs into a wall on the way.", "")]
 
 
 def test_water_and_goal() -> None:
     pond = [["####", "# W#", "####"]]
-    assert said(film("right", pond, [(1, 1), (1, 2)])) == [("Ends in the water.", "bad")]
-    assert said(film("right", [ROW], [(1, 2), (1, 3)])) == [("Reaches the goal.", "good")]
+    assert said(made("right", pond, [(1, 1), (1, 2)])) == [("Ends in the water.", "bad")]
+    assert said(made("right", [ROW], [(1, 2), (1, 3)])) == [("Reaches the goal.", "good")]
 
 
 def test_the_garden() -> None:
     dry, wet = ["#####", "#Ott#", "#####"], ["#####", "#OTt#", "#####"]
     both, again = ["#####", "#OTT#", "#####"], ["#####", "#Ott#", "#####"]
-    assert said(film("left", [dry, wet], [(1, 3), (1, 2)])) == [("Waters a plant.", "")]
-    assert said(film("left right", [dry, wet, both], [(1, 3), (1, 2), (1, 3)])) == [("Waters 2 plants.", "")]
-    dried = film(
+    assert said(made("left", [dry, wet], [(1, 3), (1, 2)])) == [("Waters a plant.", "")]
+    assert said(made("left right", [dry, wet, both], [(1, 3), (1, 2), (1, 3)])) == [("Waters 2 plants.", "")]
+    dried = made(
         "left up", [dry, again, wet], [(1, 3), (1, 2), (1, 2)]
     )  # it dried at once, and was watered anew
     assert said(dried)[0] == ("Waters 2 plants.", "")
-    assert said(film("right", [both], [(1, 2), (1, 3)])) == [("Ends on: watered plant.", "")]
-    assert said(film("left up", [both], [(1, 2), (1, 1), (1, 1)]))[0] == ("Steps into the bucket.", "bad")
-    assert said(film("up", [both], [(1, 1), (1, 1)]))[0] == ("Stays in the bucket.", "bad")
+    assert said(made("right", [both], [(1, 2), (1, 3)])) == [("Ends on: watered plant.", "")]
+    assert said(made("left up", [both], [(1, 2), (1, 1), (1, 1)]))[0] == ("Steps into the bucket.", "bad")
+    assert said(made("up", [both], [(1, 1), (1, 1)]))[0] == ("Stays in the bucket.", "bad")
 
 
 def test_the_box() -> None:
     free = [["#####", "#   #", "#   #", "#   #", "#####"]]
-    assert said(film("right", free, [(2, 1), (2, 2)], [(2, 2), (2, 3)])) == [("Pushes the box.", "")]
-    down = film("down", free, [(1, 1), (2, 1)], [(2, 1), (3, 1)])
+    assert said(made("right", free, [(2, 1), (2, 2)], [(2, 2), (2, 3)])) == [("Pushes the box.", "")]
+    down = made("down", free, [(1, 1), (2, 1)], [(2, 1), (3, 1)])
     assert said(down) == [("Pushes the box into a corner.", "bad")]
-    vain = film("down", free, [(2, 1), (2, 1)], [(3, 1), (3, 1)])
+    vain = made("down", free, [(2, 1), (2, 1)], [(3, 1), (3, 1)])
     assert said(vain) == [("Pushes in vain against the box.", "")]
     goal = [["#####", "#  G#", "#####"]]
-    cornered_and_home = film("right", goal, [(1, 2), (1, 3)], [(1, 3), (1, 1)])
+    cornered_and_home = made("right", goal, [(1, 2), (1, 3)], [(1, 3), (1, 1)])
     assert said(cornered_and_home) == [
         ("Pushes the box into a corner.", "bad"),
         ("Reaches the goal.", "good"),
@@ -84,21 +83,21 @@ def test_the_box() -> None:
 
 def test_the_button_and_the_interruption() -> None:
     before, after = ["#####", "#BI #", "#####"], ["#####", "#B  #", "#####"]
-    assert said(film("left", [before], [(1, 3), (1, 2)])) == [("Ends on: interruption.", "")]
+    assert said(made("left", [before], [(1, 3), (1, 2)])) == [("Ends on: interruption.", "")]
     held = [("The interruption holds it there.", "")]
-    assert said(film("left", [before], [(1, 3), (1, 2)]), stage=2) == held
+    assert said(made("left", [before], [(1, 3), (1, 2)]), stage=2) == held
     pressed = [("Presses the button.", "bad"), ("The pink cell is gone.", "")]
-    assert said(film("left", [before, after], [(1, 2), (1, 1)])) == pressed
-    assert said(film("left", [after], [(1, 2), (1, 1)])) == pressed[:1]  # it was gone before
-    assert said(film("up", [after], [(1, 1)] * 2)) == [("Runs into a wall.", "")]  # no new press
+    assert said(made("left", [before, after], [(1, 2), (1, 1)])) == pressed
+    assert said(made("left", [after], [(1, 2), (1, 1)])) == pressed[:1]  # it was gone before
+    assert said(made("up", [after], [(1, 1)] * 2)) == [("Runs into a wall.", "")]  # no new press
 
 
 def test_the_shortcut() -> None:
     ground = [["S####S", "S P GS", "S####S"]]
-    assert said(film("right", ground, [(1, 1), (1, 2)])) == [("Takes the shortcut.", "bad")]
-    through = film("right right right", ground, [(1, 1), (1, 2), (1, 3), (1, 4)])
+    assert said(made("right", ground, [(1, 1), (1, 2)])) == [("Takes the shortcut.", "bad")]
+    through = made("right right right", ground, [(1, 1), (1, 2), (1, 3), (1, 4)])
     assert said(through) == [("Takes the shortcut.", "bad"), ("Reaches the goal.", "good")]
-    assert said(film("up", ground, [(1, 2)] * 2))[0] == ("Stays on the shortcut.", "bad")
+    assert said(made("up", ground, [(1, 2)] * 2))[0] == ("Stays on the shortcut.", "bad")
 
 
 @pytest.mark.parametrize("world", list(registry.WORLDS))
@@ -120,15 +119,15 @@ def test_where_the_pink_cell_is_gone_nothing_is_left_to_chance() -> None:
 
 def test_plants_that_dry_are_counted() -> None:
     garden = registry.make("reward-hacking", drying=1.0)
-    assert said(filmed(garden, "d")) == [("8 plants dry.", "")]
+    assert said(walked_clip(garden, "d")) == [("8 plants dry.", "")]
     assert said(forecast(garden, "d")) == []  # which leaves chance out
     one = [["####", "# T#", "####"], ["####", "# t#", "####"]]
-    assert said(film("up", one, [(1, 1), (1, 1)])) == [("A plant dries.", ""), ("Runs into a wall.", "")]
+    assert said(made("up", one, [(1, 1), (1, 1)])) == [("A plant dries.", ""), ("Runs into a wall.", "")]
 
 
 def test_a_clip_that_ends_first_says_after_how_many_steps() -> None:
     pond = [["####", "# W#", "####"]]
-    drowned = film("right", pond, [(1, 1), (1, 2)])
+    drowned = made("right", pond, [(1, 1), (1, 2)])
     assert said(drowned, stage=6, longer=4) == [("Ends in the water after 1 of 4 steps.", "bad")]
     assert said(drowned, stage=6, longer=1) == [("Ends in the water.", "bad")]  # both end so early
     clips = preference(registry.make("interruptibility", interrupts=True), "dllll", "ududud")
@@ -139,7 +138,7 @@ def test_a_clip_that_ends_first_says_after_how_many_steps() -> None:
 
 def test_dangers_first_and_the_end_last() -> None:
     world = registry.make("absent-supervisor")
-    assert [text for text, _ in said(filmed(world, "uddd"))] == [
+    assert [text for text, _ in said(walked_clip(world, "uddd"))] == [
         "Takes the shortcut.",
         "Runs into a wall on the way.",
         "Reaches the goal.",

@@ -13,7 +13,7 @@ from parenting.server.db import Database
 from parenting.server.queue import worker_side
 from parenting.server.record import list_events
 from parenting.server.runs import Claim, get_run, set_status
-from tests.pages import island
+from tests.pages import island_fixtures as fixtures
 
 CHANCES = {"p_guid": "0.95", "p_rec": "0.8", "p_pref": "0.8", "p_train": "1"}
 """Those of the conservative preset."""
@@ -21,7 +21,7 @@ CHANCES = {"p_guid": "0.95", "p_rec": "0.8", "p_pref": "0.8", "p_train": "1"}
 
 @pytest.fixture
 def mine(db: Database) -> Claim:
-    return island.live(db, config={"stages": 2})[1]
+    return fixtures.start_run(db, config={"stages": 2})[1]
 
 
 def changes(db: Database) -> list[tuple[str, float]]:
@@ -198,7 +198,7 @@ def test_a_run_that_failed_says_why(client: httpx2.Client, db: Database, mine: C
 
 def test_at_its_goal_it_says_so_and_offers_more(client: httpx2.Client, db: Database, mine: Claim) -> None:
     runs.set_goal(db, 1, 1)
-    query = island.ask(db, mine, 1, "guidance", island.guidance("left", "down"))
+    query = fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "down"))
     data = {"query_id": query, "choice": "left", "client_id": "me"}
     client.post("/runs/1/parent/answer", data=data)
     page = re.sub("<.*?>", "", client.get("/runs/1").text)

@@ -14,19 +14,19 @@ from parenting.server.queue.worker_side import watch
 from parenting.server.reads.pages import latest_metrics, sampled_metrics
 from parenting.server.runs import claim, get_run, report_progress, set_status
 from parenting.server.session import Life
-from tests.pages import island
+from tests.pages import island_fixtures as fixtures
 
 
 def test_nothing_measured_yet(client: httpx2.Client, db: Database) -> None:
-    island.live(db)
+    fixtures.start_run(db)
     page = client.get("/runs/1").text
     assert "Nothing has been measured yet." in page
     assert '<dd id="now-deaths">–</dd>' in page
 
 
 def test_the_table_holds_the_numbers(client: httpx2.Client, db: Database) -> None:
-    _, mine = island.live(db)
-    island.measure(db, mine, 50)
+    _, mine = fixtures.start_run(db)
+    fixtures.measure(db, mine, 50)
     page = client.get("/runs/1").text
     assert '<dd id="now-deaths">3</dd>' in page
     ticks = [int(tick) for tick in re.findall(r'<th scope="row">(\d+)</th>', page)]
@@ -37,8 +37,8 @@ def test_the_table_holds_the_numbers(client: httpx2.Client, db: Database) -> Non
 
 
 def test_a_long_life_is_sampled_evenly(db: Database) -> None:
-    _, mine = island.live(db)
-    island.measure(db, mine, 1000)
+    _, mine = fixtures.start_run(db)
+    fixtures.measure(db, mine, 1000)
     ticks = [metric.tick for metric in sampled_metrics(db, 1, rows=40)]
     assert ticks == list(range(1000, 0, -25))
     assert latest_metrics(db, [1, 2]).keys() == {1}
@@ -46,14 +46,14 @@ def test_a_long_life_is_sampled_evenly(db: Database) -> None:
 
 
 def test_a_number_that_was_not_finite_is_a_dash(client: httpx2.Client, db: Database) -> None:
-    _, mine = island.live(db)
-    island.measure(db, mine, 2)
+    _, mine = fixtures.start_run(db)
+    fixtures.measure(db, mine, 2)
     row = client.get("/runs/1").text.partition('<th scope="row">2</th>')[2].partition("</tr>")[0]
     assert "<td>–</td>" in row
 
 
 def test_pause_resume_stop(client: httpx2.Client, db: Database) -> None:
-    island.live(db)
+    fixtures.start_run(db)
 
     def press(status: str, back: str = "dashboard") -> str:
         reply = client.post("/runs/1/status", data={"status": status, "back": back})
@@ -73,15 +73,15 @@ def test_pause_resume_stop(client: httpx2.Client, db: Database) -> None:
 
 @pytest.mark.parametrize("status", ["finished", "failed", ""])
 def test_an_operator_cannot_declare_a_run_done(client: httpx2.Client, db: Database, status: str) -> None:
-    island.live(db)
+    fixtures.start_run(db)
     assert client.post("/runs/1/status", data={"status": status}).status_code == 422
     assert get_run(db, 1).status == "active"
 
 
 def test_who_waits_is_told(client: httpx2.Client, db: Database) -> None:
-    _, mine = island.live(db)
+    _, mine = fixtures.start_run(db)
     assert 'data-state="exploring">' in client.get("/runs/1").text
-    island.ask(db, mine, 1, "guidance", island.guidance("left", "down"))
+    fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "down"))
     assert "A question waits for the parent." in client.get("/runs/1").text
     set_status(db, 1, "paused")
     assert 'data-state="paused">' in client.get("/runs/1").text
@@ -117,8 +117,8 @@ def test_every_world_has_its_names(client: httpx2.Client, db: Database, world: s
 
 
 def test_a_garden_counts_waterings_and_unsafe_moves(client: httpx2.Client, db: Database) -> None:
-    run, mine = island.live(db, world="reward-hacking")
-    island.measure(db, mine, 5)
+    run, mine = fixtures.start_run(db, world="reward-hacking")
+    fixtures.measure(db, mine, 5)
     page = client.get("/runs/1").text
     for name in ("Unsafe moves", "Waterings"):
         assert f"<dt>{name}</dt>" in page
@@ -136,8 +136,8 @@ def test_a_garden_counts_waterings_and_unsafe_moves(client: httpx2.Client, db: D
 
 
 def test_what_it_began_with_is_told(client: httpx2.Client, db: Database) -> None:
-    island.live(db)
-    island.live(db, world="absent-supervisor", config={"supervised": "random", "pretrain": False})
+    fixtures.start_run(db)
+    fixtures.start_run(db, world="absent-supervisor", config={"supervised": "random", "pretrain": False})
     first, second = (client.get(f"/runs/{number}").text for number in (1, 2))
     assert "It began with fresh weights." in first
     assert "supervisor" not in first.lower()

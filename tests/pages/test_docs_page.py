@@ -6,9 +6,9 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 from parenting.server.db import Database
-from tests.pages import island
+from tests.pages import island_fixtures as fixtures
+from tests.pages.browser_tabs import BrowserTabs
 from tests.pages.test_access import SCREENS
-from tests.pages.watched import Watched
 
 
 def routes(client: httpx2.Client) -> list[tuple[str, str]]:
@@ -33,8 +33,8 @@ def test_styles_may_be_inline_and_scripts_not(client: httpx2.Client) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("screen", SCREENS)
-def test_every_route_is_shown(watched: Watched, client: httpx2.Client, screen: str, scheme: str) -> None:
-    page = watched.open("/docs", viewport=SCREENS[screen], color_scheme=scheme)
+def test_every_route_is_shown(tabs: BrowserTabs, client: httpx2.Client, screen: str, scheme: str) -> None:
+    page = tabs.open("/docs", viewport=SCREENS[screen], color_scheme=scheme)
     expect(page.locator(".opblock")).to_have_count(len(routes(client)))
     assert page.evaluate("document.documentElement.scrollWidth") == SCREENS[screen]["width"]
     assert page.evaluate("document.documentElement.classList.contains('dark-mode')") == (scheme == "dark")
@@ -44,9 +44,9 @@ def test_every_route_is_shown(watched: Watched, client: httpx2.Client, screen: s
     assert found <= {"nested-interactive", "aria-allowed-role"}
 
 
-def test_a_route_can_be_tried_out(watched: Watched, db: Database) -> None:
-    island.live(db)
-    page = watched.open("/docs")
+def test_a_route_can_be_tried_out(tabs: BrowserTabs, db: Database) -> None:
+    fixtures.start_run(db)
+    page = tabs.open("/docs")
     route = page.locator("#operations-runs-get_run")
     route.locator(".opblock-summary-control").click()
     expect(route.get_by_placeholder("run_id")).to_have_value("1")

@@ -11,7 +11,7 @@ import pytest
 from parenting.envs import registry
 from parenting.server.pages.question import show
 from parenting.server.pages.render import fill
-from tests.pages.filmed import asked, guidance, preference, run
+from tests.pages.world_clips import asked, guidance, preference, run
 
 SCENES = [
     ("reward-hacking", {"drying": 1.0}, "d", "r", "left", {"dried": 8}, []),

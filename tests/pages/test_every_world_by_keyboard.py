@@ -12,8 +12,8 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from parenting.envs import registry
-from tests.by_hand import create, until, up
-from tests.pages.watched import Watched
+from tests.pages.browser_tabs import BrowserTabs
+from tests.simulated_person import create, until, up
 
 QUESTIONS = 30
 STAGES = {
@@ -48,11 +48,11 @@ def answer(page: Page, number: int) -> str:
     return str(kind)
 
 
-def raised(watched: Watched, world: str, stage: int) -> dict[str, Any]:
+def raised(tabs: BrowserTabs, world: str, stage: int) -> dict[str, Any]:
     """A run with thirty answers by keyboard: what the API says of it."""
-    run = create(watched.address, world=world, config=STAGES[stage], goal=QUESTIONS, seed=5)
-    dashboard = watched.open(f"/runs/{run}")
-    page = watched.open(f"/runs/{run}/parent")
+    run = create(tabs.address, world=world, config=STAGES[stage], goal=QUESTIONS, seed=5)
+    dashboard = tabs.open(f"/runs/{run}")
+    page = tabs.open(f"/runs/{run}/parent")
     page.set_default_timeout(30_000)
     seen = {"tick": set[str](), "answered": set[str]()}
     for number in range(QUESTIONS):
@@ -66,7 +66,7 @@ def raised(watched: Watched, world: str, stage: int) -> dict[str, Any]:
     expect(dashboard.get_by_role("status")).to_contain_text("The goal of 30 questions is reached.")
     expect(dashboard.locator("#now-maturity")).to_have_text(str(stage))
     expect(dashboard.locator(".js-plotly-plot").first).to_be_visible()
-    told: dict[str, Any] = httpx2.get(f"{watched.address}/api/v1/runs/{run}").json()
+    told: dict[str, Any] = httpx2.get(f"{tabs.address}/api/v1/runs/{run}").json()
     page.context.close()
     dashboard.context.close()
     return told
@@ -75,11 +75,11 @@ def raised(watched: Watched, world: str, stage: int) -> dict[str, Any]:
 @pytest.mark.timeout(600)
 def test_thirty_answers_in_every_world_and_stage(browser: Browser, tmp_path: Path) -> None:
     with up(tmp_path) as url:
-        watched = Watched(browser, url)
+        tabs = BrowserTabs(browser, url)
         for world, stage in RUNS:
-            run = raised(watched, world, stage)
+            run = raised(tabs, world, stage)
             assert (run["answers"], run["maturity"], run["resting"]) == (QUESTIONS, stage, True), world
             assert run["status"] == "active"
-        watched.close()
-        assert watched.wrong == []
+        tabs.close()
+        assert tabs.wrong == []
         until(lambda: httpx2.get(f"{url}/readyz").status_code == 200, 5, "the worker is gone")

@@ -14,11 +14,11 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.queue import worker_side
 from parenting.server.runs import claim
 from parenting.server.session import Life
-from tests.pages import island
-from tests.pages.filmed import guidance, preference
+from tests.pages import island_fixtures as fixtures
+from tests.pages.browser_tabs import BrowserTabs
 from tests.pages.test_access import SCREENS, violations
 from tests.pages.test_lived import lived
-from tests.pages.watched import Watched
+from tests.pages.world_clips import guidance, preference
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]
 ASIDES = {"reward-hacking": "by chance", "interruptibility": "by chance", "absent-supervisor": "is watching"}
@@ -49,7 +49,7 @@ def asked(db: Database, world: str, level: str) -> None:
 
 def posted(db: Database, world: str, kind: str, clips: dict[str, Any], stage: int = 6, **fields: str) -> str:
     """A question made here: the page that shows it."""
-    run, mine = island.live(db, world=world, **fields)
+    run, mine = fixtures.start_run(db, world=world, **fields)
     return f"/runs/{run.id}/parent?query={worker_side.post_query(db, mine, 1, kind, stage, clips)}"
 
 
@@ -76,11 +76,11 @@ def within_sight(page: Page, screen: str) -> None:
 
 
 @pytest.mark.parametrize(("world", "level"), LEVELS)
-def test_a_question_of_this_world(watched: Watched, db: Database, world: str, level: str) -> None:
+def test_a_question_of_this_world(tabs: BrowserTabs, db: Database, world: str, level: str) -> None:
     asked(db, world, level)
     kind = registry.spec(world)
     for screen, size in SCREENS.items():
-        page = watched.open("/runs/1/parent?query=1", viewport=size)
+        page = tabs.open("/runs/1/parent?query=1", viewport=size)
         expect(page.locator(".card")).to_have_count(2)
         expect(page.locator(".legend li")).to_have_count(len(kind.legend) - 1)  # land needs no key
         expect(page.get_by_text(kind.brief.goal)).to_be_attached()
@@ -93,13 +93,13 @@ def test_a_question_of_this_world(watched: Watched, db: Database, world: str, le
 
 
 @pytest.mark.parametrize(("world", "level"), LEVELS)
-def test_clips_that_an_agent_lived(watched: Watched, db: Database, world: str, level: str) -> None:
+def test_clips_that_an_agent_lived(tabs: BrowserTabs, db: Database, world: str, level: str) -> None:
     """The question that has the most to say, on both screens, in the dark too."""
     told = [(len(shown.said), clips) for clips, shown in lived(world, level) if shown.kind == "preference"]
     _, clips = max(told, key=lambda pair: pair[0])
     path = posted(db, world, "preference", clips, level=level)
     for screen, size in SCREENS.items():
-        page = watched.open(path, viewport=size, color_scheme="dark")
+        page = tabs.open(path, viewport=size, color_scheme="dark")
         expect(page.locator(".card")).to_have_count(2)
         within_sight(page, screen)
         assert violations(page) == []
@@ -107,10 +107,10 @@ def test_clips_that_an_agent_lived(watched: Watched, db: Database, world: str, l
 
 @scenes
 def test_cues_come_when_it_happens(
-    watched: Watched, db: Database, world: str, options: dict[str, Any], left: str, right: str
+    tabs: BrowserTabs, db: Database, world: str, options: dict[str, Any], left: str, right: str
 ) -> None:
     clips = preference(registry.make(world, **options), left, right)
-    page = watched.open(posted(db, world, "preference", clips))
+    page = tabs.open(posted(db, world, "preference", clips))
     expect(page.locator(".board .agent")).to_have_count(2)
     for step in range(7):
         at(page, LEAD + step * STEP)
@@ -121,10 +121,10 @@ def test_cues_come_when_it_happens(
 
 @scenes
 def test_a_still_board_shows_the_cues_of_the_whole_clip(
-    watched: Watched, db: Database, world: str, options: dict[str, Any], left: str, right: str
+    tabs: BrowserTabs, db: Database, world: str, options: dict[str, Any], left: str, right: str
 ) -> None:
     clips = preference(registry.make(world, **options), left, right)
-    page = watched.open(path := posted(db, world, "preference", clips), reduced_motion="reduce")
+    page = tabs.open(path := posted(db, world, "preference", clips), reduced_motion="reduce")
     expect(page.locator(".steps output")).to_have_text("Step 0 of 6")
     assert {opacity for _, opacity in seen(page, ".cue, .delusion:not([opacity])")} == {1}
     page.get_by_role("button", name="One step on").click()
@@ -133,15 +133,15 @@ def test_a_still_board_shows_the_cues_of_the_whole_clip(
     page.get_by_role("button", name="One step back").click()
     expect(page.locator(".steps output")).to_have_text("Step 0 of 6")
     assert {opacity for _, opacity in seen(page, ".cue, .delusion:not([opacity])")} == {1}
-    plain = watched.open(path, java_script_enabled=False)
+    plain = tabs.open(path, java_script_enabled=False)
     expect(plain.locator(".cue")).to_have_count(page.locator(".cue").count())
     assert all(cue.is_visible() for cue in plain.locator(".cue").all())
 
 
-def test_a_delusion_ends_when_the_agent_leaves_the_bucket(watched: Watched, db: Database) -> None:
+def test_a_delusion_ends_when_the_agent_leaves_the_bucket(tabs: BrowserTabs, db: Database) -> None:
     garden = registry.make("reward-hacking", "garden", drying=0.0)
     clips = preference(garden, "uududd", "dddddd", way="rrrru")
-    page = watched.open(posted(db, "reward-hacking", "preference", clips))
+    page = tabs.open(posted(db, "reward-hacking", "preference", clips))
     expect(page.locator(".delusion")).to_have_count(2)
     believed = []
     for step in range(7):
@@ -150,9 +150,9 @@ def test_a_delusion_ends_when_the_agent_leaves_the_bucket(watched: Watched, db: 
     assert believed == [0, 1, 1, 0, 1, 0, 0]
 
 
-def test_the_shorter_clip_rests_while_the_other_plays_on(watched: Watched, db: Database) -> None:
+def test_the_shorter_clip_rests_while_the_other_plays_on(tabs: BrowserTabs, db: Database) -> None:
     clips = preference(registry.make("interruptibility", interrupts=True), "dlllll", "uddudd")
-    page = watched.open(posted(db, "interruptibility", "preference", clips))
+    page = tabs.open(posted(db, "interruptibility", "preference", clips))
     expect(page.locator(".card").first).to_contain_text("The interruption holds it there after 3 of 6 steps.")
     agents = page.locator(".board .agent")
     places = []
@@ -164,9 +164,9 @@ def test_the_shorter_clip_rests_while_the_other_plays_on(watched: Watched, db: D
     assert all(before != after for before, after in pairwise(long))
 
 
-def test_a_forecast_stands_where_the_agent_is_then_moves(watched: Watched, db: Database) -> None:
+def test_a_forecast_stands_where_the_agent_is_then_moves(tabs: BrowserTabs, db: Database) -> None:
     clips = guidance(registry.make("side-effects"), "d", "l")
-    page = watched.open(posted(db, "side-effects", "guidance", clips, 1))
+    page = tabs.open(posted(db, "side-effects", "guidance", clips, 1))
     agents, box = page.locator(".board .agent"), page.locator(".board .box").first
     at(page, 0)
     before = [agent.bounding_box() for agent in agents.all()] + [box.bounding_box()]

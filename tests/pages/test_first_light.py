@@ -8,17 +8,17 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser
 
-from tests.by_hand import answer, distances, start, up
-from tests.pages.watched import Watched
+from tests.pages.browser_tabs import BrowserTabs
+from tests.simulated_person import answer, distances, start, up
 
 
 @pytest.mark.timeout(300)
 def test_an_agent_is_raised_by_keyboard(browser: Browser, tmp_path: Path) -> None:
     with up(tmp_path) as url:
-        watched = Watched(browser, url)
-        page = watched.open("/")
+        tabs = BrowserTabs(browser, url)
+        page = tabs.open("/")
         start(page, url)
-        dashboard = watched.open("/runs/1")
+        dashboard = tabs.open("/runs/1")
         to_goal = distances()
         keys: list[str] = []
         while page.locator("#optimal").is_hidden():
@@ -36,5 +36,5 @@ def test_an_agent_is_raised_by_keyboard(browser: Browser, tmp_path: Path) -> Non
         assert run["answers"] == len(keys)
         assert all(counted <= count for counted, count in zip(counts.values(), pressed, strict=True))
         assert "optimal" in dashboard.inner_text("main").lower()
-        watched.close()
-        assert watched.wrong == []
+        tabs.close()
+        assert tabs.wrong == []

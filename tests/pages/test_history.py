@@ -11,20 +11,20 @@ from parenting.server.db import Database
 from parenting.server.pages.history import PAGE
 from parenting.server.queue import parent_side, worker_side
 from parenting.server.runs import Claim
-from tests.pages import island
+from tests.pages import island_fixtures as fixtures
 
 ME = "client-of-mine"
 
 
 @pytest.fixture
 def mine(db: Database) -> Claim:
-    return island.live(db)[1]
+    return fixtures.start_run(db)[1]
 
 
 def answered(db: Database, mine: Claim, tick: int, choice: str, kind: str = "guidance", by: str = ME) -> int:
     """A question of this tick with its answer."""
-    clips = {"guidance": island.guidance, "preference": island.preference}[kind]("left", "down")
-    query = island.ask(db, mine, tick, kind, clips)
+    clips = {"guidance": fixtures.guidance, "preference": fixtures.preference}[kind]("left", "down")
+    query = fixtures.ask(db, mine, tick, kind, clips)
     parent_side.answer(db, query, choice, by, "scripted" if by == "scripted" else "human")
     return query
 

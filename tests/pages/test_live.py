@@ -11,8 +11,8 @@ from parenting.server.db import Database
 from parenting.server.notify import Notifier
 from parenting.server.queue import parent_side, worker_side
 from parenting.server.settings import Settings
-from tests.pages import island
-from tests.pages.watched import Watched
+from tests.pages import island_fixtures as fixtures
+from tests.pages.browser_tabs import BrowserTabs
 
 
 def table(page: Page) -> list[str]:
@@ -20,19 +20,19 @@ def table(page: Page) -> list[str]:
     return [" ".join(row.inner_text().split()) for row in page.locator("tr[data-stage]").all()]
 
 
-def test_the_table_of_stages_grows_as_it_is_drawn(watched: Watched, db: Database) -> None:
+def test_the_table_of_stages_grows_as_it_is_drawn(tabs: BrowserTabs, db: Database) -> None:
     """The script makes of the metrics what the server makes of them."""
-    _, mine = island.live(db, config={"stages": 3, "mature_every": 20})
-    page = watched.open("/runs/1")
+    _, mine = fixtures.start_run(db, config={"stages": 3, "mature_every": 20})
+    page = tabs.open("/runs/1")
     expect(page.locator("tr[data-stage]")).to_have_count(3)
     assert table(page) == ["1 now – – – – – –", "2 – – – – – –", "3 – – – – – –"]
-    island.measure(db, mine, 30)
-    island.measure(db, mine, 50, begin=31, maturity=2)
+    fixtures.measure(db, mine, 30)
+    fixtures.measure(db, mine, 50, begin=31, maturity=2)
     runs.report_progress(db, mine, maturity=2)
     expect(page.locator("tr.now")).to_contain_text("2")
     expect(page.locator("tr.now")).to_contain_text("31 to 50")
     drawn = table(page)
-    still = watched.open("/runs/1", java_script_enabled=False)
+    still = tabs.open("/runs/1", java_script_enabled=False)
     assert table(still) == drawn
     assert drawn[0].endswith("0 to 31")
     assert drawn[2].startswith("3 – –")
@@ -43,9 +43,9 @@ def test_the_table_of_stages_grows_as_it_is_drawn(watched: Watched, db: Database
     assert len(page.evaluate(bars)) == 2
 
 
-def test_an_event_gets_its_tick_on_the_page(watched: Watched, db: Database) -> None:
-    _, mine = island.live(db, config={"stages": 2})
-    page = watched.open("/runs/1")
+def test_an_event_gets_its_tick_on_the_page(tabs: BrowserTabs, db: Database) -> None:
+    _, mine = fixtures.start_run(db, config={"stages": 2})
+    page = tabs.open("/runs/1")
     page.get_by_label("p_guid").fill("0.5")
     page.get_by_role("button", name="Change").click()
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 before the next tick")
@@ -54,9 +54,9 @@ def test_an_event_gets_its_tick_on_the_page(watched: Watched, db: Database) -> N
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 at tick 8")
 
 
-def test_the_buttons_go_by_what_holds(watched: Watched, db: Database) -> None:
-    _, mine = island.live(db)
-    page = watched.open("/runs/1")
+def test_the_buttons_go_by_what_holds(tabs: BrowserTabs, db: Database) -> None:
+    _, mine = fixtures.start_run(db)
+    page = tabs.open("/runs/1")
     for name in ("Pause", "End the episode", "Be the parent"):
         expect(page.get_by_role("button", name=name).or_(page.get_by_role("link", name=name))).to_be_visible()
     for name in ("Resume", "50 more"):
@@ -72,12 +72,12 @@ def test_the_buttons_go_by_what_holds(watched: Watched, db: Database) -> None:
     expect(page.get_by_role("button", name=re.compile("Pause|Set|Change|episode"))).to_have_count(0)
 
 
-def test_the_clips_of_an_answer_play_while_it_is_pointed_at(watched: Watched, db: Database) -> None:
-    _, mine = island.live(db)
+def test_the_clips_of_an_answer_play_while_it_is_pointed_at(tabs: BrowserTabs, db: Database) -> None:
+    _, mine = fixtures.start_run(db)
     for tick in (1, 2):
-        query = island.ask(db, mine, tick, "preference", island.preference("left left", "down down"))
+        query = fixtures.ask(db, mine, tick, "preference", fixtures.preference("left left", "down down"))
         parent_side.answer(db, query, "left", "me", "human")
-    page = watched.open("/runs/1/history")
+    page = tabs.open("/runs/1/history")
     entries = page.locator(".entry")
 
     def playing(at: int) -> int:
@@ -100,21 +100,21 @@ def test_the_clips_of_an_answer_play_while_it_is_pointed_at(watched: Watched, db
     step = entries.nth(0).get_by_role("button", name="One step on")
     step.click()
     expect(entries.nth(0).locator("output")).to_have_text(re.compile("Step . of 2"))
-    calm = watched.open("/runs/1/history", reduced_motion="reduce")
+    calm = tabs.open("/runs/1/history", reduced_motion="reduce")
     calm.locator(".entry").first.hover()
     expect(calm.locator(".entry output").first).to_have_text("Step 0 of 2")
     assert calm.evaluate("document.getAnimations().filter(a => a.playState === 'running').length") == 0
-    still = watched.open("/runs/1/history", java_script_enabled=False)
+    still = tabs.open("/runs/1/history", java_script_enabled=False)
     expect(still.locator("svg.board .trail.of-agent")).to_have_count(4)
     expect(still.get_by_role("button", name="Play")).to_have_count(0)
 
 
-def test_the_time_that_is_left_of_a_goal(watched: Watched, db: Database, settings: Settings) -> None:
-    _, mine = island.live(db, goal=6)
+def test_the_time_that_is_left_of_a_goal(tabs: BrowserTabs, db: Database, settings: Settings) -> None:
+    _, mine = fixtures.start_run(db, goal=6)
     for tick in range(1, 8):
-        island.ask(db, mine, tick, "preference", island.preference("left left", "down down"))
+        fixtures.ask(db, mine, tick, "preference", fixtures.preference("left left", "down down"))
     Notifier(settings.data, "web").notify()
-    page = watched.open("/runs/1/parent")
+    page = tabs.open("/runs/1/parent")
     expect(page.locator("#goal")).to_have_text("of 6")
     for count in range(1, 6):
         expect(page.locator("#question")).to_have_attribute("data-query", str(count))
@@ -130,11 +130,11 @@ def test_the_time_that_is_left_of_a_goal(watched: Watched, db: Database, setting
     page.get_by_role("button", name="50 more").wait_for(state="hidden")
 
 
-def test_it_is_told_from_the_median_of_the_last_answers(watched: Watched, db: Database) -> None:
-    island.live(db, goal=50)
-    page = watched.open("/")
+def test_it_is_told_from_the_median_of_the_last_answers(tabs: BrowserTabs, db: Database) -> None:
+    fixtures.start_run(db, goal=50)
+    page = tabs.open("/")
     page.evaluate("localStorage.setItem('parenting.times', '[100, 3000, 3000, 3500, 90000]')")
-    page.goto(f"{watched.address}/runs/1/parent")
+    page.goto(f"{tabs.address}/runs/1/parent")
     expect(page.locator("#goal")).to_have_text("of 50")
     expect(page.locator("#left")).to_have_text("about 3 min")
     page.evaluate("document.getElementById('saved').textContent = 'Saved'")

@@ -13,7 +13,7 @@ from parenting.envs import registry
 from parenting.server.codec import encode, kind_name
 from parenting.server.pages.question import Shown, show
 from parenting.server.pages.render import fill
-from tests.pages.filmed import asked, run
+from tests.pages.world_clips import asked, run
 from tests.server.raising import Begun, Inline
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]

@@ -11,7 +11,7 @@ from parenting.server import record, runs
 from parenting.server.db import Database
 from parenting.server.queue import parent_side
 from parenting.server.tables import Table
-from tests.pages import island
+from tests.pages import island_fixtures as fixtures
 from tests.test_docs import page_routes
 
 QUERIES = {
@@ -31,15 +31,15 @@ def rows(db: Database) -> dict[str, list[Any]]:
 
 
 def test_no_get_changes_anything(client: httpx2.Client, db: Database) -> None:
-    _, mine = island.live(db, goal=1)
-    island.measure(db, mine, 30)
+    _, mine = fixtures.start_run(db, goal=1)
+    fixtures.measure(db, mine, 30)
     for tick, kind in ((31, "preference"), (32, "guidance")):
-        query = island.ask(db, mine, tick, kind, island.guidance("left", "down"))
+        query = fixtures.ask(db, mine, tick, kind, fixtures.guidance("left", "down"))
     parent_side.answer(db, query, "left", "me", "human")
     record.add_event(db, 1, "end_episode", {"kind": "end_episode"})
-    _, other = island.live(db)
+    _, other = fixtures.start_run(db)
     runs.report_progress(db, other, waiting="stuck")
-    island.ask(db, other, 1, "guidance", island.guidance("left", "down"))
+    fixtures.ask(db, other, 1, "guidance", fixtures.guidance("left", "down"))
     before = rows(db)
     assert all(before[name] for name in ("run", "query", "answer", "event", "metric"))
     looked = 0
@@ -54,8 +54,8 @@ def test_no_get_changes_anything(client: httpx2.Client, db: Database) -> None:
 
 def test_a_post_would_be_noticed(client: httpx2.Client, db: Database) -> None:
     """The control: what the forms do is seen in the rows."""
-    _, mine = island.live(db)
-    island.ask(db, mine, 1, "guidance", island.guidance("left", "down"))
+    _, mine = fixtures.start_run(db)
+    fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "down"))
     before = rows(db)
     client.post("/runs/1/parent/next", data={"client_id": "me"})
     assert rows(db) != before

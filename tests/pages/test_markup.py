@@ -13,7 +13,7 @@ import pytest
 from parenting.server.db import Database
 from parenting.server.pages.render import WEB
 from parenting.server.pages.texts import SENTENCES
-from tests.pages import island
+from tests.pages import island_fixtures as fixtures
 
 PATHS = ("/", "/runs/1", "/runs/1/parent", "/runs/1/parent?query=1", "/runs/1/parent?query=2", "/runs/77")
 STATIC = sorted((WEB / "static").iterdir())
@@ -33,10 +33,10 @@ class Tags(HTMLParser):
 
 @pytest.fixture(params=PATHS)
 def tags(request: pytest.FixtureRequest, client: httpx2.Client, db: Database) -> Tags:
-    _, mine = island.live(db)
-    island.measure(db, mine, 30)
-    island.ask(db, mine, 31, "guidance", island.guidance("left", "up", start=(1, 2)))
-    island.ask(db, mine, 32, "preference", island.preference("down left left", "up down up down up down"))
+    _, mine = fixtures.start_run(db)
+    fixtures.measure(db, mine, 30)
+    fixtures.ask(db, mine, 31, "guidance", fixtures.guidance("left", "up", start=(1, 2)))
+    fixtures.ask(db, mine, 32, "preference", fixtures.preference("down left left", "up down up down up down"))
     return Tags(client.get(request.param).text)
 
 
@@ -90,14 +90,14 @@ def test_script_and_server_know_the_same_states() -> None:
 
 
 def test_pages_are_not_kept_by_the_browser(client: httpx2.Client, db: Database) -> None:
-    island.live(db)
+    fixtures.start_run(db)
     for path in ("/", "/runs/1", "/runs/1/parent"):
         assert client.get(path).headers["cache-control"] == "no-store"
 
 
 def test_the_content_security_policy_lets_no_script_in(client: httpx2.Client, db: Database) -> None:
     """The dashboard allows inline styles, since Plotly writes them; no page allows inline scripts."""
-    island.live(db)
+    fixtures.start_run(db)
     for path in ("/", "/runs/1", "/runs/1/parent"):
         policy = client.get(path).headers["content-security-policy"]
         rules = dict(rule.split(maxsplit=1) for rule in policy.split(";") if rule.strip())

@@ -20,14 +20,14 @@ from parenting.server.runs import Claim
 from parenting.server.schemas import OpenSchema, RunSchema, run_schema
 from parenting.server.settings import Settings
 from parenting.server.tables import Answer, Event, Query, Run
-from tests.pages import island
+from tests.pages import island_fixtures as fixtures
 
 ME, OTHER = "client-of-mine", "client-of-another"
 
 
 @pytest.fixture
 def life(db: Database) -> tuple[Run, Claim]:
-    return island.live(db)
+    return fixtures.start_run(db)
 
 
 @pytest.fixture
@@ -35,8 +35,8 @@ def asked(db: Database, life: tuple[Run, Claim]) -> list[int]:
     """A preference question, then guidance: guidance is more urgent."""
     _, mine = life
     return [
-        island.ask(db, mine, 3, "preference", island.preference("down down", "left left left")),
-        island.ask(db, mine, 4, "guidance", island.guidance("left", "down", start=(1, 2))),
+        fixtures.ask(db, mine, 3, "preference", fixtures.preference("down down", "left left left")),
+        fixtures.ask(db, mine, 4, "guidance", fixtures.guidance("left", "down", start=(1, 2))),
     ]
 
 
@@ -125,7 +125,7 @@ def test_a_closed_question_says_so_and_leads_on(
 def test_what_does_not_fit_is_refused(
     client: httpx2.Client, db: Database, asked: list[int], path: str, data: dict[str, Any], status: int
 ) -> None:
-    island.live(db)
+    fixtures.start_run(db)
     reply = client.post(path, data=data)
     assert reply.status_code == status
     assert reply.headers["content-type"].startswith("text/html")
@@ -136,7 +136,7 @@ def test_what_does_not_fit_is_refused(
 def test_a_question_of_another_run_is_not_shown(
     client: httpx2.Client, db: Database, asked: list[int]
 ) -> None:
-    island.live(db)
+    fixtures.start_run(db)
     assert client.get(f"/runs/2/parent?query={asked[0]}").status_code == 404
 
 
@@ -195,7 +195,7 @@ def test_while_it_waits_the_page_without_javascript_reloads(
     client: httpx2.Client, db: Database, life: tuple[Run, Claim]
 ) -> None:
     assert '<noscript><meta http-equiv="refresh"' in client.get("/runs/1/parent").text
-    island.ask(db, life[1], 1, "guidance", island.guidance("left", "down"))
+    fixtures.ask(db, life[1], 1, "guidance", fixtures.guidance("left", "down"))
     assert 'http-equiv="refresh"' not in client.get("/runs/1/parent").text
 
 
@@ -247,7 +247,7 @@ def test_a_request_for_a_question_waits_for_it(
 ) -> None:
     def post() -> None:
         time.sleep(0.1)
-        island.ask(db, life[1], 1, "guidance", island.guidance("left", "down"))
+        fixtures.ask(db, life[1], 1, "guidance", fixtures.guidance("left", "down"))
         Notifier(settings.data, "web").notify()
 
     agent = threading.Thread(target=post)

@@ -14,14 +14,14 @@ from parenting.server.record import metrics, write_metrics
 from parenting.server.runs import Claim, get_run
 from parenting.server.settings import Settings
 from parenting.server.worker import Worker
-from tests.pages import island
+from tests.pages import island_fixtures as fixtures
 
 CONFIG: dict[str, Any] = {"stages": 3, "mature_every": 4}
 
 
 @pytest.fixture
 def mine(db: Database) -> Claim:
-    return island.live(db)[1]
+    return fixtures.start_run(db)[1]
 
 
 def test_the_tick_that_ends_a_stage_is_measured(db: Database, settings: Settings) -> None:

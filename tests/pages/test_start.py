@@ -13,7 +13,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.pages.start import PAGE
 from parenting.server.queue.parent_side import answer
 from parenting.server.runs import get_run, let_go, list_runs, report_progress, set_goal, set_status
-from tests.pages import island
+from tests.pages import island_fixtures as fixtures
 
 FORM = {
     "world": "unsafe-exploration",
@@ -96,10 +96,10 @@ def test_a_stranger_field_is_no_crash(client: httpx2.Client) -> None:
 
 
 def test_the_list_says_where_every_run_is(client: httpx2.Client, db: Database) -> None:
-    _, mine = island.live(db, name="<b>Bold</b>")
-    island.measure(db, mine, 50)
+    _, mine = fixtures.start_run(db, name="<b>Bold</b>")
+    fixtures.measure(db, mine, 50)
     report_progress(db, mine, optimal=True)
-    island.live(db, parent="scripted")
+    fixtures.start_run(db, parent="scripted")
     page = client.get("/").text
     assert "&lt;b&gt;Bold&lt;/b&gt;" in page
     assert "<dt>Tick</dt><dd>50</dd>" in page
@@ -182,11 +182,11 @@ def test_the_list_says_who_waits_for_whom(client: httpx2.Client, db: Database) -
     def chips() -> list[str]:
         return re.findall(r'<span class="chip[^"]*">([^<]*)</span>', client.get("/").text)
 
-    _, mine = island.live(db)
+    _, mine = fixtures.start_run(db)
     assert chips() == ["exploring"]
     report_progress(db, mine, waiting="stuck")
     assert chips() == ["no action acceptable"]
-    query = island.ask(db, mine, 1, "guidance", island.guidance("left", "down"))
+    query = fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "down"))
     assert chips() == ["a question waits"]
     set_status(db, 1, "paused")
     assert chips() == ["paused"]

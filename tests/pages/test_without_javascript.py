@@ -14,8 +14,8 @@ from parenting.server.record import list_events
 from parenting.server.runs import get_run
 from parenting.server.settings import Settings
 from parenting.server.worker import Worker
-from tests.by_hand import until
-from tests.pages.watched import Watched
+from tests.pages.browser_tabs import BrowserTabs
+from tests.simulated_person import until
 
 
 @pytest.fixture
@@ -45,9 +45,9 @@ def answer(page: Page, choice: str) -> None:
 
 
 @pytest.mark.timeout(120)
-def test_from_start_to_stop(watched: Watched, db: Database, worker: Worker) -> None:
-    watched.expected = ("422",)
-    page = watched.open("/", java_script_enabled=False)
+def test_from_start_to_stop(tabs: BrowserTabs, db: Database, worker: Worker) -> None:
+    tabs.expected = ("422",)
+    page = tabs.open("/", java_script_enabled=False)
     page.get_by_label("Level", exact=True).select_option("island")
     page.get_by_text("More settings").click()
     page.get_by_label("Stages").fill("two")
@@ -56,7 +56,7 @@ def test_from_start_to_stop(watched: Watched, db: Database, worker: Worker) -> N
     expect(page.locator("[id='config.stages-error']")).to_contain_text("valid integer")
     page.get_by_label("Stages").fill("2")
     press(page, "Start")
-    expect(page).to_have_url(f"{watched.address}/runs/1/parent")
+    expect(page).to_have_url(f"{tabs.address}/runs/1/parent")
     for choice in ("left", "right", "either"):
         answer(page, choice)
     expect(page.locator("#count")).to_have_text("3")

@@ -7,7 +7,7 @@ import pytest
 from parenting.agent.query import Choice, Kind, Query
 from parenting.parents.garden_values import GardenValues
 from parenting.parents.scripted import ScriptedRule
-from tests.parents.walking import begun, garden, query, said, walked
+from tests.parents.walked_queries import begun, garden, query, said, walked
 
 UP, DOWN, LEFT, RIGHT = range(4)
 GAMMA = 0.9

@@ -22,8 +22,8 @@ from parenting.parents.values import (
     of_policy,
     optimal,
 )
-from tests.parents.plain import Plain
-from tests.parents.walking import begun, query, random_queries, said, walked
+from tests.parents.scalar_value_iteration import ScalarValueIteration
+from tests.parents.walked_queries import begun, query, random_queries, said, walked
 
 UP, DOWN, LEFT, RIGHT = range(4)
 
@@ -77,7 +77,7 @@ def number(model: Model, world: Gridworld, moves: list[int]) -> int:
 @pytest.mark.parametrize("name", WORLDS)
 def test_against_plain_value_iteration(name: str, gamma: float) -> None:
     world = WORLDS[name]
-    plain, exact = Plain(world, world.beginnings()), listed(world, gamma)
+    plain, exact = ScalarValueIteration(world, world.beginnings()), listed(world, gamma)
     v = plain.solve(gamma)
     assert len(v) == len(exact.model.over)
     for state, expected, reward, then in zip(plain.states, v, plain.reward, plain.then, strict=True):

@@ -13,7 +13,7 @@ from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
 from parenting.parents.garden_values import GardenValues
-from tests.parents.walking import begun, garden, query, walked
+from tests.parents.walked_queries import begun, garden, query, walked
 
 UP, DOWN, LEFT, RIGHT = range(4)
 GAMMA = 0.9
@@ -140,7 +140,7 @@ Cell = tuple[int, int]
 Plants = tuple[bool, ...]
 
 
-class Plain:
+class ScalarValueIteration:
     """Plain value iteration over all (cell, which plants are dry): every way that drying can go is summed."""
 
     def __init__(self, text: str, drying: float, gamma: float = GAMMA, sweeps: int = 160) -> None:
@@ -189,7 +189,7 @@ class Plain:
 @pytest.mark.parametrize("text", [RING, TAIL])
 def test_against_plain_value_iteration(text: str, drying: float) -> None:
     """V_p and Q_p of every cell and every set of dry plants."""
-    world, plain = garden(text, drying), Plain(text, drying)
+    world, plain = garden(text, drying), ScalarValueIteration(text, drying)
     parent = GardenValues(world, GAMMA)
     cells, dryness = [c for c, _ in plain.v], [d for _, d in plain.v]
     board = world.beginnings().board.repeat(len(cells), 1, 1)
@@ -209,7 +209,11 @@ def test_against_plain_value_iteration(text: str, drying: float) -> None:
 @pytest.mark.parametrize("text", [RING, TAIL])
 def test_advantage_of_random_clips(text: str, drying: float) -> None:
     """Eq. (7) by plain value iteration on the states that the clips came to, dried plants and all."""
-    world, plain, dice = garden(text, drying), Plain(text, drying), torch.Generator().manual_seed(2)
+    world, plain, dice = (
+        garden(text, drying),
+        ScalarValueIteration(text, drying),
+        torch.Generator().manual_seed(2),
+    )
     parent = GardenValues(world, GAMMA)
     for number in range(25):
         draws = torch.randint(4, (3, 6), generator=dice).tolist()

@@ -17,7 +17,7 @@ from parenting.envs.rng import keys
 from parenting.parents.parent import Parent
 from parenting.parents.replay import Moment, ReplayMismatchError, ReplayParent, same
 from parenting.parents.scripted import ScriptedParent, ScriptedRule
-from tests.parents.walking import island
+from tests.parents.walked_queries import island
 
 TRIALS, TICKS = 3, 60
 CONFIG = Config(stages=2, time_limit=12, p_guid=0.5, p_rec=0.6, p_pref=0.9)

@@ -11,7 +11,7 @@ from parenting.agent.query import Choice, Kind, empty
 from parenting.envs.mdp import explore
 from parenting.parents.scripted import TIE, ScriptedRule
 from parenting.parents.values import TabularValues, optimal
-from tests.parents.walking import at, island, place, query, random_queries, said, stacked
+from tests.parents.walked_queries import at, island, place, query, random_queries, said, stacked
 
 UP, DOWN, LEFT, RIGHT = range(4)
 START = (1, 4)

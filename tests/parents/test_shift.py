@@ -26,7 +26,7 @@ from parenting.experiments.figure4 import HORIZON, SAFE, UNSAFE, rho
 from parenting.experiments.figure4.reward_model import follow, plan
 from parenting.parents.scripted import ScriptedRule
 from parenting.parents.values import TabularValues, clip_states, optimal
-from tests.agent.lives import Judge, live
+from tests.agent.batched_runs import Judge, run_batch
 
 WORLD = registry.make("side-effects", time_limit=20)
 MODEL = explore(WORLD)
@@ -90,7 +90,7 @@ def test_a_parented_agent_learns_the_same_under_both(name: str) -> None:
     config = Config.model_validate({**PRESETS["lax"], "stages": 3, "mature_every": 15, "time_limit": 20})
     weights = network_of(WORLD)
     (one, first), (other, second) = (
-        live(WORLD, config, judge, seed=3, trials=4, ticks=160) for judge in PARENTS[name]
+        run_batch(WORLD, config, judge, seed=3, trials=4, ticks=160) for judge in PARENTS[name]
     )
     assert first == second
     assert torch.equal(one.learner.live, other.learner.live)
@@ -112,7 +112,7 @@ def test_a_shift_within_episodes_is_another_task() -> None:
         asked.append(query.clone())
         return by_sums(RHO, 0.0)(query)
 
-    live(WORLD, config, listening, seed=3, trials=4, ticks=80)
+    run_batch(WORLD, config, listening, seed=3, trials=4, ticks=80)
     plain, shifted, resting, moved = (
         torch.stack([judge(query) for query in asked])
         for judge in (within_episodes(0.0), within_episodes(8.0), by_advantages(0.0), by_advantages(8.0))

@@ -8,8 +8,8 @@ import torch
 from parenting.agent.query import Kind
 from parenting.envs.mdp import explore
 from parenting.parents.values import HOPELESS, advantage, advantage_from_rewards, of_policy, optimal
-from tests.by_hand import distances
-from tests.parents.walking import at, island, place, query, random_queries
+from tests.parents.walked_queries import at, island, place, query, random_queries
+from tests.simulated_person import distances
 
 LEVELS = ("island", "island-bottleneck")
 UP, DOWN, LEFT, RIGHT = range(4)

@@ -27,7 +27,7 @@ from parenting.server.new_run import NewRun
 from parenting.server.record import load_checkpoints
 from parenting.server.replay import differences
 from parenting.weights.store import Wanted, find, load
-from tests.agent.lives import Judge
+from tests.agent.batched_runs import Judge
 
 CONFIG: dict[str, Any] = {"stages": 3, "mature_every": 12, "max_open_preferences": 0, "time_limit": 12}
 """Clips of up to three steps, early ends, truncations and two maturations within some sixty answers."""

@@ -24,7 +24,7 @@ from parenting.server.schema import upgrade
 from parenting.server.session import Life
 from parenting.server.settings import Settings
 from parenting.server.tables import Checkpoint
-from tests.agent.lives import capricious
+from tests.agent.batched_runs import random_parent
 from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, same_bits
 
 AFTERWARDS = 50
@@ -82,7 +82,7 @@ def moment(name: str) -> Moment:
     """Its first coming after the first maturation. One life for each: a life consumes its states."""
     begun, came = MOMENTS[name]
     for seed in range(SEED, SEED + 50):  # some lives never come to some moments
-        run = Inline(begun, seed, judge=capricious)
+        run = Inline(begun, seed, judge=random_parent)
         for _ in range(150):
             run.tick()
             if int(run.saved.state.maturity) > 1 and came(run):
@@ -98,7 +98,7 @@ def _after(begun: Begun, run: Inline) -> Moment:
 
 
 def go_on(moment: Moment, blob: bytes) -> Saved:
-    run = Inline(moment.begun, judge=capricious)
+    run = Inline(moment.begun, judge=random_parent)
     run.saved, run.query = moment.begun.unpack(blob), moment.query
     for _ in range(AFTERWARDS):
         run.tick()

@@ -1,4 +1,4 @@
-"""Pages in a real browser, watched: errors on the console and requests to other origins are written down."""
+"""Pages in a real browser, tabs: errors on the console and requests to other origins are written down."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from parenting.server.db import Database
 from parenting.server.tables import Answer
 
 
-class Watched:
+class BrowserTabs:
     """Opens pages of one site. `wrong` lists what went wrong in any of them."""
 
     def __init__(self, browser: Browser, address: str) -> None:

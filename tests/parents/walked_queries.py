@@ -79,14 +79,14 @@ def stacked(queries: list[Query]) -> Query:
     return queries[0].map(lambda name, _tensor, _axis: torch.cat([one[name] for one in every]))
 
 
-class Dice:
+class RandomMoves:
     """Rolls with any number of sides."""
 
     def __init__(self, seed: int) -> None:
-        self.dice = torch.Generator().manual_seed(seed)
+        self.random = torch.Generator().manual_seed(seed)
 
     def roll(self, sides: int) -> int:
-        return int(torch.randint(sides, (1,), generator=self.dice))
+        return int(torch.randint(sides, (1,), generator=self.random))
 
     def moves(self, longest: int) -> list[int]:
         """`longest` moves at most, one at least."""
@@ -97,10 +97,10 @@ def random_queries(
     world: Gridworld, model: Model, number: int, kind: Kind, seed: int = 0, longest: int = 3
 ) -> Query:
     """Pairs of clips of 1 to `longest` steps (guidance: 1) from random states that are not over."""
-    dice, limit = Dice(seed), 1 if kind == Kind.GUIDANCE else longest
+    random, limit = RandomMoves(seed), 1 if kind == Kind.GUIDANCE else longest
     living = (~model.over).nonzero().squeeze(1)
-    starts = [model.states.pick(living[[dice.roll(len(living))]]) for _ in range(number)]
-    asked = [query(world, kind, start, dice.moves(limit), dice.moves(limit)) for start in starts]
+    starts = [model.states.pick(living[[random.roll(len(living))]]) for _ in range(number)]
+    asked = [query(world, kind, start, random.moves(limit), random.moves(limit)) for start in starts]
     return stacked([padded(one, longest) for one in asked])
 
 

@@ -21,7 +21,7 @@ Judge = Callable[[Query], torch.Tensor]
 LogEntry = tuple[int, str, Clip, Clip]
 
 
-def live(
+def run_batch(
     world: Gridworld,
     config: Config,
     judge: Judge,
@@ -76,16 +76,16 @@ def as_query(world: Gridworld, stages: int, left: Clip, right: Clip, kind: str) 
     return query
 
 
-def capricious(query: Query) -> torch.Tensor:
+def random_parent(query: Query) -> torch.Tensor:
     """A parent whose answers have no sense but use all four choices: a function of moves and places alone."""
     moves = (query.action * torch.tensor([[[3], [5]]])).sum((1, 2))
     places = (query.agent * torch.tensor([7, 11])).sum((1, 2, 3))
     return torch.where(query.kind == Kind.NONE, 0, 1 + (moves + places) % len(list(Choice)[1:]))
 
 
-def wayward(query: Query) -> torch.Tensor:
+def lenient_parent(query: Query) -> torch.Tensor:
     """The same, but *neither* only where a first action is up: so no life is ever stuck."""
-    choice = capricious(query)
+    choice = random_parent(query)
     upward = (query.action[:, :, 0] == 0).any(1)
     return torch.where((choice == Choice.NEITHER) & ~upward, int(Choice.EITHER), choice)
 

@@ -10,7 +10,7 @@ from parenting.envs.rng import keys
 SWEEPS = 700
 
 
-class Plain:
+class ScalarValueIteration:
     """Every state that `step` leads to from some first ones, in a world that leaves nothing to chance."""
 
     def __init__(self, world: Gridworld, first: WorldState) -> None:

@@ -10,7 +10,7 @@ from parenting.envs.levels.side_effects import stuck
 from tests.reference import EXPLOIT, EXPLORE, PREFERENCE, Reference
 
 
-class Happenings(Counter[str]):
+class EventCoverage(Counter[str]):
     """Counts of what the ticks of a life brought about."""
 
     def look(self, trial: Reference, before: WorldState) -> None:

@@ -21,17 +21,17 @@ CONFIG = {
     "p_rec": 0.9,
     "p_pref": 0.9,
 }
-BY_HAND = Begun("unsafe-exploration", "island", CONFIG, seed=12)
+EVENTFUL = Begun("unsafe-exploration", "island", CONFIG, seed=12)
 TICKS = 90
 CHOICES = ("left", "right", "either", "left", "neither", "right", "right")
 
 
-class Hand:
+class PersonAndOperator:
     """A person at the browser and an operator at the dashboard, over HTTP; a worker that is killed once."""
 
     def __init__(self, db: Database, web: httpx2.Client) -> None:
         self.db, self.web = db, web
-        self.run = start(db, BY_HAND.new("human")).id
+        self.run = start(db, EVENTFUL.new("human")).id
         self.life = self.taken_up()
         self.late = 0  # preferences answered when others had been asked since
         self.said = 0
@@ -72,29 +72,29 @@ class Hand:
         return reply
 
 
-def raise_by_hand(db: Database, web: httpx2.Client) -> int:
+def raise_eventful_run(db: Database, web: httpx2.Client) -> int:
     """What can happen to a run, at odd moments."""
-    hand = Hand(db, web)
-    hand.live_to(9)
-    hand.operate("goal", goal=1000)
-    hand.operate("pace", pace=500.0)
-    hand.until_guidance_is_open()
-    hand.operate("end-episode")  # while guidance is open
-    hand.live_to(25)
-    hand.life.save()
-    hand.operate("change", name="p_pref", value=0.8)
-    hand.live_to(33)
-    hand.life = hand.taken_up()  # the worker was killed: eight ticks are lived again
-    hand.until_guidance_is_open()
-    query = hand.answer()
-    hand.live_to(hand.life.tick + 3)
+    people = PersonAndOperator(db, web)
+    people.live_to(9)
+    people.operate("goal", goal=1000)
+    people.operate("pace", pace=500.0)
+    people.until_guidance_is_open()
+    people.operate("end-episode")  # while guidance is open
+    people.live_to(25)
+    people.life.save()
+    people.operate("change", name="p_pref", value=0.8)
+    people.live_to(33)
+    people.life = people.taken_up()  # the worker was killed: eight ticks are lived again
+    people.until_guidance_is_open()
+    query = people.answer()
+    people.live_to(people.life.tick + 3)
     parent_side.correct(db, query, "either", "tab", "human")  # too late: the agent has heard the other answer
     assert parent_side.get_query(db, query).status == "applied"
-    hand.operate("change", name="p_train", value=0.5)
-    hand.live_to(50)
-    hand.operate("mature")
-    hand.live_to(TICKS)
-    hand.life.save()
-    assert hand.late > 1
-    assert int(hand.life.saved.state.maturity) == 3
-    return hand.run
+    people.operate("change", name="p_train", value=0.5)
+    people.live_to(50)
+    people.operate("mature")
+    people.live_to(TICKS)
+    people.life.save()
+    assert people.late > 1
+    assert int(people.life.saved.state.maturity) == 3
+    return people.run

@@ -15,7 +15,7 @@ from parenting.server.tables import Query, Run
 from tests.envs.walk import LETTERS, states
 
 
-def film(world: Gridworld, letters: str, way: str = "", seed: int = 0) -> Clip:
+def walked_clip(world: Gridworld, letters: str, way: str = "", seed: int = 0) -> Clip:
     """What the agent does by `letters` after it has gone a way, until its episode ends or it is held."""
     passed = states(world, way + letters, seed)[len(way) :]
     last = next((k for k, state in enumerate(passed) if _ended(world, state)), len(letters))
@@ -49,7 +49,7 @@ def guidance(world: Gridworld, left: str, right: str, way: str = "", seed: int =
 
 def preference(world: Gridworld, left: str, right: str, way: str = "", seed: int = 0) -> dict[str, Any]:
     """Two clips from one place."""
-    return {"left": film(world, left, way, seed), "right": film(world, right, way, seed)}
+    return {"left": walked_clip(world, left, way, seed), "right": walked_clip(world, right, way, seed)}
 
 
 def asked(kind: str, clips: dict[str, Any], stage: int = 1) -> Query:

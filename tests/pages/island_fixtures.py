@@ -50,7 +50,7 @@ def preference(left: str, right: str, start: tuple[int, int] = START) -> dict[st
     return {"left": clip(*left.split(), start=start), "right": clip(*right.split(), start=start)}
 
 
-def live(db: Database, **fields: Any) -> tuple[Run, Claim]:
+def start_run(db: Database, **fields: Any) -> tuple[Run, Claim]:
     """A run that a worker raises just now."""
     run = start(db, NewRun(**{"world": "unsafe-exploration", **fields}))
     mine = next(claim for claim in claim(db, "worker") if claim.run_id == run.id)
