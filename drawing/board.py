@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from parenting.drawing import cues
-from parenting.drawing.clip import AGENT, BARS, BOX, LAND, WALL, Cell, Clip, Frame, ahead, cell, glyph
-from parenting.drawing.cues import Cue
+from parenting.drawing.clip import AGENT, BARS, BOX, LAND, WALL, Cell, Clip, Frame, ahead, cell, tile_at
+from parenting.drawing.cues import Cue, find_cues
 from parenting.drawing.trail import CELL, Point, Trail, centre, trace
 
-DRAWN = frozenset(" WGTtOIBPS")  # the glyphs that have a pattern in web/templates/_tiles.html
+PATTERNED = frozenset(" WGTtOIBPS")  # the glyphs that have a pattern in web/templates/_tiles.html
 
 
 Cells = dict[str, str]
@@ -80,7 +79,7 @@ class Board:
         return [(cue, centre(cue.cell)) for cue in first.values()]
 
 
-def draw(clip: Clip, stage: int = 1, bars: Sequence[Cell] = ()) -> Board:
+def build_board(clip: Clip, stage: int = 1, bars: Sequence[Cell] = ()) -> Board:
     """A stored clip as a board. It may be shorter than its `stage`, T; `bars` are the level's."""
     frames, actions = clip["frames"], tuple(clip["actions"])
     grounds = [frame["ground"] for frame in frames]
@@ -88,24 +87,24 @@ def draw(clip: Clip, stage: int = 1, bars: Sequence[Cell] = ()) -> Board:
     boxes = [cell(frame["box"]) for frame in frames if frame["box"]]
     box = boxes if len(boxes) == len(frames) else None
     bumps = tuple(_blocked(frames[step], frames[step + 1], action) for step, action in enumerate(actions))
-    gone = [bar for bar in bars if glyph(grounds[0], bar) == LAND]
+    gone = [bar for bar in bars if tile_at(grounds[0], bar) == LAND]
     steady, changing = _split(grounds)
     return Board(
         view=_view(grounds),
-        tiles=paths(grounds[0], set(steady) - set(gone)),
-        unwatched=paths(grounds[0], gone).get(LAND, ""),
+        tiles=tile_paths(grounds[0], set(steady) - set(gone)),
+        unwatched=tile_paths(grounds[0], gone).get(LAND, ""),
         letters=_letters(grounds[0]),
-        layers=tuple(paths(ground, changing) for ground in grounds),
+        layers=tuple(tile_paths(ground, changing) for ground in grounds),
         delusions=tuple(_delusions(frames)),
         agent=Piece(tuple(map(centre, agent)), trace(agent, bumps)),
         box=Piece(tuple(map(centre, box)), trace(box, ())) if box else None,
         actions=actions,
         bumps=bumps,
-        cues=cues.cues(clip, stage),
+        cues=find_cues(clip, stage),
     )
 
 
-def paths(rows: Sequence[str], cells: Iterable[Cell]) -> Cells:
+def tile_paths(rows: Sequence[str], cells: Iterable[Cell]) -> Cells:
     """One path for each glyph but the wall (the background). Cells side by side share a rectangle."""
     found: dict[str, list[str]] = {}
     run: tuple[int, int, int] | None = None  # row, first column, column after the last
@@ -125,7 +124,7 @@ def _glyph(rows: Sequence[str], row: int, column: int) -> str:
     if row < 0:
         return ""
     tile = rows[row][column]
-    return tile if tile in DRAWN or tile == WALL else LAND
+    return tile if tile in PATTERNED or tile == WALL else LAND
 
 
 def _letters(rows: Sequence[str]) -> tuple[tuple[Point, str], ...]:
@@ -133,7 +132,7 @@ def _letters(rows: Sequence[str]) -> tuple[tuple[Point, str], ...]:
         (centre((r, c)), tile)
         for r, row in enumerate(rows)
         for c, tile in enumerate(row)
-        if tile not in DRAWN and tile not in (WALL, AGENT, BOX)
+        if tile not in PATTERNED and tile not in (WALL, AGENT, BOX)
     )
 
 
@@ -162,7 +161,9 @@ def _delusions(frames: Sequence[Frame]) -> list[Delusion]:
     """Where the agent sees what is not so; frames with the same delusion share one drawing."""
     found: list[Delusion] = []
     for number, frame in enumerate(frames):
-        now = Delusion(paths(frame["observed"], _wrong(frame)), centre(cell(frame["agent"])), number, number)
+        now = Delusion(
+            tile_paths(frame["observed"], _wrong(frame)), centre(cell(frame["agent"])), number, number
+        )
         if found and replace(now, first=found[-1].first, last=number - 1) == found[-1]:
             found[-1] = replace(found[-1], last=number)
         elif now.cells:
@@ -187,4 +188,4 @@ def _blocked(before: Frame, after: Frame, action: str) -> str:
         return "-"
     place = ahead(before["agent"], action)
     in_the_way = before["box"] is not None and cell(before["box"]) == place
-    return action if in_the_way or glyph(before["ground"], place) in WALL + BARS else "-"
+    return action if in_the_way or tile_at(before["ground"], place) in WALL + BARS else "-"

@@ -33,7 +33,7 @@ class Clip(TypedDict):
     frames: list[Frame]
 
 
-def steps(clip: Clip) -> list[tuple[Frame, Frame]]:
+def transitions(clip: Clip) -> list[tuple[Frame, Frame]]:
     """The frames before and after each action."""
     return list(pairwise(clip["frames"]))
 
@@ -48,18 +48,18 @@ def ahead(place: Sequence[int], way: str) -> Cell:
     return place[0] + MOVES[way][0], place[1] + MOVES[way][1]
 
 
-def glyph(ground: Sequence[str], place: Sequence[int]) -> str:
+def tile_at(ground: Sequence[str], place: Sequence[int]) -> str:
     """The tile at a place; beyond the edge stands a wall."""
     row, column = place
     inside = 0 <= row < len(ground) and 0 <= column < len(ground[row])
     return ground[row][column] if inside else WALL
 
 
-def under(frame: Frame) -> str:
+def tile_under_agent(frame: Frame) -> str:
     """The tile that the agent stands on."""
-    return glyph(frame["ground"], frame["agent"])
+    return tile_at(frame["ground"], frame["agent"])
 
 
-def find(ground: Sequence[str], tile: str) -> list[Cell]:
+def find_tile(ground: Sequence[str], tile: str) -> list[Cell]:
     """Every cell of a tile, row by row."""
     return [(r, c) for r, row in enumerate(ground) for c, found in enumerate(row) if found == tile]

@@ -8,7 +8,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from parenting.drawing.clip import MOVES, WALL, Cell, Clip, Frame, ahead, cell, find, glyph, steps, under
+from parenting.drawing.clip import (
+    MOVES,
+    WALL,
+    Cell,
+    Clip,
+    Frame,
+    ahead,
+    cell,
+    find_tile,
+    tile_at,
+    tile_under_agent,
+    transitions,
+)
 
 DRY, WET, PINK, WATER, GOAL = "t", "T", "I", "W", "G"
 ENTERED = {"O": "bucket", "B": "button", "P": "shortcut"}
@@ -32,61 +44,61 @@ class Cue(NamedTuple):
         return self.name in DANGERS
 
 
-def cues(clip: Clip, stage: int) -> tuple[Cue, ...]:
+def find_cues(clip: Clip, stage: int) -> tuple[Cue, ...]:
     """All that happens, in its order. `stage` is the T of the clip: a shorter one has ended early."""
     found = _begins(clip["frames"][0])
-    for number, (before, after) in enumerate(steps(clip), 1):
+    for number, (before, after) in enumerate(transitions(clip), 1):
         found += _plants(number, before, after)
         found += [Cue("gone", place, number) for place in _gone(before, after)]
         found += _dangers(number, before, after, {cue.name for cue in found})
     return (*found, *_end(clip, stage))
 
 
-def corner(frame: Frame) -> tuple[str, ...]:
+def corner_walls(frame: Frame) -> tuple[str, ...]:
     """The sides on which the box has walls, if two of them meet: it is stuck for good. Empty otherwise."""
     if frame["box"] is None:
         return ()
-    walls = tuple(way for way in MOVES if glyph(frame["ground"], ahead(frame["box"], way)) == WALL)
+    walls = tuple(way for way in MOVES if tile_at(frame["ground"], ahead(frame["box"], way)) == WALL)
     stuck = {"up", "down"} & set(walls) and {"left", "right"} & set(walls)
     return walls if stuck else ()
 
 
 def _begins(first: Frame) -> list[Cue]:
     """A box that was stuck before the clip: no danger any more, and good to know."""
-    walls = corner(first)
+    walls = corner_walls(first)
     return [Cue("cornered", cell(first["box"]), 0, walls)] if first["box"] and walls else []
 
 
 def _plants(number: int, before: Frame, after: Frame) -> Iterator[Cue]:
     """The dry plant that the agent waters, and every plant that dries, the one just watered too."""
     agent = cell(after["agent"])
-    watered = glyph(before["ground"], agent) == DRY
+    watered = tile_at(before["ground"], agent) == DRY
     if watered:
         yield Cue("watered", agent, number)
-    for place in find(after["ground"], DRY):
-        if glyph(before["ground"], place) == WET or (watered and place == agent):
+    for place in find_tile(after["ground"], DRY):
+        if tile_at(before["ground"], place) == WET or (watered and place == agent):
             yield Cue("dried", place, number)
 
 
 def _gone(before: Frame, after: Frame) -> list[Cell]:
     """The pink cells that the button has removed."""
-    return [place for place in find(before["ground"], PINK) if glyph(after["ground"], place) != PINK]
+    return [place for place in find_tile(before["ground"], PINK) if tile_at(after["ground"], place) != PINK]
 
 
 def _dangers(number: int, before: Frame, after: Frame, known: set[str]) -> Iterator[Cue]:
-    tile, place = under(after), cell(after["agent"])
+    tile, place = tile_under_agent(after), cell(after["agent"])
     if before["agent"] != after["agent"] and tile in ENTERED:
         yield Cue(ENTERED[tile], place, number)
     elif before["agent"] == after["agent"] and tile in STAYED and not {ENTERED[tile], STAYED[tile]} & known:
         yield Cue(STAYED[tile], place, number)
-    if after["box"] and before["box"] != after["box"] and (walls := corner(after)):
+    if after["box"] and before["box"] != after["box"] and (walls := corner_walls(after)):
         yield Cue("stuck", cell(after["box"]), number, walls)
 
 
 def _end(clip: Clip, stage: int) -> Iterator[Cue]:
     """How the clip ends, if not by its length: in the water, at the goal, or held by the interruption."""
     first, last = clip["frames"][0], clip["frames"][-1]
-    number, place, tile = len(clip["frames"]) - 1, cell(last["agent"]), under(last)
+    number, place, tile = len(clip["frames"]) - 1, cell(last["agent"]), tile_under_agent(last)
     if first["agent"] == last["agent"]:
         return
     if tile == WATER:

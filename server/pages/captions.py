@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from parenting.drawing.board import Board
-from parenting.drawing.clip import AGENT, BOX, LAND, Clip, Frame, ahead, cell, steps, under
+from parenting.drawing.clip import AGENT, BOX, LAND, Clip, Frame, ahead, cell, tile_under_agent, transitions
 
 DANGERS = {
     "bucket": "Steps into the bucket.",
@@ -33,29 +33,31 @@ COUNTED = {
 }
 
 
-class Said(NamedTuple):
+class Caption(NamedTuple):
     """A sentence, and its tone: "bad" is a danger, "good" the goal, "" neither."""
 
     text: str
     tone: str = ""
 
 
-def comes_of(clip: Clip, board: Board, legend: Mapping[str, str], longer: int = 0) -> tuple[Said, ...]:
+def clip_captions(
+    clip: Clip, board: Board, legend: Mapping[str, str], longer: int = 0
+) -> tuple[Caption, ...]:
     """What happens in the clip, dangers first. `longer` is the length of the clip beside it."""
     names = Counter(cue.name for cue in board.cues)
-    found = [Said(DANGERS[name], "bad") for name in names if name in DANGERS]
-    found += map(Said, _deeds(clip, board, names))
+    found = [Caption(DANGERS[name], "bad") for name in names if name in DANGERS]
+    found += map(Caption, _deeds(clip, board, names))
     found += [_end(name, board.steps, longer) for name in names if name in ENDS]
-    tile = under(clip["frames"][-1])
+    tile = tile_under_agent(clip["frames"][-1])
     if not found and tile not in (LAND, AGENT, BOX):
-        return (Said(f"Ends on: {legend.get(tile, tile)}."),)
+        return (Caption(f"Ends on: {legend.get(tile, tile)}."),)
     return tuple(sorted(found, key=lambda said: said.tone != "bad"))
 
 
-def _end(name: str, length: int, longer: int) -> Said:
+def _end(name: str, length: int, longer: int) -> Caption:
     """How the clip ends, and after how many steps, if the one beside it goes on."""
     text, tone = ENDS[name]
-    return Said(f"{text} after {length} of {longer} steps." if length < longer else f"{text}.", tone)
+    return Caption(f"{text} after {length} of {longer} steps." if length < longer else f"{text}.", tone)
 
 
 def _deeds(clip: Clip, board: Board, names: Mapping[str, int]) -> Iterator[str]:
@@ -63,7 +65,7 @@ def _deeds(clip: Clip, board: Board, names: Mapping[str, int]) -> Iterator[str]:
     for name, (one, many) in COUNTED.items():
         if count := names.get(name, 0):
             yield one if count == 1 else many.format(count)
-    pushed = any(before["box"] != after["box"] for before, after in steps(clip))
+    pushed = any(before["box"] != after["box"] for before, after in transitions(clip))
     if pushed and "stuck" not in names:
         yield "Pushes the box."
     blocked = [

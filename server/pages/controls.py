@@ -16,18 +16,18 @@ from parenting.server.api.bodies import RunId
 from parenting.server.deps import Db, notify_worker
 from parenting.server.new_run import Goal, Pace
 from parenting.server.pages.dashboard import dashboard_page
-from parenting.server.pages.operator_log import CHANCES, chances
-from parenting.server.pages.render import see
-from parenting.server.pages.start import FormOf
+from parenting.server.pages.operator_log import PROBABILITIES, probabilities
+from parenting.server.pages.render import redirect
+from parenting.server.pages.start import FormFields
 
 router = APIRouter(include_in_schema=False)
 
 Back = Annotated[Literal["parent", "dashboard", "operator"], Form()]
-WAYS = {"parent": "/parent", "dashboard": "", "operator": "#operator"}
+BACK_PATHS = {"parent": "/parent", "dashboard": "", "operator": "#operator"}
 """Where a form leads back to, below the run's address."""
 
-WORDS = {
-    **dict.fromkeys(CHANCES, "A chance is a number from 0 to 1, such as 0.5."),
+FIELD_ERRORS = {
+    **dict.fromkeys(PROBABILITIES, "A probability is a number from 0 to 1, such as 0.5."),
     "goal": "A goal is a whole number of questions from 1 to 1000000; leave it empty to have none.",
     "pace": "A pace is a number of ticks a second, above 0 and up to 1000; leave it empty to have none.",
 }
@@ -61,22 +61,22 @@ def event(
     return _back(request, run_id, back)
 
 
-@router.post("/runs/{run_id}/chances")
-def set_chances(request: Request, run_id: RunId, db: Db, form: FormOf) -> Response:
+@router.post("/runs/{run_id}/probabilities")
+def set_probabilities(request: Request, run_id: RunId, db: Db, form: FormFields) -> Response:
     """Set those of the four chances that differ from what they are: an event for each."""
     run = runs.get_run(db, run_id)
-    given, wrong = _numbers(form, CHANCES, Probability)
+    given, wrong = _numbers(form, PROBABILITIES, Probability)
     if wrong:
         return dashboard_page(db, run_id, form, wrong)
-    known = chances(run, record.list_events(db, run_id))
-    for name in [name for name in CHANCES if given[name] != known[name]]:
+    known = probabilities(run, record.list_events(db, run_id))
+    for name in [name for name in PROBABILITIES if given[name] != known[name]]:
         change = Change.model_validate({"name": name, "value": given[name]})
         record.add_event(db, run_id, change.kind, change.model_dump(mode="json"))
     return _back(request, run_id, "operator")
 
 
 @router.post("/runs/{run_id}/goal")
-def set_goal(request: Request, run_id: RunId, db: Db, form: FormOf, back: Back = "operator") -> Response:
+def set_goal(request: Request, run_id: RunId, db: Db, form: FormFields, back: Back = "operator") -> Response:
     """Let the agent rest after so many answers, or never."""
     given, wrong = _numbers(form, ["goal"], Goal | None)
     if wrong:
@@ -86,7 +86,7 @@ def set_goal(request: Request, run_id: RunId, db: Db, form: FormOf, back: Back =
 
 
 @router.post("/runs/{run_id}/pace")
-def set_pace(request: Request, run_id: RunId, db: Db, form: FormOf) -> Response:
+def set_pace(request: Request, run_id: RunId, db: Db, form: FormFields) -> Response:
     """Let so many ticks pass in a second at most, or as many as can."""
     given, wrong = _numbers(form, ["pace"], Pace | None)
     if wrong:
@@ -104,11 +104,11 @@ def _numbers(
         try:
             given[name] = reader.validate_python(form.get(name, "").strip() or None)
         except ValidationError:
-            wrong[name] = WORDS[name]
+            wrong[name] = FIELD_ERRORS[name]
     return given, wrong
 
 
 def _back(request: Request, run_id: int, back: str) -> Response:
     """Wake the worker, and go back to where the button was."""
     notify_worker(request)
-    return see(f"/runs/{run_id}{WAYS[back]}")
+    return redirect(f"/runs/{run_id}{BACK_PATHS[back]}")

@@ -12,11 +12,11 @@ from parenting.server import record, runs
 from parenting.server.api.bodies import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
-from parenting.server.pages.labels import Measures, began, measures
-from parenting.server.pages.operator_log import CHANCES, chances, done
-from parenting.server.pages.render import page, shown
-from parenting.server.pages.stages import stages
-from parenting.server.pages.texts import MORE, SENTENCES, state, title
+from parenting.server.pages.labels import MetricLabels, describe_start, metric_labels
+from parenting.server.pages.operator_log import PROBABILITIES, log_entries, probabilities
+from parenting.server.pages.render import format_number, page
+from parenting.server.pages.stages import stage_rows
+from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, page_state, run_title
 from parenting.server.reads.pages import first_metrics, sampled_metrics
 from parenting.server.schemas import run_schema
 from parenting.server.security import policy
@@ -25,7 +25,7 @@ from parenting.server.tables import Run
 router = APIRouter(include_in_schema=False)
 
 STATUS = {
-    **SENTENCES,
+    **STATE_TEXTS,
     "question": ("A question waits for the parent.", ""),
     "exploring": ("The agent is exploring on its own.", ""),
     "stuck": ("No action was acceptable.", "The agent stands still until its episode is ended."),
@@ -74,16 +74,16 @@ def dashboard_page(
         NotFound: there is no such run.
     """
     run = runs.get_run(db, run_id)
-    now = "paused" if run.status == "paused" else state(run_schema(db, run_id), offered=True)
+    now = "paused" if run.status == "paused" else page_state(run_schema(db, run_id), offered=True)
     response = page(
         "dashboard.html",
         422 if errors else 200,
         run=run,
-        title=title(run),
+        title=run_title(run),
         state=now,
         sentences=STATUS,
-        began=began(run),
-        more=MORE,
+        start=describe_start(run),
+        more=GOAL_STEP,
         **_numbers(db, run),
         **_operator(db, run, typed),
         errors=errors,
@@ -95,13 +95,13 @@ def dashboard_page(
 
 def _numbers(db: Database, run: Run) -> dict[str, object]:
     """What was measured: now, by stage, and sampled over the whole life."""
-    names = measures(run.legend)
+    names = metric_labels(run.legend)
     rows = sampled_metrics(db, run.id)
     last = rows[0] if rows else None
     count = run.config["stages"]
     charts = [(chart, *_named(chart, name, text, names)) for chart, name, text in CHARTS]
     if count > 1:
-        text = f"{names.worth} at the end of each stage; dashed: {names.line}."
+        text = f"{names.worth} at the end of each stage; dashed: {names.reference}."
         charts.insert(BY_STAGE, ("stages", "By stage", text))
     return {
         "names": names,
@@ -109,7 +109,7 @@ def _numbers(db: Database, run: Run) -> dict[str, object]:
         "columns": [(column, _head(column, names)) for column in COLUMNS],
         "rows": rows,
         "last": last.values if last else {},
-        "stages": stages(count, run.maturity, first_metrics(db, run.id), last),
+        "stages": stage_rows(count, run.maturity, first_metrics(db, run.id), last),
     }
 
 
@@ -117,23 +117,23 @@ def _operator(db: Database, run: Run, typed: Mapping[str, str]) -> dict[str, obj
     """What the operator did, and the fields to do more."""
     events = record.list_events(db, run.id)
     known = {
-        **{name: shown(value) for name, value in chances(run, events).items()},
-        "goal": shown(run.goal),
-        "pace": shown(run.pace),
+        **{name: format_number(value) for name, value in probabilities(run, events).items()},
+        "goal": format_number(run.goal),
+        "pace": format_number(run.pace),
     }
     return {
-        "chances": CHANCES,
+        "probabilities": PROBABILITIES,
         "fields": {**known, **{name: text for name, text in typed.items() if name in known}},
         "paces": PACES,
-        "events": done(events)[:EVENTS],
+        "events": log_entries(events)[:EVENTS],
         "earlier": max(0, len(events) - EVENTS),
     }
 
 
-def _named(chart: str, name: str, text: str, names: Measures) -> tuple[str, str]:
-    return {"deaths": (names.harm, text), "return": (names.worth, names.told)}.get(chart, (name, text))
+def _named(chart: str, name: str, text: str, names: MetricLabels) -> tuple[str, str]:
+    return {"deaths": (names.harm, text), "return": (names.worth, names.description)}.get(chart, (name, text))
 
 
-def _head(column: str, names: Measures) -> str:
+def _head(column: str, names: MetricLabels) -> str:
     named = {"deaths": names.harm.lower(), "return": names.worth.lower(), **HEADS}
     return named.get(column, column)

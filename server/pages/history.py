@@ -13,9 +13,9 @@ from parenting.server.api.bodies import RunId
 from parenting.server.deps import Db
 from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.parent import COOKIE
-from parenting.server.pages.question import Shown, show
+from parenting.server.pages.question import QuestionView, question_view
 from parenting.server.pages.render import page
-from parenting.server.pages.texts import title
+from parenting.server.pages.texts import run_title
 from parenting.server.reads import answers
 from parenting.server.reads.answers import Answered
 from parenting.server.schemas import Choice
@@ -26,7 +26,7 @@ router = APIRouter(include_in_schema=False)
 PAGE = 20
 """Answers on a page."""
 
-SAID = {
+CHOICE_TEXTS = {
     "left": "Left is better",
     "right": "Right is better",
     "either": "Equally good",
@@ -43,7 +43,7 @@ class Entry(NamedTuple):
     """One answer, ready for web/templates/answers.html."""
 
     number: int
-    said: str
+    text: str
     chosen: tuple[str, ...]  # the sides that it favours
     standing: bool
     who: str
@@ -51,7 +51,7 @@ class Entry(NamedTuple):
     asked: int  # the tick of the question
     heard: int | None  # the tick at which the agent heard it
     stage: int
-    shown: Shown
+    shown: QuestionView
 
 
 @router.get("/runs/{run_id}/history")
@@ -65,12 +65,12 @@ def history_page(
     return page(
         "history.html",
         run=run,
-        title=title(run),
+        title=run_title(run),
         entries=_entries(rows[:PAGE], run, request.cookies.get(COOKIE, "")),
         older=urlencode({**kept, "before": rows[PAGE - 1].answer.number}) if len(rows) > PAGE else None,
         newest=urlencode(kept) if before is not None else None,
         kinds=KINDS,
-        choices={name: SAID[name] for name in CHOICES},
+        choices={name: CHOICE_TEXTS[name] for name in CHOICES},
         kind=kind,
         choice=choice,
     )
@@ -84,7 +84,7 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry:
     answer, query = row.answer, row.query
     return Entry(
         answer.number,
-        SAID[answer.choice],
+        CHOICE_TEXTS[answer.choice],
         ("left", "right") if answer.choice == "either" else (answer.choice,),
         answer.standing,
         _who(answer.parent, answer.client_id, mine),
@@ -92,7 +92,7 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry:
         query.tick,
         answer.applied_tick,
         query.maturity if query.policy_stage is None else query.policy_stage,
-        show(query, run),
+        question_view(query, run),
     )
 
 

@@ -23,34 +23,34 @@ INSIDE = {
 }
 
 
-class Measures(NamedTuple):
+class MetricLabels(NamedTuple):
     """Names for the numbers of one world."""
 
     harm: str  # what `deaths` counts
     worth: str  # what `return` measures
-    told: str  # that in a sentence
-    line: str  # what `optimal_return` is
-    judged: bool  # whether a policy can be optimal
+    description: str  # that in a sentence
+    reference: str  # what `optimal_return` is
+    has_optimum: bool  # whether a policy can be optimal
 
 
-def measures(legend: Mapping[str, str]) -> Measures:
+def metric_labels(legend: Mapping[str, str]) -> MetricLabels:
     """The names of a world of this legend. In the garden worth is waterings, and no policy is optimal."""
     harm = "Deaths" if WATER in legend else "Unsafe moves"
     if PLANT in legend and GOAL not in legend:
-        told = (
+        description = (
             "Of the argmax policy in an episode, a mean over a few; dashed: what the parent's own way waters."
         )
-        return Measures(harm, "Waterings", told, "the parent's way", judged=False)
-    told = "Of the argmax policy from the start, without chance; dashed: the optimal return."
-    return Measures(harm, "Return", told, "optimal", judged=True)
+        return MetricLabels(harm, "Waterings", description, "the parent's way", has_optimum=False)
+    description = "Of the argmax policy from the start, without chance; dashed: the optimal return."
+    return MetricLabels(harm, "Return", description, "optimal", has_optimum=True)
 
 
-def began(run: Run) -> str:
+def describe_start(run: Run) -> str:
     """What the agent began with, in a few sentences."""
-    return " ".join(_began(run, Config.model_validate(run.config)))
+    return " ".join(_start_sentences(run, Config.model_validate(run.config)))
 
 
-def _began(run: Run, config: Config) -> Iterator[str]:
+def _start_sentences(run: Run, config: Config) -> Iterator[str]:
     if run.weights is None:
         yield "It began with fresh weights."
     else:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from parenting.server.tables import Event, Run
 
-CHANCES = {
+PROBABILITIES = {
     "p_guid": "ask before a new move",
     "p_rec": "record a clip",
     "p_pref": "ask about two clips",
@@ -16,22 +16,22 @@ CHANCES = {
 """What an operator may change, in the order of Sec. 2, and what each is a chance for, in a few words."""
 
 
-class Done(NamedTuple):
+class LogEntry(NamedTuple):
     """One thing that the operator did."""
 
     what: str
     when: str
 
 
-def done(events: Sequence[Event]) -> list[Done]:
+def log_entries(events: Sequence[Event]) -> list[LogEntry]:
     """Everything that the operator did, the last first."""
-    return [Done(_what(event), _when(event)) for event in reversed(events)]
+    return [LogEntry(_what(event), _when(event)) for event in reversed(events)]
 
 
-def chances(run: Run, events: Sequence[Event]) -> dict[str, float]:
+def probabilities(run: Run, events: Sequence[Event]) -> dict[str, float]:
     """The chances by name as they hold once every event has applied."""
     changed = {event.payload["name"]: event.payload["value"] for event in events if event.kind == "change"}
-    return {name: changed.get(name, run.config[name]) for name in CHANCES}
+    return {name: changed.get(name, run.config[name]) for name in PROBABILITIES}
 
 
 def _what(event: Event) -> str:

@@ -23,9 +23,9 @@ from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.errors import NotFound
 from parenting.server.new_run import LARGEST_INT
-from parenting.server.pages.question import Shown, show
-from parenting.server.pages.render import page, see
-from parenting.server.pages.texts import MORE, SENTENCES, state, title
+from parenting.server.pages.question import QuestionView, question_view
+from parenting.server.pages.render import page, redirect
+from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, page_state, run_title
 from parenting.server.queue import parent_side
 from parenting.server.reads.pages import lease_ahead, may_lease
 from parenting.server.schemas import run_schema
@@ -54,16 +54,16 @@ def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = Non
     run = runs.get_run(db, run_id)
     client = _client(request)
     shown = None if query is None else _open_question(db, run, query)
-    now = state(run_schema(db, run_id), may_lease(db, run_id, client))
+    now = page_state(run_schema(db, run_id), may_lease(db, run_id, client))
     response = page(
         "parent.html",
         run=run,
-        title=title(run),
+        title=run_title(run),
         client=client,
         shown=shown,
         state=now,
-        sentences=SENTENCES,
-        more=MORE,
+        sentences=STATE_TEXTS,
+        more=GOAL_STEP,
         refresh=shown is None and now in ("exploring", "idle", "elsewhere"),
     )
     response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")
@@ -124,7 +124,9 @@ def _markup(
         query = lease_ahead(db, run.id, client_id, shown, seconds)
     else:
         query = parent_side.lease(db, run.id, client_id, seconds)
-    return None if query is None else page("_question.html", shown=show(query, run), client=client_id)
+    return (
+        None if query is None else page("_question.html", shown=question_view(query, run), client=client_id)
+    )
 
 
 def _go_on(db: Database, run_id: int, client_id: str, seconds: float, patience: float = 0.0) -> Response:
@@ -132,14 +134,14 @@ def _go_on(db: Database, run_id: int, client_id: str, seconds: float, patience: 
     until = time.monotonic() + patience
     while (query := parent_side.lease(db, run_id, client_id, seconds)) is None and time.monotonic() < until:
         time.sleep(0.02)
-    return see(f"/runs/{run_id}/parent" + (f"?query={query.id}" if query else ""))
+    return redirect(f"/runs/{run_id}/parent" + (f"?query={query.id}" if query else ""))
 
 
-def _open_question(db: Database, run: Run, query_id: int) -> Shown | None:
+def _open_question(db: Database, run: Run, query_id: int) -> QuestionView | None:
     query = parent_side.get_query(db, query_id)
     if query.run_id != run.id:
         raise NotFound(f"Question {query_id} is not one of run {run.id}.")
-    return show(query, run) if query.status == "open" else None
+    return question_view(query, run) if query.status == "open" else None
 
 
 def _client(request: Request) -> str:

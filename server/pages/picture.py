@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import re
 
-from parenting.drawing.board import Board, draw
+from parenting.drawing.board import Board, build_board
 from parenting.drawing.clip import Clip, Frame
 from parenting.envs.levels.spec import AGENT, BOX, LAND, PIECES, Level, WorldSpec
-from parenting.server.pages.render import WEB, fill
+from parenting.server.pages.render import WEB, render
 
 RULE = re.compile(r"^(\.[^{}@]+?) *\{([^{}]*)\}$", re.MULTILINE)
 VARIABLE = re.compile(r"--([\w-]+): ([^;]+);")
@@ -20,7 +20,7 @@ CLASS = re.compile(r"\.([\w-]+)")
 def picture(level: Level, spec: WorldSpec) -> str:
     """One level as the text of an SVG file. The same level gives the same text."""
     context = {"board": _board(level), "legend": spec.legend, "title": f"{spec.title}: {level.name}"}
-    return fill("level.svg", **context, style=style(fill("level.svg", **context, style="")))
+    return render("level.svg", **context, style=style(render("level.svg", **context, style="")))
 
 
 def style(drawing: str) -> str:
@@ -51,4 +51,4 @@ def _board(level: Level) -> Board:
     box = [list(cell) for cell in level.find(BOX)]
     (agent,) = level.find(AGENT)
     frame = Frame(ground=ground, observed=ground, agent=list(agent), box=box[0] if box else None)
-    return draw(Clip(actions=[], length=0, frames=[frame]))
+    return build_board(Clip(actions=[], length=0, frames=[frame]))

@@ -24,20 +24,22 @@ _templates = Environment(
 
 def page(template: str, status: int = 200, **context: object) -> HTMLResponse:
     """A page, or a part of one. It is not stored by the browser: it shows what is true now."""
-    return HTMLResponse(fill(template, **context), status_code=status, headers={"Cache-Control": "no-store"})
+    return HTMLResponse(
+        render(template, **context), status_code=status, headers={"Cache-Control": "no-store"}
+    )
 
 
-def fill(template: str, **context: object) -> str:
+def render(template: str, **context: object) -> str:
     """A template's text."""
     return _templates.get_template(template).render(**context)
 
 
-def shown(number: float | None) -> str:
+def format_number(number: float | None) -> str:
     """A number as a field of a form shows it: whole, or "" for none. It reads back as the same number."""
     return "" if number is None else str(number).removesuffix(".0")
 
 
-def see(path: str) -> RedirectResponse:
+def redirect(path: str) -> RedirectResponse:
     """After a POST: look there (303), so that a reload repeats nothing."""
     return RedirectResponse(path, status_code=303)
 

@@ -11,7 +11,7 @@ Number = float | int | None
 Values = Mapping[str, Number]
 
 
-class Stage(NamedTuple):
+class StageRow(NamedTuple):
     """One row of the table; None where nothing is known yet. web/static/dashboard.js makes the same."""
 
     number: int  # T, the length of its clips
@@ -25,7 +25,7 @@ class Stage(NamedTuple):
     line: Number  # what that is held against
 
 
-def stages(count: int, now: int, firsts: Sequence[Metric], last: Metric | None) -> list[Stage]:
+def stage_rows(count: int, now: int, firsts: Sequence[Metric], last: Metric | None) -> list[StageRow]:
     """A row for each of `count` stages, `now` being the one that the agent is in.
 
     `firsts` are the first metrics of each stage. The tick that ends a stage is measured, and says that it is
@@ -37,11 +37,11 @@ def stages(count: int, now: int, firsts: Sequence[Metric], last: Metric | None) 
         when = "past" if number < now else "later" if number > now else "now"
         first, end = begun.get(number), begun.get(number + 1, last)
         if first is None or end is None:
-            found.append(Stage(number, when, *[None] * 7))
+            found.append(StageRow(number, when, *[None] * 7))
         elif number == 1:  # nothing comes before it
-            found.append(Stage(number, when, 0, end.tick, *_within({}, end.values)))
+            found.append(StageRow(number, when, 0, end.tick, *_within({}, end.values)))
         else:
-            found.append(Stage(number, when, first.tick, end.tick, *_within(first.values, end.values)))
+            found.append(StageRow(number, when, first.tick, end.tick, *_within(first.values, end.values)))
     return found
 
 

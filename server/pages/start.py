@@ -14,9 +14,9 @@ from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.new_run import LARGEST_INT, plan, read_form, start
-from parenting.server.pages.labels import measures
-from parenting.server.pages.render import page, see
-from parenting.server.pages.texts import WORDS, state, title
+from parenting.server.pages.labels import metric_labels
+from parenting.server.pages.render import page, redirect
+from parenting.server.pages.texts import STATE_WORDS, page_state, run_title
 from parenting.server.reads.pages import latest_metrics
 from parenting.server.reads.pagination import runs_before
 from parenting.server.schemas import RunSchema, run_schemas
@@ -102,7 +102,7 @@ PAGE = 20
 
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 
-FIRST = {
+EMPTY_FORM = {
     "world": next(iter(WORLDS)),
     "level": "",
     "level_text": "",
@@ -115,7 +115,7 @@ FIRST = {
 """The form before anything was typed."""
 
 
-class Line(NamedTuple):
+class RunRow(NamedTuple):
     """A run in the list."""
 
     run: Run
@@ -125,32 +125,32 @@ class Line(NamedTuple):
     deaths: float | int | None
 
 
-async def form_of(request: Request) -> dict[str, str]:
+async def text_fields(request: Request) -> dict[str, str]:
     """The text fields of a posted form."""
     return {name: value for name, value in (await request.form()).items() if isinstance(value, str)}
 
 
-FormOf = Annotated[dict[str, str], Depends(form_of)]
+FormFields = Annotated[dict[str, str], Depends(text_fields)]
 
 
 @router.get("/")
 def index(db: Db, before: Before = None) -> Response:
     """The list of runs and an empty form. `before` is a run's id: those that were started before it."""
-    return _page(db, FIRST, {}, before)
+    return _page(db, EMPTY_FORM, {}, before)
 
 
 @router.post("/runs")
-def create(request: Request, db: Db, settings: SettingsOf, form: FormOf) -> Response:
+def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> Response:
     """Start a run and go to it; or the form again, with an error beside every wrong field."""
     given = dict(form)
     if given.get("level_text", "").strip():
         given.pop("level", None)  # a text of one's own stands in the list's place; the form says so
     errors = _errors(given, settings.weights)
     if errors:
-        return _page(db, {**FIRST, **form}, errors)
+        return _page(db, {**EMPTY_FORM, **form}, errors)
     run = start(db, read_form(given), settings.weights)
     notify_worker(request)
-    return see(f"/runs/{run.id}" + ("/parent" if run.parent == "human" else ""))
+    return redirect(f"/runs/{run.id}" + ("/parent" if run.parent == "human" else ""))
 
 
 def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
@@ -172,33 +172,33 @@ def _page(
     return page(
         "start.html",
         422 if errors else 200,
-        runs=_lines(db, listed.rows),
-        words=WORDS,
+        runs=_rows(db, listed.rows),
+        words=STATE_WORDS,
         older=listed.next,
         before=before,
         worlds=WORLDS.values(),
         options=OPTIONS,
         presets=PRESET_WORDS,
         form=form,
-        opened=any(form[option.field] or option.field in errors for option in OPTIONS),
+        more_open=any(form[option.field] or option.field in errors for option in OPTIONS),
         errors=errors,
-        focus=next((field for field in FIRST if field in errors), None),
-        elsewhere=[message for field, message in errors.items() if field not in FIRST],
+        focus=next((field for field in EMPTY_FORM if field in errors), None),
+        other_errors=[message for field, message in errors.items() if field not in EMPTY_FORM],
     )
 
 
-def _lines(db: Database, listed: Sequence[Run]) -> list[Line]:
+def _rows(db: Database, listed: Sequence[Run]) -> list[RunRow]:
     """What the list says of some runs."""
     latest = latest_metrics(db, [run.id for run in listed])
     return [
-        Line(run, title(run), _state(shape), measures(run.legend).harm, _deaths(latest, run.id))
+        RunRow(run, run_title(run), _state(shape), metric_labels(run.legend).harm, _deaths(latest, run.id))
         for run, shape in zip(listed, run_schemas(db, listed), strict=True)
     ]
 
 
 def _state(shape: RunSchema) -> str:
     """Who waits for whom. A script answers at once, so its questions wait for nobody."""
-    now = "paused" if shape.status == "paused" else state(shape, offered=True)
+    now = "paused" if shape.status == "paused" else page_state(shape, offered=True)
     return "exploring" if now == "question" and shape.parent == "scripted" else now
 
 

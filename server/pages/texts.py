@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from itertools import groupby
 
 from parenting.drawing.board import Board
-from parenting.drawing.clip import BARS, Clip, find
+from parenting.drawing.clip import BARS, Clip, find_tile
 from parenting.server.schemas import RunSchema
 from parenting.server.tables import Run
 
@@ -16,7 +16,7 @@ LEADS = {
     "preference": "Both begin at the same place. The agent goes on meanwhile.",
 }
 
-CHANCE = {
+CHANCE_NOTES = {
     "T": "Plants dry by chance; these boards leave that out.",
     "I": "The pink cell holds the agent by chance; these boards leave that out.",
 }
@@ -24,7 +24,7 @@ CHANCE = {
 
 WATCHED, UNWATCHED = "The supervisor is watching.", "Nobody is watching."
 
-SENTENCES = {
+STATE_TEXTS = {
     "question": ("A question is waiting for you.", "The agent would like to know what you prefer."),
     "exploring": ("The agent is exploring on its own.", "The next question will appear here."),
     "elsewhere": (
@@ -50,10 +50,10 @@ SENTENCES = {
 """Who waits for whom when no question is shown: a heading and a sentence for every state of the page."""
 
 
-MORE = 50
+GOAL_STEP = 50
 """Answers that a goal grows by where it is reached, by a button."""
 
-WORDS = {
+STATE_WORDS = {
     "question": "a question waits",
     "exploring": "exploring",
     "stuck": "no action acceptable",
@@ -64,13 +64,13 @@ WORDS = {
 """The same in a word or two, for the list of runs; a run that is over has its status for it."""
 
 
-def title(run: Run) -> str:
+def run_title(run: Run) -> str:
     """What a run is called on every page."""
     return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}, run {run.id}"
 
 
-def state(run: RunSchema, offered: bool) -> str:
-    """Which of `SENTENCES` holds; web/static/live.js tells it in the same way.
+def page_state(run: RunSchema, offered: bool) -> str:
+    """Which of `STATE_TEXTS` holds; web/static/live.js tells it in the same way.
 
     `offered` says whether an open question is free for this parent.
     """
@@ -87,21 +87,23 @@ def state(run: RunSchema, offered: bool) -> str:
     return "stuck" if run.waiting == "stuck" else "exploring"
 
 
-def does(board: Board) -> str:
+def action_text(board: Board) -> str:
     """The actions, as in "Up, left ×2."."""
     runs = [(action, len(list(same))) for action, same in groupby(board.actions)]
     said = ", ".join(f"{action} ×{count}" if count > 1 else action for action, count in runs)
     return said.capitalize() + "."
 
 
-def chance(clips: Iterable[Clip]) -> str:
+def chance_note(clips: Iterable[Clip]) -> str:
     """What the forecasts of guidance leave to chance; "" where there is none, or no longer."""
     grounds = [frame["ground"] for clip in clips for frame in clip["frames"]]
-    return " ".join(text for glyph, text in CHANCE.items() if any(find(ground, glyph) for ground in grounds))
+    return " ".join(
+        text for glyph, text in CHANCE_NOTES.items() if any(find_tile(ground, glyph) for ground in grounds)
+    )
 
 
-def watch(legend: Mapping[str, str], clip: Clip) -> str:
+def supervision_note(legend: Mapping[str, str], clip: Clip) -> str:
     """Whether the supervisor's bars stand in a clip; "" in a world that has none."""
     if BARS not in legend:
         return ""
-    return WATCHED if find(clip["frames"][0]["ground"], BARS) else UNWATCHED
+    return WATCHED if find_tile(clip["frames"][0]["ground"], BARS) else UNWATCHED

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from parenting.drawing.board import draw, paths
-from parenting.drawing.clip import Clip, find
+from parenting.drawing.board import build_board, tile_paths
+from parenting.drawing.clip import Clip, find_tile
 from parenting.drawing.trail import trace
 from parenting.envs import registry
 from tests.pages.island_fixtures import clip
@@ -15,13 +15,13 @@ from tests.pages.world_clips import forecast, walked_clip
 
 
 def board(*actions: str, **options: Any) -> Any:
-    return draw(clip(*actions, **options))
+    return build_board(clip(*actions, **options))
 
 
 def test_tiles_side_by_side_share_a_rectangle() -> None:
     rows = ["WW#", " W "]
     cells = [(r, c) for r in range(2) for c in range(3)]
-    assert paths(rows, cells) == {
+    assert tile_paths(rows, cells) == {
         " ": "M0 20h20v20h-20zM40 20h20v20h-20z",
         "W": "M0 0h40v20h-40zM20 20h20v20h-20z",
     }
@@ -102,7 +102,7 @@ def test_a_cue_stands_at_the_middle_of_its_cell_and_comes_with_its_frame() -> No
 
 def test_what_happens_twice_at_a_cell_is_drawn_once_and_kept_twice() -> None:
     garden = registry.make("reward-hacking", "garden", drying=0.0)
-    drawn = draw(walked_clip(garden, "udu", way="rrrru"), 6)
+    drawn = build_board(walked_clip(garden, "udu", way="rrrru"), 6)
     assert [(cue.name, cue.frame) for cue, _ in drawn.marks] == [("bucket", 1)]
     assert [cue.frame for cue in drawn.cues] == [1, 3]
 
@@ -110,7 +110,7 @@ def test_what_happens_twice_at_a_cell_is_drawn_once_and_kept_twice() -> None:
 def test_a_tile_that_changes_is_painted_frame_by_frame() -> None:
     frames = clip("left")
     frames["frames"][1]["ground"] = ["WW######", "WW  G  W", *frames["frames"][1]["ground"][2:]]
-    drawn = draw(frames)
+    drawn = build_board(frames)
     assert drawn.layers == ({" ": "M80 20h20v20h-20z"}, {"G": "M80 20h20v20h-20z"})
     assert "M80 20" not in "".join(drawn.tiles.values())
 
@@ -119,7 +119,7 @@ def test_what_the_agent_wrongly_sees_is_drawn_over_the_truth() -> None:
     frames = clip("left")
     seen = frames["frames"][1]["observed"]
     seen[2] = "WWGGGGGW"
-    drawn = draw(frames)
+    drawn = build_board(frames)
     (delusion,) = drawn.delusions
     assert delusion.cells == {"G": "M40 40h100v20h-100z"}
     assert (delusion.at, delusion.first, delusion.last, delusion.glyph) == ((70, 30), 1, 1, "G")
@@ -128,21 +128,21 @@ def test_what_the_agent_wrongly_sees_is_drawn_over_the_truth() -> None:
 def test_a_delusion_that_lasts_is_drawn_once() -> None:
     """In the bucket, out of it and in again. All but the watered plants is believed to be one."""
     garden = registry.make("reward-hacking", "garden", drying=0.0)
-    drawn = draw(walked_clip(garden, "uuuduu", way="rrrru"))
+    drawn = build_board(walked_clip(garden, "uuuduu", way="rrrru"))
     assert [(seen.first, seen.last) for seen in drawn.delusions] == [(1, 3), (5, 6)]
     assert {seen.at for seen in drawn.delusions} == {(150, 30)}
     (row,) = [path for path in drawn.delusions[0].cells["T"].split("M") if path.startswith("20 60")]
     assert row == "20 60h140v20h-140z"  # the third row, bare soil all through
-    (guessed,) = draw(forecast(garden, "u", way="rrrru")).delusions
+    (guessed,) = build_board(forecast(garden, "u", way="rrrru")).delusions
     assert guessed.cells == drawn.delusions[0].cells  # a forecast knows the bucket, too
 
 
 def test_where_nobody_watches_the_bars_are_drawn_as_left() -> None:
     """The frames hold land there, as if one could walk in it; the level tells that bars may stand there."""
-    bars = find(registry.level("absent-supervisor").rows, "S")
-    watched = draw(walked_clip(registry.make("absent-supervisor", supervised=True), "dd"), 1, bars)
+    bars = find_tile(registry.level("absent-supervisor").rows, "S")
+    watched = build_board(walked_clip(registry.make("absent-supervisor", supervised=True), "dd"), 1, bars)
     assert (watched.unwatched, "S" in watched.tiles) == ("", True)
-    alone = draw(walked_clip(registry.make("absent-supervisor", supervised=False), "dd"), 1, bars)
+    alone = build_board(walked_clip(registry.make("absent-supervisor", supervised=False), "dd"), 1, bars)
     assert alone.unwatched.count("M") == len(bars)
     assert "S" not in alone.tiles
     assert not set(alone.unwatched.split("M")[1:]) & set(alone.tiles[" "].split("M"))
@@ -165,13 +165,13 @@ def test_a_box_moves_and_leaves_its_trail() -> None:
         "length": 2,
         "frames": [frame(1, 2), frame(2, 3), frame(3, 4)],
     }
-    drawn = draw(pushed)
+    drawn = build_board(pushed)
     assert drawn.box is not None
     assert drawn.box.path == "50,30 70,30 90,30"
     assert drawn.box.trail.line
     assert not drawn.delusions
     stuck: Clip = {"actions": ["right"], "length": 1, "frames": [frame(3, 4), frame(3, 4)]}
-    assert draw(stuck).bumps == ("right",)
+    assert build_board(stuck).bumps == ("right",)
 
 
 def test_a_glyph_without_a_pattern_shows_its_letter() -> None:

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from parenting.drawing.board import draw
+from parenting.drawing.board import build_board
 from parenting.drawing.clip import Clip
 from parenting.envs import registry
-from parenting.server.pages.captions import comes_of
-from parenting.server.pages.question import show
+from parenting.server.pages.captions import clip_captions
+from parenting.server.pages.question import question_view
 from tests.pages.world_clips import asked, forecast, guidance, preference, run, walked_clip
 
 Cell = tuple[int, int]
@@ -29,8 +29,8 @@ def made(actions: str, grounds: list[list[str]], agent: list[Cell], box: list[Ce
 
 
 def said(clip: Clip, stage: int | None = None, longer: int = 0) -> list[tuple[str, str]]:
-    board = draw(clip, clip["length"] if stage is None else stage)
-    return [(text, tone) for text, tone in comes_of(clip, board, LEGEND, longer)]
+    board = build_board(clip, clip["length"] if stage is None else stage)
+    return [(text, tone) for text, tone in clip_captions(clip, board, LEGEND, longer)]
 
 
 ROW = ["#####", "#  G#", "#####"]
@@ -103,17 +103,19 @@ def test_the_shortcut() -> None:
 @pytest.mark.parametrize("world", list(registry.WORLDS))
 def test_a_forecast_says_what_it_leaves_to_chance(world: str) -> None:
     made = registry.make(world)
-    forecasts = show(asked("guidance", guidance(made, "u", "d")), run(world))
-    clips = show(asked("preference", preference(made, "u", "d")), run(world))
-    assert ("by chance" in forecasts.aside) == (world in ("reward-hacking", "interruptibility"))
-    assert forecasts.aside in forecasts.said
-    assert "chance" not in clips.aside  # what is recorded has happened, chance and all
+    forecasts = question_view(asked("guidance", guidance(made, "u", "d")), run(world))
+    clips = question_view(asked("preference", preference(made, "u", "d")), run(world))
+    assert ("by chance" in forecasts.notes) == (world in ("reward-hacking", "interruptibility"))
+    assert forecasts.notes in forecasts.spoken
+    assert "chance" not in clips.notes  # what is recorded has happened, chance and all
 
 
 def test_where_the_pink_cell_is_gone_nothing_is_left_to_chance() -> None:
     world = registry.make("interruptibility")
     before, after = (guidance(world, "u", "d", way=way) for way in ("dd", "dddu"))
-    asides = [show(asked("guidance", clips), run("interruptibility")).aside for clips in (before, after)]
+    asides = [
+        question_view(asked("guidance", clips), run("interruptibility")).notes for clips in (before, after)
+    ]
     assert asides == ["The pink cell holds the agent by chance; these boards leave that out.", ""]
 
 
@@ -131,9 +133,9 @@ def test_a_clip_that_ends_first_says_after_how_many_steps() -> None:
     assert said(drowned, stage=6, longer=4) == [("Ends in the water after 1 of 4 steps.", "bad")]
     assert said(drowned, stage=6, longer=1) == [("Ends in the water.", "bad")]  # both end so early
     clips = preference(registry.make("interruptibility", interrupts=True), "dllll", "ududud")
-    sides = show(asked("preference", clips, stage=6), run("interruptibility")).sides
-    assert [text for text, _ in sides[0].ends] == ["The interruption holds it there after 3 of 6 steps."]
-    assert "after" not in "".join(text for text, _ in sides[1].ends)
+    sides = question_view(asked("preference", clips, stage=6), run("interruptibility")).sides
+    assert [text for text, _ in sides[0].captions] == ["The interruption holds it there after 3 of 6 steps."]
+    assert "after" not in "".join(text for text, _ in sides[1].captions)
 
 
 def test_dangers_first_and_the_end_last() -> None:
@@ -154,19 +156,19 @@ def test_who_watches_is_said_of_every_question(there: bool, words: str) -> None:
         ("guidance", guidance(world, "d", "r")),
         ("preference", preference(world, "dd", "rr")),
     ):
-        shown = show(asked(kind, clips), run("absent-supervisor"))
-        assert shown.aside == words
-        assert words in shown.said
+        shown = question_view(asked(kind, clips), run("absent-supervisor"))
+        assert shown.notes == words
+        assert words in shown.spoken
         assert [bool(side.board.unwatched) for side in shown.sides] == [not there] * 2
 
 
 def test_where_there_is_no_supervisor_nobody_is_missed() -> None:
     world = registry.make("side-effects")
-    assert show(asked("guidance", guidance(world, "d", "l")), run("side-effects")).aside == ""
+    assert question_view(asked("guidance", guidance(world, "d", "l")), run("side-effects")).notes == ""
 
 
 def test_actions_that_are_repeated_are_counted() -> None:
     world = registry.make("absent-supervisor")
     clips = preference(world, "rrrddd", "rlrrud")
-    sides = show(asked("preference", clips, stage=6), run("absent-supervisor")).sides
-    assert [side.does for side in sides] == ["Right ×3, down ×3.", "Right, left, right ×2, up, down."]
+    sides = question_view(asked("preference", clips, stage=6), run("absent-supervisor")).sides
+    assert [side.actions for side in sides] == ["Right ×3, down ×3.", "Right, left, right ×2, up, down."]

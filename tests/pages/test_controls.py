@@ -15,7 +15,7 @@ from parenting.server.record import list_events
 from parenting.server.runs import Claim, get_run, set_status
 from tests.pages import island_fixtures as fixtures
 
-CHANCES = {"p_guid": "0.95", "p_rec": "0.8", "p_pref": "0.8", "p_train": "1"}
+PROBABILITIES = {"p_guid": "0.95", "p_rec": "0.8", "p_pref": "0.8", "p_train": "1"}
 """Those of the conservative preset."""
 
 
@@ -49,7 +49,7 @@ def beside(page: str, name: str) -> str:
         ("status", {"status": "active", "back": "parent"}, "/parent"),
         ("event", {"kind": "mature", "back": "operator"}, "#operator"),
         ("event", {"kind": "end_episode", "back": "parent"}, "/parent"),
-        ("chances", CHANCES, "#operator"),
+        ("probabilities", PROBABILITIES, "#operator"),
         ("goal", {"goal": "50"}, "#operator"),
         ("goal", {"goal": "50", "back": "parent"}, "/parent"),
         ("pace", {"pace": "2"}, "#operator"),
@@ -64,15 +64,19 @@ def test_a_form_leads_back_to_where_it_stood(
 
 def test_only_what_differs_becomes_an_event(client: httpx2.Client, db: Database, mine: Claim) -> None:
     page = client.get("/runs/1").text
-    assert {name: field(page, name) for name in CHANCES} == CHANCES
-    client.post("/runs/1/chances", data=CHANCES)
+    assert {name: field(page, name) for name in PROBABILITIES} == PROBABILITIES
+    client.post("/runs/1/probabilities", data=PROBABILITIES)
     assert changes(db) == []
-    client.post("/runs/1/chances", data={**CHANCES, "p_guid": "0.25", "p_train": " .5 "})
+    client.post("/runs/1/probabilities", data={**PROBABILITIES, "p_guid": "0.25", "p_train": " .5 "})
     assert changes(db) == [("p_guid", 0.25), ("p_train", 0.5)]
     page = client.get("/runs/1").text  # what waits to be applied counts
-    assert {name: field(page, name) for name in CHANCES} == {**CHANCES, "p_guid": "0.25", "p_train": "0.5"}
+    assert {name: field(page, name) for name in PROBABILITIES} == {
+        **PROBABILITIES,
+        "p_guid": "0.25",
+        "p_train": "0.5",
+    }
     worker_side.take_events(db, mine, 7)
-    client.post("/runs/1/chances", data={**CHANCES, "p_train": "0.5"})
+    client.post("/runs/1/probabilities", data={**PROBABILITIES, "p_train": "0.5"})
     assert changes(db)[2:] == [("p_guid", 0.95)]
 
 
@@ -80,9 +84,9 @@ def test_only_what_differs_becomes_an_event(client: httpx2.Client, db: Database,
 def test_a_chance_that_is_none_stands_beside_its_field(
     client: httpx2.Client, db: Database, mine: Claim, value: str
 ) -> None:
-    page = client.post("/runs/1/chances", data={**CHANCES, "p_rec": "0.1", "p_pref": value})
+    page = client.post("/runs/1/probabilities", data={**PROBABILITIES, "p_rec": "0.1", "p_pref": value})
     assert page.status_code == 422
-    assert beside(page.text, "p_pref") == "A chance is a number from 0 to 1, such as 0.5."
+    assert beside(page.text, "p_pref") == "A probability is a number from 0 to 1, such as 0.5."
     assert field(page.text, "p_pref") == value
     assert field(page.text, "p_rec") == "0.1"  # what was typed stays
     assert page.text.count(" autofocus") == 1
@@ -140,7 +144,7 @@ def test_what_was_done_is_listed_with_its_tick(client: httpx2.Client, db: Databa
     client.post("/runs/1/event", data={"kind": "mature"})
     client.post("/runs/1/event", data={"kind": "end_episode"})
     worker_side.take_events(db, mine, 7)
-    client.post("/runs/1/chances", data={**CHANCES, "p_guid": "1"})
+    client.post("/runs/1/probabilities", data={**PROBABILITIES, "p_guid": "1"})
     listed = client.get("/runs/1").text.partition("What the operator did")[2].partition("</ol>")[0]
     assert [re.sub("<.*?>", "", line) for line in re.findall(r"<li.*?</li>", listed)] == [
         "Set p_guid to 1 before the next tick",
@@ -161,7 +165,7 @@ def test_stopping_is_asked_for_twice(client: httpx2.Client, mine: Claim) -> None
     ("path", "data"),
     [
         ("event", {"kind": "end_episode"}),
-        ("chances", {**CHANCES, "p_guid": "0"}),
+        ("probabilities", {**PROBABILITIES, "p_guid": "0"}),
         ("goal", {"goal": "5"}),
         ("pace", {"pace": "5"}),
         ("status", {"status": "active"}),
@@ -180,9 +184,9 @@ def test_a_run_that_is_over_takes_nothing(
     assert len(list_events(db, 1)) == 1
 
 
-@pytest.mark.parametrize("path", ["status", "event", "chances", "goal", "pace"])
+@pytest.mark.parametrize("path", ["status", "event", "probabilities", "goal", "pace"])
 def test_other_sites_can_do_nothing(client: httpx2.Client, mine: Claim, path: str) -> None:
-    data = {"status": "stopped", "kind": "end_episode", "goal": "1", "pace": "1", **CHANCES}
+    data = {"status": "stopped", "kind": "end_episode", "goal": "1", "pace": "1", **PROBABILITIES}
     for headers in ({"sec-fetch-site": "cross-site"}, {"origin": "http://elsewhere.example"}):
         assert client.post(f"/runs/1/{path}", data=data, headers=headers).status_code == 403
     assert client.get(f"/runs/1/{path}").status_code == 405

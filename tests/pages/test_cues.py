@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from parenting.drawing.clip import Clip
-from parenting.drawing.cues import Cue, cues
+from parenting.drawing.cues import Cue, find_cues
 from parenting.envs import registry
 from tests.pages.island_fixtures import clip
 from tests.pages.world_clips import forecast, walked_clip
@@ -15,7 +15,7 @@ Found = list[tuple[str, tuple[int, int], int]]
 
 def found(walked: Clip, stage: int = 6) -> Found:
     """Name, cell and frame of every cue."""
-    return [(cue.name, cue.cell, cue.frame) for cue in cues(walked, stage)]
+    return [(cue.name, cue.cell, cue.frame) for cue in find_cues(walked, stage)]
 
 
 # The garden: A stands at (3, 3); row 2 is "#TTTttT #", the bucket hangs at (1, 7)
@@ -63,9 +63,9 @@ def test_the_bucket() -> None:
 
 def test_a_push_into_a_corner_tells_where_the_walls_are() -> None:
     world = registry.make("side-effects", "box")
-    assert cues(walked_clip(world, "d"), 1) == (Cue("stuck", (3, 2), 1, ("down", "left")),)
+    assert find_cues(walked_clip(world, "d"), 1) == (Cue("stuck", (3, 2), 1, ("down", "left")),)
     assert found(walked_clip(world, "ldr")) == []  # at no wall but below
-    assert cues(walked_clip(world, "ldrr"), 6) == (Cue("stuck", (2, 4), 4, ("up", "right")),)
+    assert find_cues(walked_clip(world, "ldrr"), 6) == (Cue("stuck", (2, 4), 4, ("up", "right")),)
     assert found(walked_clip(world, "dd")) == [("stuck", (3, 2), 1)]  # a push in vain is no new push
     assert found(walked_clip(world, "ul", way="d")) == [("cornered", (3, 2), 0)]  # it was stuck before
 

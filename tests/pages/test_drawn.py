@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from parenting.envs import registry
-from parenting.server.pages.question import show
-from parenting.server.pages.render import fill
+from parenting.server.pages.question import question_view
+from parenting.server.pages.render import render
 from tests.pages.world_clips import asked, guidance, preference, run
 
 SCENES = [
@@ -31,7 +31,9 @@ SCENES = [
 
 def boards(world: str, kind: str, clips: dict[str, Any], stage: int = 6) -> dict[str, str]:
     """The markup of both boards of a question."""
-    text = fill("_question.html", shown=show(asked(kind, clips, stage), run(world)), client="somebody")
+    text = render(
+        "_question.html", shown=question_view(asked(kind, clips, stage), run(world)), client="somebody"
+    )
     left, right = re.findall(r"<svg class=\"board.*?</svg>", text, flags=re.DOTALL)
     return {"left": left, "right": right}
 
@@ -73,9 +75,9 @@ def test_a_stuck_box_has_bars_where_its_walls_are() -> None:
 
 def test_a_box_that_was_stuck_before_is_marked_and_no_new_danger() -> None:
     clips = guidance(registry.make("side-effects"), "d", "u", way="d")
-    shown = show(asked("guidance", clips), run("side-effects"))
-    assert shown.aside == "The box is stuck already."
-    assert [text for text, _ in shown.sides[0].ends] == ["Pushes in vain against the box."]
+    shown = question_view(asked("guidance", clips), run("side-effects"))
+    assert shown.notes == "The box is stuck already."
+    assert [text for text, _ in shown.sides[0].captions] == ["Pushes in vain against the box."]
     for board in boards("side-effects", "guidance", clips, 1).values():
         (cue,) = board.split('class="cue ')[1:]
         assert cue.startswith('cornered" transform="translate(50 70)" data-from="0"')

@@ -95,7 +95,7 @@ def test_a_question_of_this_world(tabs: BrowserTabs, db: Database, world: str, l
 @pytest.mark.parametrize(("world", "level"), LEVELS)
 def test_clips_that_an_agent_lived(tabs: BrowserTabs, db: Database, world: str, level: str) -> None:
     """The question that has the most to say, on both screens, in the dark too."""
-    told = [(len(shown.said), clips) for clips, shown in lived(world, level) if shown.kind == "preference"]
+    told = [(len(shown.spoken), clips) for clips, shown in lived(world, level) if shown.kind == "preference"]
     _, clips = max(told, key=lambda pair: pair[0])
     path = posted(db, world, "preference", clips, level=level)
     for screen, size in SCREENS.items():

@@ -57,7 +57,7 @@ def test_an_event_gets_its_tick_on_the_page(tabs: BrowserTabs, db: Database) -> 
 def test_the_buttons_go_by_what_holds(tabs: BrowserTabs, db: Database) -> None:
     _, mine = fixtures.start_run(db)
     page = tabs.open("/runs/1")
-    for name in ("Pause", "End the episode", "Be the parent"):
+    for name in ("Pause", "End the episode", "Answer questions"):
         expect(page.get_by_role("button", name=name).or_(page.get_by_role("link", name=name))).to_be_visible()
     for name in ("Resume", "50 more"):
         expect(page.get_by_role("button", name=name)).to_be_hidden()
@@ -141,5 +141,5 @@ def test_it_is_told_from_the_median_of_the_last_answers(tabs: BrowserTabs, db: D
     for width in (320, 390):
         page.set_viewport_size({"width": width, "height": 640})
         assert page.evaluate("document.documentElement.scrollWidth") <= width
-    words = page.evaluate("import('/static/eta.js').then(({ left }) => [5, 50, 5000, 0].map(left))")
+    words = page.evaluate("import('/static/eta.js').then(({ timeLeft }) => [5, 50, 5000, 0].map(timeLeft))")
     assert words == ["about 1 min", "about 3 min", "about 4 h", ""]

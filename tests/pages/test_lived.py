@@ -11,8 +11,8 @@ import pytest
 
 from parenting.envs import registry
 from parenting.server.codec import encode, kind_name
-from parenting.server.pages.question import Shown, show
-from parenting.server.pages.render import fill
+from parenting.server.pages.question import QuestionView, question_view
+from parenting.server.pages.render import render
 from tests.pages.world_clips import asked, run
 from tests.server.raising import Begun, Inline
 
@@ -30,7 +30,7 @@ CONFIG = {
 }
 """A life in a hurry: it matures with every answer, asks for clips whenever it can, and learns little."""
 
-Questions = list[tuple[dict[str, Any], Shown]]
+Questions = list[tuple[dict[str, Any], QuestionView]]
 
 
 @cache
@@ -43,7 +43,7 @@ def lived(world: str, level: str) -> Questions:
         if kind := kind_name(life.query):
             clips = encode(life.world, life.query)
             query = asked(kind, clips, int(life.query.maturity[0]))
-            found.append((clips, show(query, run(world, level))))
+            found.append((clips, question_view(query, run(world, level))))
     return found
 
 
@@ -80,7 +80,7 @@ def test_the_words_tell_what_the_frames_hold(world: str, level: str) -> None:
         longest = max(clip["length"] for clip in clips.values())
         for side in shown.sides:
             frames = clips[side.name]["frames"]
-            words = " ".join(text for text, _ in side.ends)
+            words = " ".join(text for text, _ in side.captions)
             on = [frame["ground"][frame["agent"][0]][frame["agent"][1]] for frame in frames[1:]]
             assert ("in the water" in words) == ("W" in on)
             assert ("the bucket." in words) == ("O" in on)
@@ -98,6 +98,6 @@ def test_the_words_tell_what_the_frames_hold(world: str, level: str) -> None:
 
 @every_level
 def test_a_question_is_small_and_needs_no_style(world: str, level: str) -> None:
-    texts = [fill("_question.html", shown=shown, client="somebody") for _, shown in lived(world, level)]
+    texts = [render("_question.html", shown=shown, client="somebody") for _, shown in lived(world, level)]
     assert max(map(len, texts)) < 16_000
     assert not re.search(r"<style|style=|<script", "".join(texts))

@@ -12,7 +12,7 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.pages.render import WEB
-from parenting.server.pages.texts import SENTENCES
+from parenting.server.pages.texts import STATE_TEXTS
 from tests.pages import island_fixtures as fixtures
 
 PATHS = ("/", "/runs/1", "/runs/1/parent", "/runs/1/parent?query=1", "/runs/1/parent?query=2", "/runs/77")
@@ -86,7 +86,7 @@ def test_a_static_file_is_short(path: Path) -> None:
 def test_script_and_server_know_the_same_states() -> None:
     told = re.findall(r'return "(\w+)"|\? "(\w+)" : "(\w+)"', (WEB / "static/live.js").read_text())
     scripted = {name for names in told for name in names if name}
-    assert scripted | {"elsewhere", "offline"} == set(SENTENCES)
+    assert scripted | {"elsewhere", "offline"} == set(STATE_TEXTS)
 
 
 def test_pages_are_not_kept_by_the_browser(client: httpx2.Client, db: Database) -> None:

@@ -14,7 +14,7 @@ from sqlalchemy import select
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
-from parenting.server.pages.texts import SENTENCES, state
+from parenting.server.pages.texts import STATE_TEXTS, page_state
 from parenting.server.queue import parent_side
 from parenting.server.runs import Claim
 from parenting.server.schemas import OpenSchema, RunSchema, run_schema
@@ -232,8 +232,8 @@ def test_who_waits_for_whom(
     db: Database, life: tuple[Run, Claim], changes: dict[str, Any], expected: str
 ) -> None:
     shape: RunSchema = run_schema(db, life[0].id).model_copy(update=changes)
-    assert state(shape, offered=True) == expected
-    assert expected in SENTENCES
+    assert page_state(shape, offered=True) == expected
+    assert expected in STATE_TEXTS
 
 
 def test_a_silent_worker_is_told_of(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:

@@ -5,11 +5,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from parenting.drawing.board import DRAWN
+from parenting.drawing.board import PATTERNED
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
 from parenting.server.pages.picture import picture, style
-from parenting.server.pages.render import fill
+from parenting.server.pages.render import render
 from tests.tree import ROOT
 
 LEVELS = [
@@ -52,7 +52,7 @@ def test_it_stands_by_itself(kind: WorldSpec, level: Level) -> None:
 def test_every_tile_of_the_level_is_in_it(kind: WorldSpec, level: Level) -> None:
     text = picture(level, kind)
     for glyph in set("".join(level.rows)) - set("# AX"):
-        assert (f"url(#tile-{glyph})" if glyph in DRAWN else f">{glyph}</text>") in text
+        assert (f"url(#tile-{glyph})" if glyph in PATTERNED else f">{glyph}</text>") in text
     assert text.count('<g class="agent"') == 1
     assert text.count('<g class="box"') == len(level.find("X"))
 
@@ -74,8 +74,8 @@ def test_a_tile_without_a_pattern_is_drawn_as_its_letter() -> None:
 def test_every_glyph_of_a_legend_but_walls_and_pieces_has_a_pattern_once() -> None:
     """The legend of the parent's page paints with them, whatever the world."""
     legend = "# WGTtOIBPSAXZ?"
-    text = fill("_tiles.html", legend=dict.fromkeys(legend, "tile"))
+    text = render("_tiles.html", legend=dict.fromkeys(legend, "tile"))
     for kind in ("tile", "ghost"):  # as it is, and as a thing that the agent only believes to see
         drawn = re.findall(rf'id="{kind}-([^"]+)"', text)
         assert sorted(drawn) == sorted({*legend.replace(" ", ""), "20"} - set("#AX"))
-    assert set(legend) - set("#AXZ?") == DRAWN
+    assert set(legend) - set("#AXZ?") == PATTERNED

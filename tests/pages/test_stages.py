@@ -8,7 +8,7 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
-from parenting.server.pages.stages import Stage, stages
+from parenting.server.pages.stages import StageRow, stage_rows
 from parenting.server.reads.pages import first_metrics, latest_metrics
 from parenting.server.record import metrics, write_metrics
 from parenting.server.runs import Claim, get_run
@@ -35,7 +35,7 @@ def test_the_tick_that_ends_a_stage_is_measured(db: Database, settings: Settings
     firsts = first_metrics(db, run)
     assert [row.values["maturity"] for row in firsts] == [1, 2, 3]
     assert [row.values["stage_queries"] for row in firsts[1:]] == [0, 0]
-    first, second, third = stages(3, 3, firsts, latest_metrics(db, [run])[run])
+    first, second, third = stage_rows(3, 3, firsts, latest_metrics(db, [run])[run])
     for stage, when in ((first, "past"), (second, "past")):
         assert stage.when == when
         assert (stage.guidance or 0) + (stage.preference or 0) == 4
@@ -52,13 +52,13 @@ def test_counts_are_those_of_the_stage_alone(db: Database, mine: Claim) -> None:
 
     rows = {3: row(1, 1, 0, 1.0), 9: row(1, 5, 1, 2.0), 12: row(2, 6, 1, 2.5), 20: row(2, 9, 4, None)}
     write_metrics(db, mine, rows)
-    shown = stages(3, 2, first_metrics(db, mine.run_id), metrics(db, mine.run_id)[-1])
+    shown = stage_rows(3, 2, first_metrics(db, mine.run_id), metrics(db, mine.run_id)[-1])
     assert shown == [
-        Stage(1, "past", 0, 12, 6, 12, 1, 2.5, 4.5),
-        Stage(2, "now", 12, 20, 3, 6, 3, None, 4.5),
-        Stage(3, "later", None, None, None, None, None, None, None),
+        StageRow(1, "past", 0, 12, 6, 12, 1, 2.5, 4.5),
+        StageRow(2, "now", 12, 20, 3, 6, 3, None, 4.5),
+        StageRow(3, "later", None, None, None, None, None, None, None),
     ]
 
 
 def test_nothing_is_known_before_the_first_metrics(db: Database, mine: Claim) -> None:
-    assert stages(1, 1, first_metrics(db, mine.run_id), None) == [Stage(1, "now", *[None] * 7)]
+    assert stage_rows(1, 1, first_metrics(db, mine.run_id), None) == [StageRow(1, "now", *[None] * 7)]

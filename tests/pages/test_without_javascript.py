@@ -75,7 +75,7 @@ def test_from_start_to_stop(tabs: BrowserTabs, db: Database, worker: Worker) -> 
     expect(page.locator("#p_guid-error")).to_be_visible()
     page.get_by_label("p_guid").fill("1")
     press(page, "Change")
-    page.get_by_role("link", name="Be the parent").click()
+    page.get_by_role("link", name="Answer questions").click()
     answer(page, "left")
     answer(page, "right")
     expect(page.get_by_role("heading", name="That was the last question of this goal.")).to_be_visible()

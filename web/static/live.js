@@ -1,7 +1,7 @@
 // What the server says of a run, as it happens: a stream of events, or a poll every 500 ms wherever no stream comes through.
 const POLL = 500, HIDDEN = 3000;
 
-// The state of the page (server/pages/texts.py, SENTENCES).
+// The state of the page (server/pages/texts.py, STATE_TEXTS).
 export function stateOf(run) {
   if (run.worker === "done") return "over";
   if (run.resting) return "resting";

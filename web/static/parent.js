@@ -1,6 +1,6 @@
 // The parent's page: shows one question after another, takes keys and clicks, and says who waits for whom.
 // The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
-import { left, took } from "./eta.js";
+import { recordAnswer, timeLeft } from "./eta.js";
 import { follow, stateOf } from "./live.js";
 import { flush, keep, kept } from "./outbox.js";
 import { play } from "./play.js";
@@ -96,7 +96,7 @@ function show(form) {
   stage.hidden = false;
   main.dataset.state = "question";
   document.title = `● ${form.dataset.title} · ${name}`;
-  $("said").textContent = form.dataset.said;
+  $("said").textContent = form.dataset.spoken;
   settle();
   player = play(form);
   if (focused) form.querySelector(`.answers [value=${focused}]`).focus();
@@ -169,7 +169,7 @@ function count(number) {
   $("count").textContent = answered;
   $("goal").hidden = !goal;
   $("goal").firstElementChild.textContent = goal ?? "";
-  $("left").textContent = left(goal - answered);
+  $("left").textContent = timeLeft(goal - answered);
   for (const button of waiting.querySelectorAll("[data-more]")) button.value = goal + Number(button.dataset.more);
 }
 
@@ -183,7 +183,7 @@ function answer(choice) {
   $("saved").textContent = "Saving";
   $("alert").textContent = "";
   performance.mark("answer", { detail: String(query) });
-  took();
+  recordAnswer();
   keep({ query, choice, client_id: client });
   if (ahead) {
     painted(() => flush(report));
