@@ -15,7 +15,7 @@ from parenting.agent.query import Answer, Choice, Kind, Query, empty
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
-from tests.reference_clips import Clip, Frame, board
+from reference.clips import Clip, Frame, board
 
 Judge = Callable[[Query], torch.Tensor]
 LogEntry = tuple[int, str, Clip, Clip]

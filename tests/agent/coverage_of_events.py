@@ -7,7 +7,7 @@ from itertools import product
 
 from parenting.envs.gridworld import WorldState
 from parenting.envs.levels.side_effects import stuck
-from tests.reference import EXPLOIT, EXPLORE, PREFERENCE, Reference
+from reference.parenting import EXPLOIT, EXPLORE, PREFERENCE, Reference
 
 
 class EventCoverage(Counter[str]):

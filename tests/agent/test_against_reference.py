@@ -11,11 +11,11 @@ from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
+from reference.clips import Clip
+from reference.parenting import Reference
 from tests.agent.batched_runs import Judge, as_query, layers, lenient_parent, run_batch
 from tests.agent.coverage_of_events import EventCoverage
 from tests.agent.scenarios import OWN, Scenario, scenarios
-from tests.reference import Reference
-from tests.reference_clips import Clip
 
 TRIALS, SEED = 2, 7
 SCENARIOS = scenarios()

@@ -13,8 +13,8 @@ from parenting.agent.pretraining_loop import Exam, Pupil, School
 from parenting.agent.pretraining_mazes import ARRIVED, LIMIT, pool
 from parenting.agent.state import Rehearsal
 from parenting.envs.rng import keys
-from tests.reference_pretraining import MOVES, Maze
-from tests.reference_pretraining import pool as plain_pool
+from reference.pretraining import MOVES, Maze
+from reference.pretraining import pool as plain_pool
 
 GLYPHS = "# GXA"
 SIZE = (4, 5)

@@ -13,10 +13,10 @@ from parenting.envs.rng import keys
 from parenting.experiments.value_iteration.levels import small
 from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
+from reference.clips import Clip
+from reference.parenting import GUIDANCE
+from reference.pretraining import Rehearsing
 from tests.agent.batched_runs import Judge, as_query, layers, lenient_parent, run_batch
-from tests.reference import GUIDANCE
-from tests.reference_clips import Clip
-from tests.reference_pretraining import Rehearsing
 
 TRIALS, TICKS, SEED = 2, 60, 7
 WEIGHTS = keys(3, 1)  # what is drawn from them stands for pre-trained weights: any will do

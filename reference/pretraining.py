@@ -16,9 +16,9 @@ from parenting.agent.pretraining import ENTROPY
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.maze import mazes
 from parenting.envs.rng import Keys, Stream, keys
-from tests.reference import ACTIONS, Reference
-from tests.reference_clips import Board, Clip, board
-from tests.reference_policy import Policy, entropy
+from reference.clips import Board, Clip, board
+from reference.parenting import ACTIONS, Reference
+from reference.policy import Policy, entropy
 
 EPISODES, LIMIT = 16, 100
 POOL, POOL_SEED = 4096, 2019

@@ -3,9 +3,9 @@
 import pytest
 import torch
 
-from tests.reference import EXPLOIT, EXPLORE
-from tests.reference_clips import Clip, Entry, Recorded
-from tests.reference_examples import (
+from reference.clips import Clip, Entry, Recorded
+from reference.parenting import EXPLOIT, EXPLORE
+from tests.reference.examples import (
     DOWN,
     ISLAND,
     LEFT,
@@ -77,7 +77,7 @@ def test_no_clip_is_begun_that_the_time_limit_would_cut(
 
 
 def test_a_clip_leaves_when_enough_have_come_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tests.reference.RING", 2)
+    monkeypatch.setattr("reference.parenting.RING", 2)
     trial = live(born(world(ROOM), p_rec=1), 10)
     assert [clip.tick for clip in completed(trial, EXPLOIT)] == [7, 9]
 

@@ -9,7 +9,7 @@ from torch.nn import functional
 from parenting.envs.gridworld import Gridworld, local_state
 from parenting.envs.levels.spec import maze_legend
 from parenting.envs.rng import Keys, Stream
-from tests.reference_clips import Board
+from reference.clips import Board
 
 Row = tuple[Board, dict[int, float]]
 """Entries of X with one first state s_0 and one pair of first actions: the sum of their mu, by action."""

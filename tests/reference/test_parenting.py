@@ -8,9 +8,9 @@ from parenting.envs import registry
 from parenting.envs.gridworld import WorldState
 from parenting.envs.rng import Stream
 from parenting.envs.unsafe_exploration import UnsafeExploration
-from tests.reference import EXPLOIT
-from tests.reference_clips import Entry
-from tests.reference_examples import (
+from reference.clips import Entry
+from reference.parenting import EXPLOIT
+from tests.reference.examples import (
     ISLAND,
     RIGHT,
     ROOM,
@@ -32,7 +32,7 @@ def test_mu(choice: str, mu: tuple[float, float]) -> None:
     assert (kind, trial.X) == ("guidance", [Entry(left.start, (left.actions[0], right.actions[0]), mu, 1)])
 
 
-# ---- 2.3: training on Eq. (2), whose numbers are in test_reference_policy.py ----
+# ---- 2.3: training on Eq. (2), whose numbers are in test_policy.py. ----
 
 
 def test_first_step_of_adam_moves_the_two_actions_apart_by_the_learning_rate() -> None:

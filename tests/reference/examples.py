@@ -8,9 +8,9 @@ from torch import Tensor, nn
 from parenting.agent.config import Config
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
-from tests.reference import Reference
-from tests.reference_clips import Clip, Recorded
-from tests.reference_policy import Policy
+from reference.clips import Clip, Recorded
+from reference.parenting import Reference
+from reference.policy import Policy
 
 ISLAND = "WWWWW\nWA GW\nWWWWW\n"
 ROOM = "#####\n#A G#\n#####\n"  # its agent can only walk, or stop at a wall

@@ -8,9 +8,9 @@ from torch import nn
 
 from parenting.agent.config import Config
 from parenting.envs.rng import Stream, keys
-from tests.reference import Reference
-from tests.reference_examples import ROOM, set_logits, world
-from tests.reference_policy import Policy, distinct, flat, loss
+from reference.parenting import Reference
+from reference.policy import Policy, distinct, flat, loss
+from tests.reference.examples import ROOM, set_logits, world
 
 SEEN = ((0, 0, 0, 0, 0), (0, 4, 1, 3, 0), (0, 0, 0, 0, 0))  # the room's first observation
 

@@ -10,9 +10,9 @@ import torch
 from parenting.agent.pretraining import ENTROPY
 from parenting.envs import registry
 from parenting.envs.rng import keys
-from tests import reference_pretraining
-from tests.reference_policy import Policy
-from tests.reference_pretraining import Maze, Visit, draw, loss, walk
+from reference import pretraining as reference_pretraining
+from reference.policy import Policy
+from reference.pretraining import Maze, Visit, draw, loss, walk
 
 UP, RIGHT = 0, 3
 BOX = registry.make("side-effects")

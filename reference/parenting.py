@@ -15,8 +15,8 @@ from torch import Tensor
 from parenting.agent.config import Config
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
 from parenting.envs.rng import Stream, gumbel, keys
-from tests.reference_clips import Clip, Entry, Frame, Query, Recorded, board, same_moves, same_pair
-from tests.reference_policy import Policy, distinct, flat, loss
+from reference.clips import Clip, Entry, Frame, Query, Recorded, board, same_moves, same_pair
+from reference.policy import Policy, distinct, flat, loss
 
 ACTIONS = range(4)  # up, down, left, right
 GUIDANCE, PREFERENCE = "guidance", "preference"  # the kinds of queries
