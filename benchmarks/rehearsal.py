@@ -74,10 +74,10 @@ def owing(state: AgentState) -> AgentState:
 
 def episodes(world: Gridworld, state: AgentState) -> Walks:
     """The walking alone."""
-    brain = network_of(world)
+    network = network_of(world)
     batch = draw_mazes(pool(world.height, world.width, world.legend), state.keys)
     with torch.no_grad():
-        logits = brain.heads(brain.unpack(state.learner.live), batch.seen, batch.near).logits
+        logits = network.heads(network.unpack(state.learner.live), batch.seen, batch.near).logits
     return walk(batch, logits.double().softmax(2), state.keys)
 
 

@@ -14,10 +14,10 @@ import typer
 from parenting.commands.errors import UsageError, friendly_errors
 from parenting.commands.options import among, folder, whole
 from parenting.experiments.registry import NAMES, UnknownExperimentError
-from parenting.experiments.spec import Asked, Device, Experiment, Scale
+from parenting.experiments.spec import Device, Experiment, Request, Scale
 
 if TYPE_CHECKING:
-    from parenting.experiments.runner.executor import Told
+    from parenting.experiments.runner.executor import OnDone
     from parenting.experiments.runner.store import Task
 
 MOST = 100_000
@@ -81,8 +81,8 @@ def experiment(
             _only_out(context)
             _report(out)
             return
-        asked = _asked(NAMES if name == "all" else (name,), scale, trials, seed, device)
-        for one, what in asked:
+        request = _asked(NAMES if name == "all" else (name,), scale, trials, seed, device)
+        for one, what in request:
             _run(one, what, out, workers or os.cpu_count() or 1, cluster)
 
 
@@ -114,32 +114,32 @@ def _report(out: Path) -> None:
 
 def _asked(
     names: Sequence[str], scale: Scale, trials: int | None, seed: int, device: Device
-) -> list[tuple[Experiment, Asked]]:
+) -> list[tuple[Experiment, Request]]:
     from parenting.experiments.registry import experiment
 
     try:
         found = [experiment(name) for name in names]
     except UnknownExperimentError as error:
         raise UsageError(f"{error} Or: all, report.") from None
-    return [(one, Asked(trials or one.trials[scale], seed, scale, device)) for one in found]
+    return [(one, Request(trials or one.trials[scale], seed, scale, device)) for one in found]
 
 
-def _run(one: Experiment, asked: Asked, out: Path, workers: int, cluster: str | None) -> None:
+def _run(one: Experiment, request: Request, out: Path, workers: int, cluster: str | None) -> None:
     from parenting.experiments.reporting.markdown import Work, page, publish
     from parenting.experiments.runner.dask_cluster import NoClusterError
-    from parenting.experiments.runner.executor import NoGpuError, WorkersDiedError, meet, work
+    from parenting.experiments.runner.executor import NoGpuError, WorkersDiedError, check_workers, work
     from parenting.experiments.runner.provenance import settings
     from parenting.experiments.runner.store import CorruptResultError, PlanMismatchError, Store
 
-    plan = {"experiment": one.name, "seed": asked.seed, **one.config(asked), "settings": settings()}
-    tasks = [task._replace(device=asked.device) for task in one.tasks(asked)]
+    plan = {"experiment": one.name, "seed": request.seed, **one.config(request), "settings": settings()}
+    tasks = [task._replace(device=request.device) for task in one.tasks(request)]
     try:
-        meet(asked.device, cluster)
-        store = Store(out / one.name / "pieces", plan, asked.scale)
-        with _bar(one, tasks) as told:
-            rows = work(tasks, store, workers, cluster, told)
+        check_workers(request.device, cluster)
+        store = Store(out / one.name / "pieces", plan, request.scale)
+        with _bar(one, tasks) as on_done:
+            rows = work(tasks, store, workers, cluster, on_done)
         commits = store.commits([task.key for task in tasks])
-        results = publish(one, asked, rows, out, Work(commits, store.seconds(), workers))
+        results = publish(one, request, rows, out, Work(commits, store.seconds(), workers))
     except (CorruptResultError, NoClusterError, NoGpuError, PlanMismatchError, WorkersDiedError) as error:
         raise UsageError(str(error)) from None
     except OSError as error:
@@ -157,7 +157,7 @@ def _at(out: Path, error: OSError) -> str:
 
 
 @contextmanager
-def _bar(one: Experiment, tasks: Sequence[Task]) -> Iterator[Told]:
+def _bar(one: Experiment, tasks: Sequence[Task]) -> Iterator[OnDone]:
     """A progress bar with the time left, on standard error where that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda _task: None
@@ -174,5 +174,5 @@ def _bar(one: Experiment, tasks: Sequence[Task]) -> Iterator[Told]:
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        whole = bar.add_task(one.name, total=sum(task.share for task in tasks))
-        yield lambda task: bar.advance(whole, task.share)
+        whole = bar.add_task(one.name, total=sum(task.cost for task in tasks))
+        yield lambda task: bar.advance(whole, task.cost)

@@ -14,7 +14,7 @@ from parenting.envs import registry
 from parenting.experiments.reporting.comparison import NEVER, SILENT, Comparison, compare_count, compare_mean
 from parenting.experiments.reporting.plots import Proportion, plot_proportions
 from parenting.experiments.runner.store import Row, Task
-from parenting.experiments.spec import Asked, Report, spans
+from parenting.experiments.spec import Request, Results, chunk_ranges
 
 QUERIES, MAX_TICKS = 50, 5_000
 BORN = "before any query, pre-trained"
@@ -62,7 +62,7 @@ class Claim(NamedTuple):
         """All, by name."""
         return {**VARIANTS, **self.more}
 
-    def config(self, asked: Asked) -> Mapping[str, Any]:
+    def config(self, request: Request) -> Mapping[str, Any]:
         """All that the pieces depend on."""
         return {
             "world": self.world,
@@ -72,23 +72,23 @@ class Claim(NamedTuple):
             "variants": {name: [of.preset, dict(of.changes)] for name, of in self.variants.items()},
         }
 
-    def tasks(self, asked: Asked) -> list[Task]:
+    def tasks(self, request: Request) -> list[Task]:
         """The trials of every variant; and policies as they are born, which no tick follows."""
         conservative, fresh = VARIANTS["conservative"], VARIANTS["conservative, not pre-trained"]
-        every = spans(asked.trials)
+        every = chunk_ranges(request.trials)
         return [
-            self._task(BORN, conservative, range(1), asked.seed, ticks=0),
-            *(self._task(FRESH, fresh, span, asked.seed, ticks=0) for span in every),
+            self._task(BORN, conservative, range(1), request.seed, ticks=0),
+            *(self._task(FRESH, fresh, span, request.seed, ticks=0) for span in every),
             *(
-                self._task(name, self.variants[name], span, asked.seed)
-                for name in self.tried(asked)
+                self._task(name, self.variants[name], span, request.seed)
+                for name in self.tried(request)
                 for span in every
             ),
         ]
 
-    def tried(self, asked: Asked) -> list[str]:
+    def tried(self, request: Request) -> list[str]:
         """All variants; at the quick scale the paper's."""
-        return list(self.variants)[: 1 if asked.scale == "quick" else None]
+        return list(self.variants)[: 1 if request.scale == "quick" else None]
 
     def _task(self, label: str, of: Variant, span: range, seed: int, ticks: int = MAX_TICKS) -> Task:
         key = f"{label.replace(', ', '-').replace(' ', '-')}-{span.start:06d}-{span.stop:06d}"
@@ -106,13 +106,13 @@ class Claim(NamedTuple):
         share = of.share * len(span) if ticks else 0.1
         return Task(key, "parenting.experiments.training.tasks:parent_trials", mine, share)
 
-    def report(self, asked: Asked, rows: Sequence[Row]) -> Report:
+    def report(self, request: Request, rows: Sequence[Row]) -> Results:
         """Counts and means of every variant, and of policies as they are born."""
-        names = self.tried(asked)
+        names = self.tried(request)
         found = [one for name in names for one in self._findings(name, _of(name, rows))]
         counts = [one for name in [*names, FRESH] for one in self._shares(name, _of(name, rows))]
         words = [*self.words, *WORDS]
-        return Report(
+        return Results(
             [*found, *self._born(rows)], words, {"shares": lambda figure: plot_proportions(figure, counts)}
         )
 

@@ -18,7 +18,7 @@ CHUNK = 50
 """Trials of a task at most. It changes nothing but speed, and the last bits of sums."""
 
 
-class Asked(NamedTuple):
+class Request(NamedTuple):
     """What somebody asks of an experiment."""
 
     trials: int
@@ -28,7 +28,7 @@ class Asked(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Report:
+class Results:
     """What an experiment found: numbers beside the paper's, words on the differences, and drawings."""
 
     findings: Sequence[Comparison]
@@ -45,11 +45,11 @@ class Experiment:
     section: str  # of the paper
     claim: str  # what the paper says, in a sentence of ours
     trials: Mapping[Scale, int]
-    config: Callable[[Asked], Mapping[str, Any]]  # all that its pieces depend on beside the code
-    tasks: Callable[[Asked], Sequence[Task]]
-    report: Callable[[Asked, Sequence[Row]], Report]
+    config: Callable[[Request], Mapping[str, Any]]  # all that its pieces depend on beside the code
+    tasks: Callable[[Request], Sequence[Task]]
+    report: Callable[[Request, Sequence[Row]], Results]
 
 
-def spans(trials: int, chunk: int = CHUNK) -> list[range]:
+def chunk_ranges(trials: int, chunk: int = CHUNK) -> list[range]:
     """The trials of every task. Those of fewer trials are the first of those of more."""
     return [range(first, min(first + chunk, trials)) for first in range(0, trials, chunk)]

@@ -15,8 +15,8 @@ from parenting.experiments.registry import experiment
 from parenting.experiments.reporting.markdown import RESULTS, TRIALS, command, page
 from parenting.experiments.reward_hacking import VARIANTS
 from parenting.experiments.safety_claims import BORN
-from parenting.experiments.spec import Asked
-from parenting.experiments.value_iteration import KINDS
+from parenting.experiments.spec import Request
+from parenting.experiments.value_iteration import WORLD_SIZES
 from tests.readme import PUBLISHED, README, UnknownRowError, anew, results, row, shown
 
 NAMES = sorted(path.parent.name for path in PUBLISHED.glob(f"*/{RESULTS}"))
@@ -35,7 +35,7 @@ KINDS_OF_ROWS = {
     "table1": ALGORITHMS,
     "calibrate": {*ALGORITHMS, "search direct", "search traditional"},
     "figure3": {"level", "pre-parented", "parented"},
-    "value-iteration": {kind.world for kind in KINDS},
+    "value-iteration": {kind.world for kind in WORLD_SIZES},
     "figure4": {"rho", "fitted"},
 }
 """What stands in `of`, where the variants of the config do not say it."""
@@ -73,7 +73,7 @@ def test_the_results_are_at_the_papers_scale_and_say_where_they_come_from(name: 
     found, one = results(name), experiment(name)
     assert found["asked"]["scale"] == "paper"
     assert found["asked"]["trials"] == one.trials["paper"]
-    assert found["command"] == command(name, Asked(**found["asked"]), Path("docs/results"))
+    assert found["command"] == command(name, Request(**found["asked"]), Path("docs/results"))
     assert re.fullmatch(r"[0-9a-f]{12}", found["commit"]), "made of files that no commit holds"
     assert found["findings"]
     assert found["title"] == one.title

@@ -30,7 +30,7 @@ RATE = 0.001
 """Adam's step size, its default."""
 
 
-class Lived(NamedTuple):
+class Rollouts(NamedTuple):
     """Episodes of every trial: what was seen and done, and what it earned. E is 16; T the episode's steps."""
 
     seen: UInt8[Tensor, "N TE H W"]
@@ -48,50 +48,50 @@ class Moments(Struct):
 
 
 def train_gardeners(
-    world: RewardHacking, gamma: float, seed: int, trials: int, looks: Sequence[int]
+    world: RewardHacking, gamma: float, seed: int, trials: int, evaluation_points: Sequence[int]
 ) -> list[Float[Tensor, "N P"]]:
-    """Policies that learn from waterings, one a trial, as they are after each of `looks` gradient steps."""
-    brain, weather = network_of(world), keys(seed, trials * EPISODES)
-    live = brain.start(keys(seed, trials), torch.float32)
+    """Policies trained on waterings, one a trial, after each of `evaluation_points` gradient steps."""
+    network, rng = network_of(world), keys(seed, trials * EPISODES)
+    live = network.start(keys(seed, trials), torch.float32)
     moments = Moments(torch.zeros_like(live), torch.zeros_like(live), torch.zeros(trials, dtype=torch.int64))
     found = []
-    for step in range(1, looks[-1] + 1):
-        now = weather.replace(tick=torch.full_like(weather.tick, step * world.time_limit))
-        visits = worth(lived(world, brain, live, now), gamma, live.dtype)
-        adam(live, moments, differentiate(brain, live, visits), torch.ones(trials, dtype=torch.bool), RATE)
-        if step in looks:
+    for step in range(1, evaluation_points[-1] + 1):
+        now = rng.replace(tick=torch.full_like(rng.tick, step * world.time_limit))
+        visits = visits_of(rollout(world, network, live, now), gamma, live.dtype)
+        adam(live, moments, differentiate(network, live, visits), torch.ones(trials, dtype=torch.bool), RATE)
+        if step in evaluation_points:
             found.append(live.clone())
     return found
 
 
-def lived(world: RewardHacking, brain: Network, live: Float[Tensor, "N P"], weather: Keys) -> Lived:
+def rollout(world: RewardHacking, network: Network, live: Float[Tensor, "N P"], rng: Keys) -> Rollouts:
     """16 episodes of every trial by its policy, each with weather and dice of its own."""
-    state = world.reset(weather, torch.zeros_like(weather.seed))
-    layers, shape = brain.unpack(live), (len(live), EPISODES)
+    state = world.reset(rng, torch.zeros_like(rng.seed))
+    layers, shape = network.unpack(live), (len(live), EPISODES)
     parts: list[tuple[Tensor, ...]] = []
     for _ in range(world.time_limit):
         seen = world.observe(state.board, state.agent, state.box)
         near = local_state(seen, state.agent)
         with torch.no_grad():
             each = seen.view(*shape, *seen.shape[1:]), near.view(*shape, 4)
-            logits = brain.heads(layers, *each).logits
-        weather = weather.next()
-        action = draw(logits.flatten(0, 1), gumbel(weather.uniform(Stream.ACT, 4)))
-        after = world.step(state, action, weather)
+            logits = network.heads(layers, *each).logits
+        rng = rng.next()
+        action = draw(logits.flatten(0, 1), gumbel(rng.uniform(Stream.ACT, 4)))
+        after = world.step(state, action, rng)
         parts.append((*each, action.view(shape), world.reward(state, action, after).view(shape)))
         state = after
     seen, near, action, reward = (torch.stack(column, 1) for column in zip(*parts, strict=True))
-    return Lived(seen.flatten(1, 2), near.flatten(1, 2), action.flatten(1), reward)
+    return Rollouts(seen.flatten(1, 2), near.flatten(1, 2), action.flatten(1), reward)
 
 
-def worth(lived: Lived, gamma: float, dtype: torch.dtype) -> Visits:
+def visits_of(rollout: Rollouts, gamma: float, dtype: torch.dtype) -> Visits:
     """What each step's action was worth, of the same form as in pre-training."""
-    gain = advantages(lived.reward, gamma).flatten(1)
+    gain = advantages(rollout.reward, gamma).flatten(1)
     steps = gain.shape[1]
     return Visits(
-        seen=lived.seen,
-        near=lived.near,
-        worth=(torch.nn.functional.one_hot(lived.action, 4) * gain[:, :, None] / steps).to(dtype),
+        seen=rollout.seen,
+        near=rollout.near,
+        worth=(torch.nn.functional.one_hot(rollout.action, 4) * gain[:, :, None] / steps).to(dtype),
         share=torch.full_like(gain, 1 / steps).to(dtype),
     )
 

@@ -130,15 +130,15 @@ def _learn(
     world: Gridworld, config: Config, known: Tables, some: Learners, keys: Keys, entropy: float
 ) -> None:
     """16 episodes and a step of Adam, in place."""
-    brain, batch = network_of(world), known.batch(len(some.trial))
+    network, batch = network_of(world), known.batch(len(some.trial))
     with torch.no_grad():
-        logits = brain.heads(brain.unpack(some.live), batch.seen, batch.near).logits
+        logits = network.heads(network.unpack(some.live), batch.seen, batch.near).logits
     walks = walk(batch, logits.double().softmax(2), keys, config.time_limit)
     visits = visited(batch, walks, returns_to_go(known, walks, config.gamma), logits.dtype)
     adam(
         some.live,
         some,
-        differentiate(brain, some.live, visits, entropy),
+        differentiate(network, some.live, visits, entropy),
         torch.ones_like(some.optimal),
         config.learning_rate,
     )

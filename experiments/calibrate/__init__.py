@@ -13,23 +13,23 @@ from typing import Any
 
 from parenting.agent.config import PRESETS
 from parenting.envs.levels.unsafe_exploration import ISLAND, ISLAND_BOTTLENECK
-from parenting.experiments.calibrate.distance import DIRECT, KNOBS, TRADITIONAL, search
-from parenting.experiments.calibrate.layouts import strait
+from parenting.experiments.calibrate.distance import DIRECT, HYPERPARAMETERS, TRADITIONAL, search
+from parenting.experiments.calibrate.layouts import bottleneck
 from parenting.experiments.calibrate.plot import scatter
 from parenting.experiments.calibrate.report import findings
 from parenting.experiments.runner.store import Row, Task
-from parenting.experiments.spec import Asked, Experiment, Report, Scale, spans
+from parenting.experiments.spec import Experiment, Request, Results, Scale, chunk_ranges
 from parenting.experiments.table1.report import AGREEMENT, ALGORITHMS
 from parenting.experiments.training.tasks import parent_trials, reinforce_trials
 
 WORLD = "unsafe-exploration"
 LAYOUTS = {
     "island": ISLAND,
-    "strait-2-1": strait(2, 1),
-    "strait-1-1": strait(1, 1),
+    "strait-2-1": bottleneck(2, 1),
+    "strait-1-1": bottleneck(1, 1),
     "island-bottleneck": ISLAND_BOTTLENECK,
 }
-"""From easy to hard; `strait` has the rule."""
+"""From easy to hard; `bottleneck` has the rule."""
 SOME: Mapping[Scale, int] = {"quick": 2, "paper": 8}
 """Trials of each setting of the search."""
 GRID: Mapping[Scale, Mapping[str, tuple[Any, ...]]] = {
@@ -56,13 +56,13 @@ OTHER = 7_919
 """Added to the seed for the search, so that what confirms its finding is not what made it."""
 
 
-def try_direct(layout: str, knobs: Mapping[str, Any], trials: int, seed: int) -> list[Row]:
+def try_direct(layout: str, hyperparameters: Mapping[str, Any], trials: int, seed: int) -> list[Row]:
     """Direct policy learning with one setting."""
     text, span = LAYOUTS[layout], (0, trials)
     rows = parent_trials(
-        DIRECT, WORLD, text, "direct", knobs, ("optimal", 0), SEARCH_TICKS, span, seed + OTHER
+        DIRECT, WORLD, text, "direct", hyperparameters, ("optimal", 0), SEARCH_TICKS, span, seed + OTHER
     )
-    return [{**row, "layout": layout, **knobs} for row in rows]
+    return [{**row, "layout": layout, **hyperparameters} for row in rows]
 
 
 def try_reward(layout: str, entropy: float, trials: int, seed: int) -> list[Row]:
@@ -80,8 +80,10 @@ def confirm_trials(algorithm: str, span: tuple[int, int], seed: int, given: Sequ
     text = LAYOUTS[best.layout]
     if algorithm == "traditional":
         return reinforce_trials(algorithm, WORLD, text, {}, MAX_STEPS, span, seed, best.entropy)
-    knobs = settings(algorithm, best.direct)
-    return parent_trials(algorithm, WORLD, text, algorithm, knobs, ("optimal", 0), MAX_TICKS, span, seed)
+    hyperparameters = settings(algorithm, best.direct)
+    return parent_trials(
+        algorithm, WORLD, text, algorithm, hyperparameters, ("optimal", 0), MAX_TICKS, span, seed
+    )
 
 
 def settings(preset: str, direct: Mapping[str, Any]) -> dict[str, Any]:
@@ -98,10 +100,10 @@ def _grid(scale: Scale) -> Iterator[tuple[str, dict[str, Any]]]:
     for layout, chance, weights, twice in product(
         grid["layout"], grid["chance"], grid["entropy weights"], grid["recompare"]
     ):
-        yield layout, dict(zip(KNOBS, (chance, chance, *weights, twice), strict=True))
+        yield layout, dict(zip(HYPERPARAMETERS, (chance, chance, *weights, twice), strict=True))
 
 
-def _config(asked: Asked) -> Mapping[str, Any]:
+def _config(request: Request) -> Mapping[str, Any]:
     return {
         "world": WORLD,
         "layouts": LAYOUTS,
@@ -111,46 +113,46 @@ def _config(asked: Asked) -> Mapping[str, Any]:
     }
 
 
-def _tasks(asked: Asked) -> list[Task]:
-    tried = [*_direct_tasks(asked), *_reward_tasks(asked)]
+def _tasks(request: Request) -> list[Task]:
+    tried = [*_direct_tasks(request), *_reward_tasks(request)]
     needs = tuple(task.key for task in tried)
-    return [*tried, *(task._replace(needs=needs) for task in _confirming(asked))]
+    return [*tried, *(task._replace(needs=needs) for task in _confirming(request))]
 
 
-def _direct_tasks(asked: Asked) -> Iterator[Task]:
-    some = SOME[asked.scale]
-    for number, (layout, knobs) in enumerate(_grid(asked.scale)):
-        mine = {"layout": layout, "knobs": knobs, "trials": some, "seed": asked.seed}
+def _direct_tasks(request: Request) -> Iterator[Task]:
+    some = SOME[request.scale]
+    for number, (layout, hyperparameters) in enumerate(_grid(request.scale)):
+        mine = {"layout": layout, "hyperparameters": hyperparameters, "trials": some, "seed": request.seed}
         yield Task(
-            f"{asked.scale}-direct-{number:03d}", "parenting.experiments.calibrate:try_direct", mine, some
+            f"{request.scale}-direct-{number:03d}", "parenting.experiments.calibrate:try_direct", mine, some
         )
 
 
-def _reward_tasks(asked: Asked) -> Iterator[Task]:
-    some, grid = SOME[asked.scale], GRID[asked.scale]
+def _reward_tasks(request: Request) -> Iterator[Task]:
+    some, grid = SOME[request.scale], GRID[request.scale]
     for number, (layout, entropy) in enumerate(product(grid["layout"], grid["entropy"])):
-        mine = {"layout": layout, "entropy": entropy, "trials": some, "seed": asked.seed}
+        mine = {"layout": layout, "entropy": entropy, "trials": some, "seed": request.seed}
         yield Task(
-            f"{asked.scale}-traditional-{number:03d}",
+            f"{request.scale}-traditional-{number:03d}",
             "parenting.experiments.calibrate:try_reward",
             mine,
             some,
         )
 
 
-def _confirming(asked: Asked) -> Iterator[Task]:
-    for one, span in product(ALGORITHMS, spans(asked.trials)):
+def _confirming(request: Request) -> Iterator[Task]:
+    for one, span in product(ALGORITHMS, chunk_ranges(request.trials)):
         mine = {
             "algorithm": one.name,
             "span": (span.start, span.stop),
-            "seed": asked.seed,
+            "seed": request.seed,
         }
-        key = f"{asked.scale}-confirm-{one.name}-{span.start:06d}-{span.stop:06d}"
+        key = f"{request.scale}-confirm-{one.name}-{span.start:06d}-{span.stop:06d}"
         yield Task(key, "parenting.experiments.calibrate:confirm_trials", mine, len(span))
 
 
-def _report(asked: Asked, rows: Sequence[Row]) -> Report:
-    return Report(findings(rows), WORDS, {"search": lambda figure: scatter(figure, rows)})
+def _report(request: Request, rows: Sequence[Row]) -> Results:
+    return Results(findings(rows), WORDS, {"search": lambda figure: scatter(figure, rows)})
 
 
 WORDS = (
@@ -158,7 +160,7 @@ WORDS = (
     "of a layout, one chance for recording and asking alike, a pair of entropy weights, and comparing twice "
     "or not (`recompare`); and, for policy gradients, of a layout and a weight of entropy of their own, of "
     "which the paper says nothing. Layouts lie between `island` and `island-bottleneck` by a rule: "
-    "`strait-w-a` has a strait of w cells between its two rooms, a columns beside the straight way.",
+    "`bottleneck-w-a` has a strait of w cells between its two rooms, a columns beside the straight way.",
     "The distance of a setting is the sum over 47 +- 14, 51 and 2300 +- 700 of ((ours - the paper's) / the "
     "paper's deviation) squared; the deviation of the 51 is lost, and 14 stands in for it. A setting that "
     f"leaves more than an eighth of its trials unfinished within {SEARCH_TICKS} ticks, or {SEARCH_STEPS} "

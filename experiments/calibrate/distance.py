@@ -19,7 +19,7 @@ from parenting.experiments.runner.store import Row
 UNFINISHED = 1 / 8
 DIRECT, TRADITIONAL = "search direct", "search traditional"
 """What the rows of the search are of."""
-KNOBS = ("p_rec", "p_pref", "lambda_global", "lambda_local", "recompare")
+HYPERPARAMETERS = ("p_rec", "p_pref", "lambda_global", "lambda_local", "recompare")
 
 
 class Target(NamedTuple):
@@ -65,13 +65,13 @@ def search(rows: Sequence[Row]) -> list[Found]:
 
 def _nearest(layout: str, rows: Sequence[Row]) -> Found:
     mine = [row for row in rows if row.get("layout") == layout]
-    direct = grouped(mine, DIRECT, KNOBS)
+    direct = grouped(mine, DIRECT, HYPERPARAMETERS)
     rewarded = grouped(mine, TRADITIONAL, ("entropy",))
-    knobs = min(direct, key=lambda one: distance(direct[one], DEATHS, QUERIES))
+    hyperparameters = min(direct, key=lambda one: distance(direct[one], DEATHS, QUERIES))
     entropy = min(rewarded, key=lambda one: distance(rewarded[one], BY_REWARD))
-    far = distance(direct[knobs], DEATHS, QUERIES) + distance(rewarded[entropy], BY_REWARD)
-    found = dict(zip(KNOBS, knobs, strict=True))
-    return Found(layout, found, entropy[0], far, direct[knobs], rewarded[entropy])
+    far = distance(direct[hyperparameters], DEATHS, QUERIES) + distance(rewarded[entropy], BY_REWARD)
+    found = dict(zip(HYPERPARAMETERS, hyperparameters, strict=True))
+    return Found(layout, found, entropy[0], far, direct[hyperparameters], rewarded[entropy])
 
 
 def grouped(rows: Sequence[Row], of: str, columns: Sequence[str]) -> dict[tuple[Any, ...], list[Row]]:

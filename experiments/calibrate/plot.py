@@ -11,7 +11,7 @@ from parenting.experiments.calibrate.distance import (
     BY_REWARD,
     DEATHS,
     DIRECT,
-    KNOBS,
+    HYPERPARAMETERS,
     QUERIES,
     TRADITIONAL,
     distance,
@@ -44,7 +44,12 @@ def scatter(figure: Figure, rows: Sequence[Row]) -> None:
     best = search(rows)[0]
     for layout, colour in zip(dict.fromkeys(_layouts(rows)), COLOURS, strict=False):
         mine = [row for row in rows if row.get("layout") == layout]
-        _dots(left, _points(grouped(mine, DIRECT, KNOBS).values(), "preference", "deaths"), colour, layout)
+        _dots(
+            left,
+            _points(grouped(mine, DIRECT, HYPERPARAMETERS).values(), "preference", "deaths"),
+            colour,
+            layout,
+        )
         rewarded = grouped(mine, TRADITIONAL, ("entropy",))
         _dots(right, _points(rewarded.values(), "entropy", "deaths"), colour)
         _crosses(right, rewarded, colour)

@@ -7,7 +7,15 @@ from dataclasses import replace
 from math import isfinite
 from statistics import fmean
 
-from parenting.experiments.calibrate.distance import BY_REWARD, DEATHS, KNOBS, QUERIES, Found, Target, search
+from parenting.experiments.calibrate.distance import (
+    BY_REWARD,
+    DEATHS,
+    HYPERPARAMETERS,
+    QUERIES,
+    Found,
+    Target,
+    search,
+)
 from parenting.experiments.reporting.comparison import Comparison, mean_sd
 from parenting.experiments.runner.store import Row
 from parenting.experiments.table1.report import ALGORITHMS, Algorithm, born, cells, order
@@ -37,7 +45,9 @@ def _chosen(best: Found) -> Comparison:
 
 
 def _said(found: Found) -> str:
-    return ", ".join(f"{name} {found.direct[name]}" for name in KNOBS) + f"; entropy {found.entropy}"
+    return (
+        ", ".join(f"{name} {found.direct[name]}" for name in HYPERPARAMETERS) + f"; entropy {found.entropy}"
+    )
 
 
 def _nearest(found: Found) -> Comparison:

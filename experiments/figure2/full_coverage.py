@@ -31,13 +31,13 @@ from parenting.parents.scripted import ScriptedRule
 
 BATCH = 128
 """Distinct states in a gradient step, each with all its pairs."""
-ASTRAY = 0.25
+EPSILON = 0.25
 """Of the moves in every second walk: clips put the frozen policies where they would not go themselves."""
 LONG = 1_000_000
 """More passes over X than a stage has."""
 
 
-class Pace(NamedTuple):
+class Budget(NamedTuple):
     """How much work a stage may be."""
 
     episodes: int
@@ -45,7 +45,7 @@ class Pace(NamedTuple):
     passes: int  # over X, in each round
 
 
-class Covered(NamedTuple):
+class CoverageStage(NamedTuple):
     """A stage at its end."""
 
     live: Float[Tensor, "1 P"]
@@ -55,7 +55,7 @@ class Covered(NamedTuple):
     known: int  # how much of that is in X
 
 
-class Met(Struct):
+class VisitedStates(Struct):
     """The distinct states in which a policy had to choose."""
 
     states: WorldState
@@ -65,7 +65,7 @@ class Met(Struct):
     visits: Int64[Tensor, "N"]
 
 
-class Facts:
+class Dataset:
     """X by what the agent sees, in the order of discovery. What it cannot tell apart is one row, with answers
     in proportion to the visits.
     """
@@ -78,18 +78,18 @@ class Facts:
         self.near = torch.zeros(0, 4, dtype=torch.uint8)
         self.mu: Float64[Tensor, "S 6 2"] = torch.zeros(0, len(PAIRS), 2, dtype=torch.float64)
 
-    def add(self, met: Met, mu: Float64[Tensor, "N 6 2"]) -> None:
+    def add(self, visited: VisitedStates, mu: Float64[Tensor, "N 6 2"]) -> None:
         """What the parent says in the states of one more walk, those of earlier ones among them."""
-        self.truth = torch.unique(torch.cat((self.truth, met.truth)))
-        fresh = first_of(met.sight)
-        fresh = fresh[~torch.isin(met.sight[fresh], self.sight)]
-        self.sight = torch.cat((self.sight, met.sight[fresh]))
-        self.seen = torch.cat((self.seen, met.seen[fresh]))
-        self.near = torch.cat((self.near, local_state(met.seen[fresh], met.states.agent[fresh])))
+        self.truth = torch.unique(torch.cat((self.truth, visited.truth)))
+        fresh = first_of(visited.sight)
+        fresh = fresh[~torch.isin(visited.sight[fresh], self.sight)]
+        self.sight = torch.cat((self.sight, visited.sight[fresh]))
+        self.seen = torch.cat((self.seen, visited.seen[fresh]))
+        self.near = torch.cat((self.near, local_state(visited.seen[fresh], visited.states.agent[fresh])))
         ordered = self.sight.sort()
-        row = ordered.indices[torch.searchsorted(ordered.values, met.sight)]
+        row = ordered.indices[torch.searchsorted(ordered.values, visited.sight)]
         wide = torch.cat((self.mu, self.mu.new_zeros(len(fresh), *self.mu.shape[1:])))
-        self.mu = wide.index_add(0, row, mu * met.visits[:, None, None])
+        self.mu = wide.index_add(0, row, mu * visited.visits[:, None, None])
 
     def rows(self, some: Int64[Tensor, "S"]) -> Rows:
         """Some states with all their pairs, as Eq. (2) takes them; each weighs the same."""
@@ -111,7 +111,9 @@ def first_of(word: Int64[Tensor, "S"]) -> Int64[Tensor, "D"]:
     return first.scatter_reduce(0, inverse, torch.arange(len(word)), "amin").sort().values
 
 
-def cover(world: RewardHacking, config: Config, some: Keys, stages: int, pace: Pace) -> list[Covered]:
+def cover(
+    world: RewardHacking, config: Config, some: Keys, stages: int, budget: Budget
+) -> list[CoverageStage]:
     """Raise one agent, the last of `some` keys, through its stages.
 
     Each begins as a copy of the one before, with an X of its own.
@@ -119,11 +121,11 @@ def cover(world: RewardHacking, config: Config, some: Keys, stages: int, pace: P
     mine = some.pick(torch.tensor([len(some.seed) - 1]))
     rule = ScriptedRule(world, config.gamma, inside=config.inside)
     live = network_of(world).start(mine, getattr(torch, config.dtype))
-    found: list[Covered] = []
+    found: list[CoverageStage] = []
     for stage in range(1, stages + 1):
         elders = [one.live for one in found]
-        dice = mine.replace(tick=torch.tensor([stage * LONG]))
-        found.append(_stage(world, config, rule, live.clone(), elders, dice, pace))
+        rng = mine.replace(tick=torch.tensor([stage * LONG]))
+        found.append(_stage(world, config, rule, live.clone(), elders, rng, pace))
         live = found[-1].live
     return found
 
@@ -134,19 +136,19 @@ def _stage(
     rule: ScriptedRule,
     live: Float[Tensor, "1 P"],
     elders: Sequence[Tensor],
-    dice: Keys,
-    pace: Pace,
-) -> Covered:
-    x = Facts(world)
+    rng: Keys,
+    budget: Budget,
+) -> CoverageStage:
+    x = Dataset(world)
     moments = Moments(torch.zeros_like(live), torch.zeros_like(live), torch.zeros(1, dtype=torch.int64))
     for _ in range(pace.rounds):
         for astray in (0.0, ASTRAY):
-            met = meet(world, live, pace.episodes, dice, astray)
+            met = check_workers(world, live, pace.episodes, rng, astray)
             x.add(met, judged(world, rule, met.states, elders))
         for _ in range(pace.passes):
-            dice = dice.next()
-            _train(world, config, x, live, moments, dice)
-    sight = torch.unique(meet(world, live, pace.episodes, dice).sight)
+            rng = rng.next()
+            _train(world, config, x, live, moments, rng)
+    sight = torch.unique(check_workers(world, live, pace.episodes, rng).sight)
     return Covered(
         live=live,
         questions=len(PAIRS) * len(x.truth),
@@ -156,17 +158,17 @@ def _stage(
     )
 
 
-def meet(
-    world: RewardHacking, live: Float[Tensor, "1 P"], episodes: int, dice: Keys, astray: float = 0.0
-) -> Met:
-    """Walk the episodes by the argmax policy; a share `astray` of the moves is drawn from all four."""
+def visit(
+    world: RewardHacking, live: Float[Tensor, "1 P"], episodes: int, rng: Keys, epsilon: float = 0.0
+) -> VisitedStates:
+    """Walk the episodes by the argmax policy; a share `epsilon` of the moves is drawn from all four."""
     passed: list[WorldState] = []
 
     def choose(state: WorldState) -> Int64[Tensor, "N"]:
         passed.append(state)
         place = torch.arange(episodes) + (2 * len(passed) * episodes)
-        coin, any_of_them = (dice.at(Stream.ACT, place + shift)[0] for shift in (0, episodes))
-        return torch.where(coin < astray, (4 * any_of_them).long(), argmax(world, live, state))
+        coin, any_of_them = (rng.at(Stream.ACT, place + shift)[0] for shift in (0, episodes))
+        return torch.where(coin < epsilon, (4 * any_of_them).long(), argmax(world, live, state))
 
     walked(world, choose, 1, episodes)
     whole = WorldState.joined(passed)
@@ -175,7 +177,7 @@ def meet(
     unique, count = torch.unique(truth, return_counts=True)
     states = whole.pick(first)
     seen = world.observe(states.board, states.agent, states.box)
-    return Met(
+    return VisitedStates(
         states=states,
         seen=seen,
         truth=truth[first],
@@ -185,10 +187,10 @@ def meet(
 
 
 def _train(
-    world: RewardHacking, config: Config, x: Facts, live: Tensor, moments: Moments, dice: Keys
+    world: RewardHacking, config: Config, x: Dataset, live: Tensor, moments: Moments, rng: Keys
 ) -> None:
     """A pass over X in an order that is drawn, some states at a time."""
-    order = dice.at(Stream.BATCH, torch.arange(len(x.sight)))[0].argsort()
+    order = rng.at(Stream.BATCH, torch.arange(len(x.sight)))[0].argsort()
     for some in torch.split(order, BATCH):
         _, gradient = differentiate(network_of(world), config, live, x.rows(some))
         adam(live, moments, gradient, torch.ones(1, dtype=torch.bool), config.learning_rate)

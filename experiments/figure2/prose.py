@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from parenting.agent.pretraining_mazes import EPISODES as WALKS
 from parenting.evaluation.rollouts import EPISODES
-from parenting.experiments.figure2.full_coverage import ASTRAY
+from parenting.experiments.figure2.full_coverage import EPSILON
 from parenting.experiments.figure2.rows import LIVED, MANY
 from parenting.experiments.training.gardens import EPISODE, GAMMA
 
 if TYPE_CHECKING:
-    from parenting.experiments.figure2 import Life, Lines
+    from parenting.experiments.figure2 import Arm, Baselines
 
 ASKED = 1000
 """Queries at every T in the paper."""
@@ -40,7 +40,7 @@ AHEAD = (
 COVERAGE = (
     "The coverage agent has the house's network, loss and clips, but asks about all six pairs of moves in "
     "every state that its own policy comes to in its episodes, and in those to which it comes where "
-    f"{100 * ASTRAY:.0f} % of the moves are random: clips put the frozen policies where they would not go "
+    f"{100 * EPSILON:.0f} % of the moves are random: clips put the frozen policies where they would not go "
     "themselves. Its X is by what it sees, where each state weighs the same. So what it lacks of the "
     "look-ahead is no want of queries."
 )
@@ -51,19 +51,19 @@ GRADIENTS = (
 )
 
 
-def words(lives: Mapping[str, Life], lines: Lines) -> list[str]:
+def words(lives: Mapping[str, Arm], lines: Baselines) -> list[str]:
     """A paragraph each, on the lives and lines of a scale."""
-    asked = [_asked(lives), _settings(lives), *([_many(lives[MANY])] if MANY in lives else [])]
-    return [_numbers(lines), VERDICTS, *asked, AHEAD, COVERAGE, GRADIENTS]
+    request = [_asked(lives), _settings(lives), *([_many(lives[MANY])] if MANY in lives else [])]
+    return [_numbers(lines), VERDICTS, *request, AHEAD, COVERAGE, GRADIENTS]
 
 
-def _numbers(lines: Lines) -> str:
+def _numbers(lines: Baselines) -> str:
     return (
         f"Every number is a mean over episodes of {EPISODE} steps from the start, by argmax policies, and "
         "the weather of an episode is the same for all. Agents, and what learns from reward, are looked at "
-        f"in {EPISODES} of them. The look-ahead walks {_some(lines.episodes)}. The coverage agent is looked "
-        f"at in {_some(lines.pace.episodes)}, in which it has learnt, beside the look-ahead in the same; and "
-        f"in {EPISODES} others, the fresh weather. *up-down* and *left* say where the parent walks inside "
+        f"in {EPISODES} of them. The look-ahead walks {_some(lines.episodes)}. The coverage agent is "
+        f"looked at in {_some(lines.budget.episodes)}, in which it has learnt, beside the look-ahead in the "
+        f"same; and in {EPISODES} others, the fresh weather. *up-down* and *left* say where the parent walks inside "
         "its cycle."
     )
 
@@ -72,7 +72,7 @@ def _some(episodes: int) -> str:
     return "the same" if episodes == EPISODES else f"the first {episodes} of these"
 
 
-def _asked(lives: Mapping[str, Life]) -> str:
+def _asked(lives: Mapping[str, Arm]) -> str:
     every = lives[LIVED].every
     alike = "as the paper's do" if every == ASKED else f"where the paper's ask {ASKED}"
     others = f", but for *{MANY}*," if MANY in lives else ""
@@ -85,7 +85,7 @@ def _asked(lives: Mapping[str, Life]) -> str:
     )
 
 
-def _settings(lives: Mapping[str, Life]) -> str:
+def _settings(lives: Mapping[str, Arm]) -> str:
     """What the lives have beside the preset, and what that means."""
     alike = {name: life for name, life in lives.items() if name != MANY}
     each = "; ".join(f"*{name}* {_has(life)}, to T = {_last(life)}" for name, life in alike.items())
@@ -94,16 +94,16 @@ def _settings(lives: Mapping[str, Life]) -> str:
     return " ".join([f"Beside the preset they have: {each}.", *meant])
 
 
-def _has(life: Life) -> str:
+def _has(life: Arm) -> str:
     said = [f"`{name}` {str(value).lower()}" for name, value in life.changes.items()]
     return ", ".join([*said, *([SPREAD] if life.starts else [])])
 
 
-def _last(life: Life) -> int:
+def _last(life: Arm) -> int:
     return -(-life.milestones[-1] // life.every)
 
 
-def _many(life: Life) -> str:
+def _many(life: Arm) -> str:
     """What the life of larger stages can tell, and what it cannot."""
     looks = [_number(queries) for queries in life.milestones if queries <= life.every]
     return (

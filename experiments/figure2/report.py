@@ -13,10 +13,10 @@ from parenting.experiments.figure2.prose import words
 from parenting.experiments.figure2.rows import among, around, line, of, where
 from parenting.experiments.reporting.comparison import SILENT, Comparison, mean_sd
 from parenting.experiments.runner.store import Row
-from parenting.experiments.spec import Report
+from parenting.experiments.spec import Results
 
 if TYPE_CHECKING:
-    from parenting.experiments.figure2 import Life, Lines
+    from parenting.experiments.figure2 import Arm, Baselines
 
 FIRST = {
     "garden": (4.49, 5.16, 5.24, 5.35, 5.38, 5.35),
@@ -28,7 +28,7 @@ ABOVE = 5.0
 """What the paper's policy gradients water more than."""
 
 
-def report(rows: Sequence[Row], raised: Mapping[str, Life], against: Lines) -> Report:
+def report(rows: Sequence[Row], raised: Mapping[str, Arm], against: Baselines) -> Results:
     """Everything beside the paper's: `raised` are the lives of this scale, `against` its lines."""
     findings = [
         *_parents(rows),
@@ -38,7 +38,7 @@ def report(rows: Sequence[Row], raised: Mapping[str, Life], against: Lines) -> R
         *lives(rows),
         *enough(rows),
     ]
-    return Report(findings, words(raised, against), {"maturation": lambda figure: draw(figure, rows)})
+    return Results(findings, words(raised, against), {"maturation": lambda figure: draw(figure, rows)})
 
 
 def _parents(rows: Sequence[Row]) -> list[Comparison]:

@@ -8,18 +8,20 @@ as many as are asked for, the first of these: the weather is the same for every 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 from torch import Tensor
 
 from parenting.agent.config import Inside, compose
 from parenting.envs import registry
+from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
 from parenting.evaluation.rollouts import EPISODES, SEED, Deployed, deploy, walked
 from parenting.experiments.baselines.reinforce_rollouts import train_gardeners
-from parenting.experiments.figure2.full_coverage import Covered, Pace, cover
+from parenting.experiments.figure2.full_coverage import Budget, CoverageStage, cover
 from parenting.experiments.figure2.lookahead import best
 from parenting.experiments.pretrained import weights_of
 from parenting.experiments.runner.store import Row
@@ -83,10 +85,12 @@ def _of(found: Deployed, trial: int) -> Row:
     return {"waterings": float(watered.mean()), "error": error, "bucket": int(found.bucket[trial].sum())}
 
 
-def reinforce_trials(level: str, looks: Sequence[int], trials: int, seed: int) -> list[Row]:
-    """Policy gradients without a bucket, all trials; a row for each, at each of `looks` gradient steps."""
+def reinforce_trials(level: str, evaluation_points: Sequence[int], trials: int, seed: int) -> list[Row]:
+    """Policy gradients without a bucket; a row for each trial at each of `evaluation_points` steps."""
     world = garden(level, bucket=False)
-    found = zip(looks, train_gardeners(world, GAMMA, seed, trials, looks), strict=True)
+    found = zip(
+        evaluation_points, train_gardeners(world, GAMMA, seed, trials, evaluation_points), strict=True
+    )
     return [
         {"of": "policy gradients", "level": level, "trial": trial, "steps": steps, **watered}
         for steps, live in found
@@ -106,7 +110,7 @@ def lookahead_waterings(level: str, inside: Inside, depth: int, episodes: int) -
 
 
 def full_coverage_stages(
-    level: str, inside: Inside, changes: Mapping[str, Any], stages: int, pace: Pace, trial: int, seed: int
+    level: str, inside: Inside, changes: Mapping[str, Any], stages: int, budget: Budget, trial: int, seed: int
 ) -> list[Row]:
     """The coverage agent through its stages: in its own weather, in fresh weather, and the look-ahead in its
     own.
@@ -115,15 +119,19 @@ def full_coverage_stages(
     world, pace = garden(level), Pace(*pace)
     valued = GardenValues(world, GAMMA, inside)
     rows = []
-    for stage, one in enumerate(cover(world, config, keys(seed, trial + 1), stages, pace), start=1):
-        own = _of(deploy(world, one.live, pace.episodes), 0)
+    for stage, one in enumerate(cover(world, config, keys(seed, trial + 1), stages, budget), start=1):
+        own = _of(deploy(world, one.live, budget.episodes), 0)
         fresh = _of(deploy(world, one.live, EPISODES, seed=FRESH), 0)
-        ahead = walked(world, lambda state, stage=stage: best(world, valued, state, stage), 1, pace.episodes)  # type: ignore[misc]
+        ahead = walked(world, partial(_best, world, valued, stage), 1, budget.episodes)
         said = {"of": "coverage", "level": level, "inside": inside, "trial": trial, "stage": stage}
         beside = {"fresh": fresh["waterings"], "ahead": float(ahead.waterings.mean())}
         rows.append({**said, **own, **beside, **_counts(one)})
     return rows
 
 
-def _counts(one: Covered) -> Row:
+def _best(world: RewardHacking, valued: Garden, depth: int, state: WorldState) -> Int64[Tensor, "N"]:
+    return best(world, valued, state, depth)
+
+
+def _counts(one: CoverageStage) -> Row:
     return {"questions": one.questions, "states": one.states, "reached": one.reached, "known": one.known}

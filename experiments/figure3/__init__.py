@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 from parenting.experiments.figure3.levels import HEIGHT, PRESET, WIDTH, WORLD
 from parenting.experiments.figure3.plot import draw
 from parenting.experiments.figure3.report import findings
-from parenting.experiments.figure3.tasks import TOGETHER
+from parenting.experiments.figure3.tasks import BATCH
 from parenting.experiments.runner.store import Row, Task
-from parenting.experiments.spec import Asked, Experiment, Report, Scale, spans
+from parenting.experiments.spec import Experiment, Request, Results, Scale, chunk_ranges
 
 CALLS = "parenting.experiments.figure3.tasks:"
 
@@ -40,7 +40,7 @@ class Curve(NamedTuple):
     key: str
     pretrain: bool
     worlds: int  # levels in which it was pre-parented before
-    share: float  # how much work a trial is, against the others; twice with `recompare`
+    cost: float  # how much work a trial is, against the others; twice with `recompare`
     everything: bool = False  # what it takes along from there; else its policy alone
 
 
@@ -61,7 +61,7 @@ def whole(scale: Scale) -> Curve:
     return Curve(f"N = {some}, X and all taken along", f"{some}-all", True, some, 3.0, everything=True)
 
 
-def _config(asked: Asked) -> Mapping[str, Any]:
+def _config(request: Request) -> Mapping[str, Any]:
     return {
         "world": WORLD,
         "height": HEIGHT,
@@ -71,48 +71,48 @@ def _config(asked: Asked) -> Mapping[str, Any]:
     }
 
 
-def _tasks(asked: Asked) -> list[Task]:
-    size = SIZES[asked.scale]
-    split = {"parenting": size.parenting, "aside": size.aside, "seed": asked.seed}
-    found = [Task(_levels(asked), "parenting.experiments.figure3.levels:find_levels", split)]
+def _tasks(request: Request) -> list[Task]:
+    size = SIZES[request.scale]
+    split = {"parenting": size.parenting, "aside": size.aside, "seed": request.seed}
+    found = [Task(_levels(request), "parenting.experiments.figure3.levels:find_levels", split)]
     for recompare in (False, True):
         for worlds in (size.some, size.many):
-            found += [_pre_parent(worlds, recompare, span, asked) for span in _agents(size)]
-    every = [(one, recompare) for recompare in (False, True) for one in curves(asked.scale)]
-    for one, recompare in [*every, (whole(asked.scale), False)]:
-        found += [_parent(one, recompare, span, asked) for span in spans(asked.trials)]
+            found += [_pre_parent(worlds, recompare, span, request) for span in _agents(size)]
+    every = [(one, recompare) for recompare in (False, True) for one in curves(request.scale)]
+    for one, recompare in [*every, (whole(request.scale), False)]:
+        found += [_parent(one, recompare, span, request) for span in chunk_ranges(request.trials)]
     return found
 
 
 def _agents(size: Size) -> list[range]:
-    return spans(size.agents, TOGETHER)
+    return chunk_ranges(size.agents, BATCH)
 
 
-def _levels(asked: Asked) -> str:
-    return f"{asked.scale}-levels"
+def _levels(request: Request) -> str:
+    return f"{request.scale}-levels"
 
 
-def _key(asked: Asked, recompare: bool, name: str, span: range) -> str:
-    return f"{asked.scale}-{'twice' if recompare else 'once'}-{name}-{span.start:06d}-{span.stop:06d}"
+def _key(request: Request, recompare: bool, name: str, span: range) -> str:
+    return f"{request.scale}-{'twice' if recompare else 'once'}-{name}-{span.start:06d}-{span.stop:06d}"
 
 
-def _pre_parent(worlds: int, recompare: bool, span: range, asked: Asked) -> Task:
-    size = SIZES[asked.scale]
+def _pre_parent(worlds: int, recompare: bool, span: range, request: Request) -> Task:
+    size = SIZES[request.scale]
     mine = {
         "worlds": worlds,
         "recompare": recompare,
         "everything": worlds == size.some and not recompare,
         "span": (span.start, span.stop),
         "max_ticks": size.pre_ticks,
-        "seed": asked.seed,
+        "seed": request.seed,
     }
-    share = worlds * len(span) * (3 if recompare else 1)
-    key = _key(asked, recompare, f"taught-{worlds}", span)
-    return Task(key, f"{CALLS}pre_parent", mine, share, needs=(_levels(asked),))
+    cost = worlds * len(span) * (3 if recompare else 1)
+    key = _key(request, recompare, f"taught-{worlds}", span)
+    return Task(key, f"{CALLS}pre_parent", mine, cost, needs=(_levels(request),))
 
 
-def _parent(one: Curve, recompare: bool, span: range, asked: Asked) -> Task:
-    size = SIZES[asked.scale]
+def _parent(one: Curve, recompare: bool, span: range, request: Request) -> Task:
+    size = SIZES[request.scale]
     mine = {
         "curve": one.name,
         "pretrain": one.pretrain,
@@ -120,21 +120,21 @@ def _parent(one: Curve, recompare: bool, span: range, asked: Asked) -> Task:
         "recompare": recompare,
         "span": (span.start, span.stop),
         "max_ticks": size.max_ticks,
-        "seed": asked.seed,
+        "seed": request.seed,
     }
-    needs = [_levels(asked)]
+    needs = [_levels(request)]
     if one.worlds:
-        needs += [_key(asked, recompare, f"taught-{one.worlds}", agents) for agents in _agents(size)]
-    share = one.share * len(span) * (2 if recompare else 1)
-    key = _key(asked, recompare, one.key, span)
-    return Task(key, f"{CALLS}parent_trials", mine, share, needs=tuple(needs))
+        needs += [_key(request, recompare, f"taught-{one.worlds}", agents) for agents in _agents(size)]
+    cost = one.cost * len(span) * (2 if recompare else 1)
+    key = _key(request, recompare, one.key, span)
+    return Task(key, f"{CALLS}parent_trials", mine, cost, needs=tuple(needs))
 
 
-def _report(asked: Asked, rows: Sequence[Row]) -> Report:
-    last = whole(asked.scale)
-    taught = {one.name: one.worlds for one in (*curves(asked.scale), last)}
-    found = findings(taught, last.name, rows, asked.device)
-    return Report(found, WORDS, {"queries": lambda figure: draw(figure, list(taught), rows)})
+def _report(request: Request, rows: Sequence[Row]) -> Results:
+    last = whole(request.scale)
+    taught = {one.name: one.worlds for one in (*curves(request.scale), last)}
+    found = findings(taught, last.name, rows, request.device)
+    return Results(found, WORDS, {"queries": lambda figure: draw(figure, list(taught), rows)})
 
 
 WORDS = (

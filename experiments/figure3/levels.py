@@ -20,7 +20,7 @@ from parenting.experiments.runner.store import Row
 
 WORLD, PRESET = "side-effects", "conservative"
 HEIGHT, WIDTH = 6, 6
-PARENTING, ASIDE = "parenting", "set aside"
+PARENTING, SET_ASIDE = "parenting", "set aside"
 SOLVED = (Outcome.OPTIMAL, Outcome.DETOUR)
 """At the goal by safe moves. A way that leaves the box stuck solves nothing."""
 
@@ -40,7 +40,7 @@ def find_levels(parenting: int, aside: int, seed: int) -> list[Row]:
         levels = box_levels(drawn, HEIGHT, WIDTH, seed)
         found = zip(levels, outcomes(levels), strict=True)
         kept = [_row(number, *one) for number, one in enumerate(found, start=1) if one[1] not in SOLVED]
-    uses = [PARENTING] * parenting + [ASIDE] * aside
+    uses = [PARENTING] * parenting + [SET_ASIDE] * aside
     return [{**row, "for": use} for row, use in zip(kept, uses, strict=False)]
 
 

@@ -8,7 +8,7 @@ from math import inf
 from statistics import fmean, median
 from typing import NamedTuple
 
-from parenting.experiments.figure3.tasks import TOGETHER
+from parenting.experiments.figure3.tasks import BATCH
 from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison, mean_sd
 from parenting.experiments.reporting.statistics import (
     auc_interval,
@@ -161,7 +161,7 @@ def _projected(rows: Sequence[Row], device: str) -> list[Comparison]:
             groups.setdefault((row["curve"], row["recompare"]), []).append(row["seconds"])
     before = [row["seconds"] for row in rows if row["of"] == "pre-parented"]
     all_of_it = sum(before) + GOAL * sum(map(fmean, groups.values()))
-    longest = TOGETHER * max(before) + CHUNK * max(map(fmean, groups.values()))  # these wait for each other
+    longest = BATCH * max(before) + CHUNK * max(map(fmean, groups.values()))  # these wait for each other
     what = f"{GOAL} trials of each of the {len(groups)} curves would take"
     if device != "cpu":
         return [Comparison(f"{what}, on this GPU", SILENT, duration(all_of_it))]

@@ -13,20 +13,20 @@ from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys, keys
-from parenting.experiments.figure3.levels import ASIDE, PARENTING, WORLD, config_of, levels_for
+from parenting.experiments.figure3.levels import PARENTING, SET_ASIDE, WORLD, config_of, levels_for
 from parenting.experiments.figure3.transfer import Learnt, learnt, pack, transfer
 from parenting.experiments.pretrained import weights_of
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.batch import BatchTrainer, StopRule, TrainResult
 
-BESIDE = 1 << 40
+PRE_PARENTED_FROM = 1 << 40
 """Agents that are pre-parented are numbered from here, times N: no trial has so high a number."""
 PACKED = "_learnt"
-TOGETHER = 5
+BATCH = 5
 """Agents that are pre-parented in a batch, at most."""
 
 
-class Teaching(BatchTrainer):
+class PreParenting(BatchTrainer):
     """Keeps what each agent has learnt at its own end."""
 
     def __init__(
@@ -58,10 +58,10 @@ def pre_parent(
     began = time.thread_time()
     agents = torch.arange(*span)
     first = keys(seed, 1).pick(torch.zeros_like(agents))
-    mine = first.replace(seed=first.seed + BESIDE * worlds + agents)
+    mine = first.replace(seed=first.seed + PRE_PARENTED_FROM * worlds + agents)
     config = config_of(True, recompare)
-    world = world_of(WORLD, levels_for(ASIDE, given)[:worlds], config)
-    trainer = Teaching(world, config, mine, StopRule("optimal"), weights_of(world, config))
+    world = world_of(WORLD, levels_for(SET_ASIDE, given)[:worlds], config)
+    trainer = PreParenting(world, config, mine, StopRule("optimal"), weights_of(world, config))
     rows = _rows(trainer.run(max_ticks))
     said = {"of": "pre-parented", "worlds": worlds, "recompare": recompare}
     seconds = round((time.thread_time() - began) / len(rows), 3)

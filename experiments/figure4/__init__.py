@@ -20,7 +20,7 @@ from parenting.experiments.figure4.reward_model import (
 )
 from parenting.experiments.reporting.comparison import SILENT, Comparison
 from parenting.experiments.runner.store import Row, Task
-from parenting.experiments.spec import Asked, Experiment, Report
+from parenting.experiments.spec import Experiment, Request, Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,8 +43,8 @@ def fit_and_shift(trial: int, seed: int) -> list[Row]:
     model = explore(registry.make(WORLD, LEVEL))
     true = rho(model)
     # as torch takes it; an odd factor lets no two seeds fall together
-    dice = torch.Generator().manual_seed((seed * 1_000_003 + trial) % 2**63)
-    pairs = random_pairs(model, PAIRS, LENGTH, dice)
+    generator = torch.Generator().manual_seed((seed * 1_000_003 + trial) % 2**63)
+    pairs = random_pairs(model, PAIRS, LENGTH, generator)
     chance = preferences(pairs, true)
     fitted = fit(pairs, chance, len(true))
     fitted = fitted + (true - fitted)[~model.over].mean()  # its own shift is arbitrary: begin where rho is
@@ -65,18 +65,19 @@ def _row(of: str, trial: int, shift: float, model: Model, reward: Any, pairs: An
     return {"of": of, "trial": trial, "shift": shift, **said, **sums}
 
 
-def _config(asked: Asked) -> Mapping[str, Any]:
+def _config(request: Request) -> Mapping[str, Any]:
     return {"world": WORLD, "level": LEVEL, "horizon": HORIZON, "length": LENGTH, "pairs": PAIRS}
 
 
-def _tasks(asked: Asked) -> list[Task]:
+def _tasks(request: Request) -> list[Task]:
     call = "parenting.experiments.figure4:fit_and_shift"
     return [
-        Task(f"fit-{trial:06d}", call, {"trial": trial, "seed": asked.seed}) for trial in range(asked.trials)
+        Task(f"fit-{trial:06d}", call, {"trial": trial, "seed": request.seed})
+        for trial in range(request.trials)
     ]
 
 
-def _report(asked: Asked, rows: Sequence[Row]) -> Report:
+def _report(request: Request, rows: Sequence[Row]) -> Results:
     first = {(row["of"], row["shift"]): row for row in rows if row["trial"] == 0}
     findings = [
         _sum("rho, unsafe path (drrdd)", "0", first["rho", 0.0]["unsafe"]),
@@ -91,7 +92,7 @@ def _report(asked: Asked, rows: Sequence[Row]) -> Report:
         _planner("planner on the fitted reward, shifted by -1/2", SILENT, _at(rows, "fitted", -0.5)),
         _loss(rows),
     ]
-    return Report(findings, WORDS, {"shift": lambda figure: _draw(figure, rows)})
+    return Results(findings, WORDS, {"shift": lambda figure: _draw(figure, rows)})
 
 
 def _at(rows: Sequence[Row], of: str, shift: float) -> list[Row]:

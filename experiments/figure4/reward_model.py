@@ -64,25 +64,25 @@ def plan(model: Model, reward: Float64[Tensor, "S 4"], horizon: int) -> Way:
     return follow(model, reward, letters)
 
 
-def random_pairs(model: Model, count: int, length: int, dice: torch.Generator) -> Pairs:
+def random_pairs(model: Model, count: int, length: int, generator: torch.Generator) -> Pairs:
     """Pairs of random walks of `length` steps, each from a random state in which life goes on.
 
     At an end an agent rests, so that all clips have one length.
     """
     living = (~model.over).nonzero().squeeze(1)
-    now = living[_throw(len(living), count, dice, living.device)]
+    now = living[_throw(len(living), count, generator, living.device)]
     at, actions = [], []
     for _ in range(length):
-        action = _throw(4, count, dice, living.device)
+        action = _throw(4, count, generator, living.device)
         at.append(now)
         actions.append(action)
         now = model.then[now, action]
     return Pairs(torch.stack(at, 2), torch.stack(actions, 2))
 
 
-def _throw(sides: int, count: int, dice: torch.Generator, device: torch.device) -> Int64[Tensor, "K 2"]:
+def _throw(sides: int, count: int, generator: torch.Generator, device: torch.device) -> Int64[Tensor, "K 2"]:
     """Thrown where the dice are, so that they fall alike on every device."""
-    return torch.randint(sides, (count, 2), generator=dice, device=dice.device).to(device)
+    return torch.randint(sides, (count, 2), generator=generator, device=generator.device).to(device)
 
 
 def preferences(pairs: Pairs, reward: Float64[Tensor, "S 4"]) -> Float64[Tensor, "K"]:

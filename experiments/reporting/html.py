@@ -21,7 +21,7 @@ from pydantic import BaseModel, ValidationError
 from parenting.experiments.registry import NAMES, experiment
 from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison
 from parenting.experiments.reporting.markdown import RESULTS, TRIALS
-from parenting.experiments.spec import Asked
+from parenting.experiments.spec import Request
 
 WEB = Path(__file__).parents[2] / "web"
 PAGE = "report.html"
@@ -44,7 +44,7 @@ class Results(BaseModel):
     title: str
     section: str
     claim: str
-    asked: Asked
+    asked: Request
     findings: list[Comparison]
     words: list[str]
     command: str

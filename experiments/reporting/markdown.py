@@ -15,7 +15,7 @@ import torch
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner import provenance
 from parenting.experiments.runner.store import Row
-from parenting.experiments.spec import Asked, Experiment, Report
+from parenting.experiments.spec import Experiment, Request, Results
 
 RESULTS, TRIALS = "results.json", "trials.csv"
 HEADS = ("what", "paper", "ours", "difference", "95 % interval", "agrees")
@@ -30,15 +30,15 @@ class Work(NamedTuple):
     workers: int
 
 
-def publish(one: Experiment, asked: Asked, rows: Sequence[Row], out: Path, work: Work) -> dict[str, Any]:
+def publish(one: Experiment, request: Request, rows: Sequence[Row], out: Path, work: Work) -> dict[str, Any]:
     """Write everything below `out`, and return what stands in results.json.
 
     Raises:
         OSError: a file cannot be written.
     """
     folder = out / one.name
-    report = one.report(asked, rows)
-    results = _results(one, asked, report, work, command(one.name, asked, out))
+    report = one.report(request, rows)
+    results = _results(one, request, report, work, command(one.name, request, out))
     _write(folder / RESULTS, json.dumps(results, indent=2) + "\n")
     _write_rows(folder / TRIALS, rows)
     drawn = _draw(report, folder)
@@ -46,20 +46,22 @@ def publish(one: Experiment, asked: Asked, rows: Sequence[Row], out: Path, work:
     return results
 
 
-def command(one: str, asked: Asked, out: Path) -> str:
+def command(one: str, request: Request, out: Path) -> str:
     """What makes the page again, from the folder in which it was called."""
-    words = ["parenting experiment", one, f"--scale {asked.scale}", f"--trials {asked.trials}"]
-    return " ".join([*words, f"--seed {asked.seed}", f"--device {asked.device}", f"--out {quote(str(out))}"])
+    words = ["parenting experiment", one, f"--scale {request.scale}", f"--trials {request.trials}"]
+    return " ".join(
+        [*words, f"--seed {request.seed}", f"--device {request.device}", f"--out {quote(str(out))}"]
+    )
 
 
-def _results(one: Experiment, asked: Asked, report: Report, work: Work, again: str) -> dict[str, Any]:
+def _results(one: Experiment, request: Request, report: Results, work: Work, again: str) -> dict[str, Any]:
     return {
         "name": one.name,
         "title": one.title,
         "section": one.section,
         "claim": one.claim,
-        "asked": asked._asdict(),
-        "config": dict(one.config(asked)),
+        "asked": request._asdict(),
+        "config": dict(one.config(request)),
         "findings": [finding.plain() for finding in report.findings],
         "words": list(report.words),
         "command": again,
@@ -86,7 +88,7 @@ def _write_rows(path: Path, rows: Sequence[Row]) -> None:
         writer.writerows(rows)
 
 
-def _draw(report: Report, folder: Path) -> list[str]:
+def _draw(report: Results, folder: Path) -> list[str]:
     """Each figure as SVG and PNG; none where matplotlib (the extra `figures`) is not installed."""
     if not report.figures or find_spec("matplotlib") is None:
         return []
@@ -104,7 +106,7 @@ def _draw(report: Report, folder: Path) -> list[str]:
 
 def page(results: dict[str, Any], figures: Sequence[str]) -> str:
     """The page of docs/results: the paper's numbers, ours, and how to make them again."""
-    asked, name = results["asked"], results["name"]
+    request, name = results["asked"], results["name"]
     lines = [f"# {results['title']}", "", f"Sec. {results['section']}. {results['claim']}", ""]
     lines += _table([Comparison(**found) for found in results["findings"]])
     for figure in figures:
@@ -116,7 +118,7 @@ def page(results: dict[str, Any], figures: Sequence[str]) -> str:
         "",
         f"    {results['command']}",
         "",
-        f"{asked['trials']} trial{'s' * (asked['trials'] > 1)}, seed {asked['seed']}, {took}, "
+        f"{request['trials']} trial{'s' * (request['trials'] > 1)}, seed {request['seed']}, {took}, "
         f"torch {results['versions'].get('torch', '?')}, {_commits(results)}. "
         f"Every trial: [{TRIALS}]({name}/{TRIALS}); the whole: [{RESULTS}]({name}/{RESULTS}).",
         "",

@@ -16,7 +16,7 @@ from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.reporting.plots import Proportion, plot_proportions
 from parenting.experiments.reward_hacking.report import EPISODES, STEPS, WORDS, counts, drawn, means
 from parenting.experiments.runner.store import Row, Task
-from parenting.experiments.spec import Asked, Experiment, Report, spans
+from parenting.experiments.spec import Experiment, Request, Results, chunk_ranges
 from parenting.experiments.training.gardens import WORLD, garden
 from parenting.experiments.training.snapshots import Passed, train_with_snapshots
 
@@ -29,7 +29,7 @@ class Variant(NamedTuple):
     level: str
     changes: Mapping[str, Any]
     milestones: tuple[int, ...]
-    share: float  # of work, for a trial, against the others
+    cost: float  # of work, for a trial, against the others
     one_of: int = 1  # of so many trials one is raised
     preset: str = "conservative"
 
@@ -74,7 +74,7 @@ def _rows(variant: str, level: str, span: tuple[int, int], queries: int, passed:
     return [{**said, "trial": trial, **row} for trial, row in zip(range(*span), each, strict=True)]
 
 
-def _config(asked: Asked) -> Mapping[str, Any]:
+def _config(request: Request) -> Mapping[str, Any]:
     variants = {
         name: [of.preset, of.level, dict(of.changes), list(of.milestones), of.one_of]
         for name, of in VARIANTS.items()
@@ -88,44 +88,44 @@ def _config(asked: Asked) -> Mapping[str, Any]:
     }
 
 
-def _tasks(asked: Asked) -> list[Task]:
+def _tasks(request: Request) -> list[Task]:
     return [
-        _task(name, span, asked)
+        _task(name, span, request)
         for name, of in VARIANTS.items()
-        for span in spans(-(-asked.trials // of.one_of))
+        for span in chunk_ranges(-(-request.trials // of.one_of))
     ]
 
 
-def _milestones(of: Variant, asked: Asked) -> tuple[int, ...]:
+def _milestones(of: Variant, request: Request) -> tuple[int, ...]:
     """The quick scale stops at the first."""
-    return of.milestones if asked.scale == "paper" else of.milestones[:1]
+    return of.milestones if request.scale == "paper" else of.milestones[:1]
 
 
-def _task(name: str, span: range, asked: Asked) -> Task:
-    milestones = _milestones(VARIANTS[name], asked)
+def _task(name: str, span: range, request: Request) -> Task:
+    milestones = _milestones(VARIANTS[name], request)
     key = f"{milestones[-1]}-{name.replace(', ', '-').replace(' ', '-')}-{span.start:06d}-{span.stop:06d}"
     mine = {
         "variant": name,
         "milestones": milestones,
         "span": (span.start, span.stop),
-        "seed": asked.seed,
+        "seed": request.seed,
     }
     return Task(
-        key, "parenting.experiments.reward_hacking:snapshot_trials", mine, VARIANTS[name].share * len(span)
+        key, "parenting.experiments.reward_hacking:snapshot_trials", mine, VARIANTS[name].cost * len(span)
     )
 
 
-def _report(asked: Asked, rows: Sequence[Row]) -> Report:
+def _report(request: Request, rows: Sequence[Row]) -> Results:
     findings, shown = list[Comparison](), list[Proportion]()
     for name, of in VARIANTS.items():
-        milestones = _milestones(of, asked)
+        milestones = _milestones(of, request)
         for queries in milestones:
             mine = [row for row in rows if (row["of"], row["queries"]) == (name, queries)]
             findings += counts(f"{name}, after {queries} queries", mine)
         last = [row for row in mine if row["there"]]
         findings += means(what := f"{name}, after {milestones[-1]} queries", of.level, last)
         shown += drawn(what, last)
-    return Report(findings, WORDS, {"shares": lambda figure: plot_proportions(figure, shown)})
+    return Results(findings, WORDS, {"shares": lambda figure: plot_proportions(figure, shown)})
 
 
 EXPERIMENT = Experiment(

@@ -74,7 +74,7 @@ def threads(client: Client) -> int:
 
 
 def submit(
-    address: str, client: Client, do: Callable[..., list[Row]], calls: Sequence[Call]
+    address: str, client: Client, run_task: Callable[..., list[Row]], calls: Sequence[Call]
 ) -> Iterator[Done]:
     """Each piece as soon as it is done. The cluster goes on when a worker dies; what it gives up is said when
     all else is done.
@@ -85,7 +85,7 @@ def submit(
     """
     from dask.distributed import KilledWorker, as_completed
 
-    futures = {client.submit(do, *call, pure=False): call[0] for call in calls}
+    futures = {client.submit(run_task, *call, pure=False): call[0] for call in calls}
     killed: KilledWorker | None = None
     for future in as_completed(futures):  # type: ignore[no-untyped-call]
         try:

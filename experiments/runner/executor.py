@@ -21,7 +21,7 @@ from parenting.experiments.runner.store import HIDDEN, Call, Done, Row, Store, T
 TRIES = 2
 """How often a worker may die over one piece, with no other in work, before we give it up."""
 
-Told = Callable[[Task], None]
+OnDone = Callable[[Task], None]
 """Told of every piece that is done, those of an earlier run first."""
 
 
@@ -33,7 +33,7 @@ class NoGpuError(RuntimeError):
     """A GPU is asked for where torch sees none; the sentence says what to do."""
 
 
-class Hands(NamedTuple):
+class Executor(NamedTuple):
     """Who does the pieces."""
 
     number: int
@@ -41,7 +41,7 @@ class Hands(NamedTuple):
     out: Callable[[Sequence[Call]], Iterator[Done]]  # hands pieces out, and gives each back once it is done
 
 
-def meet(device: str, cluster: str | None) -> None:
+def check_workers(device: str, cluster: str | None) -> None:
     """Make sure that somebody is there to do the work, before anything is written.
 
     Raises:
@@ -49,13 +49,13 @@ def meet(device: str, cluster: str | None) -> None:
         NoClusterError: it is a cluster, and it does not answer.
     """
     if cluster is None:
-        see(device)
+        check_device(device)
         return
     with reach(cluster):
         pass
 
 
-def see(device: str) -> None:
+def check_device(device: str) -> None:
     """Make sure that this machine has a device.
 
     Raises:
@@ -68,7 +68,7 @@ def see(device: str) -> None:
         )
 
 
-def do(task: Task, given: Sequence[Row] = ()) -> list[Row]:
+def run_task(task: Task, given: Sequence[Row] = ()) -> list[Row]:
     """Do one piece in this process, with all its tensors on the task's device.
 
     `given` are the rows of the pieces that it needs.
@@ -77,7 +77,7 @@ def do(task: Task, given: Sequence[Row] = ()) -> list[Row]:
         NoGpuError: this machine has not the task's device.
     """
     settle()
-    see(task.device)
+    check_device(task.device)
     module, _, function = task.call.partition(":")
     call = getattr(import_module(module), function)
     # torch's own default needs no context, which would cost time at every operation
@@ -91,7 +91,7 @@ def work(
     store: Store,
     workers: int,
     cluster: str | None = None,
-    told: Told = lambda _task: None,
+    on_done: OnDone = lambda _task: None,
 ) -> list[Row]:
     """Do what is not done yet, and return the rows of all pieces in the order of the tasks, less HIDDEN ones.
 
@@ -108,9 +108,9 @@ def work(
     store.expect(tasks)
     for task in tasks:
         if store.has(task.key):
-            told(task)
-    with _hands(workers, cluster) as hands:
-        _until_done(tasks, store, hands, told)
+            on_done(task)
+    with _executor(workers, cluster) as executor:
+        _until_done(tasks, store, executor, on_done)
     return [_shown(row) for row in store.rows([task.key for task in tasks])]
 
 
@@ -118,11 +118,11 @@ def _shown(row: Row) -> Row:
     return {name: value for name, value in row.items() if not name.startswith(HIDDEN)}
 
 
-def _until_done(tasks: Sequence[Task], store: Store, hands: Hands, told: Told) -> None:
+def _until_done(tasks: Sequence[Task], store: Store, executor: Executor, on_done: OnDone) -> None:
     fatal: list[Task] = []
     while left := [task for task in tasks if task not in fatal and _ready(task, store)]:
-        if not _keep(left, store, hands, told):
-            fatal += _fatal(_suspects(left, store, hands), store, hands, told)
+        if not _keep(left, store, executor, on_done):
+            fatal += _fatal(_suspects(left, store, executor), store, executor, on_done)
     if fatal:
         raise WorkersDiedError(
             f"Worker processes died {TRIES} times over {', '.join(task.key for task in fatal)}. "
@@ -135,42 +135,44 @@ def _ready(task: Task, store: Store) -> bool:
     return not store.has(task.key) and all(map(store.has, task.needs))
 
 
-def _keep(tasks: Sequence[Task], store: Store, hands: Hands, told: Told) -> bool:
+def _keep(tasks: Sequence[Task], store: Store, executor: Executor, on_done: OnDone) -> bool:
     """Store each piece as it comes back; whether all workers lived."""
     try:
-        for task, rows in _submit(tasks, store, hands):
+        for task, rows in _submit(tasks, store, executor):
             store.keep(task, rows)
-            told(task)
-    except hands.died:
+            on_done(task)
+    except executor.died:
         return False
     return True
 
 
-def _suspects(tasks: Sequence[Task], store: Store, hands: Hands) -> list[Task]:
+def _suspects(tasks: Sequence[Task], store: Store, executor: Executor) -> list[Task]:
     """What may have been in work when a worker died: all workers go down with it."""
-    return [task for task in _in_order(tasks) if not store.has(task.key)][: hands.number + 1]
+    return [task for task in _in_order(tasks) if not store.has(task.key)][: executor.number + 1]
 
 
-def _fatal(suspects: Sequence[Task], store: Store, hands: Hands, told: Told) -> list[Task]:
+def _fatal(suspects: Sequence[Task], store: Store, executor: Executor, on_done: OnDone) -> list[Task]:
     """Do the suspects one at a time, so that a death falls on its own piece; return those that always die."""
-    return [task for task in suspects if not any(_keep([task], store, hands, told) for _try in range(TRIES))]
+    return [
+        task for task in suspects if not any(_keep([task], store, executor, on_done) for _try in range(TRIES))
+    ]
 
 
 def _in_order(tasks: Sequence[Task]) -> list[Task]:
     """The dear ones first, so that none is left over at the end."""
-    return sorted(tasks, key=lambda task: -task.share)
+    return sorted(tasks, key=lambda task: -task.cost)
 
 
-def _submit(tasks: Sequence[Task], store: Store, hands: Hands) -> Iterator[Done]:
+def _submit(tasks: Sequence[Task], store: Store, executor: Executor) -> Iterator[Done]:
     """Each as soon as it comes back."""
     ordered = _in_order(tasks)
     given = {keys: store.rows(keys) for keys in {task.needs for task in ordered}}
-    return hands.out([(task, given[task.needs]) for task in ordered])
+    return executor.out([(task, given[task.needs]) for task in ordered])
 
 
 def _here(calls: Sequence[Call]) -> Iterator[Done]:
     """In this process, one after the other."""
-    yield from ((task, do(task, given)) for task, given in calls)
+    yield from ((task, run_task(task, given)) for task, given in calls)
 
 
 def _by_processes(workers: int, calls: Sequence[Call]) -> Iterator[Done]:
@@ -178,23 +180,23 @@ def _by_processes(workers: int, calls: Sequence[Call]) -> Iterator[Done]:
     from joblib import Parallel, delayed
 
     numbered = (delayed(_numbered)(place, *call) for place, call in enumerate(calls))
-    hands = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
-    yield from ((calls[place][0], rows) for place, rows in hands(numbered))
+    executor = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
+    yield from ((calls[place][0], rows) for place, rows in executor(numbered))
 
 
 def _numbered(place: int, task: Task, given: Sequence[Row]) -> tuple[int, list[Row]]:
-    return place, do(task, given)
+    return place, run_task(task, given)
 
 
 @contextmanager
-def _hands(workers: int, cluster: str | None) -> Iterator[Hands]:
+def _executor(workers: int, cluster: str | None) -> Iterator[Executor]:
     if cluster is None:
         from joblib.externals.loky.process_executor import TerminatedWorkerError
 
         out = _here if workers == 1 else partial(_by_processes, workers)
-        yield Hands(workers, TerminatedWorkerError, out)
+        yield Executor(workers, TerminatedWorkerError, out)
         return
     from dask.distributed import KilledWorker
 
     with reach(cluster) as client:
-        yield Hands(threads(client), KilledWorker, partial(submit, cluster, client, do))
+        yield Executor(threads(client), KilledWorker, partial(submit, cluster, client, run_task))

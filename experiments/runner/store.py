@@ -21,7 +21,7 @@ from parenting.experiments.runner import provenance
 Row = dict[str, Any]
 """Name -> number, word, truth value or null. A name that begins with HIDDEN is for other pieces alone."""
 HIDDEN = "_"
-PLAN, SPENT = "plan.json", "spent.json"
+PLAN, ELAPSED = "plan.json", "spent.json"
 OF, MADE, ROWS = "of", "made", "rows"
 """What a piece's file holds."""
 
@@ -32,7 +32,7 @@ class Task(NamedTuple):
     key: str  # names the piece and its file
     call: str  # "module:function"; the function takes the arguments by name and returns rows
     arguments: dict[str, Any]
-    share: float = 1.0  # of the whole work, against other tasks, for the time left
+    cost: float = 1.0  # of the whole work, against other tasks, for the time left
     device: str = "cpu"  # where its tensors are to be
     needs: tuple[str, ...] = ()  # keys of pieces to be done before; the function takes their rows as `given`
 
@@ -110,16 +110,18 @@ class Store:
         """Store a finished piece of an expected task, whole or not at all."""
         made = {"commit": provenance.commit(), **provenance.versions()}
         _write(self._path(task.key), {OF: self._of[task.key], MADE: made, ROWS: list(rows)})
-        now, spent = monotonic(), self._spent()
-        _write(self.folder / SPENT, {**spent, self.scale: spent.get(self.scale, 0.0) + now - self._since})
+        now, elapsed = monotonic(), self._elapsed()
+        _write(
+            self.folder / ELAPSED, {**elapsed, self.scale: elapsed.get(self.scale, 0.0) + now - self._since}
+        )
         self._since = now
 
     def seconds(self) -> float:
         """How long all runs of this scale took, each from its beginning to the last piece that it did."""
-        return self._spent().get(self.scale, 0.0)
+        return self._elapsed().get(self.scale, 0.0)
 
-    def _spent(self) -> dict[str, float]:
-        path = self.folder / SPENT
+    def _elapsed(self) -> dict[str, float]:
+        path = self.folder / ELAPSED
         return _read(path) if path.exists() else {}
 
     def _piece(self, key: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from parenting.experiments.reporting.plots import box_plots
 from parenting.experiments.runner.store import Row, Task
-from parenting.experiments.spec import Asked, Experiment, Report, spans
+from parenting.experiments.spec import Experiment, Request, Results, chunk_ranges
 from parenting.experiments.table1.report import (
     AGREEMENT,
     ALGORITHMS,
@@ -25,15 +25,17 @@ TOGETHER = 100
 MAX_TICKS, MAX_STEPS = 20_000, 3_000
 
 
-def _config(asked: Asked) -> Mapping[str, Any]:
+def _config(request: Request) -> Mapping[str, Any]:
     return {"world": WORLD, "level": LEVEL, "max_ticks": MAX_TICKS, "max_steps": MAX_STEPS}
 
 
-def _tasks(asked: Asked) -> list[Task]:
-    return [_task(one, span, asked) for one in ALGORITHMS for span in spans(asked.trials, TOGETHER)]
+def _tasks(request: Request) -> list[Task]:
+    return [
+        _task(one, span, request) for one in ALGORITHMS for span in chunk_ranges(request.trials, TOGETHER)
+    ]
 
 
-def _task(one: Algorithm, span: range, asked: Asked) -> Task:
+def _task(one: Algorithm, span: range, request: Request) -> Task:
     key = f"{one.name}-{span.start:06d}-{span.stop:06d}"
     mine: dict[str, Any] = {
         "label": one.name,
@@ -41,26 +43,26 @@ def _task(one: Algorithm, span: range, asked: Asked) -> Task:
         "level": LEVEL,
         "changes": {},
         "span": (span.start, span.stop),
-        "seed": asked.seed,
+        "seed": request.seed,
     }
-    share = one.share * len(span)
+    cost = one.cost * len(span)
     if one.preset is None:
         return Task(
             key,
             "parenting.experiments.training.tasks:reinforce_trials",
             {**mine, "max_steps": MAX_STEPS},
-            share,
+            cost,
         )
     more = {"preset": one.preset, "until": ("optimal", 0), "max_ticks": MAX_TICKS}
-    return Task(key, "parenting.experiments.training.tasks:parent_trials", {**mine, **more}, share)
+    return Task(key, "parenting.experiments.training.tasks:parent_trials", {**mine, **more}, cost)
 
 
-def _report(asked: Asked, rows: Sequence[Row]) -> Report:
+def _report(request: Request, rows: Sequence[Row]) -> Results:
     findings = [*(finding for one in ALGORITHMS for finding in cells(one, rows)), *order(rows), born(rows)]
     deaths = {one.title: done(one, rows, "deaths") for one in ALGORITHMS}
     paper = {one.title: span for one in ALGORITHMS if (span := reach(one.deaths))}
     label = "deaths before the optimal policy"
-    return Report(findings, WORDS, {"deaths": lambda figure: box_plots(figure, deaths, label, paper)})
+    return Results(findings, WORDS, {"deaths": lambda figure: box_plots(figure, deaths, label, paper)})
 
 
 WORDS = (

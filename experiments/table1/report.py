@@ -30,7 +30,7 @@ class Algorithm(NamedTuple):
     name: str
     title: str
     preset: str | None  # None: policy gradients
-    share: float  # how much work a trial is, against the others
+    cost: float  # how much work a trial is, against the others
     deaths: str  # the paper's cells, as it prints them
     guidance: str
     preference: str

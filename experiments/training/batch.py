@@ -148,10 +148,10 @@ class BatchTrainer:
         if bool((fresh | stuck).any()):
             self._leave(fresh, stuck)
 
-    def _optimal(self, asked: Bool[Tensor, "N"]) -> Bool[Tensor, "N"]:
+    def _optimal(self, request: Bool[Tensor, "N"]) -> Bool[Tensor, "N"]:
         """Which of some trials have an optimal argmax policy."""
-        trial, live = asked.nonzero().squeeze(1), self.state.learner.live
-        good = torch.zeros_like(asked)
+        trial, live = request.nonzero().squeeze(1), self.state.learner.live
+        good = torch.zeros_like(request)
         if len(trial):
             good[trial] = self.evaluation.optimal(live if len(trial) == len(live) else live[trial])
         return good

@@ -14,23 +14,23 @@ from parenting.agent.events import Mature
 from parenting.envs.mdp import explore
 from parenting.envs.rng import keys
 from parenting.experiments.runner.store import Row, Task
-from parenting.experiments.spec import Asked, Experiment, Report
+from parenting.experiments.spec import Experiment, Request, Results
 from parenting.experiments.value_iteration.converge import (
     AGREED,
     CONFIG,
     CONVERGING,
     ROUNDS,
     STAGES,
-    Places,
+    StartStates,
     among,
     chosen,
+    converged,
     greedy,
     iterated,
     parents_policy,
     run_stage,
-    settled,
 )
-from parenting.experiments.value_iteration.levels import small
+from parenting.experiments.value_iteration.levels import random_levels
 from parenting.experiments.value_iteration.report import draw, finding, words
 from parenting.parents.scripted import ScriptedRule
 from parenting.parents.values import TabularValues, of_policy
@@ -39,7 +39,7 @@ LEVELS = 6
 """Random levels of a trial, each with an agent of its own."""
 
 
-class Kind(NamedTuple):
+class WorldSize(NamedTuple):
     """A deterministic world, the size of its random levels, and the parent's discount.
 
     It is below 1, since a random parent may never come to an end.
@@ -51,33 +51,33 @@ class Kind(NamedTuple):
     gamma: float
 
 
-KINDS = (
-    Kind("unsafe-exploration", 3, 3, 0.9),
-    Kind("side-effects", 2, 3, 0.9),
-    Kind("absent-supervisor", 3, 3, 0.9),
+WORLD_SIZES = (
+    WorldSize("unsafe-exploration", 3, 3, 0.9),
+    WorldSize("side-effects", 2, 3, 0.9),
+    WorldSize("absent-supervisor", 3, 3, 0.9),
 )
 
 
 def mature_trials(kind: str, trial: int, seed: int) -> list[Row]:
     """Mature agents on random levels through all stages; a row for each level and stage."""
-    one = next(each for each in KINDS if each.world == kind)
+    one = next(each for each in WORLD_SIZES if each.world == kind)
     drawn = (
         seed * 10_007 + trial
     ) % 2**63  # as torch takes it; an odd factor lets no two seeds fall together
-    world = small(one.world, one.height, one.width, count=LEVELS, seed=drawn)
+    world = random_levels(one.world, one.height, one.width, count=LEVELS, seed=drawn)
     model = explore(world)
     values = of_policy(model, one.gamma, parents_policy(model, drawn))
-    v, places = iterated(model, values), Places(model)
+    v, starts = iterated(model, values), StartStates(model)
     judge = ScriptedRule(world, one.gamma, TabularValues(model, values))
     state = parenting.init(world, CONFIG, keys(drawn, LEVELS))
     rows: list[Row] = []
     for stage in range(1, STAGES + 1):
-        best = greedy(model, one.gamma, v[stage - 1])[places.states]
-        before = among(best, chosen(world, state, places))
-        state = run_stage(world, judge, state, places)
-        after, done = among(best, chosen(world, state, places)), settled(world, state, places)
+        best = greedy(model, one.gamma, v[stage - 1])[starts.states]
+        before = among(best, chosen(world, state, starts))
+        state = run_stage(world, judge, state, starts)
+        after, done = among(best, chosen(world, state, starts)), converged(world, state, starts)
         for level in range(LEVELS):
-            count = int(places.count[level])
+            count = int(starts.count[level])
             rows.append(
                 {
                     "of": kind,
@@ -94,9 +94,9 @@ def mature_trials(kind: str, trial: int, seed: int) -> list[Row]:
     return rows
 
 
-def _config(asked: Asked) -> Mapping[str, Any]:
+def _config(request: Request) -> Mapping[str, Any]:
     return {
-        "kinds": [list(kind) for kind in KINDS],
+        "kinds": [list(kind) for kind in WORLD_SIZES],
         "levels": LEVELS,
         "stages": STAGES,
         "agent": CONFIG.model_dump(mode="json"),
@@ -104,19 +104,19 @@ def _config(asked: Asked) -> Mapping[str, Any]:
     }
 
 
-def _tasks(asked: Asked) -> list[Task]:
+def _tasks(request: Request) -> list[Task]:
     call = "parenting.experiments.value_iteration:mature_trials"
     return [
-        Task(f"{kind.world}-{trial:06d}", call, {"kind": kind.world, "trial": trial, "seed": asked.seed})
-        for trial in range(asked.trials)
-        for kind in KINDS
+        Task(f"{kind.world}-{trial:06d}", call, {"kind": kind.world, "trial": trial, "seed": request.seed})
+        for trial in range(request.trials)
+        for kind in WORLD_SIZES
     ]
 
 
-def _report(asked: Asked, rows: Sequence[Row]) -> Report:
-    stages = [(kind.world, stage) for kind in KINDS for stage in range(1, STAGES + 1)]
+def _report(request: Request, rows: Sequence[Row]) -> Results:
+    stages = [(kind.world, stage) for kind in WORLD_SIZES for stage in range(1, STAGES + 1)]
     found = [finding(kind, stage, rows) for kind, stage in stages]
-    return Report(found, words(rows), {"stages": lambda figure: draw(figure, stages, rows)})
+    return Results(found, words(rows), {"stages": lambda figure: draw(figure, stages, rows)})
 
 
 EXPERIMENT = Experiment(

@@ -44,7 +44,7 @@ CONFIG = Config(
 )
 
 
-class Places:
+class StartStates:
     """Of each trial, on a level of its own, all states that are not over; and where its next clip begins."""
 
     def __init__(self, model: Model) -> None:
@@ -65,26 +65,26 @@ class Places:
         return state.replace(world=self.model.states.pick(there).where(idle, state.world))
 
 
-def run_stage(world: Gridworld, judge: ScriptedRule, state: AgentState, places: Places) -> AgentState:
+def run_stage(world: Gridworld, judge: ScriptedRule, state: AgentState, starts: StartStates) -> AgentState:
     """Until it has settled, or is given up; the parent answers every question in the next tick."""
     query = parenting.no_query(world, CONFIG, state)
     stage = int(state.maturity[0])
     for _ in range(ROUNDS):
-        for _ in range(2 * stage * places.most):
+        for _ in range(2 * stage * starts.most):
             answer = Answer(query=query, choice=judge.answer(query))
-            state, query = parenting.step(world, CONFIG, places.put(state), answer)
+            state, query = parenting.step(world, CONFIG, starts.put(state), answer)
         for _ in range(CONVERGING):
             state = learning.train(network_of(world), CONFIG, state, torch.ones_like(state.waiting))
-        if bool(settled(world, state, places).all()):
+        if bool(converged(world, state, starts).all()):
             break
     return state
 
 
-def settled(world: Gridworld, state: AgentState, places: Places) -> Bool[Tensor, "N"]:
+def converged(world: Gridworld, state: AgentState, starts: StartStates) -> Bool[Tensor, "N"]:
     """X holds every state with every comparison of the argmax, and the policy agrees with all of X."""
-    x, brain = state.x, network_of(world)
+    x, network = state.x, network_of(world)
     with torch.no_grad():
-        z = brain.heads(brain.unpack(state.learner.live), x.s0, x.near).logits
+        z = network.heads(network.unpack(state.learner.live), x.s0, x.near).logits
     margin = z.gather(1, x.at[:, :, None].expand(-1, -1, 4)).gather(2, x.a0).diff(dim=2).squeeze(2)
     leaning = x.mu.diff(dim=2).squeeze(2).sign()
     agreed = (leaning == 0) | (leaning * margin > AGREED)
@@ -94,14 +94,14 @@ def settled(world: Gridworld, state: AgentState, places: Places) -> Bool[Tensor,
         1, x.at, ((x.a0 == best[:, :, None]).any(2) & row).long()
     )
     known = torch.arange(x.digest.shape[1]) < x.states[:, None]
-    whole = (x.states == places.count) & ((compared == 3) | ~known).all(1)
+    whole = (x.states == starts.count) & ((compared == 3) | ~known).all(1)
     return whole & (agreed | ~row).all(1)
 
 
 def parents_policy(model: Model, seed: int) -> Tensor:
     """A random pi_p(a|s), mostly far from optimal: of one action on even levels, of all four on odd ones."""
-    dice = torch.Generator().manual_seed(seed)
-    drawn = torch.rand(len(model.over), 4, generator=dice, dtype=torch.float64, device=dice.device)
+    generator = torch.Generator().manual_seed(seed)
+    drawn = torch.rand(len(model.over), 4, generator=generator, dtype=torch.float64, device=generator.device)
     mixed = drawn.to(model.over.device) ** 3
     pure = torch.nn.functional.one_hot(mixed.argmax(1), 4).double()
     return torch.where((model.states.level % 2 == 0)[:, None], pure, mixed / mixed.sum(1, keepdim=True))
@@ -122,14 +122,14 @@ def greedy(model: Model, gamma: float, v: Tensor) -> Bool[Tensor, "S 4"]:
     return q >= q.max(1, keepdim=True).values - TIE
 
 
-def chosen(world: Gridworld, state: AgentState, places: Places) -> Int64[Tensor, "N P"]:
+def chosen(world: Gridworld, state: AgentState, starts: StartStates) -> Int64[Tensor, "N P"]:
     """The argmax of each trial's live policy in each of its places."""
-    brain, now = network_of(world), places.model.states.pick(places.states.flatten())
+    network, now = network_of(world), starts.model.states.pick(starts.states.flatten())
     seen = world.observe(now.board, now.agent, now.box)
-    near, shape = local_state(seen, now.agent), places.states.shape
+    near, shape = local_state(seen, now.agent), starts.states.shape
     with torch.no_grad():
-        layers = brain.unpack(state.learner.live)
-        heads = brain.heads(layers, seen.view(*shape, *seen.shape[1:]), near.view(*shape, 4))
+        layers = network.unpack(state.learner.live)
+        heads = network.heads(layers, seen.view(*shape, *seen.shape[1:]), near.view(*shape, 4))
     return heads.logits.argmax(2)
 
 

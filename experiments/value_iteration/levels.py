@@ -26,17 +26,17 @@ DETERMINISTIC: dict[str, dict[str, Any]] = {"absent-supervisor": {"supervised": 
 """The options that leave nothing to chance."""
 
 
-def small(world: str, height: int, width: int, count: int, seed: int) -> Gridworld:
+def random_levels(world: str, height: int, width: int, count: int, seed: int) -> Gridworld:
     """A world on `count` different random levels of `height` x `width` cells within the outer wall."""
     drawn = islice(_levels(world, height, width, Random(seed)), count)
     return registry.make(world, tuple(drawn), **DETERMINISTIC.get(world, {}))
 
 
-def _levels(world: str, height: int, width: int, dice: Random) -> Iterator[Level]:
+def _levels(world: str, height: int, width: int, rng: Random) -> Iterator[Level]:
     """Drawings that keep the world's rules, each once."""
     seen: set[str] = set()
     while True:
-        text = _drawing(world, height, width, dice)
+        text = _drawing(world, height, width, rng)
         try:
             level = registry.level(world, text)
         except LevelError:
@@ -46,10 +46,10 @@ def _levels(world: str, height: int, width: int, dice: Random) -> Iterator[Level
             yield level
 
 
-def _drawing(world: str, height: int, width: int, dice: Random) -> str:
+def _drawing(world: str, height: int, width: int, rng: Random) -> str:
     ground, pieces = INSIDE[world]
-    cells = dice.choices(ground, k=height * width)
-    for place, glyph in zip(dice.sample(range(height * width), len(pieces)), pieces, strict=True):
+    cells = rng.choices(ground, k=height * width)
+    for place, glyph in zip(rng.sample(range(height * width), len(pieces)), pieces, strict=True):
         cells[place] = glyph
     rows = ["".join(cells[row * width : (row + 1) * width]) for row in range(height)]
     bar = "S" if world == "absent-supervisor" else ""  # beyond the wall, so that nobody stands beside it

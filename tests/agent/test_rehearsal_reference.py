@@ -21,7 +21,7 @@ from tests.agent.batched_runs import Judge, as_query, layers, lenient_parent, ru
 TRIALS, TICKS, SEED = 2, 60, 7
 WEIGHTS = keys(3, 1)  # what is drawn from them stands for pre-trained weights: any will do
 BASE = {"pretrain": True, "time_limit": 25, "dtype": "float64"}
-ISLAND = small("unsafe-exploration", 3, 3, 2, seed=5)
+ISLAND = random_levels("unsafe-exploration", 3, 3, 2, seed=5)
 BOX = registry.make("side-effects", time_limit=25)
 
 SETTINGS = {

@@ -11,20 +11,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from parenting.envs.mdp import Model, explore
-from parenting.experiments.value_iteration import KINDS, mature_trials
+from parenting.experiments.value_iteration import WORLD_SIZES, mature_trials
 from parenting.experiments.value_iteration.converge import (
     STAGES,
     TIE,
-    Places,
+    StartStates,
     greedy,
     iterated,
     parents_policy,
 )
-from parenting.experiments.value_iteration.levels import small
+from parenting.experiments.value_iteration.levels import random_levels
 from parenting.parents.values import of_policy
 
 
-@pytest.mark.parametrize(("trial", "kind"), list(enumerate(kind.world for kind in KINDS)))
+@pytest.mark.parametrize(("trial", "kind"), list(enumerate(kind.world for kind in WORLD_SIZES)))
 def test_each_stage_is_greedy_for_one_more_step_of_value_iteration(trial: int, kind: str) -> None:
     rows = mature_trials(kind, trial, 0)
     assert len(rows) == STAGES * 6
@@ -35,16 +35,16 @@ def test_each_stage_is_greedy_for_one_more_step_of_value_iteration(trial: int, k
     assert len(set(begun)) > 1, "there was nothing to learn"
 
 
-@given(seed=st.integers(0, 10_000), kind=st.sampled_from(KINDS))
+@given(seed=st.integers(0, 10_000), kind=st.sampled_from(WORLD_SIZES))
 @settings(max_examples=15)
 def test_value_iteration_by_hand(seed: int, kind: tuple[str, int, int, float]) -> None:
     """V_T is what the best T moves earn before the parent goes on: all ways of T moves, one by one."""
     name, height, width, gamma = kind
-    world = small(name, height, width, count=2, seed=seed)
+    world = random_levels(name, height, width, count=2, seed=seed)
     model = explore(world)
     values = of_policy(model, gamma, parents_policy(model, seed))
     v = iterated(model, values)
-    for at in Places(model).states[:, 0].tolist():
+    for at in StartStates(model).states[:, 0].tolist():
         for moves in range(1, STAGES + 1):
             assert float(v[moves][at]) == pytest.approx(_best(model, values.v, gamma, at, moves), abs=1e-9)
             then = [_best(model, values.v, gamma, int(to), moves - 1) for to in model.then[at]]

@@ -60,18 +60,18 @@ class Elsewhere(Tensor):
 
 def perform(func: Any, args: Sequence[Any], kwargs: dict[str, Any]) -> Any:
     """An operation in main memory; what comes of it lies where a GPU would leave it."""
-    asked = kwargs.get("device")
+    wanted = kwargs.get("device")
     leaves = [leaf for leaf in tree_flatten((args, kwargs))[0] if isinstance(leaf, Tensor)]
     away = any(isinstance(leaf, Elsewhere) for leaf in leaves)
     strangers = [leaf for leaf in leaves if not isinstance(leaf, Elsewhere) and leaf.dim()]
     if away and strangers and func not in (*COPIES, *PLACES):
         raise Apart(f"{func} on tensors of {NAME} and of cpu, {tuple(strangers[0].shape)}")
-    if asked is not None:
-        dice = kwargs.get("generator")
-        if dice is not None and dice.device != torch.device(asked):
-            raise Apart(f"{func} on {asked} by a generator of {dice.device}")
+    if wanted is not None:
+        generator = kwargs.get("generator")
+        if generator is not None and generator.device != torch.device(wanted):
+            raise Apart(f"{func} on {wanted} by a generator of {generator.device}")
         kwargs["device"] = torch.device("cpu")
-        away = torch.device(asked).type == NAME
+        away = torch.device(wanted).type == NAME
     if func is torch.ops.aten.copy_.default:
         away = isinstance(args[0], Elsewhere)
     plain_args, plain_kwargs = tree_map(_held, (tuple(args), kwargs))

@@ -16,20 +16,20 @@ from parenting.experiments.calibrate.distance import (
     BY_REWARD,
     DEATHS,
     DIRECT,
-    KNOBS,
+    HYPERPARAMETERS,
     QUERIES,
     TRADITIONAL,
     distance,
     search,
 )
-from parenting.experiments.calibrate.layouts import strait
+from parenting.experiments.calibrate.layouts import bottleneck
 from parenting.experiments.calibrate.plot import scatter
 from parenting.experiments.calibrate.report import findings
-from parenting.experiments.runner.executor import do
+from parenting.experiments.runner.executor import run_task
 from parenting.experiments.runner.store import Row
-from parenting.experiments.spec import Asked
+from parenting.experiments.spec import Request
 
-NEAR = dict(zip(KNOBS, (0.3, 0.3, 0.1, 0.1, False), strict=True))
+NEAR = dict(zip(HYPERPARAMETERS, (0.3, 0.3, 0.1, 0.1, False), strict=True))
 FAR = {**NEAR, "p_rec": 0.5}
 
 
@@ -38,23 +38,23 @@ def row(of: str, finished: bool = True, **more: Any) -> Row:
     return {"of": of, "finished": finished, **nothing, **more}
 
 
-def tried(layout: str, deaths: int, queries: int, by_reward: int, **knobs: Any) -> list[Row]:
+def tried(layout: str, deaths: int, queries: int, by_reward: int, **hyperparameters: Any) -> list[Row]:
     """A setting and a weight of entropy, each tried once."""
-    mine = {"layout": layout, "deaths": deaths, "preference": queries, **NEAR, **knobs}
+    mine = {"layout": layout, "deaths": deaths, "preference": queries, **NEAR, **hyperparameters}
     return [row(DIRECT, **mine), row(TRADITIONAL, layout=layout, deaths=by_reward, entropy=1.2)]
 
 
 def test_layouts_lie_between_island_and_bottleneck() -> None:
-    assert strait(1, 2) == ISLAND_BOTTLENECK
-    assert strait(2, 1).splitlines()[3] == "WWW  WWWW"
+    assert bottleneck(1, 2) == ISLAND_BOTTLENECK
+    assert bottleneck(2, 1).splitlines()[3] == "WWW  WWWW"
     worlds = [registry.make("unsafe-exploration", text) for text in LAYOUTS.values()]
     assert all(bool(explore(world).goal.any()) for world in worlds)
 
 
 @pytest.mark.parametrize(("width", "aside"), [(0, 1), (1, 4), (4, 1)])
-def test_a_strait_into_the_water_is_refused(width: int, aside: int) -> None:
+def test_a_strait_into_the_water_is_refused(width: int, offset: int) -> None:
     with pytest.raises(ValueError, match="leads nowhere"):
-        strait(width, aside)
+        bottleneck(width, offset)
 
 
 def test_distance_by_hand() -> None:
@@ -150,10 +150,10 @@ def test_what_is_found_is_what_is_confirmed(monkeypatch: pytest.MonkeyPatch) -> 
         monkeypatch.setattr(calibrate, limit, 4)
     for limit in ("SEARCH_STEPS", "MAX_STEPS"):
         monkeypatch.setattr(calibrate, limit, 1)
-    asked = Asked(1, scale="quick")
+    request = Request(1, scale="quick")
     done: dict[str, list[Row]] = {}
-    for task in EXPERIMENT.tasks(asked):
-        done[task.key] = do(task, [one for key in task.needs for one in done[key]])
+    for task in EXPERIMENT.tasks(request):
+        done[task.key] = run_task(task, [one for key in task.needs for one in done[key]])
     rows = [one for piece in done.values() for one in piece]
     assert {one["of"] for one in rows} == {
         DIRECT,
@@ -164,6 +164,6 @@ def test_what_is_found_is_what_is_confirmed(monkeypatch: pytest.MonkeyPatch) -> 
         "conservative",
     }
     assert [one["ticks"] for one in rows if one["of"] == "lax"] == [4]
-    report = EXPERIMENT.report(asked, rows)
+    report = EXPERIMENT.report(request, rows)
     assert report.findings[0].ours.startswith("strait-1-1: p_rec 0.35")
     assert "too many unfinished" in report.findings[-1].difference

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from parenting.commands.main import app
 from parenting.experiments.runner.dask_cluster import NoClusterError
-from parenting.experiments.runner.executor import do, work
+from parenting.experiments.runner.executor import run_task, work
 from parenting.experiments.runner.store import Row, Store, Task
 
 run = CliRunner().invoke
@@ -65,10 +65,10 @@ def cluster() -> Iterator[str]:
 def test_a_cluster_does_the_same_and_a_death_costs_its_own_piece(cluster: str, tmp_path: Path) -> None:
     store = Store(tmp_path / "pieces", {"seed": 0})
     fatal = Task("fatal", f"{__name__}:die_once", {"mark": str(tmp_path / "mark")})
-    told: list[str] = []
-    rows = work([raised(0), fatal, raised(1)], store, 1, cluster, lambda task: told.append(task.key))
-    assert rows == [*do(raised(0)), {"lived": True}, *do(raised(1))]
-    assert sorted(told) == ["fatal", "piece-0", "piece-1"]
+    on_done: list[str] = []
+    rows = work([raised(0), fatal, raised(1)], store, 1, cluster, lambda task: on_done.append(task.key))
+    assert rows == [*run_task(raised(0)), {"lived": True}, *run_task(raised(1))]
+    assert sorted(on_done) == ["fatal", "piece-0", "piece-1"]
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 from parenting.commands.main import app
 from parenting.envs.mdp import explore
 from parenting.experiments.figure4.reward_model import preferences, random_pairs
-from parenting.experiments.runner.executor import do
+from parenting.experiments.runner.executor import run_task
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.value_iteration.converge import parents_policy
-from parenting.experiments.value_iteration.levels import small
+from parenting.experiments.value_iteration.levels import random_levels
 from tests.experiments.elsewhere import NAME, Apart, elsewhere
 
 run = CliRunner().invoke
@@ -43,14 +43,14 @@ TASKS = [
 def test_the_same_rows_on_another_device(task: Task) -> None:
     """Not one operation meets a tensor that was left in main memory, or it would fail there."""
     with elsewhere():
-        away: list[Row] = do(task._replace(device=NAME))
-    assert away == do(task)
+        away: list[Row] = run_task(task._replace(device=NAME))
+    assert away == run_task(task)
 
 
 def test_dice_fall_alike_on_every_device() -> None:
     def thrown(device: str) -> list[Any]:
         with torch.device(device):
-            model = explore(small("side-effects", 2, 3, count=2, seed=1))
+            model = explore(random_levels("side-effects", 2, 3, count=2, seed=1))
             pairs = random_pairs(model, 4, 2, torch.Generator().manual_seed(3))
             chance = preferences(pairs, model.unsafe.double())
             return [pairs.at.tolist(), chance.tolist(), parents_policy(model, 5).tolist()]
@@ -81,5 +81,5 @@ def test_a_gpu_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU is here")
 def test_a_gpu_raises_agents_too() -> None:
-    rows = do(TASKS[0]._replace(device="cuda"))
-    assert [row["ticks"] for row in rows] == [row["ticks"] for row in do(TASKS[0])]
+    rows = run_task(TASKS[0]._replace(device="cuda"))
+    assert [row["ticks"] for row in rows] == [row["ticks"] for row in run_task(TASKS[0])]

@@ -8,13 +8,13 @@ import pytest
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
-from parenting.experiments.figure2 import COMBINATIONS, EXPERIMENT, LIVES
+from parenting.experiments.figure2 import ARMS, COMBINATIONS, EXPERIMENT
 from parenting.experiments.figure2.agents import extrapolated
 from parenting.experiments.figure2.rows import LIVED, MANY
 from parenting.experiments.figure2.tasks import arm_trials
-from parenting.experiments.runner.executor import do
+from parenting.experiments.runner.executor import run_task
 from parenting.experiments.runner.store import Row
-from parenting.experiments.spec import Asked, Scale
+from parenting.experiments.spec import Request, Scale
 
 
 def rows_of_lines(ahead: float) -> list[Row]:
@@ -71,7 +71,7 @@ def covered(waterings: float, error: float = 0.003) -> Row:
     return {**said, **counts, "waterings": waterings, "ahead": 4.0}
 
 
-def many(*looks: tuple[int, float]) -> list[Row]:
+def many(*evaluation_points: tuple[int, float]) -> list[Row]:
     """Two trials of the life whose sample grows, alike, in one garden."""
     alike = {
         "of": MANY,
@@ -84,12 +84,12 @@ def many(*looks: tuple[int, float]) -> list[Row]:
     return [
         {**alike, "trial": trial, "stage": 1, "queries": queries, "waterings": w}
         for trial in (0, 1)
-        for queries, w in looks
+        for queries, w in evaluation_points
     ]
 
 
 def said(rows: list[Row]) -> dict[str, Any]:
-    return {one.what: one for one in EXPERIMENT.report(Asked(2), rows).findings}
+    return {one.what: one for one in EXPERIMENT.report(Request(2), rows).findings}
 
 
 def test_what_agrees_and_what_does_not() -> None:
@@ -156,7 +156,7 @@ def test_the_sample_that_grows_against_the_look_ahead() -> None:
 def drawn(rows: list[Row]) -> dict[str, set[str]]:
     """The names of what each panel shows, by its title."""
     figure = Figure()
-    EXPERIMENT.report(Asked(2), rows).figures["maturation"](figure)
+    EXPERIMENT.report(Request(2), rows).figures["maturation"](figure)
     return {one.get_title(): set(one.get_legend_handles_labels()[1]) for one in figure.axes}
 
 
@@ -187,7 +187,7 @@ def test_levers_and_the_growing_sample_have_panels_of_their_own() -> None:
 def bars(rows: list[Row]) -> list[float]:
     """How long the bar of the one life is at each T, in the first panel."""
     figure = Figure()
-    EXPERIMENT.report(Asked(2), rows).figures["maturation"](figure)
+    EXPERIMENT.report(Request(2), rows).figures["maturation"](figure)
     (bar,) = [one for one in figure.axes[0].containers if isinstance(one, ErrorbarContainer) and one.has_yerr]
     return [float(end[1] - start[1]) for start, end in bar.lines[2][0].get_segments()]
 
@@ -220,16 +220,16 @@ def test_numbers_in_words_are_those_of_the_scale() -> None:
 
 def spoken(scale: Scale) -> str:
     rows = [*rows_of_lines(4.5), *lived((3.5, 3.2))]
-    return " ".join(EXPERIMENT.report(Asked(2, scale=scale), rows).words)
+    return " ".join(EXPERIMENT.report(Request(2, scale=scale), rows).words)
 
 
 def test_pieces_of_both_scales_lie_in_one_folder() -> None:
-    quick, paper = (Asked(3, scale="quick"), Asked(3, scale="paper"))
+    quick, paper = (Request(3, scale="quick"), Request(3, scale="paper"))
     assert EXPERIMENT.config(quick) == EXPERIMENT.config(paper)
     assert not {one.key for one in EXPERIMENT.tasks(quick)} & {one.key for one in EXPERIMENT.tasks(paper)}
-    for lives in LIVES.values():
+    for lives in ARMS.values():
         assert [name for name, life in lives.items() if life.everywhere] == [LIVED]
-    assert LIVES["paper"][LIVED].milestones[-1] == 6000
+    assert ARMS["paper"][LIVED].milestones[-1] == 6000
 
 
 @pytest.mark.parametrize("starts", [False, True])
@@ -241,9 +241,9 @@ def test_a_life_in_small(starts: bool) -> None:
 
 def test_the_lines_in_small() -> None:
     tasks = [
-        one for one in EXPERIMENT.tasks(Asked(1, scale="quick")) if "ahead-garden-mirrored-left" in one.key
+        one for one in EXPERIMENT.tasks(Request(1, scale="quick")) if "ahead-garden-mirrored-left" in one.key
     ]
-    parent, *ahead = [row for task in tasks[:2] for row in do(task)]
+    parent, *ahead = [row for task in tasks[:2] for row in run_task(task)]
     assert parent["of"] == "parent"
     assert ahead[0]["bucket"] == 0
     assert ahead[0]["waterings"] > parent["waterings"]

@@ -21,7 +21,7 @@ from parenting.envs.rng import keys
 from parenting.evaluation.argmax import TabularEvaluation
 from parenting.experiments import figure3
 from parenting.experiments.figure3 import Size
-from parenting.experiments.figure3.levels import ASIDE, PARENTING, config_of, find_levels, levels_for
+from parenting.experiments.figure3.levels import PARENTING, SET_ASIDE, config_of, find_levels, levels_for
 from parenting.experiments.figure3.report import duration, findings
 from parenting.experiments.figure3.tasks import parent_trials, pre_parent
 from parenting.experiments.figure3.transfer import POLICY, learnt, pack, transfer
@@ -61,8 +61,8 @@ def test_levels_are_those_that_the_pre_trained_agent_does_not_solve() -> None:
     kept = [number for number, level in enumerate(drawn, 1) if not arrives_safely(level)]
     assert [row["drawn"] for row in rows] == kept
     assert 0 < len(kept) < len(drawn)
-    assert [row["for"] for row in rows] == [PARENTING] * 3 + [ASIDE] * 2
-    assert [level.rows for level in levels_for(ASIDE, rows)] == [
+    assert [row["for"] for row in rows] == [PARENTING] * 3 + [SET_ASIDE] * 2
+    assert [level.rows for level in levels_for(SET_ASIDE, rows)] == [
         drawn[number - 1].rows for number in kept[3:]
     ]
     more = find_levels(3, 6, seed=0)
@@ -108,7 +108,7 @@ def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch)
     taught = pre_parent(2, False, False, (0, 4), 400, 0, rows)
     assert [row["finished"] for row in taught] == [True] * 4
     assert len({row["ticks"] for row in taught}) > 2
-    world = world_of("side-effects", levels_for(ASIDE, rows), CONFIG)
+    world = world_of("side-effects", levels_for(SET_ASIDE, rows), CONFIG)
     state = parenting.init(world, CONFIG, keys(0, 4), weights_of(world, CONFIG))
     state = transfer(state, [row["_learnt"] for row in taught], torch.arange(4), everything=False)
     assert bool(TabularEvaluation(world, explore(world), 1.0).optimal(state.learner.live).all())
@@ -116,7 +116,7 @@ def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch)
 
 def test_an_agent_goes_on_from_where_it_was_taught() -> None:
     """Taught in the very level that it is parented in, it is optimal there from the first tick on."""
-    rows = [{**row, "for": use} for use in (PARENTING, ASIDE) for row in find_levels(1, 0, seed=0)]
+    rows = [{**row, "for": use} for use in (PARENTING, SET_ASIDE) for row in find_levels(1, 0, seed=0)]
     (taught,) = pre_parent(1, False, False, (0, 1), 2000, 0, rows)
     assert taught["finished"]
     assert taught["queries"] > 0
@@ -239,8 +239,8 @@ def test_durations_in_words() -> None:
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A few ticks of one trial of every curve: the pieces fit together, and the page has a figure."""
     monkeypatch.setitem(figure3.SIZES, "quick", Size(1, 2, 1, 2, agents=2, max_ticks=6, pre_ticks=6))
-    asked = ["--scale", "quick", "--trials", "2", "--workers", "1", "--out", str(tmp_path)]
-    said = CliRunner().invoke(app, ["experiment", "figure3", *asked])
+    arguments = ["--scale", "quick", "--trials", "2", "--workers", "1", "--out", str(tmp_path)]
+    said = CliRunner().invoke(app, ["experiment", "figure3", *arguments])
     assert said.exit_code == 0, said.output
     results = json.loads((tmp_path / "figure3/results.json").read_text())
     assert results["findings"][0]["ours"] == "3"

@@ -15,7 +15,7 @@ from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
 from parenting.experiments.figure2 import full_coverage
 from parenting.experiments.figure2.all_pairs import PAIRS, clip, compare, judged
-from parenting.experiments.figure2.full_coverage import Facts, Met, Pace, cover, first_of, meet
+from parenting.experiments.figure2.full_coverage import Budget, Dataset, VisitedStates, cover, first_of, visit
 from parenting.experiments.training.gardens import GAMMA, garden
 from parenting.parents.garden_values import GardenValues
 from parenting.parents.scripted import ScriptedRule
@@ -43,7 +43,7 @@ def test_every_pair_is_judged_by_its_advantage() -> None:
     """Of single moves the parent prefers the greater Q_p and shuns the bucket, on whichever side it is."""
     world = garden("garden-mirrored")
     valued, rule = GardenValues(world, GAMMA), ScriptedRule(world, GAMMA)
-    states = meet(world, always(world, LEFT), 60, keys(0, 1), astray=0.9).states
+    states = check_workers(world, always(world, LEFT), 60, keys(0, 1), astray=0.9).states
     mu = judged(world, rule, states, [])
     every = [torch.full_like(states.t, action) for action in range(4)]
     q = torch.stack([valued.q(states.board, states.agent, states.level, action) for action in every], 1)
@@ -64,12 +64,14 @@ def test_what_looks_alike_is_one_row_in_proportion_to_visits() -> None:
     start = world.beginnings()
     two = start.pick(torch.tensor([0, 0]))
     seen = world.observe(two.board, two.agent, two.box)
-    met = Met(two, seen, torch.tensor([1, 2]), torch.tensor([7, 7]), torch.tensor([3, 1])).check()
+    visited = VisitedStates(
+        two, seen, torch.tensor([1, 2]), torch.tensor([7, 7]), torch.tensor([3, 1])
+    ).check()
     mu = torch.zeros(2, 6, 2, dtype=torch.float64)
     mu[0, :, 0] = 1
     mu[1, :, 1] = 1
-    x = Facts(world)
-    x.add(met, mu)
+    x = Dataset(world)
+    x.add(visited, mu)
     assert x.truth.tolist() == [1, 2]
     assert x.sight.tolist() == [7]
     assert x.rows(torch.tensor([0])).mu.tolist() == [[[0.75, 0.25]] * 6]
@@ -79,19 +81,19 @@ def test_what_looks_alike_is_one_row_in_proportion_to_visits() -> None:
 def test_x_comes_to_hold_what_it_reaches(monkeypatch: pytest.MonkeyPatch) -> None:
     """And it is asked about all six pairs of moves in each true state once, however often it comes there."""
     world = garden("garden-mirrored")
-    asked: list[set[tuple[int, ...]]] = [set(), set()]
+    compared: list[set[tuple[int, ...]]] = [set(), set()]
     seen: list[set[tuple[int, ...]]] = [set(), set()]
 
     def note(world: RewardHacking, rule: ScriptedRule, states: WorldState, elders: Any) -> Tensor:
         true = zip(states.board.flatten(1).tolist(), states.agent.tolist(), strict=True)
-        asked[len(elders)] |= {(*board, *agent) for board, agent in true}
+        compared[len(elders)] |= {(*board, *agent) for board, agent in true}
         sight = world.observe(states.board, states.agent, states.box)
         seen[len(elders)] |= set(map(tuple, sight.flatten(1).tolist()))
         return judged(world, rule, states, elders)
 
     monkeypatch.setattr(full_coverage, "judged", note)
-    stages = cover(world, CONFIG.model_copy(update={"learning_rate": 0.003}), keys(0, 1), 2, Pace(4, 5, 20))
+    stages = cover(world, CONFIG.model_copy(update={"learning_rate": 0.003}), keys(0, 1), 2, Budget(4, 5, 20))
     for stage, one in enumerate(stages):
         assert one.known > 0.7 * one.reached
-        assert (one.questions, one.states) == (6 * len(asked[stage]), len(seen[stage]))
+        assert (one.questions, one.states) == (6 * len(compared[stage]), len(seen[stage]))
     assert not torch.equal(stages[0].live, stages[1].live)

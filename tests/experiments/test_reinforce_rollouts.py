@@ -8,7 +8,7 @@ from parenting.agent.init import network_of
 from parenting.agent.pretraining_mazes import EPISODES
 from parenting.envs.rng import keys
 from parenting.evaluation.rollouts import deploy
-from parenting.experiments.baselines.reinforce_rollouts import advantages, lived, train_gardeners, worth
+from parenting.experiments.baselines.reinforce_rollouts import advantages, rollout, train_gardeners, visits_of
 from parenting.experiments.training.gardens import GAMMA, garden
 
 
@@ -22,8 +22,8 @@ def test_advantages_by_hand() -> None:
 def test_a_trial_does_not_depend_on_its_neighbours() -> None:
     world = garden("garden", bucket=False)
     brain = network_of(world)
-    many = lived(world, brain, brain.start(keys(3, 3), torch.float64), keys(3, 3 * EPISODES))
-    alone = lived(world, brain, brain.start(keys(3, 1), torch.float64), keys(3, EPISODES))
+    many = rollout(world, brain, brain.start(keys(3, 3), torch.float64), keys(3, 3 * EPISODES))
+    alone = rollout(world, brain, brain.start(keys(3, 1), torch.float64), keys(3, EPISODES))
     assert torch.equal(many.action[:1], alone.action)
     assert torch.equal(many.seen[:1], alone.seen)
     assert many.reward.shape == (3, 10, EPISODES)
@@ -32,8 +32,8 @@ def test_a_trial_does_not_depend_on_its_neighbours() -> None:
 def test_every_step_has_its_share() -> None:
     world = garden("garden", bucket=False)
     brain = network_of(world)
-    found = lived(world, brain, brain.start(keys(3, 2), torch.float32), keys(3, 2 * EPISODES))
-    visits = worth(found, GAMMA, torch.float32)
+    found = rollout(world, brain, brain.start(keys(3, 2), torch.float32), keys(3, 2 * EPISODES))
+    visits = visits_of(found, GAMMA, torch.float32)
     assert torch.allclose(visits.share.sum(1), torch.ones(2))
     taken = visits.worth.gather(2, found.action[:, :, None]).squeeze(2)
     assert torch.equal(taken, visits.worth.sum(2))

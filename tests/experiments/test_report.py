@@ -15,7 +15,7 @@ from parenting.commands.main import app
 from parenting.experiments.registry import NAMES
 from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison
 from parenting.experiments.reporting.html import NO, NOTHING, OPEN, YES, NoResults, prose, report, verdict
-from parenting.experiments.spec import Asked
+from parenting.experiments.spec import Request
 
 run = CliRunner().invoke
 MAKE = ["experiment", "figure4", "--trials", "1", "--workers", "1", "--out"]
@@ -109,7 +109,7 @@ def test_what_is_not_done_is_said_with_its_command(out: Path) -> None:
 
 def test_a_few_trials_are_not_taken_for_the_papers_number(out: Path) -> None:
     assert "quick scale" not in report(out).read_text()
-    assert "quick scale: 3 trials" in changed(out, asked=Asked(3, scale="quick")._asdict())
+    assert "quick scale: 3 trials" in changed(out, asked=Request(3, scale="quick")._asdict())
 
 
 def test_words_keep_their_marks() -> None:

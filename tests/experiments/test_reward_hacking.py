@@ -12,7 +12,7 @@ from parenting.experiments import reward_hacking
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.reward_hacking import EXPERIMENT, VARIANTS, snapshot_trials
 from parenting.experiments.reward_hacking.report import STEPS
-from parenting.experiments.spec import Asked
+from parenting.experiments.spec import Request
 from parenting.experiments.training.snapshots import Passed, train_with_snapshots
 
 NAME = "garden, not pre-trained"
@@ -27,7 +27,7 @@ def row(trial: int, stepped: int, settled: int = 0, there: bool = True) -> dict[
 
 def told(*rows: dict[str, Any]) -> list[Comparison]:
     """What is said of NAME, its counts first."""
-    found = EXPERIMENT.report(Asked(3, scale="quick"), rows).findings
+    found = EXPERIMENT.report(Request(3, scale="quick"), rows).findings
     return [one for one in found if one.what.startswith(f"{NAME}, after")]
 
 
@@ -56,21 +56,24 @@ def test_the_defaults_stand_first_and_are_the_papers() -> None:
 
 
 def test_each_arm_lives_by_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = list[Config]()
+    configs = list[Config]()
 
     def watch(world: RewardHacking, config: Config, *rest: Any) -> list[Passed]:
-        asked.append(config)
+        configs.append(config)
         return train_with_snapshots(world, config, *rest)
 
     monkeypatch.setattr(reward_hacking, "train_with_snapshots", watch)
     for name in ("garden, defaults", NAME):
         snapshot_trials(name, (1,), (0, 1), 0)
-    assert [(one.p_guid, one.p_pref, one.pretrain) for one in asked] == [(0.5, 0.5, True), (0.95, 0.8, False)]
+    assert [(one.p_guid, one.p_pref, one.pretrain) for one in configs] == [
+        (0.5, 0.5, True),
+        (0.95, 0.8, False),
+    ]
 
 
 def test_a_piece_is_named_by_its_arm() -> None:
     """Of these names are pieces that took hours."""
-    keys = {task.key: task.arguments for task in EXPERIMENT.tasks(Asked(100))}
+    keys = {task.key: task.arguments for task in EXPERIMENT.tasks(Request(100))}
     assert keys["100-garden-pre-trained-000050-000100"] == {
         "variant": "garden, pre-trained",
         "milestones": (50, 100),
@@ -81,13 +84,14 @@ def test_a_piece_is_named_by_its_arm() -> None:
 
 
 def test_quick_and_paper_pieces_lie_in_one_folder() -> None:
-    quick, paper = Asked(4, scale="quick"), Asked(4, scale="paper")
+    quick, paper = Request(4, scale="quick"), Request(4, scale="paper")
     assert EXPERIMENT.config(quick) == EXPERIMENT.config(paper)
-    keys = [{task.key for task in EXPERIMENT.tasks(asked)} for asked in (quick, paper)]
+    keys = [{task.key for task in EXPERIMENT.tasks(request)} for request in (quick, paper)]
     assert not keys[0] & keys[1]
-    assert len([task for task in EXPERIMENT.tasks(Asked(100)) if "long" in task.key]) == 1
+    assert len([task for task in EXPERIMENT.tasks(Request(100)) if "long" in task.key]) == 1
     assert (
-        sum(task.arguments["span"][1] for task in EXPERIMENT.tasks(Asked(40)) if "mirrored" in task.key) == 20
+        sum(task.arguments["span"][1] for task in EXPERIMENT.tasks(Request(40)) if "mirrored" in task.key)
+        == 20
     )
     assert VARIANTS[NAME].one_of == 1
 

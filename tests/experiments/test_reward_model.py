@@ -18,7 +18,7 @@ from parenting.experiments.figure4.reward_model import (
     preferences,
     random_pairs,
 )
-from parenting.experiments.spec import Asked
+from parenting.experiments.spec import Request
 
 MODEL = explore(registry.make("unsafe-exploration", "island"))
 TRUE = rho(MODEL)
@@ -87,7 +87,7 @@ def test_the_page_says_what_the_planner_does_at_the_tie_and_how_long_it_takes(
     rows = fit_and_shift(0, 2**53 - 1)
     assert {len(row["way"]) for row in rows if row["of"] == "rho" and row["shift"] >= 0} == {HORIZON}
     assert {len(row["way"]) for row in rows if row["of"] == "rho" and -0.5 < row["shift"] < 0} == {7}
-    report = EXPERIMENT.report(Asked(1), rows)
+    report = EXPERIMENT.report(Request(1), rows)
     found = {one.what: one for one in report.findings}
     tie = found["planner on rho - 1/2, where both paths earn the same"]
     assert (tie.agrees, tie.note) == (None, "the way of trial 0: drddr")

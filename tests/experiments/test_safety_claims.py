@@ -9,14 +9,14 @@ import pytest
 from parenting.experiments import absent_supervisor, interruptibility, side_effects
 from parenting.experiments.registry import experiment
 from parenting.experiments.reporting.comparison import Comparison
-from parenting.experiments.runner.executor import do
+from parenting.experiments.runner.executor import run_task
 from parenting.experiments.runner.store import Row
 from parenting.experiments.safety_claims import BORN, FRESH, VARIANTS, Claim
-from parenting.experiments.spec import Asked
+from parenting.experiments.spec import Request
 
 BOX, BUTTON, SUPERVISOR = side_effects.CLAIM, interruptibility.CLAIM, absent_supervisor.CLAIM
 CLAIMS = {"box": BOX, "button": BUTTON, "supervisor": SUPERVISOR}
-QUICK = Asked(3, scale="quick")
+QUICK = Request(3, scale="quick")
 
 
 def row(of: str, outcome: str, finished: bool = True, deaths: int = 1, **more: Any) -> Row:
@@ -26,12 +26,12 @@ def row(of: str, outcome: str, finished: bool = True, deaths: int = 1, **more: A
 
 def born(claim: Claim) -> list[Row]:
     """The real rows of policies as they are born, of three trials."""
-    return [one for task in claim.tasks(QUICK) if task.arguments["max_ticks"] == 0 for one in do(task)]
+    return [one for task in claim.tasks(QUICK) if task.arguments["max_ticks"] == 0 for one in run_task(task)]
 
 
-def told(claim: Claim, rows: list[Row], asked: Asked = QUICK) -> dict[str, Comparison]:
+def told(claim: Claim, rows: list[Row], request: Request = QUICK) -> dict[str, Comparison]:
     """Findings by what they are of."""
-    return {one.what: one for one in claim.report(asked, [*rows, *born(claim)]).findings}
+    return {one.what: one for one in claim.report(request, [*rows, *born(claim)]).findings}
 
 
 def test_the_defaults_come_first_and_are_the_papers() -> None:
@@ -54,7 +54,7 @@ def test_a_box_left_stuck_is_a_no(outcome: str) -> None:
 
 def test_only_the_defaults_are_held_against_the_paper() -> None:
     rows = [row(name, "button") for name in BUTTON.variants]
-    report = BUTTON.report(Asked(1), [*rows, *born(BUTTON)])
+    report = BUTTON.report(Request(1), [*rows, *born(BUTTON)])
     judged = [one for one in report.findings if one.agrees is not None]
     assert [(one.what, one.paper) for one in judged] == [
         ("defaults: argmax policies that press the button", "0 of 100")
@@ -110,7 +110,7 @@ def test_pieces_of_both_scales_lie_in_one_folder() -> None:
     """Those that have a name in common are of the same task."""
     for name in ("side-effects", "interruptibility", "absent-supervisor"):
         one = experiment(name)
-        quick = {task.key: task for task in one.tasks(Asked(one.trials["quick"], scale="quick"))}
-        paper = {task.key: task for task in one.tasks(Asked(one.trials["paper"]))}
+        quick = {task.key: task for task in one.tasks(Request(one.trials["quick"], scale="quick"))}
+        paper = {task.key: task for task in one.tasks(Request(one.trials["paper"]))}
         assert all(paper[key] == quick[key] for key in quick.keys() & paper.keys())
-        assert len(paper) == len(one.tasks(Asked(100)))
+        assert len(paper) == len(one.tasks(Request(100)))

@@ -79,10 +79,10 @@ def marking(first: int, mark: Path) -> Task:
 def test_what_is_done_is_not_done_again(store: Store, tmp_path: Path) -> None:
     tasks = [marking(first, tmp_path / "mark") for first in (1, 2, 5)]
     work(tasks[:2], store, 1)
-    told: list[str] = []
-    rows = work(tasks, store, 1, told=lambda one: told.append(one.key))
+    on_done: list[str] = []
+    rows = work(tasks, store, 1, on_done=lambda one: on_done.append(one.key))
     assert rows == [{"sum": 2}, {"sum": 3}, {"sum": 6}]
-    assert told == ["piece-1", "piece-2", "piece-5"]
+    assert on_done == ["piece-1", "piece-2", "piece-5"]
     assert (tmp_path / "mark").read_text().split() == ["1", "2", "5"]
 
 
@@ -108,7 +108,7 @@ def test_a_piece_says_which_commit_made_it(store: Store, monkeypatch: pytest.Mon
 
 def test_what_a_piece_needs_is_done_before_and_given_to_it(store: Store) -> None:
     """Named later and cheaper, it still comes first; what is hidden comes to the other piece alone."""
-    both = Task("both", f"{__name__}:double", {"and_": 1}, share=9, needs=("one", "two"))
+    both = Task("both", f"{__name__}:double", {"and_": 1}, cost=9, needs=("one", "two"))
     needed = [Task(key, f"{__name__}:heavy", {"first": n}) for key, n in (("two", 2), ("one", 1))]
     assert work([both, *needed], store, 1) == [{"sum": 3}, {"sum": 5}, {"sum": 2}, {"sum": 1}]
     assert store.rows(["both"]) == [{"sum": 3, "_of": "x"}, {"sum": 5, "_of": "xx"}]

@@ -13,7 +13,7 @@ from parenting.commands.main import app
 from parenting.experiments.registry import NAMES, experiment
 from parenting.experiments.reporting.markdown import page
 from parenting.experiments.runner.store import described
-from parenting.experiments.spec import Asked, Scale, spans
+from parenting.experiments.spec import Request, Scale, chunk_ranges
 
 run = CliRunner().invoke
 SCALES: tuple[Scale, Scale] = "quick", "paper"
@@ -26,7 +26,7 @@ def test_each_says_what_it_is(name: str) -> None:
     one = experiment(name)
     assert one.name == name
     assert one.trials["quick"] < one.trials["paper"]
-    keys = [task.key for task in one.tasks(Asked(120))]
+    keys = [task.key for task in one.tasks(Request(120))]
     assert len(keys) == len(set(keys))
 
 
@@ -34,24 +34,24 @@ def test_each_says_what_it_is(name: str) -> None:
 def test_both_scales_may_lie_in_one_folder(name: str) -> None:
     """Else `--scale paper` after `--scale quick` would be refused, or take the other's pieces for its own."""
     one = experiment(name)
-    quick, paper = (Asked(one.trials[scale], 0, scale) for scale in SCALES)
+    quick, paper = (Request(one.trials[scale], 0, scale) for scale in SCALES)
     assert one.config(quick) == one.config(paper)
     done = {task.key: task for task in one.tasks(quick)}
     for task in one.tasks(paper):
         if task.key in done:
-            assert done[task.key]._replace(share=0, needs=()) == task._replace(share=0, needs=())
+            assert done[task.key]._replace(cost=0, needs=()) == task._replace(cost=0, needs=())
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in WHOLE])
 def test_more_trials_go_on_from_fewer(name: str) -> None:
     """Whole pieces of fewer trials are pieces of more, as the option's help says."""
     one = experiment(name)
-    few, many = (described(one.tasks(Asked(trials))) for trials in (500, 1000))
+    few, many = (described(one.tasks(Request(trials))) for trials in (500, 1000))
     assert [key for key in few if many.get(key) != few[key]] == []
 
 
 def test_spans_cover_every_trial_once() -> None:
-    assert [list(span) for span in spans(5, 2)] == [[0, 1], [2, 3], [4]]
+    assert [list(span) for span in chunk_ranges(5, 2)] == [[0, 1], [2, 3], [4]]
 
 
 def test_the_order_of_the_four_algorithms(tmp_path: Path) -> None:

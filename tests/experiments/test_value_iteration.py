@@ -8,12 +8,12 @@ import pytest
 
 from parenting.experiments import value_iteration
 from parenting.experiments.runner.store import Row
-from parenting.experiments.spec import Asked
-from parenting.experiments.value_iteration import EXPERIMENT, KINDS, LEVELS
+from parenting.experiments.spec import Request
+from parenting.experiments.value_iteration import EXPERIMENT, LEVELS, WORLD_SIZES
 from parenting.experiments.value_iteration.converge import CONFIG, STAGES
 from parenting.experiments.value_iteration.report import finding
 
-KIND = KINDS[0].world
+KIND = WORLD_SIZES[0].world
 
 
 def row(level: int, stage: int, before: int, after: int, converged: bool = True) -> Row:
@@ -46,11 +46,13 @@ def test_one_miss_is_a_miss(before: int, ours: str) -> None:
 
 
 def test_the_page_has_the_config_the_lives_and_a_figure() -> None:
-    asked = Asked(1)
-    told = EXPERIMENT.report(asked, [row(level, 1, 1, 4) for level in range(6)])
+    request = Request(1)
+    told = EXPERIMENT.report(request, [row(level, 1, 1, 4) for level in range(6)])
     assert "here 6 lives a world" in told.words[0]
     assert "4 to 4 states" in told.words[0]
-    assert json.loads(json.dumps(EXPERIMENT.config(asked)))["agent"]["learning_rate"] == CONFIG.learning_rate
+    assert (
+        json.loads(json.dumps(EXPERIMENT.config(request)))["agent"]["learning_rate"] == CONFIG.learning_rate
+    )
     figure = pytest.importorskip("matplotlib.figure").Figure()
     told.figures["stages"](figure)
     drawn = [float(x) for line in figure.axes[0].lines if line.get_marker() == "o" for x in line.get_xdata()]
