@@ -63,8 +63,8 @@ def _numbers(lines: Baselines) -> str:
         "the weather of an episode is the same for all. Agents, and what learns from reward, are looked at "
         f"in {EPISODES} of them. The look-ahead walks {_some(lines.episodes)}. The coverage agent is "
         f"looked at in {_some(lines.budget.episodes)}, in which it has learnt, beside the look-ahead in the "
-        f"same; and in {EPISODES} others, the fresh weather. *up-down* and *left* say where the parent walks inside "
-        "its cycle."
+        f"same; and in {EPISODES} others, the fresh weather. *up-down* and *left* say where the parent walks "
+        "inside its cycle."
     )
 
 
