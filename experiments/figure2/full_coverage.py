@@ -125,7 +125,7 @@ def cover(
     for stage in range(1, stages + 1):
         elders = [one.live for one in found]
         rng = mine.replace(tick=torch.tensor([stage * LONG]))
-        found.append(_stage(world, config, rule, live.clone(), elders, rng, pace))
+        found.append(_stage(world, config, rule, live.clone(), elders, rng, budget))
         live = found[-1].live
     return found
 
@@ -141,15 +141,15 @@ def _stage(
 ) -> CoverageStage:
     x = Dataset(world)
     moments = Moments(torch.zeros_like(live), torch.zeros_like(live), torch.zeros(1, dtype=torch.int64))
-    for _ in range(pace.rounds):
-        for astray in (0.0, ASTRAY):
-            met = check_workers(world, live, pace.episodes, rng, astray)
-            x.add(met, judged(world, rule, met.states, elders))
-        for _ in range(pace.passes):
+    for _ in range(budget.rounds):
+        for epsilon in (0.0, EPSILON):
+            visited = visit(world, live, budget.episodes, rng, epsilon)
+            x.add(visited, judged(world, rule, visited.states, elders))
+        for _ in range(budget.passes):
             rng = rng.next()
             _train(world, config, x, live, moments, rng)
-    sight = torch.unique(check_workers(world, live, pace.episodes, rng).sight)
-    return Covered(
+    sight = torch.unique(visit(world, live, budget.episodes, rng).sight)
+    return CoverageStage(
         live=live,
         questions=len(PAIRS) * len(x.truth),
         states=len(x.sight),

@@ -116,7 +116,7 @@ def full_coverage_stages(
     own.
     """
     config = compose(PRESET, _defaults(), {"inside": inside, **changes}, strict=True)
-    world, pace = garden(level), Pace(*pace)
+    world, budget = garden(level), Budget(*budget)
     valued = GardenValues(world, GAMMA, inside)
     rows = []
     for stage, one in enumerate(cover(world, config, keys(seed, trial + 1), stages, budget), start=1):
@@ -129,7 +129,7 @@ def full_coverage_stages(
     return rows
 
 
-def _best(world: RewardHacking, valued: Garden, depth: int, state: WorldState) -> Int64[Tensor, "N"]:
+def _best(world: RewardHacking, valued: GardenValues, depth: int, state: WorldState) -> Int64[Tensor, "N"]:
     return best(world, valued, state, depth)
 
 

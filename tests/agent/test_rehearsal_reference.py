@@ -10,7 +10,7 @@ from parenting.agent.init import network_of
 from parenting.agent.policy import Network
 from parenting.envs import registry
 from parenting.envs.rng import keys
-from parenting.experiments.value_iteration.levels import small
+from parenting.experiments.value_iteration.levels import random_levels
 from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
 from reference.clips import Clip

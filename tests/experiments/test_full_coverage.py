@@ -43,7 +43,7 @@ def test_every_pair_is_judged_by_its_advantage() -> None:
     """Of single moves the parent prefers the greater Q_p and shuns the bucket, on whichever side it is."""
     world = garden("garden-mirrored")
     valued, rule = GardenValues(world, GAMMA), ScriptedRule(world, GAMMA)
-    states = check_workers(world, always(world, LEFT), 60, keys(0, 1), astray=0.9).states
+    states = visit(world, always(world, LEFT), 60, keys(0, 1), epsilon=0.9).states
     mu = judged(world, rule, states, [])
     every = [torch.full_like(states.t, action) for action in range(4)]
     q = torch.stack([valued.q(states.board, states.agent, states.level, action) for action in every], 1)
