@@ -11,7 +11,7 @@ from sqlalchemy import make_url
 from parenting.commands.errors import settings
 from parenting.server.db import Database, connect
 from parenting.server.errors import SetupError
-from parenting.server.schema import require
+from parenting.server.migrate import require_current
 
 
 @contextmanager
@@ -30,7 +30,7 @@ def database() -> Iterator[Database]:
         )
     db = connect(chosen)
     try:
-        require(db)
+        require_current(db)
         yield db
     finally:
         db.close()

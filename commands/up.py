@@ -23,7 +23,7 @@ import typer
 from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.lifeline import VARIABLE
 from parenting.server.db import connect
-from parenting.server.schema import upgrade
+from parenting.server.migrate import upgrade
 from parenting.server.serve import bind
 from parenting.server.settings import Settings
 

@@ -11,7 +11,7 @@ from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.lifeline import follow
 from parenting.server.db import connect
 from parenting.server.log import set_up_log
-from parenting.server.schema import require
+from parenting.server.migrate import require_current
 from parenting.server.settings import Settings
 from parenting.server.workers import SILENT_SECONDS, alive
 
@@ -59,7 +59,7 @@ def _check() -> int:
 def _alive(chosen: Settings) -> list[str]:
     db = connect(chosen)
     try:
-        require(db)
+        require_current(db)
         return list(alive(db))
     finally:
         db.close()

@@ -1,4 +1,4 @@
-"""How alembic reaches the database: always through a connection that `server.schema` opened."""
+"""How alembic reaches the database: always through a connection that `server.migrate` opened."""
 
 from alembic import context
 

@@ -27,9 +27,9 @@ from parenting.server.errors import (
     SetupError,
     TooLargeError,
 )
+from parenting.server.migrate import require_current
 from parenting.server.new_run import messages
 from parenting.server.notify import Notifier
-from parenting.server.schema import require
 from parenting.server.security import SecurityMiddleware
 from parenting.server.settings import Settings
 from parenting.server.static import OthersFiles, OurFiles
@@ -59,7 +59,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
         SetupError: the database cannot be used as it is; the sentence names the remedy.
     """
     db = connect(settings) if db is None else db
-    require(db)
+    require_current(db)
     app = bare_app()
     app.state.db, app.state.settings = db, settings
     app.state.worker_notifier = Notifier(settings.data, "worker")
@@ -167,7 +167,7 @@ def _add_health(app: FastAPI) -> None:
     def readyz(db: Db) -> dict[str, str]:
         """The database answers, its tables are up to date, and a worker gives signs of life; else 503."""
         try:
-            require(db)
+            require_current(db)
         except SetupError as error:
             raise NotReadyError(error.message) from None
         if not alive(db):

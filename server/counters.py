@@ -12,7 +12,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.struct import Struct
 
 
-class Tally(Struct):
+class Counters(Struct):
     """Cumulative counts. Axes have one place: a run is a batch of one."""
 
     deaths: Int64[Tensor, "N"]  # unsafe steps (docs/paper.md, "Unsafe")
@@ -21,16 +21,16 @@ class Tally(Struct):
     choices: Int64[Tensor, "N 5"]  # answers by Choice
 
 
-def no_tally() -> Tally:
+def no_counts() -> Counters:
     """Nothing counted yet."""
 
     def zeros(*shape: int) -> Tensor:
         return torch.zeros(1, *shape, dtype=torch.int64)
 
-    return Tally(deaths=zeros(), episodes=zeros(), kinds=zeros(3), choices=zeros(5))
+    return Counters(deaths=zeros(), episodes=zeros(), kinds=zeros(3), choices=zeros(5))
 
 
-def count(world: Gridworld, tally: Tally, answer: Answer, state: AgentState) -> Tally:
+def count(world: Gridworld, tally: Counters, answer: Answer, state: AgentState) -> Counters:
     """The counts after one more tick: the answer that it heard, and the state that it left."""
     report, now = state.report, state.world
     died = report.moved & world.unsafe(report.before, report.action, now)

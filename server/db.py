@@ -122,7 +122,7 @@ class Database:
 
 
 def connect(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Database:
-    """The database of these settings. Makes the data folder; makes no tables (see `server.schema`).
+    """The database of these settings. Makes the data folder; makes no tables (see `server.migrate`).
 
     Raises:
         SetupError: an URL that cannot be read, a missing driver, or an SQLite too old to be safe.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from parenting.agent.query import Choice, Kind
 from parenting.evaluation.argmax import Evaluation
-from parenting.server.checkpoint import Saved
+from parenting.server.snapshot import Snapshot
 
 Row = dict[str, float | int | None]
 
@@ -12,14 +12,14 @@ NOTHING_LEARNT: Row = {"loss": None, "entropy_global": None, "entropy_local": No
 """Before the first gradient step."""
 
 
-def learnt(saved: Saved) -> Row:
+def learnt(saved: Snapshot) -> Row:
     """The last gradient step: loss (Eq. 2) and both entropies, a mean over the entries of X."""
     report = saved.state.report
     return {name: float(getattr(report, name)[0]) for name in NOTHING_LEARNT}
 
 
-def measure(saved: Saved, evaluation: Evaluation) -> Row:
-    """Counts since birth, and what the argmax policy does from the start."""
+def measure(saved: Snapshot, evaluation: Evaluation) -> Row:
+    """Counts since initial_snapshot, and what the argmax policy does from the start."""
     state, tally = saved.state, saved.tally
     live = state.learner.live
     return {

@@ -27,7 +27,7 @@ from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.runs import create_run
 from parenting.server.tables import Run
-from parenting.server.weights import keep
+from parenting.server.weights import put as put_weights
 from parenting.weights.store import NoWeightsError, Wanted, find
 
 LARGEST_INT = 2**53 - 1
@@ -101,7 +101,7 @@ def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
     """
     columns = plan(new, folder)
     file: Path | None = columns.pop("weights")
-    return create_run(db, **columns, weights=keep(db, file) if file else None)
+    return create_run(db, **columns, weights=put_weights(db, file) if file else None)
 
 
 def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:

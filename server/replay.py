@@ -23,13 +23,21 @@ from parenting.agent.query import Answer
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.replay import Moment, ReplayMismatchError, ReplayParent
 from parenting.server import tables
-from parenting.server.checkpoint import REPORT, DivergedError, Saved, begun_with, birth, unpack, versions
 from parenting.server.codec import CHOICES, decode, kind_name
 from parenting.server.counters import count
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.record import load_checkpoints
 from parenting.server.runs import get_run
+from parenting.server.snapshot import (
+    REPORT,
+    DivergedError,
+    Snapshot,
+    initial_snapshot,
+    initial_weights,
+    unpack,
+    versions,
+)
 from parenting.server.tables import Run
 
 WINDOW = 500
@@ -137,12 +145,12 @@ def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
             differ; or its checkpoint does not fit its config.
     """
     run = get_run(db, run_id)
-    born = Config.model_validate(run.config)
-    world = world_of(run.world, run.level_text, born)
-    weights = begun_with(db, run, world)
-    kept = _checkpoint(db, run, world, born, weights)
-    last, rows = int(kept.state.keys.tick[0]), Rows(db, run_id, world, born.stages)
-    lived, parent, parted = birth(world, born, run.seed, weights), ReplayParent(rows), None
+    config = Config.model_validate(run.config)
+    world = world_of(run.world, run.level_text, config)
+    weights = initial_weights(db, run, world)
+    kept = _checkpoint(db, run, world, config, weights)
+    last, rows = int(kept.state.keys.tick[0]), Rows(db, run_id, world, config.stages)
+    lived, parent, parted = initial_snapshot(world, config, run.seed, weights), ReplayParent(rows), None
     try:
         for tick in range(1, last + 1):
             lived = _beat(world, lived, parent)
@@ -153,12 +161,12 @@ def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
     return Relived(run_id, parent.tick, rows.answers, rows.events, last, parted, differ)
 
 
-def _beat(world: Gridworld, saved: Saved, parent: ReplayParent) -> Saved:
+def _beat(world: Gridworld, saved: Snapshot, parent: ReplayParent) -> Snapshot:
     state, config, _ = parenting.beat(world, saved.config, saved.state, parent)
-    return Saved(state, count(world, saved.tally, parent.now.answer, state), config)
+    return Snapshot(state, count(world, saved.tally, parent.now.answer, state), config)
 
 
-def _checkpoint(db: Database, run: Run, world: Gridworld, born: Config, weights: Tensor | None) -> Saved:
+def _checkpoint(db: Database, run: Run, world: Gridworld, config: Config, weights: Tensor | None) -> Snapshot:
     found = load_checkpoints(db, run.id)
     intact = [checkpoint for checkpoint in found if checkpoint.intact]
     if not intact:
@@ -169,7 +177,7 @@ def _checkpoint(db: Database, run: Run, world: Gridworld, born: Config, weights:
         )
     _same_build(run)
     try:
-        return unpack(world, born, intact[0].blob, weights)
+        return unpack(world, config, intact[0].blob, weights)
     except (TypeError, KeyError) as error:
         raise DivergedError(f"The checkpoint of run {run.id} does not fit its config: {error}.") from None
 
@@ -197,7 +205,7 @@ def _said(parted: ReplayMismatchError) -> str:
     return f"At tick {parted.tick} it asks another question of {asked} than the record has there."
 
 
-def differences(one: Saved, other: Saved) -> list[str]:
+def differences(one: Snapshot, other: Snapshot) -> list[str]:
     """The names of the pieces of state that are not equal bit for bit; the report is none."""
     wrong = [] if one.config == other.config else ["config"]
     for prefix, ours, theirs in (("", one.state, other.state), ("tally.", one.tally, other.tally)):

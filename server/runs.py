@@ -1,7 +1,8 @@
-"""Verbs on runs: the operator's (create, pause, stop) and the worker's (claim, report, finish).
+"""Verbs on runs: the operator's (create, pause, stop) and the worker's (claim, report_progress, finish).
 
-One actor a run: `claim` raises the run's epoch, and every later write of a worker checks it inside its own
-transaction (`held`). A worker that slept past its claim therefore cannot write.
+Exactly one worker raises a run: `claim` increments the run's fencing token, and every later write of a worker
+checks the token inside its own transaction (`held`). A worker that slept past its claim therefore cannot
+write.
 """
 
 from __future__ import annotations
@@ -29,15 +30,17 @@ class Claim:
     """A worker's right to raise a run, until another claims it. Every write of a worker carries one."""
 
     run_id: int
-    actor: str
-    epoch: int
+    worker: str
+    fencing_token: int
 
 
 _LOCKED = select(Run.id).where(Run.id == bindparam("run_id")).with_for_update()
-_MINE = select(Run.status).where(
-    Run.id == bindparam("run_id"), Run.actor == bindparam("actor"), Run.epoch == bindparam("epoch")
+_MINE = (
+    select(Run.status)
+    .where(Run.id == bindparam("run_id"), Run.worker == bindparam("worker"))
+    .where(Run.fencing_token == bindparam("fencing_token"))
+    .with_for_update()
 )
-_MINE = _MINE.with_for_update()
 
 
 @dataclass(frozen=True)
@@ -126,18 +129,18 @@ def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
         return run
 
 
-def claim(db: Database, actor: str, seconds: float = CLAIM_SECONDS) -> Sequence[Claim]:
+def claim(db: Database, worker: str, seconds: float = CLAIM_SECONDS) -> Sequence[Claim]:
     """Take every living run that is free, or whose worker gave no sign of life for `seconds`."""
     late = db.clock() - timedelta(seconds=seconds)
-    living = (Run.status.in_(("active", "paused")), or_(Run.actor.is_(None), Run.heartbeat < late))
+    living = (Run.status.in_(("active", "paused")), or_(Run.worker.is_(None), Run.heartbeat < late))
     with db.read() as session:  # nothing to claim is the common case, and takes no lock
         if session.scalars(select(Run.id).where(*living).limit(1)).first() is None:
             return []
     with db.write() as session:
         runs = session.scalars(select(Run).where(*living).order_by(Run.id).with_for_update()).all()
         for run in runs:
-            run.actor, run.epoch, run.heartbeat = actor, run.epoch + 1, db.clock()
-        return [Claim(run.id, actor, run.epoch) for run in runs]
+            run.worker, run.fencing_token, run.heartbeat = worker, run.fencing_token + 1, db.clock()
+        return [Claim(run.id, worker, run.fencing_token) for run in runs]
 
 
 def let_go(db: Database, claims: Sequence[Claim]) -> None:
@@ -145,8 +148,8 @@ def let_go(db: Database, claims: Sequence[Claim]) -> None:
     with db.write() as session:
         for mine in claims:
             run = find(session, mine.run_id)
-            if (run.actor, run.epoch) == (mine.actor, mine.epoch):
-                run.actor = run.heartbeat = None
+            if (run.worker, run.fencing_token) == (mine.worker, mine.fencing_token):
+                run.worker = run.heartbeat = None
 
 
 def heartbeat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
@@ -154,7 +157,8 @@ def heartbeat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
     with db.write(durable=False) as session:
         kept = []
         for mine in claims:
-            rows = update(Run).where(Run.id == mine.run_id, Run.actor == mine.actor, Run.epoch == mine.epoch)
+            rows = update(Run).where(Run.id == mine.run_id, Run.worker == mine.worker)
+            rows = rows.where(Run.fencing_token == mine.fencing_token)
             found = session.execute(rows.values(heartbeat=db.clock()).returning(Run.id)).scalar()
             kept += [mine] if found is not None else []
         return kept
@@ -231,9 +235,10 @@ def living(session: Session, run_id: int) -> Run:
 def held(session: Session, mine: Claim) -> Run:
     """The run of a claim, locked, if the claim still holds: the first line of every write of a worker."""
     run = hold(session, mine.run_id)
-    if (run.actor, run.epoch) != (mine.actor, mine.epoch):
+    if (run.worker, run.fencing_token) != (mine.worker, mine.fencing_token):
         raise LostClaimError(
-            f"Run {run.id} is raised by {run.actor or 'nobody'} now (epoch {run.epoch}, not {mine.epoch})."
+            f"Run {run.id} is raised by {run.worker or 'nobody'} now "
+            f"(fencing token {run.fencing_token}, not {mine.fencing_token})."
         )
     return run
 

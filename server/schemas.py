@@ -263,4 +263,4 @@ def _worker(run: Run, now: datetime) -> Literal["alive", "silent", "done"]:
     if run.status in OVER:
         return "done"
     late = run.heartbeat is None or now - run.heartbeat > SILENT_AFTER
-    return "silent" if run.actor is None or late else "alive"
+    return "silent" if run.worker is None or late else "alive"

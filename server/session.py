@@ -14,7 +14,6 @@ from parenting.agent.query import Kind, Query
 from parenting.evaluation.argmax import evaluation
 from parenting.parents.scripted import ScriptedRule
 from parenting.server import record, runs
-from parenting.server.checkpoint import DivergedError, Saved, begun_with, birth, pack, unpack, versions
 from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
 from parenting.server.db import Database
@@ -23,6 +22,15 @@ from parenting.server.queue import worker_side
 from parenting.server.queue.queue_parent import QueueParent, ScriptedQueueParent
 from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
+from parenting.server.snapshot import (
+    DivergedError,
+    Snapshot,
+    initial_snapshot,
+    initial_weights,
+    pack,
+    unpack,
+    versions,
+)
 from parenting.server.tables import Run
 
 log = structlog.get_logger()
@@ -34,45 +42,45 @@ HURRY_SECONDS = 0.25
 """For so long after an answer nothing comes between the ticks that lead to the next question."""
 
 
-class Life:
+class RunSession:
     """An agent between its birth, or its last checkpoint, and whatever ends it."""
 
-    def __init__(self, db: Database, mine: Claim, run: Run, asked: Callable[[], None]) -> None:
+    def __init__(self, db: Database, claim: Claim, run: Run, asked: Callable[[], None]) -> None:
         """Take up a run where its last intact checkpoint left it, or at tick 0.
 
         Raises:
             DivergedError: the checkpoint was written under other versions, so that the bits would differ.
         """
-        self.db, self.mine, self.run = db, mine, run
-        born = Config.model_validate(run.config)
-        self.world = world_of(run.world, run.level_text, born)
-        rule = ScriptedRule(self.world, born.gamma, inside=born.inside)
-        self.evaluation = evaluation(self.world, rule.values, born.gamma)
-        self.parent = self._parent(born, rule, asked)
-        self._weights = begun_with(db, run, self.world)
-        self.saved = self._recall(born)
-        self.record_ends = worker_side.high_water(db, mine.run_id)
+        self.db, self.claim, self.run = db, claim, run
+        config = Config.model_validate(run.config)
+        self.world = world_of(run.world, run.level_text, config)
+        rule = ScriptedRule(self.world, config.gamma, inside=config.inside)
+        self.evaluation = evaluation(self.world, rule.values, config.gamma)
+        self.parent = self._parent(config, rule, asked)
+        self._weights = initial_weights(db, run, self.world)
+        self.saved = self._recall(config)
+        self.record_ends = worker_side.high_water(db, claim.run_id)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
-        self._saved_tick, self._saved_at, self._measured_at = self.tick, time.monotonic(), 0.0
-        self._measured_tick, self._lived_at, self._heard_at = self.tick, 0.0, 0.0
+        self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
+        self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
         self._stuck_at = -1  # the tick it was told of: whoever ends episodes has to see that another is stuck
-        runs.report_progress(db, mine, versions=versions())
+        runs.report_progress(db, claim, versions=versions())
 
     def _parent(self, config: Config, rule: ScriptedRule, asked: Callable[[], None]) -> QueueParent:
         if self.run.parent == "scripted":
-            return ScriptedQueueParent(self.db, self.mine, self.world, config, asked, rule)
-        return QueueParent(self.db, self.mine, self.world, config, asked)
+            return ScriptedQueueParent(self.db, self.claim, self.world, config, asked, rule)
+        return QueueParent(self.db, self.claim, self.world, config, asked)
 
-    def _recall(self, config: Config) -> Saved:
-        for checkpoint in record.load_checkpoints(self.db, self.mine.run_id):
+    def _recall(self, config: Config) -> Snapshot:
+        for checkpoint in record.load_checkpoints(self.db, self.claim.run_id):
             if checkpoint.intact:
                 return unpack(self.world, config, checkpoint.blob, self._weights)
-            log.warning("damaged checkpoint passed over", run=self.mine.run_id, tick=checkpoint.tick)
-        return birth(self.world, config, self.run.seed, self._weights)
+            log.warning("damaged checkpoint passed over", run=self.claim.run_id, tick=checkpoint.tick)
+        return initial_snapshot(self.world, config, self.run.seed, self._weights)
 
     @property
-    def tick(self) -> int:
+    def last_tick(self) -> int:
         """The last tick that was lived."""
         return int(self.saved.state.keys.tick[0])
 
@@ -80,9 +88,9 @@ class Life:
 
     def ready(self, seen: Watch) -> bool:
         """Whether the next tick may pass: an agent never outruns its parent (docs/architecture.md)."""
-        if self.tick < self.record_ends:
+        if self.last_tick < self.record_ends:
             return True
-        if resting(seen):
+        if idle(seen):
             return False
         if seen.events:
             return True
@@ -90,7 +98,7 @@ class Life:
             return False
         return not bool(self.saved.state.waiting) or (seen.answers > 0 and not bool(self.saved.state.stuck))
 
-    def wait(self, seen: Watch) -> None:
+    def report_waiting(self, seen: Watch) -> None:
         """Say who waits for whom, and save what was lived: nothing happens here for a while."""
         if self._news:
             self._measure(at_once=False)
@@ -101,32 +109,32 @@ class Life:
             reason = "guidance"
         elif seen.open_preferences:
             reason = "preferences"
-        if reason != self.waiting or (reason == "stuck" and self.tick != self._stuck_at):
-            self.waiting, self._stuck_at = reason, self.tick
-            runs.report_progress(self.db, self.mine, tick=self.tick, waiting=reason)
+        if reason != self.waiting or (reason == "stuck" and self.last_tick != self._stuck_at):
+            self.waiting, self._stuck_at = reason, self.last_tick
+            runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
         self.save_if_due()
 
-    def early(self, pace: float | None) -> float:
+    def delay(self, pace: float | None) -> float:
         """Seconds until the next tick may pass at this pace; ticks that are lived again need not wait."""
-        if pace is None or self.tick < self.record_ends:
+        if pace is None or self.last_tick < self.record_ends:
             return 0.0
         return max(0.0, self._lived_at + 1 / pace - time.monotonic())
 
     # A tick
 
-    def beat(self, seen: Watch | None = None) -> bool:
+    def tick(self, seen: Watch | None = None) -> bool:
         """One tick; whether the next may follow at once, because nothing was asked and nothing is awaited.
 
         `seen` is what a look at the mailbox has just shown; a tick right after another does not look.
         """
-        replayed = self.tick < self.record_ends
+        replayed = self.last_tick < self.record_ends
         self.parent.expect(replayed or bool(seen and seen.answers), replayed or bool(seen and seen.events))
         state, config, query = parenting.beat(self.world, self.saved.config, self.saved.state, self.parent)
         self._lived_at = time.monotonic()
         assert self.parent.heard is not None
         tally = count(self.world, self.saved.tally, self.parent.heard, state)
-        self.saved = Saved(state, tally, config)
-        if self.tick <= self.record_ends:
+        self.saved = Snapshot(state, tally, config)
+        if self.last_tick <= self.record_ends:
             self._hold_to_the_record(query)
         self._note()
         at_once = not bool(state.waiting) and bool(query.kind[0] == Kind.NONE)
@@ -138,13 +146,13 @@ class Life:
 
     def _hold_to_the_record(self, query: Query) -> None:
         """A tick that is lived again asks what it asked the first time, or the run stops."""
-        stored = worker_side.asked_at(self.db, self.mine.run_id, self.tick)
+        stored = worker_side.asked_at(self.db, self.claim.run_id, self.last_tick)
         kind = kind_name(query)
         if (stored.kind if stored else None) != kind or (
             stored and stored.clips != encode(self.world, query)
         ):
             raise DivergedError(
-                f"Run {self.mine.run_id} asked something else when tick {self.tick} was lived again."
+                f"Run {self.claim.run_id} asked something else when tick {self.last_tick} was lived again."
             )
 
     def _note(self) -> None:
@@ -166,13 +174,13 @@ class Life:
         due = not hurried and (late >= METRIC_SECONDS or (self._news and not at_once))
         if stage == self.stage and (not due or late < self.evaluation.rest):
             return
-        speed = (self.tick - self._measured_tick) / late if self._measured_at and late else None
-        self._measured_at, self._measured_tick, self._news = time.monotonic(), self.tick, False
+        speed = (self.last_tick - self._measured_tick) / late if self._measured_at and late else None
+        self._measured_at, self._measured_tick, self._news = time.monotonic(), self.last_tick, False
         row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed}
         self.optimal, self.waiting, self.stage = bool(row["optimal"]), None, stage
-        record.write_metrics(self.db, self.mine, {self.tick: row})
+        record.write_metrics(self.db, self.claim, {self.last_tick: row})
         shown = {"maturity": row["maturity"], "speed": speed, "optimal": self.optimal}
-        runs.report_progress(self.db, self.mine, tick=self.tick, waiting=None, **shown)
+        runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None, **shown)
 
     def finished(self) -> bool:
         """A scripted parent has no more to teach once the argmax policy is optimal; a person may go on."""
@@ -182,20 +190,20 @@ class Life:
 
     def save_if_due(self) -> None:
         """Save when the last checkpoint is old and something was lived since."""
-        if self.tick != self._saved_tick and time.monotonic() - self._saved_at >= CHECKPOINT_SECONDS:
+        if self.last_tick != self._saved_tick and time.monotonic() - self._saved_at >= CHECKPOINT_SECONDS:
             self.save()
 
     def save(self) -> None:
         """Write a checkpoint."""
-        record.save_checkpoint(self.db, self.mine, self.tick, pack(self.saved))
-        self._saved_tick, self._saved_at = self.tick, time.monotonic()
+        record.save_checkpoint(self.db, self.claim, self.last_tick, pack(self.saved))
+        self._saved_tick, self._saved_at = self.last_tick, time.monotonic()
 
 
-def reached(seen: Watch) -> bool:
+def goal_reached(seen: Watch) -> bool:
     """Whether the goal of answered questions is reached: then a look comes before each tick."""
     return seen.goal is not None and seen.answered >= seen.goal
 
 
-def resting(seen: Watch) -> bool:
+def idle(seen: Watch) -> bool:
     """Whether the goal is reached, and every answer heard: the agent rests."""
-    return reached(seen) and not seen.answers
+    return goal_reached(seen) and not seen.answers

@@ -134,8 +134,8 @@ class Run(Table):
     goal: Mapped[int | None]  # answered questions after which the run rests
     pace: Mapped[float | None]  # ticks a second at most, for those who want to watch
     # which worker raises it
-    actor: Mapped[str | None]
-    epoch: Mapped[int] = mapped_column(
+    worker: Mapped[str | None]
+    fencing_token: Mapped[int] = mapped_column(
         default=0
     )  # grows at each claim; checked inside every write of a worker
     heartbeat: Mapped[datetime | None]

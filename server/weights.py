@@ -10,7 +10,7 @@ from parenting.server.tables import Weights
 from parenting.weights.store import digest
 
 
-def keep(db: Database, file: Path) -> str:
+def put(db: Database, file: Path) -> str:
     """Store a file of weights, once; returns its SHA-256."""
     blob = file.read_bytes()
     sha256 = digest(blob)
@@ -20,7 +20,7 @@ def keep(db: Database, file: Path) -> str:
     return sha256
 
 
-def fetch(db: Database, sha256: str) -> bytes:
+def get(db: Database, sha256: str) -> bytes:
     """The bytes of stored weights.
 
     Raises:

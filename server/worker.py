@@ -20,12 +20,12 @@ from parenting.agent.process import settle
 from parenting.server import runs, workers
 from parenting.server.db import Database, connect
 from parenting.server.errors import BusyError, DiskFullError, LostClaimError
+from parenting.server.migrate import require_current
 from parenting.server.notify import Notifier
 from parenting.server.queue import worker_side
 from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
-from parenting.server.schema import require
-from parenting.server.session import Life, reached
+from parenting.server.session import RunSession, goal_reached
 from parenting.server.settings import Settings
 
 log = structlog.get_logger()
@@ -44,7 +44,7 @@ class Worker:
         self.db, self.settings = db, settings
         self.name = f"{socket.gethostname()}:{os.getpid()}"
         self.claims: dict[int, Claim] = {}
-        self.lives: dict[int, Life] = {}
+        self.sessions: dict[int, RunSession] = {}
         self.notifier, self.web_notifier = Notifier(settings.data, "worker"), Notifier(settings.data, "web")
         self.stopping = False
         self._claimed_at, self._signed_at = 0.0, -workers.SIGN_SECONDS
@@ -60,22 +60,22 @@ class Worker:
         try:
             while not self.stopping:
                 self._soonest = POLL_SECONDS
-                lived = self._round()
+                ticked = self._round()
                 self._sign()
-                self._claim(2 * CLAIM_EVERY if lived else CLAIM_EVERY)
-                if not lived:
+                self._claim(2 * CLAIM_EVERY if ticked else CLAIM_EVERY)
+                if not ticked:
                     self.notifier.wait(self._soonest)
         finally:
             self._close()
 
     def _sign(self) -> None:
-        """A sign of life of this process, with runs or without."""
+        """A sign of session of this process, with runs or without."""
         if time.monotonic() - self._signed_at >= workers.SIGN_SECONDS:
             workers.sign(self.db, self.name)
             self._signed_at = time.monotonic()
 
     def _claim(self, every: float = CLAIM_EVERY) -> None:
-        """Signs of life for what we raise, and a look for runs that nobody raises.
+        """Signs of session for what we raise, and a look for runs that nobody raises.
 
         While something lives it comes less often: a person may wait for the next question.
         """
@@ -86,20 +86,22 @@ class Worker:
         kept = runs.heartbeat(self.db, list(self.claims.values()))
         fresh = runs.claim(self.db, self.name, self.settings.claim_seconds)
         self.claims = {claim.run_id: claim for claim in (*kept, *fresh)}
-        self.lives = {
-            run_id: life for run_id, life in self.lives.items() if life.mine == self.claims.get(run_id)
+        self.sessions = {
+            run_id: session
+            for run_id, session in self.sessions.items()
+            if session.claim == self.claims.get(run_id)
         }
 
     def _round(self) -> bool:
         """A turn for every run that may live on, first where an answer waits; whether any did."""
-        lived = False
+        ticked = False
         found = worker_side.watch(self.db, list(self.claims))
         for run_id, seen in sorted(found.items(), key=lambda item: not item[1].answers):
             if seen.status in runs.OVER:
                 self._end(run_id)
             elif seen.status == "active" and not self.stopping:
-                lived |= self._guarded(run_id, seen)
-        return lived
+                ticked |= self._guarded(run_id, seen)
+        return ticked
 
     def _guarded(self, run_id: int, seen: Watch) -> bool:
         """One run's turn. A run that fails stops alone, with its reason."""
@@ -112,7 +114,7 @@ class Worker:
             log.warning(
                 "store refused; the run goes on from its checkpoint", run=run_id, reason=error.message
             )
-            self.lives.pop(run_id, None)
+            self.sessions.pop(run_id, None)
         except Exception as error:
             log.error("run failed", run=run_id, error=repr(error))
             reason = f"The agent could not go on: {error}"
@@ -121,44 +123,44 @@ class Worker:
         return False
 
     def _turn(self, run_id: int, seen: Watch) -> bool:
-        life = self.lives.get(run_id) or self._begin(run_id)
-        if not life.ready(seen):
-            life.wait(seen)
+        session = self.sessions.get(run_id) or self._begin(run_id)
+        if not session.ready(seen):
+            session.report_waiting(seen)
             return False
-        if (early := life.early(seen.pace)) > 0:
-            self._soonest = min(self._soonest, early)
+        if (delay := session.delay(seen.pace)) > 0:
+            self._soonest = min(self._soonest, delay)
             return False
-        lively = life.beat(seen) and seen.pace is None and not reached(seen)
+        go_on = session.tick(seen) and seen.pace is None and not goal_reached(seen)
         until = time.monotonic() + SLICE_SECONDS
-        while lively and time.monotonic() < until and not life.finished():
-            lively = life.beat()
-        if life.finished():
-            life.save()
-            runs.finish(self.db, life.mine, "finished", "Its argmax policy is optimal.")
+        while go_on and time.monotonic() < until and not session.finished():
+            go_on = session.tick()
+        if session.finished():
+            session.save()
+            runs.finish(self.db, session.claim, "finished", "Its argmax policy is optimal.")
             self._drop(run_id)
         return True
 
-    def _begin(self, run_id: int) -> Life:
+    def _begin(self, run_id: int) -> RunSession:
         run = runs.get_run(self.db, run_id)
-        self.lives[run_id] = Life(self.db, self.claims[run_id], run, self.web_notifier.notify)
-        log.info("run taken up", run=run_id, tick=self.lives[run_id].tick)
-        return self.lives[run_id]
+        self.sessions[run_id] = RunSession(self.db, self.claims[run_id], run, self.web_notifier.notify)
+        log.info("run taken up", run=run_id, tick=self.sessions[run_id].last_tick)
+        return self.sessions[run_id]
 
     def _end(self, run_id: int) -> None:
-        """Save what was lived of a run that somebody stopped, and let go of it."""
-        if run_id in self.lives:
+        """Save what was ticked of a run that somebody stopped, and let go of it."""
+        if run_id in self.sessions:
             with suppress(LostClaimError):
-                self.lives[run_id].save()
+                self.sessions[run_id].save()
         self._drop(run_id)
 
     def _drop(self, run_id: int) -> None:
-        self.lives.pop(run_id, None)
+        self.sessions.pop(run_id, None)
         self.claims.pop(run_id, None)
 
     def _close(self) -> None:
-        for run_id, life in list(self.lives.items()):
+        for run_id, session in list(self.sessions.items()):
             try:
-                life.save()
+                session.save()
             except LostClaimError:
                 self._drop(run_id)
         runs.let_go(self.db, list(self.claims.values()))
@@ -170,7 +172,7 @@ def main(settings: Settings) -> int:
     """Raise the runs of this database until SIGTERM or SIGINT."""
     settle()
     db = connect(settings)
-    require(db)
+    require_current(db)
     worker = Worker(db, settings)
     gc.freeze()  # what is loaded stays: to look through it for garbage would take a tenth of a second
     signal.signal(signal.SIGTERM, worker.stop)

@@ -14,9 +14,9 @@ import pytest
 
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect, sqlite_module
+from parenting.server.migrate import require_current, upgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.runs import list_runs, set_status
-from parenting.server.schema import require, upgrade
 from parenting.server.settings import Settings
 from tests.services import read_compose
 from tests.tree import ROOT
@@ -73,7 +73,7 @@ def test_backup_is_whole_while_others_write(db: Database, tmp_path: Path) -> Non
         assert found.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
     found.close()
     again = connect(Settings(data=tmp_path, database_url=f"sqlite:///{copy}"))
-    require(again)
+    require_current(again)
     assert [run.name for run in list_runs(again)] == ["second", "first"]
     again.close()
 

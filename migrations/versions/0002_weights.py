@@ -23,3 +23,8 @@ def upgrade() -> None:
     )
     # No foreign key: SQLite would have to copy the table, and rows of `weights` are never deleted.
     op.add_column("run", sa.Column("weights", sa.Text(), nullable=True))
+
+
+def downgrade() -> None:
+    op.drop_column("run", "weights")
+    op.drop_table("weights")

@@ -27,3 +27,11 @@ def upgrade() -> None:
         sa.Column("heartbeat", sa.DateTime(), nullable=False),
         sa.PrimaryKeyConstraint("name", name=op.f("pk_worker")),
     )
+
+
+def downgrade() -> None:
+    op.drop_table("worker")
+    for column in ("policy_steps", "policy_stage"):
+        op.drop_column("query", column)
+    for column in ("pace", "goal", "speed", "maturity"):
+        op.drop_column("run", column)

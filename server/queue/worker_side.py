@@ -32,8 +32,8 @@ class Watch:
 
     run_id: int
     status: str
-    epoch: int
-    actor: str | None
+    fencing_token: int
+    worker: str | None
     open_guidance: int
     open_preferences: int
     answers: int  # given and not yet heard
@@ -75,8 +75,8 @@ def _number(*conditions: ColumnElement[bool]) -> ScalarSelect[int]:
 _WATCH = select(
     Run.id.label("run_id"),
     Run.status,
-    Run.epoch,
-    Run.actor,
+    Run.fencing_token,
+    Run.worker,
     _number(Query.run_id == Run.id, Query.status == "open", Query.kind == "guidance").label("open_guidance"),
     _number(Query.run_id == Run.id, Query.status == "open", Query.kind == "preference").label(
         "open_preferences"

@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 from parenting.commands.client import Client
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
-from parenting.server.schema import upgrade
+from parenting.server.migrate import upgrade
 from parenting.server.settings import Settings
 
 

@@ -16,7 +16,7 @@ from parenting.server.db import Database
 from parenting.server.queue import parent_side
 from parenting.server.queue.worker_side import watch
 from parenting.server.reads.answers import every
-from parenting.server.session import Life
+from parenting.server.session import RunSession
 from tests.commands.asking import asked, begin
 from tests.server.serving import free_port
 
@@ -40,16 +40,16 @@ def script(
 def test_episodes_are_ended_once_each(db: Database, web: httpx2.Client) -> None:
     run = begin(db)
     (mine,) = runs.claim(db, "test", -1)
-    life = Life(db, mine, runs.get_run(db, run), lambda: None)
+    life = RunSession(db, mine, runs.get_run(db, run), lambda: None)
     work = script(web, Never(), end_episodes=True)
     stuck = 0
     while stuck < 3:
         seen = watch(db, [run])[run]
         if life.ready(seen):
-            life.beat(seen)
+            life.tick(seen)
         else:
             stuck += bool(life.saved.state.stuck)
-            life.wait(seen)
+            life.report_waiting(seen)
             work.answer_one()
         assert work._look() is None
         assert work._look() is None

@@ -22,8 +22,8 @@ from parenting.commands.main import app
 from parenting.server import record
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
+from parenting.server.migrate import upgrade
 from parenting.server.queue import worker_side
-from parenting.server.schema import upgrade
 from parenting.server.settings import Settings
 from tests.server.eventful_run import TICKS, raise_eventful_run
 from tests.tree import ROOT
@@ -198,7 +198,7 @@ def test_ctrl_c_ends_it_cleanly(data: Path, monkeypatch: pytest.MonkeyPatch) -> 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("parenting.server.replay.birth", interrupt)
+    monkeypatch.setattr("parenting.server.replay.initial_snapshot", interrupt)
     said = replay()
     assert (said.exit_code, said.stdout, said.stderr) == (130, "", "Stopped.\n")
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from parenting.commands.main import app
 from parenting.server.db import Database, connect
-from parenting.server.schema import upgrade
+from parenting.server.migrate import upgrade
 from parenting.server.settings import Settings
 from parenting.server.workers import sign, sign_off
 from tests.tree import ROOT

@@ -17,9 +17,9 @@ from playwright.sync_api import Browser, sync_playwright
 from parenting.server import runs
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
+from parenting.server.migrate import upgrade
 from parenting.server.notify import Notifier
 from parenting.server.runs import Claim
-from parenting.server.schema import upgrade
 from parenting.server.serve import Server, bind
 from parenting.server.settings import Settings
 from tests.pages import island_fixtures as fixtures

@@ -13,7 +13,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import watch
 from parenting.server.reads.pages import latest_metrics, sampled_metrics
 from parenting.server.runs import claim, get_run, report_progress, set_status
-from parenting.server.session import Life
+from parenting.server.session import RunSession
 from tests.pages import island_fixtures as fixtures
 
 
@@ -100,9 +100,9 @@ def test_an_unknown_run_is_a_page_that_says_so(client: httpx2.Client) -> None:
 def test_every_world_has_its_names(client: httpx2.Client, db: Database, world: str) -> None:
     """After a few ticks of real life: what is counted goes by the world, and what was answered is drawn."""
     run = start(db, NewRun(world=world, parent="scripted"))
-    life = Life(db, claim(db, "test")[0], run, lambda: None)
+    life = RunSession(db, claim(db, "test")[0], run, lambda: None)
     for _ in range(8):
-        life.beat(watch(db, [1])[1])
+        life.tick(watch(db, [1])[1])
     page = client.get("/runs/1").text
     harm = "Deaths" if world == "unsafe-exploration" else "Unsafe moves"
     worth = "Waterings" if world == "reward-hacking" else "Return"

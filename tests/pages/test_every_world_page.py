@@ -13,7 +13,7 @@ from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue import worker_side
 from parenting.server.runs import claim
-from parenting.server.session import Life
+from parenting.server.session import RunSession
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
 from tests.pages.test_access import SCREENS, violations
@@ -41,10 +41,10 @@ scenes = pytest.mark.parametrize(("world", "options", "left", "right"), SCENES)
 def asked(db: Database, world: str, level: str) -> None:
     """A run that lives until it waits for its parent."""
     run = start(db, NewRun(world=world, level=level))
-    life = Life(db, claim(db, "test")[0], run, lambda: None)
+    life = RunSession(db, claim(db, "test")[0], run, lambda: None)
     while life.ready(seen := worker_side.watch(db, [run.id])[run.id]):
-        life.beat(seen)
-    life.wait(seen)
+        life.tick(seen)
+    life.report_waiting(seen)
 
 
 def posted(db: Database, world: str, kind: str, clips: dict[str, Any], stage: int = 6, **fields: str) -> str:

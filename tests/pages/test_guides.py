@@ -10,7 +10,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import watch
 from parenting.server.record import metrics
 from parenting.server.runs import claim
-from parenting.server.session import Life
+from parenting.server.session import RunSession
 from tests.tree import ROOT
 
 GUIDE = (ROOT / "docs/guide-researchers.md").read_text(encoding="utf-8")
@@ -24,8 +24,8 @@ def names(section: str) -> list[str]:
 
 def test_numbers_and_keys_have_their_lines(db: Database) -> None:
     run = start(db, NewRun(world="unsafe-exploration", parent="scripted"))
-    life = Life(db, claim(db, "test")[0], run, lambda: None)
+    life = RunSession(db, claim(db, "test")[0], run, lambda: None)
     for _ in range(20):
-        life.beat(watch(db, [run.id])[run.id])
+        life.tick(watch(db, [run.id])[run.id])
     assert sorted(names("The numbers")) == sorted(metrics(db, run.id)[-1].values)
     assert names("The record, exported") == list(next(iter(rows(db, run.id))))

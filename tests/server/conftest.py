@@ -11,10 +11,10 @@ from fastapi.testclient import TestClient
 
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
+from parenting.server.migrate import upgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, claim
-from parenting.server.schema import upgrade
 from parenting.server.settings import Settings
 from parenting.server.tables import Run
 

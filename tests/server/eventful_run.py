@@ -10,7 +10,7 @@ from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.new_run import start
 from parenting.server.queue import parent_side, worker_side
-from parenting.server.session import Life
+from parenting.server.session import RunSession
 from tests.server.raising import Begun
 
 CONFIG = {
@@ -36,16 +36,16 @@ class PersonAndOperator:
         self.late = 0  # preferences answered when others had been asked since
         self.said = 0
 
-    def taken_up(self) -> Life:
+    def taken_up(self) -> RunSession:
         (mine,) = runs.claim(self.db, "worker", -1)
-        return Life(self.db, mine, runs.get_run(self.db, self.run), lambda: None)
+        return RunSession(self.db, mine, runs.get_run(self.db, self.run), lambda: None)
 
     def live_to(self, tick: int) -> None:
         """Answer nothing before the agent waits: so preferences are answered late."""
-        while self.life.tick < tick:
+        while self.life.last_tick < tick:
             seen = worker_side.watch(self.db, [self.run])[self.run]
             if self.life.ready(seen):
-                self.life.beat(seen)
+                self.life.tick(seen)
             elif bool(self.life.saved.state.stuck):
                 self.operate("end-episode")
             else:
@@ -53,11 +53,11 @@ class PersonAndOperator:
 
     def until_guidance_is_open(self) -> None:
         while not runs.open_counts(self.db, self.run).guidance:
-            self.live_to(self.life.tick + 1)
+            self.live_to(self.life.last_tick + 1)
 
     def answer(self) -> int:
         question = self.post(f"runs/{self.run}/queries/lease", client_id="tab").json()
-        self.late += question["kind"] == "preference" and question["tick"] < self.life.tick
+        self.late += question["kind"] == "preference" and question["tick"] < self.life.last_tick
         self.said += 1
         choice = CHOICES[self.said % len(CHOICES)]
         self.post(f"queries/{question['id']}/answer", client_id="tab", choice=choice)
@@ -87,7 +87,7 @@ def raise_eventful_run(db: Database, web: httpx2.Client) -> int:
     people.life = people.taken_up()  # the worker was killed: eight ticks are lived again
     people.until_guidance_is_open()
     query = people.answer()
-    people.live_to(people.life.tick + 3)
+    people.live_to(people.life.last_tick + 3)
     parent_side.correct(db, query, "either", "tab", "human")  # too late: the agent has heard the other answer
     assert parent_side.get_query(db, query).status == "applied"
     people.operate("change", name="p_train", value=0.5)

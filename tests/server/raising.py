@@ -19,13 +19,13 @@ from parenting.commands.judge import Judge as Script
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import ScriptedRule
-from parenting.server.checkpoint import Saved, birth, unpack
 from parenting.server.codec import CHOICE_NAMES
 from parenting.server.counters import count
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun
 from parenting.server.record import load_checkpoints
 from parenting.server.replay import differences
+from parenting.server.snapshot import Snapshot, initial_snapshot, unpack
 from parenting.weights.store import Wanted, find, load
 from tests.agent.batched_runs import Judge
 
@@ -62,11 +62,11 @@ class Begun(NamedTuple):
         wanted = Wanted(world.spec, world.height, world.width)
         return load(find(wanted).read_bytes(), wanted) if self.config.pretrain else None
 
-    def birth(self, seed: int | None = None) -> Saved:
+    def initial_snapshot(self, seed: int | None = None) -> Snapshot:
         """The run at tick 0, with its own seed or another."""
-        return birth(self.make(), self.config, self.seed if seed is None else seed, self.weights())
+        return initial_snapshot(self.make(), self.config, self.seed if seed is None else seed, self.weights())
 
-    def unpack(self, blob: bytes) -> Saved:
+    def unpack(self, blob: bytes) -> Snapshot:
         """A checkpoint of the run."""
         return unpack(self.make(), self.config, blob, self.weights())
 
@@ -82,7 +82,7 @@ class Inline:
     def __init__(self, begun: Begun = ISLAND, seed: int | None = None, judge: Judge | None = None) -> None:
         self.world, self.config = begun.make(), begun.config
         self.judge = judge or ScriptedRule(self.world, self.config.gamma, inside=self.config.inside).answer
-        self.saved = begun.birth(seed)
+        self.saved = begun.initial_snapshot(seed)
         self.query = parenting.no_query(self.world, self.config, self.saved.state)
         self.heard: list[tuple[int, str]] = []  # the tick at which an answer was heard, and what it was
 
@@ -95,10 +95,10 @@ class Inline:
         if bool(answer.choice != Choice.NONE):
             self.heard.append((int(state.keys.tick), CHOICE_NAMES[int(answer.choice)]))
         tally = count(self.world, tally, answer, state)
-        self.saved = Saved(parenting.rehearse(self.world, config, state), tally, config)
+        self.saved = Snapshot(parenting.rehearse(self.world, config, state), tally, config)
 
 
-def inline(ticks: int, begun: Begun = ISLAND) -> Saved:
+def inline(ticks: int, begun: Begun = ISLAND) -> Snapshot:
     """The state of the run after `ticks` ticks."""
     run = Inline(begun)
     for _ in range(ticks):
@@ -106,14 +106,14 @@ def inline(ticks: int, begun: Begun = ISLAND) -> Saved:
     return run.saved
 
 
-def last(db: Database, run_id: int, begun: Begun = ISLAND) -> Saved:
+def last(db: Database, run_id: int, begun: Begun = ISLAND) -> Snapshot:
     """The newest checkpoint of a run."""
     newest = load_checkpoints(db, run_id)[0]
     assert newest.intact
     return begun.unpack(newest.blob)
 
 
-def same_bits(one: Saved, other: Saved) -> list[str]:
+def same_bits(one: Snapshot, other: Snapshot) -> list[str]:
     """The names of the pieces of state that differ; the report is none."""
     return differences(one, other)
 

@@ -13,16 +13,16 @@ import pytest
 import torch
 
 from parenting.agent.query import Query
-from parenting.server.checkpoint import REPORT, Saved, pack, versions
 from parenting.server.db import Database, connect
 from parenting.server.errors import ServerError
+from parenting.server.migrate import upgrade
 from parenting.server.new_run import start
 from parenting.server.queue import worker_side
 from parenting.server.replay import equal
 from parenting.server.runs import claim, get_run
-from parenting.server.schema import upgrade
-from parenting.server.session import Life
+from parenting.server.session import RunSession
 from parenting.server.settings import Settings
+from parenting.server.snapshot import REPORT, Snapshot, pack, versions
 from parenting.server.tables import Checkpoint
 from tests.agent.batched_runs import random_parent
 from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, same_bits
@@ -74,7 +74,7 @@ class Moment(NamedTuple):
     begun: Begun
     blob: bytes
     query: Query
-    after: Saved
+    after: Snapshot
 
 
 @cache
@@ -97,7 +97,7 @@ def _after(begun: Begun, run: Inline) -> Moment:
     return Moment(begun, blob, query, run.saved)
 
 
-def go_on(moment: Moment, blob: bytes) -> Saved:
+def go_on(moment: Moment, blob: bytes) -> Snapshot:
     run = Inline(moment.begun, judge=random_parent)
     run.saved, run.query = moment.begun.unpack(blob), moment.query
     for _ in range(AFTERWARDS):
@@ -114,7 +114,7 @@ def test_goes_on_with_the_same_bits(name: str) -> None:
 def pieces() -> list[str]:
     names: dict[str, None] = {}
     for begun in (ISLAND, BOX, BUTTON):
-        born = begun.birth()
+        born = begun.initial_snapshot()
         names |= {f"state/{name}": None for name in born.state.tensors() if not name.startswith(REPORT)}
         names |= {f"tally/{name}": None for name in born.tally.tensors()}
     return list(names)
@@ -136,7 +136,7 @@ def test_no_piece_can_be_left_out(piece: str) -> None:
     caught, varied = False, False
     for then in map(moment, MOMENTS):
         whole = torch.load(io.BytesIO(then.blob), weights_only=True)
-        fresh = getattr(then.begun.birth(SEED - 1), part).tensors().get(name)
+        fresh = getattr(then.begun.initial_snapshot(SEED - 1), part).tensors().get(name)
         if fresh is None or equal(whole[part][name], fresh):
             continue
         varied = True
@@ -155,13 +155,13 @@ def test_no_piece_can_be_left_out(piece: str) -> None:
 
 def test_config_is_restored() -> None:
     """An operator's event changes the config, so it is a piece of state, too."""
-    changed = ISLAND.birth()._replace(config=ISLAND.config.model_copy(update={"p_guid": 0.123}))
+    changed = ISLAND.initial_snapshot()._replace(config=ISLAND.config.model_copy(update={"p_guid": 0.123}))
     assert ISLAND.unpack(pack(changed)).config.p_guid == 0.123
 
 
 def test_other_threads_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    blob = pack(ISLAND.birth())
-    monkeypatch.setattr("parenting.server.checkpoint.versions", lambda: {**versions(), "threads": 99})
+    blob = pack(ISLAND.initial_snapshot())
+    monkeypatch.setattr("parenting.server.snapshot.versions", lambda: {**versions(), "threads": 99})
     with pytest.raises(ServerError, match="99"):
         ISLAND.unpack(blob)
 
@@ -177,19 +177,19 @@ def db(tmp_path: object) -> Iterator[Database]:
     database.close()
 
 
-def alive(db: Database, run: int) -> Life:
+def alive(db: Database, run: int) -> RunSession:
     """The run, taken up by a new worker."""
     with db.write() as session:
-        session.connection().exec_driver_sql("UPDATE run SET actor = NULL")
+        session.connection().exec_driver_sql("UPDATE run SET worker = NULL")
     (mine,) = claim(db, "test")
-    return Life(db, mine, get_run(db, run), lambda: None)
+    return RunSession(db, mine, get_run(db, run), lambda: None)
 
 
-def live_to(life: Life, tick: int) -> None:
-    while life.tick < tick:
-        seen = worker_side.watch(life.db, [life.mine.run_id])[life.mine.run_id]
+def live_to(life: RunSession, tick: int) -> None:
+    while life.last_tick < tick:
+        seen = worker_side.watch(life.db, [life.claim.run_id])[life.claim.run_id]
         assert life.ready(seen)
-        life.beat(seen)
+        life.tick(seen)
 
 
 def scripted(db: Database) -> int:
@@ -207,7 +207,7 @@ def test_a_damaged_checkpoint_is_passed_over(db: Database) -> None:
         assert newest is not None
         newest.blob = newest.blob[:-100] + bytes(100)
     again = alive(db, run)
-    assert again.tick == 20
+    assert again.last_tick == 20
     live_to(again, 60)
     expected = Inline()
     for _ in range(60):
@@ -231,7 +231,7 @@ def test_ticks_that_were_lived_ask_nothing_twice(db: Database) -> None:
     with db.read() as session:
         before = session.connection().exec_driver_sql("SELECT id, tick, clips FROM query ORDER BY id").all()
     again = alive(db, run)
-    assert again.tick == 0
+    assert again.last_tick == 0
     live_to(again, 40)
     with db.read() as session:
         assert (

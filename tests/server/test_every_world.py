@@ -18,11 +18,11 @@ from parenting.envs import registry
 from parenting.server import record
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
+from parenting.server.migrate import upgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue import worker_side
 from parenting.server.runs import claim, get_run, set_status
-from parenting.server.schema import upgrade
-from parenting.server.session import Life
+from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.tables import Weights
 from parenting.server.worker import Worker
@@ -60,17 +60,17 @@ def db(settings: Settings) -> Iterator[Database]:
     database.close()
 
 
-def taken_up(db: Database, run: int) -> Life:
+def taken_up(db: Database, run: int) -> RunSession:
     """The run in the hands of a new worker."""
     (mine,) = claim(db, "test", -1)  # taken from whoever has it
-    return Life(db, mine, get_run(db, run), lambda: None)
+    return RunSession(db, mine, get_run(db, run), lambda: None)
 
 
-def live_to(life: Life, tick: int) -> None:
-    while life.tick < tick:
-        seen = worker_side.watch(life.db, [life.mine.run_id])[life.mine.run_id]
+def live_to(life: RunSession, tick: int) -> None:
+    while life.last_tick < tick:
+        seen = worker_side.watch(life.db, [life.claim.run_id])[life.claim.run_id]
         assert life.ready(seen), life.saved.state.stuck
-        life.beat(seen)
+        life.tick(seen)
 
 
 @pytest.mark.parametrize("begun", LONGER, ids=name)
@@ -80,7 +80,7 @@ def test_a_script_raises_it(db: Database, begun: Begun) -> None:
     live_to(first, TICKS // 2)
     first.save()
     second = taken_up(db, run)
-    assert second.tick == TICKS // 2
+    assert second.last_tick == TICKS // 2
     live_to(second, TICKS)
     second.save()
     saved = last(db, run, begun)
@@ -96,15 +96,15 @@ def test_the_lease_reply_is_all_that_a_parent_needs(settings: Settings, db: Data
     life = taken_up(db, run)
     with TestClient(create_app(settings, db), base_url="http://localhost") as web:
         parent = script(web, run)
-        while life.tick < TICKS:
+        while life.last_tick < TICKS:
             seen = worker_side.watch(db, [run])[run]
             if life.ready(seen):
-                life.beat(seen)
+                life.tick(seen)
             else:
                 assert parent.answer_one(), life.waiting
     life.save()
     assert get_run(db, run).answers > 0
-    assert same_bits(last(db, run, begun), inline(life.tick, begun)) == []
+    assert same_bits(last(db, run, begun), inline(life.last_tick, begun)) == []
 
 
 @pytest.mark.parametrize("world", list(registry.WORLDS))
@@ -117,7 +117,7 @@ def test_it_begins_by_its_name_alone(settings: Settings, db: Database, world: st
         life = taken_up(db, run["id"])
         seen = worker_side.watch(db, [run["id"]])[run["id"]]
         while life.ready(seen):
-            life.beat(seen)
+            life.tick(seen)
             seen = worker_side.watch(db, [run["id"]])[run["id"]]
         question = _good(web.post("/api/v1/runs/1/queries/lease", json={"client_id": "me"}), 200)
     assert question["world"]["text"] == registry.level(world).text
@@ -160,34 +160,34 @@ def test_a_garden_goes_on_until_it_is_stopped(settings: Settings, db: Database) 
     assert 0 <= row["return"] < 100
     assert row["optimal_return"] > 40  # what the parent's own way waters in a hundred steps
     assert row["optimal"] == 0
-    assert not worker.lives[run].finished()
+    assert not worker.sessions[run].finished()
     assert get_run(db, run).status == "active"
     set_status(db, run, "stopped")
     worker._round()
-    assert run not in worker.lives
+    assert run not in worker.sessions
 
 
 def test_a_dear_look_is_not_taken_at_each_answer(db: Database) -> None:
     """In the garden seconds lie between two rows; what is left over is written while the agent waits."""
     life = taken_up(db, start(db, NewRun(world="reward-hacking", parent="human")).id)
-    run = life.mine.run_id
+    run = life.claim.run_id
     life.evaluation.rest = 1e9
     with TestClient(create_app(Settings(), db), base_url="http://localhost") as web:
         parent = script(web, run)
-        while life.tick < 30:
+        while life.last_tick < 30:
             seen = worker_side.watch(db, [run])[run]
             if life.ready(seen):
-                life.beat(seen)
+                life.tick(seen)
             else:
-                life.wait(seen)
+                life.report_waiting(seen)
                 assert parent.answer_one()
     assert not record.metrics(db, run)
     life.evaluation.rest = 0.0
     while life.ready(seen := worker_side.watch(db, [run])[run]):
-        life.beat(seen)
-    life.wait(seen)
+        life.tick(seen)
+    life.report_waiting(seen)
     newest = record.metrics(db, run)[-1]
-    assert (newest.tick, newest.values["guidance"]) == (life.tick, int(life.saved.tally.kinds[0, 1]))
+    assert (newest.tick, newest.values["guidance"]) == (life.last_tick, int(life.saved.tally.kinds[0, 1]))
     assert get_run(db, run).waiting == "guidance"
 
 

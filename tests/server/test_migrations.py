@@ -9,7 +9,8 @@ from sqlalchemy import Connection, text
 
 from parenting.server.db import Database, connect
 from parenting.server.errors import SetupError
-from parenting.server.schema import require, upgrade
+from parenting.server.migrate import downgrade, require_current, upgrade
+from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 from parenting.server.tables import Table
 
@@ -51,15 +52,15 @@ def test_migrations_make_the_same_checks_and_indices(db: Database, settings: Set
 def test_twice_is_once(empty: Database) -> None:
     assert upgrade(empty) is True
     assert upgrade(empty) is False
-    require(empty)
+    require_current(empty)
 
 
 def test_unmigrated_database_is_refused(empty: Database) -> None:
     with pytest.raises(SetupError, match=r"has no tables yet\. Run: parenting migrate"):
-        require(empty)
+        require_current(empty)
 
 
-@pytest.mark.parametrize("verb", [require, upgrade])
+@pytest.mark.parametrize("verb", [require_current, upgrade])
 def test_newer_database_is_refused(db: Database, verb: object) -> None:
     with db.write() as session:
         session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
@@ -82,3 +83,32 @@ def test_migration_that_fails_leaves_nothing(empty: Database) -> None:
         upgrade(empty)
     with empty.read() as session:
         assert list(checks(session.connection())) == ["answer"]
+
+
+@pytest.mark.parametrize("revision", ["0001", "0002", "0003"])
+def test_down_and_up_again_leads_to_the_same_tables(db: Database, mine: Claim, revision: str) -> None:
+    with db.read() as session:
+        before = checks(session.connection())
+    downgrade(db, revision)
+    with pytest.raises(SetupError, match=r"older version of Parenting\. Run: parenting migrate"):
+        require_current(db)
+    assert upgrade(db) is True
+    with db.read() as session:
+        assert checks(session.connection()) == before
+
+
+def test_renamed_columns_keep_their_values_down_and_up(db: Database, mine: Claim) -> None:
+    downgrade(db, "0003")
+    with db.read() as session:
+        [row] = session.execute(text("SELECT actor, epoch FROM run"))
+    assert tuple(row) == (mine.worker, mine.fencing_token)
+    upgrade(db)
+    with db.read() as session:
+        [row] = session.execute(text("SELECT worker, fencing_token FROM run"))
+    assert tuple(row) == (mine.worker, mine.fencing_token)
+
+
+@pytest.mark.parametrize("revision", ["0004", "9999", "head", ""])
+def test_only_an_older_revision_can_be_gone_back_to(db: Database, revision: str) -> None:
+    with pytest.raises(SetupError, match=r"is not an older revision\. Use one of: 0001, 0002, 0003\."):
+        downgrade(db, revision)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 import torch
 
-from parenting.server.checkpoint import Saved
 from parenting.server.db import Database
 from parenting.server.new_run import start
 from parenting.server.queue.worker_side import watch
 from parenting.server.replay import differences, equal, relive
 from parenting.server.runs import claim, get_run
-from parenting.server.session import Life
+from parenting.server.session import RunSession
+from parenting.server.snapshot import Snapshot
 from tests.server.raising import ISLAND, inline
 
 
@@ -37,7 +37,7 @@ def test_every_piece_is_held_against_its_own() -> None:
     """Each tensor alone, changed in its last bit or flag, is named alone."""
     kept = inline(30)
 
-    def changed(name: str) -> Saved:
+    def changed(name: str) -> Snapshot:
         def flip(this: str, part: torch.Tensor, _axis: int | None) -> torch.Tensor:
             if this != name:
                 return part
@@ -64,9 +64,9 @@ def test_it_is_the_same_in_small_portions(db: Database, monkeypatch: pytest.Monk
     monkeypatch.setattr("parenting.server.replay.WINDOW", window)
     run = start(db, ISLAND.new("scripted")).id
     (mine,) = claim(db, "test")
-    life = Life(db, mine, get_run(db, run), lambda: None)
-    while life.tick < 30:
-        life.beat(watch(db, [run])[run])
+    life = RunSession(db, mine, get_run(db, run), lambda: None)
+    while life.last_tick < 30:
+        life.tick(watch(db, [run])[run])
     life.save()
     seen: list[tuple[int, int]] = []
     found = relive(db, run, lambda tick, last: seen.append((tick, last)))

@@ -53,7 +53,7 @@ def test_one_worker_a_run(db: Database, run: Run, clock: Clock) -> None:
     clock.pass_seconds(4)
     assert claim(db, "b") == []
     clock.pass_seconds(2)
-    assert [mine.epoch for mine in claim(db, "b")] == [2]
+    assert [mine.fencing_token for mine in claim(db, "b")] == [2]
 
 
 def test_sign_of_life_keeps_the_claim(db: Database, mine: ClaimOf, clock: Clock) -> None:
@@ -70,8 +70,8 @@ def test_run_that_was_let_go_is_free_at_once(db: Database, mine: ClaimOf) -> Non
     let_go(db, [mine])
     (next_claim,) = claim(db, "b")
     let_go(db, [mine])  # too late: another's by now
-    assert get_run(db, mine.run_id).actor == "b"
-    assert next_claim.epoch == 2
+    assert get_run(db, mine.run_id).worker == "b"
+    assert next_claim.fencing_token == 2
 
 
 @pytest.mark.parametrize("status", ["stopped", "finished", "failed"])

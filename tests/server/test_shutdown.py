@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from parenting.server.db import connect
+from parenting.server.migrate import upgrade
 from parenting.server.new_run import NewRun, start
-from parenting.server.schema import upgrade
 from parenting.server.settings import Settings
 from tests.server.serving import Stream, free_port, parenting, until_up
 

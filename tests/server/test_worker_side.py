@@ -158,7 +158,7 @@ def test_watch_tells_all_that_a_worker_waits_for(db: Database, run: Run, mine: C
     seen = watch(db, [run.id, 99])
     assert list(seen) == [run.id]
     found = seen[run.id]
-    assert (found.status, found.actor, found.epoch) == ("active", mine.actor, mine.epoch)
+    assert (found.status, found.worker, found.fencing_token) == ("active", mine.worker, mine.fencing_token)
     assert (found.open_guidance, found.open_preferences, found.answers, found.events) == (1, 1, 1, 1)
 
 
@@ -169,7 +169,7 @@ def test_worker_that_slept_past_its_claim_cannot_write(
     add_event(db, run.id, "mature", {})
     clock.pass_seconds(6)
     (taker,) = claim(db, "worker-2")
-    assert taker.epoch == mine.epoch + 1
+    assert taker.fencing_token == mine.fencing_token + 1
     for write in (
         lambda: post_query(db, mine, 9, "guidance", 1, CLIPS),
         lambda: take_answer(db, mine, 9),

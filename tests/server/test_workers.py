@@ -13,7 +13,7 @@ from parenting.server.queue.parent_side import answer, lease
 from parenting.server.reads.pages import lease_ahead, may_lease
 from parenting.server.record import add_event, load_checkpoints
 from parenting.server.runs import Claim, claim, get_run, set_goal, set_pace, set_status
-from parenting.server.session import Life, resting
+from parenting.server.session import RunSession, idle
 from parenting.server.settings import Settings
 from parenting.server.tables import Run
 from parenting.server.worker import Worker
@@ -62,11 +62,11 @@ def test_it_rests_once_every_answer_is_heard(db: Database, mine: Claim) -> None:
     query = worker_side.post_query(db, mine, 1, "guidance", 1, CLIPS)
     set_goal(db, mine.run_id, 1)
     answer(db, query, "left", "me", "human")
-    assert not resting(worker_side.watch(db, [mine.run_id])[mine.run_id])
+    assert not idle(worker_side.watch(db, [mine.run_id])[mine.run_id])
     worker_side.take_answer(db, mine, 2)
-    assert resting(worker_side.watch(db, [mine.run_id])[mine.run_id])
+    assert idle(worker_side.watch(db, [mine.run_id])[mine.run_id])
     set_goal(db, mine.run_id, None)
-    assert not resting(worker_side.watch(db, [mine.run_id])[mine.run_id])
+    assert not idle(worker_side.watch(db, [mine.run_id])[mine.run_id])
 
 
 def test_a_script_stops_at_its_goal_to_the_question(db: Database, settings: Settings) -> None:
@@ -77,15 +77,15 @@ def test_a_script_stops_at_its_goal_to_the_question(db: Database, settings: Sett
         worker._round()
     assert get_run(db, run).answers == 5
     assert get_run(db, run).status == "active"
-    tick = worker.lives[run].tick
+    tick = worker.sessions[run].last_tick
     add_event(db, run, "change", {"kind": "change", "name": "p_guid", "value": 0.5})
     worker._round()
-    assert worker.lives[run].tick == tick  # at rest an event waits, too
+    assert worker.sessions[run].last_tick == tick  # at rest an event waits, too
     set_goal(db, run, 6)
     for _ in range(60):
         worker._round()
     assert get_run(db, run).answers == 6
-    assert worker.lives[run].saved.config.p_guid == 0.5
+    assert worker.sessions[run].saved.config.p_guid == 0.5
 
 
 def test_a_pace_holds_ticks_back(db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,25 +96,25 @@ def test_a_pace_holds_ticks_back(db: Database, settings: Settings, monkeypatch: 
     monkeypatch.setattr("parenting.server.worker.time.monotonic", lambda: now[0])
     worker._claim()
     worker._round()
-    assert worker.lives[run].tick == 1
+    assert worker.sessions[run].last_tick == 1
     now[0] += 0.2
     worker._round()
-    assert worker.lives[run].tick == 1
+    assert worker.sessions[run].last_tick == 1
     assert worker._soonest == pytest.approx(0.05)
     now[0] += 0.06
     worker._round()
-    assert worker.lives[run].tick == 2
+    assert worker.sessions[run].last_tick == 2
     set_pace(db, run, None)
     worker._round()
-    assert worker.lives[run].tick > 2
+    assert worker.sessions[run].last_tick > 2
 
 
 def test_ticks_that_are_lived_again_do_not_keep_the_pace(db: Database) -> None:
     run = start(db, NewRun(world="unsafe-exploration", pace=0.001))
     (mine,) = claim(db, "first")
     worker_side.post_query(db, mine, 9, "guidance", 1, CLIPS)
-    life = Life(db, mine, get_run(db, run.id), lambda: None)
-    assert life.early(0.001) == 0
+    life = RunSession(db, mine, get_run(db, run.id), lambda: None)
+    assert life.delay(0.001) == 0
 
 
 @pytest.mark.parametrize("verb", [set_goal, set_pace])
@@ -137,7 +137,7 @@ def test_a_stopped_run_is_saved_as_it_was(db: Database, settings: Settings) -> N
     worker = Worker(db, settings)
     worker._claim()
     worker._round()
-    tick = worker.lives[run].tick
+    tick = worker.sessions[run].last_tick
     assert tick > 0
     set_status(db, run, "stopped")
     worker._round()
@@ -171,6 +171,6 @@ def test_each_run_has_its_turn_in_every_round(
     worker._claim()
     for _ in range(25):
         worker._round()
-    assert [worker.lives[run].tick for run in ids] == [25, 25, 25]
-    assert worker.lives[waits].tick < 25
+    assert [worker.sessions[run].last_tick for run in ids] == [25, 25, 25]
+    assert worker.sessions[waits].last_tick < 25
     assert get_run(db, waits).waiting == "guidance"

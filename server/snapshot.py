@@ -15,7 +15,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
 from parenting.envs.struct import Struct
 from parenting.server import weights
-from parenting.server.counters import Tally, no_tally
+from parenting.server.counters import Counters, no_counts
 from parenting.server.db import Database
 from parenting.server.errors import ServerError
 from parenting.server.tables import Run
@@ -31,11 +31,11 @@ class DivergedError(ServerError):
     """The record and the agent disagree; the run was stopped so that nothing is built on it."""
 
 
-class Saved(NamedTuple):
+class Snapshot(NamedTuple):
     """What a checkpoint holds: agent, counts, and the config as the operator's events left it."""
 
     state: AgentState
-    tally: Tally
+    tally: Counters
     config: Config
 
 
@@ -44,7 +44,7 @@ def versions() -> dict[str, Any]:
     return {"torch": str(torch.__version__), "threads": torch.get_num_threads()}
 
 
-def begun_with(db: Database, run: Run, world: Gridworld) -> Tensor | None:
+def initial_weights(db: Database, run: Run, world: Gridworld) -> Tensor | None:
     """The pre-trained weights that a run began with; None where it drew fresh ones (Sec. 3.1.4).
 
     Raises:
@@ -52,15 +52,15 @@ def begun_with(db: Database, run: Run, world: Gridworld) -> Tensor | None:
     """
     if run.weights is None:
         return None
-    return load(weights.fetch(db, run.weights), Wanted(world.spec, world.height, world.width))
+    return load(weights.get(db, run.weights), Wanted(world.spec, world.height, world.width))
 
 
-def birth(world: Gridworld, config: Config, seed: int, weights: Tensor | None = None) -> Saved:
+def initial_snapshot(world: Gridworld, config: Config, seed: int, weights: Tensor | None = None) -> Snapshot:
     """A run at tick 0."""
-    return Saved(parenting.init(world, config, keys(seed, 1), weights), no_tally(), config)
+    return Snapshot(parenting.init(world, config, keys(seed, 1), weights), no_counts(), config)
 
 
-def pack(saved: Saved) -> bytes:
+def pack(saved: Snapshot) -> bytes:
     """A checkpoint's bytes."""
     whole = {
         "state": {name: part for name, part in saved.state.tensors().items() if not name.startswith(REPORT)},
@@ -73,7 +73,7 @@ def pack(saved: Saved) -> bytes:
     return out.getvalue()
 
 
-def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None = None) -> Saved:
+def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None = None) -> Snapshot:
     """What the bytes hold; `weights` are those that the run began with.
 
     Raises:
@@ -85,8 +85,8 @@ def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None
         raise DivergedError(
             f"This run was raised with {whole['versions']}; here it would go on with {versions()}."
         )
-    template = birth(world, config, 0, weights)
-    return Saved(
+    template = initial_snapshot(world, config, 0, weights)
+    return Snapshot(
         state=_restore(template.state, whole["state"]).check(),
         tally=_restore(template.tally, whole["tally"]).check(),
         config=Config.model_validate_json(whole["config"]),

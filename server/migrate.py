@@ -38,7 +38,29 @@ def upgrade(db: Database) -> bool:
         return True
 
 
-def require(db: Database) -> None:
+def downgrade(db: Database, revision: str) -> None:
+    """Take the database back to an older revision, all or nothing, for an older version of Parenting.
+
+    Columns and tables that the older version does not know are dropped with what they hold.
+
+    Args:
+        db: A database that is up to date.
+        revision: One of the revisions in `migrations/versions`, from "0001" on.
+
+    Raises:
+        SetupError: there is no such older revision, or the database is not up to date.
+    """
+    require_current(db)
+    known = [script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()]
+    if revision not in known[1:]:
+        raise SetupError(f"'{revision}' is not an older revision. Use one of: {', '.join(known[:0:-1])}.")
+    with db.write() as session:
+        config = _config()
+        config.attributes["connection"] = session.connection()
+        command.downgrade(config, revision)
+
+
+def require_current(db: Database) -> None:
     """Refuse to start on a database that is not up to date.
 
     Raises:
