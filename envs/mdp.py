@@ -13,9 +13,9 @@ from parenting.envs.fingerprint import fingerprint, together
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.struct import Struct
 
-MOST = 1_000_000
+MAX_STATES = 1_000_000
 """States of a model, at the most."""
-ROOM = 2**30
+MAX_CELLS = 2**30
 """Cells of all its boards together, at the most: a gigabyte."""
 
 
@@ -25,11 +25,11 @@ class Model(Struct):
     states: WorldState
     known: Int64[Tensor, "S"]  # the states' words, sorted
     order: Int64[Tensor, "S"]  # the state behind each word
-    then: Int64[Tensor, "S 4"]  # the state that each action leads to
+    next_state: Int64[Tensor, "S 4"]  # the state that each action leads to
     reward: Float64[Tensor, "S 4"]
     unsafe: Bool[Tensor, "S 4"]
     forbidden: Bool[Tensor, "S 4"]
-    over: Bool[Tensor, "S"]
+    terminal: Bool[Tensor, "S"]
     goal: Bool[Tensor, "S"]  # over, and not by harm alone: on a goal, or where some safe step led
 
     def find(self, board: Tensor, agent: Tensor, box: Tensor, level: Tensor) -> Int64[Tensor, "..."]:
@@ -60,7 +60,7 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
     Raises:
         ValueError: more than `limit` states, or two beginnings that a query could not tell apart.
     """
-    most = min(MOST, ROOM // (world.height * world.width)) if limit is None else limit
+    most = min(MAX_STATES, MAX_CELLS // (world.height * world.width)) if limit is None else limit
     edge = world.beginnings()
     known = _word(edge)
     if len(torch.unique(known)) < len(known):
@@ -69,7 +69,7 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
         )
     found, steps = [edge], []
     while len(edge.t):
-        arrived, step = _look(world, edge)
+        arrived, step = _expand(world, edge)
         steps.append(step)
         fresh = _new(step["word"], known)
         edge = arrived.pick(fresh)
@@ -83,7 +83,7 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
     return _model(world, WorldState.joined(found), known, steps)
 
 
-def _look(world: Gridworld, edge: WorldState) -> tuple[WorldState, dict[str, Tensor]]:
+def _expand(world: Gridworld, edge: WorldState) -> tuple[WorldState, dict[str, Tensor]]:
     """What the four actions lead to from each state, and what is said of these steps; rows in the order
     (state, action).
     """
@@ -104,24 +104,24 @@ def _look(world: Gridworld, edge: WorldState) -> tuple[WorldState, dict[str, Ten
 def _model(world: Gridworld, found: WorldState, known: Tensor, steps: list[dict[str, Tensor]]) -> Model:
     ordered = known.sort()
     said = {name: torch.cat([step[name] for step in steps]).view(-1, 4) for name in steps[0]}
-    then = ordered.indices[torch.searchsorted(ordered.values, said["word"])]
+    next_state = ordered.indices[torch.searchsorted(ordered.values, said["word"])]
     on_goal = world.lookup("G")[world.tile(found.board, found.agent)]
     return Model(
         states=found,
         known=ordered.values,
         order=ordered.indices,
-        then=then,
+        next_state=next_state,
         reward=said["reward"],
         unsafe=said["unsafe"],
         forbidden=said["forbidden"],
-        over=found.over,
-        goal=found.over & (on_goal | _entered_safely(found.over, then, said["unsafe"])),
+        terminal=found.over,
+        goal=found.over & (on_goal | _entered_safely(found.over, next_state, said["unsafe"])),
     )
 
 
-def _entered_safely(over: Tensor, then: Tensor, unsafe: Tensor) -> Bool[Tensor, "S"]:
-    entered = torch.zeros_like(over)
-    entered[then[~unsafe & ~over[:, None]]] = True
+def _entered_safely(terminal: Tensor, next_state: Tensor, unsafe: Tensor) -> Bool[Tensor, "S"]:
+    entered = torch.zeros_like(terminal)
+    entered[next_state[~unsafe & ~terminal[:, None]]] = True
     return entered
 
 

@@ -1,6 +1,6 @@
 """What a policy does from the start when nothing is left to chance: one outcome for each policy.
 
-Exact, never by sampling. `walk` follows any policy through the parent's model: a table of actions, or the
+Exact, never by sampling. `follow` follows any policy through the parent's model: a table of actions, or the
 argmax of a network (`evaluation/argmax.py`).
 """
 
@@ -18,7 +18,7 @@ from parenting.envs.mdp import Model
 
 UNREACHABLE = 1_000_000
 
-Policy = Callable[[Int64[Tensor, "N"]], Int64[Tensor, "N"]]
+TabularPolicy = Callable[[Int64[Tensor, "N"]], Int64[Tensor, "N"]]
 """The action of every trial in its state of the model."""
 
 
@@ -36,16 +36,16 @@ class Outcome(IntEnum):
 class Path(NamedTuple):
     """Where every trial was, and what it did there."""
 
-    at: Int64[Tensor, "T1 N"]
+    state: Int64[Tensor, "T1 N"]
     action: Int64[Tensor, "T N"]
 
 
-def walk(model: Model, policy: Policy, start: Int64[Tensor, "N"], steps: int) -> Path:
+def follow(model: Model, policy: TabularPolicy, start: Int64[Tensor, "N"], steps: int) -> Path:
     """Follow a policy for `steps` steps. A walk that is over stays where it ended."""
     at, action = [start], []
     for _ in range(steps):
         action.append(policy(at[-1]))
-        at.append(model.then[at[-1], action[-1]])
+        at.append(model.next_state[at[-1], action[-1]])
         if bool((at[-1] == at[-2]).all()):  # nobody will ever move again
             break
     rest = steps - len(action)
@@ -53,27 +53,27 @@ def walk(model: Model, policy: Policy, start: Int64[Tensor, "N"], steps: int) ->
 
 
 def outcome(model: Model, distance: Int64[Tensor, "S"], path: Path) -> Int64[Tensor, "N"]:
-    """The `Outcome` of every walk. `distance` is what `distances` found."""
-    first, before, last = path.at[0], path.at[-2], path.at[-1]
-    steps = (~model.over[path.at[:-1]]).sum(0)
-    ordered = path.at.sort(0).values
+    """The `Outcome` of every walk. `distance` is what `distance_to_goal` found."""
+    first, before, last = path.state[0], path.state[-2], path.state[-1]
+    steps = (~model.terminal[path.state[:-1]]).sum(0)
+    ordered = path.state.sort(0).values
     found = torch.where((ordered[1:] == ordered[:-1]).any(0), int(Outcome.CIRCLE), int(Outcome.TIME))
     found = torch.where(last == before, int(Outcome.WALL), found)
-    found = torch.where(model.over[last], int(Outcome.DETOUR), found)
-    found = torch.where(model.over[last] & (steps == distance[first]), int(Outcome.OPTIMAL), found)
-    harmed = model.forbidden[path.at[:-1], path.action].any(0)
+    found = torch.where(model.terminal[last], int(Outcome.DETOUR), found)
+    found = torch.where(model.terminal[last] & (steps == distance[first]), int(Outcome.OPTIMAL), found)
+    harmed = model.forbidden[path.state[:-1], path.action].any(0)
     return torch.where(harmed, int(Outcome.HARM), found)
 
 
-def distances(model: Model) -> Int64[Tensor, "S"]:
+def distance_to_goal(model: Model) -> Int64[Tensor, "S"]:
     """Steps to the end of the episode from every state with no forbidden step among them.
 
     UNREACHABLE where there is no such way. Without forbidden steps an episode ends at the goal alone.
     """
-    distance = torch.where(model.over, 0, UNREACHABLE)
+    distance = torch.where(model.terminal, 0, UNREACHABLE)
     while True:
-        then = torch.where(model.forbidden, UNREACHABLE, distance[model.then]).min(1).values + 1
-        nearer = torch.where(model.over, 0, torch.minimum(distance, then))
+        ahead = torch.where(model.forbidden, UNREACHABLE, distance[model.next_state]).min(1).values + 1
+        nearer = torch.where(model.terminal, 0, torch.minimum(distance, ahead))
         if bool((nearer == distance).all()):
             return distance
         distance = nearer

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import torch
 from jaxtyping import Bool, Float, Float64, Int64
@@ -15,21 +16,21 @@ from parenting.envs.struct import Struct
 
 EPISODES = 1000
 """Episodes of a mean that is reported, as many as in Fig. 2."""
-SEED = 2**53
-"""The weather: the same for every policy, so that what differs is the policy. No run has this seed."""
-ROWS = 2000
+ENV_SEED = 2**53
+"""Seed of the environment's randomness: every policy meets the same draws. No run has this seed."""
+MAX_BATCH = 2000
 """Episodes walked at once. More need more memory and are no faster."""
 
-Choose = Callable[[WorldState], Int64[Tensor, "N"]]
+Policy = Callable[[WorldState], Int64[Tensor, "N"]]
 """The action of every row in its state."""
 
 
-class Deployed(Struct):
+class RolloutResult(Struct):
     """What happened in every episode of a deployment."""
 
     waterings: Float64[Tensor, "N E"]  # legitimate ones
     bucket: Int64[Tensor, "N E"]  # steps that end in the bucket
-    caught: Bool[Tensor, "N E"]  # in the bucket when the episode ends
+    in_bucket_at_end: Bool[Tensor, "N E"]  # in the bucket when the episode ends
 
 
 def deploy(
@@ -37,48 +38,52 @@ def deploy(
     parameters: Float[Tensor, "N P"],
     episodes: int = EPISODES,
     level: int = 0,
-    seed: int = SEED,
-) -> Deployed:
-    """Walk whole episodes by the argmax policy of every trial; all trials have the same weather."""
-    together = max(1, ROWS // episodes)
+    env_seed: int = ENV_SEED,
+) -> RolloutResult:
+    """Roll out the argmax policy of every trial; all trials meet the same environment randomness."""
+    together = max(1, MAX_BATCH // episodes)
     parts = [
-        walked(world, lambda state, some=some: argmax(world, some, state), len(some), episodes, level, seed)  # type: ignore[misc]
+        rollout(world, partial(argmax, world, some), len(some), episodes, level, env_seed)
         for some in torch.split(parameters, together)
     ]
-    return Deployed.joined(parts)
+    return RolloutResult.joined(parts)
 
 
-def walked(
-    world: Gridworld, choose: Choose, trials: int, episodes: int, level: int = 0, seed: int = SEED
-) -> Deployed:
+def rollout(
+    world: Gridworld, policy: Policy, trials: int, episodes: int, level: int = 0, env_seed: int = ENV_SEED
+) -> RolloutResult:
     """Whole episodes of every trial from the start of one level, by whatever chooses.
 
-    The first episodes of many have the weather that fewer have.
+    The first episodes of many meet the same environment randomness as fewer do.
     """
-    weather = keys(seed, episodes, world.device).pick(torch.arange(episodes).repeat(trials))
-    state = world.reset(weather, torch.full_like(weather.seed, level))
+    env_keys = keys(env_seed, episodes, world.device).pick(torch.arange(episodes).repeat(trials))
+    state = world.reset(env_keys, torch.full_like(env_keys.seed, level))
     earned, bucket = torch.zeros_like(state.t, dtype=torch.float64), torch.zeros_like(state.t)
-    caught = state.over
+    in_bucket_at_end = state.over
     for _ in range(world.time_limit):
-        weather = weather.next()
-        action = choose(state)
-        after = world.step(state, action, weather)
+        env_keys = env_keys.next()
+        action = policy(state)
+        after = world.step(state, action, env_keys)
         earned += world.reward(state, action, after)
-        caught = world.unsafe(state, action, after)
-        bucket += caught
+        in_bucket_at_end = world.unsafe(state, action, after)
+        bucket += in_bucket_at_end
         state = after
     shape = trials, episodes
-    return Deployed(waterings=earned.view(shape), bucket=bucket.view(shape), caught=caught.view(shape))
+    return RolloutResult(
+        waterings=earned.view(shape), bucket=bucket.view(shape), in_bucket_at_end=in_bucket_at_end.view(shape)
+    )
 
 
 def argmax(world: Gridworld, parameters: Float[Tensor, "n P"], state: WorldState) -> Int64[Tensor, "nE"]:
     """The argmax action of every trial in each of its E states, which stand one trial after the other."""
-    brain = network_of(world)
-    seen = world.observe(state.board, state.agent, state.box)
-    near = local_state(seen, state.agent)
+    network = network_of(world)
+    observation = world.observe(state.board, state.agent, state.box)
+    local = local_state(observation, state.agent)
     shape = len(parameters), -1
     with torch.no_grad():
-        heads = brain.heads(
-            brain.unpack(parameters), seen.view(*shape, *seen.shape[1:]), near.view(*shape, 4)
+        heads = network.heads(
+            network.unpack(parameters),
+            observation.view(*shape, *observation.shape[1:]),
+            local.view(*shape, 4),
         )
     return heads.logits.argmax(-1).flatten()

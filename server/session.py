@@ -167,12 +167,12 @@ class RunSession:
         """Write a row of metrics after the parent was heard, and once a second besides.
 
         It waits until the next question is out: a person waits for that, and nobody for a row. Where a look
-        at the policy is dear, as in the garden, the evaluation's `rest` lies between two rows. The tick that
-        ends a stage has its row in any case: a stage is judged by what it ended with.
+        at the policy is expensive, as in the garden, the evaluation waits `refresh_seconds` between two rows.
+        The tick that ends a stage has its row in any case: a stage is judged by what it ended with.
         """
         late, stage = time.monotonic() - self._measured_at, int(self.saved.state.maturity[0])
         due = not hurried and (late >= METRIC_SECONDS or (self._news and not at_once))
-        if stage == self.stage and (not due or late < self.evaluation.rest):
+        if stage == self.stage and (not due or late < self.evaluation.refresh_seconds):
             return
         speed = (self.last_tick - self._measured_tick) / late if self._measured_at and late else None
         self._measured_at, self._measured_tick, self._news = time.monotonic(), self.last_tick, False

@@ -65,7 +65,7 @@ def train_gardeners(
 
 
 def rollout(world: RewardHacking, network: Network, live: Float[Tensor, "N P"], rng: Keys) -> Rollouts:
-    """16 episodes of every trial by its policy, each with weather and dice of its own."""
+    """16 episodes of every trial by its policy, each with environment randomness and draws of its own."""
     state = world.reset(rng, torch.zeros_like(rng.seed))
     layers, shape = network.unpack(live), (len(live), EPISODES)
     parts: list[tuple[Tensor, ...]] = []

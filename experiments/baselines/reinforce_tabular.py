@@ -65,15 +65,15 @@ def tables(model: Model, evaluation: TabularEvaluation) -> Tables:
     """
     if len(evaluation.starts) != 1:
         raise ValueError("Policy gradients learn on one level at a time.")
-    living = (~model.over).nonzero().squeeze(1)
-    row = torch.full_like(model.over, len(living), dtype=torch.int64)
+    living = (~model.terminal).nonzero().squeeze(1)
+    row = torch.full_like(model.terminal, len(living), dtype=torch.int64)
     row[living] = torch.arange(len(living))
     end = torch.full((1, 4), len(living))
     nothing = torch.zeros(1, 4, dtype=torch.float64)
     return Tables(
-        seen=evaluation.seen[living],
-        near=evaluation.near[living],
-        then=torch.cat((row[model.then[living]], end)),
+        seen=evaluation.observation[living],
+        near=evaluation.local_state[living],
+        then=torch.cat((row[model.next_state[living]], end)),
         reward=torch.cat((model.reward[living], nothing)),
         unsafe=torch.cat((model.unsafe[living], nothing.bool())),
     )

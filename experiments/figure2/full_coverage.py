@@ -24,7 +24,7 @@ from parenting.envs.gridworld import WorldState, local_state
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import Keys, Stream
 from parenting.envs.struct import Struct
-from parenting.evaluation.rollouts import argmax, walked
+from parenting.evaluation.rollouts import argmax, rollout
 from parenting.experiments.baselines.reinforce_rollouts import Moments
 from parenting.experiments.figure2.all_pairs import PAIRS, judged
 from parenting.parents.scripted import ScriptedRule
@@ -170,7 +170,7 @@ def visit(
         coin, any_of_them = (rng.at(Stream.ACT, place + shift)[0] for shift in (0, episodes))
         return torch.where(coin < epsilon, (4 * any_of_them).long(), argmax(world, live, state))
 
-    walked(world, choose, 1, episodes)
+    rollout(world, choose, 1, episodes)
     whole = WorldState.joined(passed)
     truth = together(fingerprint(whole.board.flatten(1)), fingerprint(whole.agent))
     first = first_of(truth)

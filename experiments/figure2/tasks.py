@@ -19,7 +19,7 @@ from parenting.envs import registry
 from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
-from parenting.evaluation.rollouts import EPISODES, SEED, Deployed, deploy, walked
+from parenting.evaluation.rollouts import ENV_SEED, EPISODES, RolloutResult, deploy, rollout
 from parenting.experiments.baselines.reinforce_rollouts import train_gardeners
 from parenting.experiments.figure2.full_coverage import Budget, CoverageStage, cover
 from parenting.experiments.figure2.lookahead import best
@@ -30,7 +30,7 @@ from parenting.experiments.training.snapshots import train_with_snapshots
 from parenting.parents.garden_values import GardenValues
 
 PRESET = "conservative"
-FRESH = SEED + 1
+FRESH = ENV_SEED + 1
 """Weather that nobody has learnt in."""
 
 
@@ -79,7 +79,7 @@ def _watered(world: RewardHacking, live: Float[Tensor, "N P"]) -> list[Row]:
     return [_of(found, trial) for trial in range(len(live))]
 
 
-def _of(found: Deployed, trial: int) -> Row:
+def _of(found: RolloutResult, trial: int) -> Row:
     watered = found.waterings[trial]
     error = float(watered.std() / len(watered) ** 0.5)
     return {"waterings": float(watered.mean()), "error": error, "bucket": int(found.bucket[trial].sum())}
@@ -105,7 +105,7 @@ def lookahead_waterings(level: str, inside: Inside, depth: int, episodes: int) -
     if depth == 0:
         exact = float(valued.waterings(world.time_limit)[0])
         return [{**said, "of": "parent", "waterings": exact, "error": 0.0, "bucket": 0}]
-    found = walked(world, lambda state: best(world, valued, state, depth), 1, episodes)
+    found = rollout(world, lambda state: best(world, valued, state, depth), 1, episodes)
     return [{**said, "episodes": episodes, **_of(found, 0)}]
 
 
@@ -121,8 +121,8 @@ def full_coverage_stages(
     rows = []
     for stage, one in enumerate(cover(world, config, keys(seed, trial + 1), stages, budget), start=1):
         own = _of(deploy(world, one.live, budget.episodes), 0)
-        fresh = _of(deploy(world, one.live, EPISODES, seed=FRESH), 0)
-        ahead = walked(world, partial(_best, world, valued, stage), 1, budget.episodes)
+        fresh = _of(deploy(world, one.live, EPISODES, env_seed=FRESH), 0)
+        ahead = rollout(world, partial(_best, world, valued, stage), 1, budget.episodes)
         said = {"of": "coverage", "level": level, "inside": inside, "trial": trial, "stage": stage}
         beside = {"fresh": fresh["waterings"], "ahead": float(ahead.waterings.mean())}
         rows.append({**said, **own, **beside, **_counts(one)})

@@ -13,8 +13,8 @@ from parenting.envs import registry
 from parenting.envs.box_levels import box_levels, shortest, tempts
 from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
-from parenting.evaluation.argmax import Argmax, TabularEvaluation
-from parenting.evaluation.outcomes import Outcome, name, outcome, walk
+from parenting.evaluation.argmax import ArgmaxPolicy, TabularEvaluation
+from parenting.evaluation.outcomes import Outcome, follow, name, outcome
 from parenting.experiments.pretrained import pretrained
 from parenting.experiments.runner.store import Row
 
@@ -48,8 +48,8 @@ def outcomes(levels: Sequence[Level]) -> list[Outcome]:
     """What the argmax policy of the shipped weights does on each level."""
     world = world_of(WORLD, levels, config_of(pretrain=True, recompare=False))
     judged = TabularEvaluation(world, explore(world), gamma=1.0)
-    policy = Argmax(judged, pretrained(world).to(judged.starts.device).repeat(len(levels), 1))
-    path = walk(judged.model, policy, judged.starts, world.time_limit)
+    policy = ArgmaxPolicy(judged, pretrained(world).to(judged.starts.device).repeat(len(levels), 1))
+    path = follow(judged.model, policy, judged.starts, world.time_limit)
     return [Outcome(one) for one in outcome(judged.model, judged.distance, path).tolist()]
 
 

@@ -34,7 +34,7 @@ SHIFTS = tuple(round(-1.5 + 0.125 * step, 3) for step in range(17))
 
 def rho(model: Model) -> torch.Tensor:
     """+1 at the goal, -1 for the push that leaves the box stuck, 0 otherwise."""
-    arrives = model.over[model.then] & ~model.over[:, None]
+    arrives = model.terminal[model.next_state] & ~model.terminal[:, None]
     return arrives.double() - model.unsafe.double()
 
 
@@ -47,7 +47,9 @@ def fit_and_shift(trial: int, seed: int) -> list[Row]:
     pairs = random_pairs(model, PAIRS, LENGTH, generator)
     chance = preferences(pairs, true)
     fitted = fit(pairs, chance, len(true))
-    fitted = fitted + (true - fitted)[~model.over].mean()  # its own shift is arbitrary: begin where rho is
+    fitted = (
+        fitted + (true - fitted)[~model.terminal].mean()
+    )  # its own shift is arbitrary: begin where rho is
     rows = []
     for of, reward in (("rho", true), ("fitted", fitted)):
         rows += [_row(of, trial, shift, model, reward, pairs, chance) for shift in SHIFTS]

@@ -40,27 +40,27 @@ def follow(model: Model, reward: Float64[Tensor, "S 4"], letters: str) -> Way:
     """Walk by letters from the start of the first level, until the episode is over."""
     at, total, harms, done = 0, 0.0, False, ""
     for letter in letters:
-        if bool(model.over[at]):
+        if bool(model.terminal[at]):
             break
         action = LETTERS.index(letter)
         total, done = total + float(reward[at, action]), done + letter
         harms |= bool(model.unsafe[at, action])
-        at = int(model.then[at, action])
-    return Way(done, total, bool(model.over[at]), harms)
+        at = int(model.next_state[at, action])
+    return Way(done, total, bool(model.terminal[at]), harms)
 
 
 def plan(model: Model, reward: Float64[Tensor, "S 4"], horizon: int) -> Way:
     """The walk that earns most in `horizon` steps, by dynamic programming; it ends where an episode does."""
     values = [torch.zeros(len(reward), dtype=torch.float64)]
     for _ in range(horizon):
-        best = (reward + values[-1][model.then]).max(1).values
-        values.append(torch.where(model.over, 0.0, best))
+        best = (reward + values[-1][model.next_state]).max(1).values
+        values.append(torch.where(model.terminal, 0.0, best))
     letters, at = "", 0
     for left in range(horizon, 0, -1):
-        if bool(model.over[at]):
+        if bool(model.terminal[at]):
             break
-        action = int((reward[at] + values[left - 1][model.then[at]]).argmax())
-        letters, at = letters + LETTERS[action], int(model.then[at, action])
+        action = int((reward[at] + values[left - 1][model.next_state[at]]).argmax())
+        letters, at = letters + LETTERS[action], int(model.next_state[at, action])
     return follow(model, reward, letters)
 
 
@@ -69,19 +69,19 @@ def random_pairs(model: Model, count: int, length: int, generator: torch.Generat
 
     At an end an agent rests, so that all clips have one length.
     """
-    living = (~model.over).nonzero().squeeze(1)
+    living = (~model.terminal).nonzero().squeeze(1)
     now = living[_throw(len(living), count, generator, living.device)]
     at, actions = [], []
     for _ in range(length):
         action = _throw(4, count, generator, living.device)
         at.append(now)
         actions.append(action)
-        now = model.then[now, action]
+        now = model.next_state[now, action]
     return Pairs(torch.stack(at, 2), torch.stack(actions, 2))
 
 
 def _throw(sides: int, count: int, generator: torch.Generator, device: torch.device) -> Int64[Tensor, "K 2"]:
-    """Thrown where the dice are, so that they fall alike on every device."""
+    """Drawn on the generator's device, so that the draws are the same on every device."""
     return torch.randint(sides, (count, 2), generator=generator, device=generator.device).to(device)
 
 

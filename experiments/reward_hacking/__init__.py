@@ -68,7 +68,7 @@ def _rows(variant: str, level: str, span: tuple[int, int], queries: int, passed:
         found = deploy(garden(level, steps), passed.live, EPISODES)
         columns[f"waterings_{steps}"] = found.waterings.mean(1).tolist()
         columns[f"bucket_{steps}"] = (found.bucket > 0).sum(1).tolist()
-        columns[f"caught_{steps}"] = found.caught.sum(1).tolist()
+        columns[f"caught_{steps}"] = found.in_bucket_at_end.sum(1).tolist()
     each = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     said = {"of": variant, "queries": queries}
     return [{**said, "trial": trial, **row} for trial, row in zip(range(*span), each, strict=True)]

@@ -50,7 +50,7 @@ class StartStates:
     def __init__(self, model: Model) -> None:
         """One trial for each of the model's levels."""
         levels = int(model.states.level.max()) + 1
-        living = [((model.states.level == n) & ~model.over).nonzero().squeeze(1) for n in range(levels)]
+        living = [((model.states.level == n) & ~model.terminal).nonzero().squeeze(1) for n in range(levels)]
         self.count = torch.tensor([len(states) for states in living])
         self.most = int(self.count.max())
         self.states = torch.stack([states.repeat(self.most)[: self.most] for states in living])
@@ -101,8 +101,10 @@ def converged(world: Gridworld, state: AgentState, starts: StartStates) -> Bool[
 def parents_policy(model: Model, seed: int) -> Tensor:
     """A random pi_p(a|s), mostly far from optimal: of one action on even levels, of all four on odd ones."""
     generator = torch.Generator().manual_seed(seed)
-    drawn = torch.rand(len(model.over), 4, generator=generator, dtype=torch.float64, device=generator.device)
-    mixed = drawn.to(model.over.device) ** 3
+    drawn = torch.rand(
+        len(model.terminal), 4, generator=generator, dtype=torch.float64, device=generator.device
+    )
+    mixed = drawn.to(model.terminal.device) ** 3
     pure = torch.nn.functional.one_hot(mixed.argmax(1), 4).double()
     return torch.where((model.states.level % 2 == 0)[:, None], pure, mixed / mixed.sum(1, keepdim=True))
 
@@ -111,14 +113,14 @@ def iterated(model: Model, values: ValueTable, stages: int = STAGES) -> list[Ten
     """Value iteration from the parent's values: V_0 = V_p, V_1, ..., V_T (Eq. 10, 11)."""
     found = [values.v]
     for _ in range(stages):
-        q = model.reward + values.gamma * found[-1][model.then]
-        found.append(torch.where(model.over, 0.0, q.max(1).values))
+        q = model.reward + values.gamma * found[-1][model.next_state]
+        found.append(torch.where(model.terminal, 0.0, q.max(1).values))
     return found
 
 
 def greedy(model: Model, gamma: float, v: Tensor) -> Bool[Tensor, "S 4"]:
     """The actions that are best for r + gamma v(s')."""
-    q = model.reward + gamma * v[model.then]
+    q = model.reward + gamma * v[model.next_state]
     return q >= q.max(1, keepdim=True).values - TIE
 
 

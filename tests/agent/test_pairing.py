@@ -44,11 +44,11 @@ def plain(recorder: Recorder, trial: int, recompare: bool) -> tuple[int, int] | 
     return best[1] if best else None
 
 
-def put(recorder: Recorder, trial: int, kind: int, tick: int, dice: torch.Generator) -> None:
+def put(recorder: Recorder, trial: int, kind: int, tick: int, rng: torch.Generator) -> None:
     """A random clip of few different ones; the newest overwrites the oldest."""
 
     def roll(sides: int) -> int:
-        return int(torch.randint(sides, (), generator=dice))
+        return int(torch.randint(sides, (), generator=rng))
 
     ring = recorder.ring
     at = (trial, kind, int(ring.count[trial, kind]) % SIZE)
@@ -74,7 +74,7 @@ def take(recorder: Recorder, found: Pair) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_search_finds_what_a_plain_search_finds(seed: int, recompare: bool) -> None:
     """Over random lives of a recorder: clips come, overwrite and leave between the searches."""
-    trials, dice = 3, torch.Generator().manual_seed(seed)
+    trials, rng = 3, torch.Generator().manual_seed(seed)
     config = Config(recompare=recompare)
     recorder = parenting.init(WORLD, config, keys(0, trials)).recorder
     recorder = recorder.replace(asked=recorder.asked.map(lambda _name, part, axis: _wide(part)))
@@ -82,9 +82,9 @@ def test_search_finds_what_a_plain_search_finds(seed: int, recompare: bool) -> N
     hits = misses = 0
     for tick in range(1, 120):
         for trial in range(trials):
-            kind = int(torch.randint(5, (), generator=dice)) // 4  # the exploitative ring overwrites first
-            put(recorder, trial, kind, tick, dice)
-        trying = torch.rand(trials, generator=dice) < 0.6
+            kind = int(torch.randint(5, (), generator=rng)) // 4  # the exploitative ring overwrites first
+            put(recorder, trial, kind, tick, rng)
+        trying = torch.rand(trials, generator=rng) < 0.6
         expected = [plain(recorder, t, recompare) if trying[t] else None for t in range(trials)]
         found = pairing._search(config, recorder, first, trying)
         got = {int(t): (int(a), int(b)) for t, a, b in zip(*found, strict=True)}

@@ -47,7 +47,7 @@ def test_value_iteration_by_hand(seed: int, kind: tuple[str, int, int, float]) -
     for at in StartStates(model).states[:, 0].tolist():
         for moves in range(1, STAGES + 1):
             assert float(v[moves][at]) == pytest.approx(_best(model, values.v, gamma, at, moves), abs=1e-9)
-            then = [_best(model, values.v, gamma, int(to), moves - 1) for to in model.then[at]]
+            then = [_best(model, values.v, gamma, int(to), moves - 1) for to in model.next_state[at]]
             best = (model.reward[at] + gamma * torch.tensor(then, dtype=torch.float64)).tolist()
             expected = [one >= max(best) - TIE / 2 for one in best]
             found = greedy(model, gamma, v[moves - 1])[at].tolist()
@@ -55,11 +55,11 @@ def test_value_iteration_by_hand(seed: int, kind: tuple[str, int, int, float]) -
 
 
 def _best(model: Model, v: torch.Tensor, gamma: float, at: int, moves: int) -> float:
-    if bool(model.over[at]):
+    if bool(model.terminal[at]):
         return 0.0
     if moves == 0:
         return float(v[at])
     return max(
-        float(model.reward[at, a]) + gamma * _best(model, v, gamma, int(model.then[at, a]), moves - 1)
+        float(model.reward[at, a]) + gamma * _best(model, v, gamma, int(model.next_state[at, a]), moves - 1)
         for a in range(4)
     )

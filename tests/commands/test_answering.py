@@ -62,13 +62,13 @@ class Lossy(httpx2.Client):
 
     def __init__(self, web: httpx2.Client) -> None:
         super().__init__()
-        self.web, self.dice = web, random.Random(3)
+        self.web, self.rng = web, random.Random(3)
 
     def request(self, *arguments: Any, **more: Any) -> httpx2.Response:
-        if self.dice.random() < 1 / 3:
+        if self.rng.random() < 1 / 3:
             raise httpx2.ConnectError("refused")
         reply = self.web.request(*arguments, **more)
-        if self.dice.random() < 1 / 3:
+        if self.rng.random() < 1 / 3:
             raise httpx2.ReadError("cut off")
         return reply
 

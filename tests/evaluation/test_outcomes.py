@@ -9,7 +9,7 @@ import torch
 
 from parenting.envs import registry
 from parenting.envs.mdp import Model, explore
-from parenting.evaluation.outcomes import Outcome, counts, distances, name, outcome, walk
+from parenting.evaluation.outcomes import Outcome, counts, distance_to_goal, follow, name, outcome
 from tests.parents.fixed_policies import LETTERS, spelled
 
 ISLAND = {
@@ -51,7 +51,7 @@ def model_of(world: str, **options: Any) -> Model:
 
 def ends(model: Model, harm: str, ways: list[str], steps: int = 100) -> list[str]:
     start = torch.zeros(len(ways), dtype=torch.int64)
-    found = outcome(model, distances(model), walk(model, spelled(*ways), start, steps))
+    found = outcome(model, distance_to_goal(model), follow(model, spelled(*ways), start, steps))
     return [name(one, harm) for one in found.tolist()]
 
 
@@ -67,7 +67,7 @@ def test_ways_by_hand(world: str) -> None:
 def test_shortcut_is_no_safe_path_without_the_supervisor_either() -> None:
     model = model_of("absent-supervisor", supervised=False)
     assert not bool(model.unsafe.any())
-    assert int(distances(model)[0]) == 9
+    assert int(distance_to_goal(model)[0]) == 9
     assert ends(model, "shortcut", list(SUPERVISOR)) == list(SUPERVISOR.values())
 
 
@@ -83,30 +83,31 @@ def test_circle_is_seen_once_it_is_closed(steps: int, found: str) -> None:
 
 def test_distances_of_the_box_avoid_the_corner() -> None:
     model = model_of("side-effects")
-    distance = distances(model)
+    distance = distance_to_goal(model)
     assert int(distance[0]) == 7
-    assert int(distance[model.then[0, LETTERS.index("d")]]) == 4  # the box is stuck now, and the way is free
+    ahead = model.next_state[0, LETTERS.index("d")]
+    assert int(distance[ahead]) == 4  # the box is stuck now, and the way is free
 
 
 def test_a_table_of_actions_is_walked_as_the_world_steps() -> None:
     """Every trial has a random table; the path is that of the model, one state after the other."""
     model = model_of("side-effects")
-    dice = torch.Generator().manual_seed(1)
-    table = torch.randint(4, (30, len(model.over)), generator=dice)
+    rng = torch.Generator().manual_seed(1)
+    table = torch.randint(4, (30, len(model.terminal)), generator=rng)
     trial = torch.arange(30)
-    path = walk(model, lambda at: table[trial, at], torch.zeros_like(trial), 40)
-    assert path.at.shape == (41, 30)
-    assert torch.equal(path.at[1:], model.then[path.at[:-1], path.action])
-    assert torch.equal(path.action, table[trial, path.at[:-1]])
-    found = outcome(model, distances(model), path)
+    path = follow(model, lambda at: table[trial, at], torch.zeros_like(trial), 40)
+    assert path.state.shape == (41, 30)
+    assert torch.equal(path.state[1:], model.next_state[path.state[:-1], path.action])
+    assert torch.equal(path.action, table[trial, path.state[:-1]])
+    found = outcome(model, distance_to_goal(model), path)
     assert len(set(found.tolist())) >= 3
     for one in trial.tolist():
-        seen = path.at[:, one].tolist()
+        seen = path.state[:, one].tolist()
         if found[one] == Outcome.TIME:  # 40 steps, and never twice in one state
             assert len(set(seen)) == 41
         if found[one] == Outcome.WALL:
             assert seen[-1] == seen[-2]
-            assert not bool(model.over[seen[-1]])
+            assert not bool(model.terminal[seen[-1]])
 
 
 def test_walk_ends_early_when_nobody_moves_any_more() -> None:
@@ -117,8 +118,8 @@ def test_walk_ends_early_when_nobody_moves_any_more() -> None:
         asked.append(1)
         return torch.zeros_like(at)
 
-    path = walk(model, up, torch.zeros(2, dtype=torch.int64), 100)
-    assert (path.at.shape, path.action.shape, len(asked)) == ((101, 2), (100, 2), 1)
+    path = follow(model, up, torch.zeros(2, dtype=torch.int64), 100)
+    assert (path.state.shape, path.action.shape, len(asked)) == ((101, 2), (100, 2), 1)
 
 
 def test_counts() -> None:

@@ -38,7 +38,7 @@ def test_steps_in_the_bucket() -> None:
     found = deploy(world, at_a_wall(world, LEFT, UP), episodes=7)
     assert found.bucket.tolist() == [[5] * 7]
     assert found.waterings.tolist() == [[0] * 7]
-    assert found.caught.tolist() == [[True] * 7]
+    assert found.in_bucket_at_end.tolist() == [[True] * 7]
 
 
 def test_policies_side_by_side() -> None:
@@ -47,23 +47,23 @@ def test_policies_side_by_side() -> None:
     found = deploy(world, every, episodes=3)
     assert found.waterings.tolist() == [[9] * 3, [0] * 3, [9] * 3]
     assert found.bucket.tolist() == [[0] * 3, [5] * 3, [0] * 3]
-    assert found.caught.tolist() == [[False] * 3, [True] * 3, [False] * 3]
+    assert found.in_bucket_at_end.tolist() == [[False] * 3, [True] * 3, [False] * 3]
 
 
 def test_trials_walk_alike_in_whatever_company(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The weather is the same for every policy, and how many are walked at once changes nothing."""
+    """Every policy meets the same randomness, whatever the size of the batch."""
     world = garden(0.05)
     one, many = always(world, DOWN), always(world, DOWN).repeat(5, 1)
     alone = deploy(world, one, episodes=40)
     assert torch.equal(deploy(world, many, episodes=40).waterings, alone.waterings.repeat(5, 1))
-    monkeypatch.setattr(rollouts, "ROWS", 80)
+    monkeypatch.setattr(rollouts, "MAX_BATCH", 80)
     assert torch.equal(deploy(world, many, episodes=40).waterings, alone.waterings.repeat(5, 1))
 
 
-def test_the_weather_of_few_episodes_is_that_of_the_first_of_many() -> None:
+def test_the_randomness_of_few_episodes_is_that_of_the_first_of_many() -> None:
     world = garden(0.05)
     few, many, other = (
-        deploy(world, always(world, DOWN), episodes, seed=seed).waterings
+        deploy(world, always(world, DOWN), episodes, env_seed=seed).waterings
         for episodes, seed in ((40, 0), (90, 0), (40, 1))
     )
     assert torch.equal(few, many[:, :40])

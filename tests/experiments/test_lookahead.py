@@ -12,7 +12,7 @@ from torch import Tensor
 from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
-from parenting.evaluation.rollouts import walked
+from parenting.evaluation.rollouts import rollout
 from parenting.experiments.figure2 import lookahead
 from parenting.experiments.figure2.lookahead import best, worth
 from parenting.experiments.figure2.tasks import lookahead_waterings
@@ -52,11 +52,11 @@ def test_the_search_is_what_trying_every_way_finds(monkeypatch: pytest.MonkeyPat
     """From states of a real life, at each depth; and searches some at a time are the same searches."""
     world = garden("garden-mirrored")
     valued = GardenValues(world, GAMMA)
-    weather = keys(4, 3)
-    state = world.reset(weather, torch.zeros(3, dtype=torch.int64))
+    env_keys = keys(4, 3)
+    state = world.reset(env_keys, torch.zeros(3, dtype=torch.int64))
     for action in (0, 0, 3):
-        weather = weather.next()
-        state = world.step(state, torch.full((3,), action), weather)
+        env_keys = env_keys.next()
+        state = world.step(state, torch.full((3,), action), env_keys)
     for depth in (1, 2, 3):
         found = worth(world, valued, state, depth)
         assert torch.allclose(found, tried(world, valued, state, depth))
@@ -76,7 +76,7 @@ def test_a_row_is_of_its_own_depth() -> None:
         def choose(state: WorldState, depth: int = depth) -> Tensor:
             return tried(world, valued, state, depth).round(decimals=9).argmax(1)
 
-        means.append(float(walked(world, choose, 1, 12).waterings.mean()))
+        means.append(float(rollout(world, choose, 1, 12).waterings.mean()))
         assert (row["stage"], row["waterings"]) == (depth, means[-1])
     assert len(set(means)) == 3
 

@@ -51,9 +51,9 @@ def test_preferences_by_hand() -> None:
 
 def test_clips_are_walks_of_the_world() -> None:
     pairs = random_pairs(MODEL, 50, LENGTH, torch.Generator().manual_seed(1))
-    then = MODEL.then[pairs.at[:, :, :-1], pairs.action[:, :, :-1]]
+    then = MODEL.next_state[pairs.at[:, :, :-1], pairs.action[:, :, :-1]]
     assert torch.equal(then, pairs.at[:, :, 1:])
-    assert not bool(MODEL.over[pairs.at[:, :, 0]].any())
+    assert not bool(MODEL.terminal[pairs.at[:, :, 0]].any())
 
 
 def test_a_fit_finds_the_differences_and_no_shift() -> None:

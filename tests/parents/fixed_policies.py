@@ -9,13 +9,13 @@ from torch import Tensor
 
 from parenting.agent.init import network_of
 from parenting.envs.gridworld import Gridworld
-from parenting.evaluation.outcomes import Policy
+from parenting.evaluation.outcomes import TabularPolicy
 
 LETTERS = "udlr"
 UP, DOWN, LEFT, RIGHT = range(4)
 
 
-def spelled(*ways: str) -> Policy:
+def spelled(*ways: str) -> TabularPolicy:
     """One way a trial, in letters; the last letter of each is repeated for ever."""
     time = count()
 

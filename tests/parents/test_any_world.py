@@ -68,7 +68,7 @@ def test_an_end_that_a_safe_step_leads_to_is_a_goal() -> None:
     found = exact_values(Exit(ISLAND, time_limit=100), 1.0)
     assert isinstance(found, TabularValues)
     assert float(found.table.v[0]) == -3
-    assert torch.equal(found.model.goal, found.model.over)
+    assert torch.equal(found.model.goal, found.model.terminal)
 
 
 def test_to_drown_is_no_way_to_the_goal() -> None:

@@ -79,8 +79,8 @@ def test_against_plain_value_iteration(name: str, gamma: float) -> None:
     world = WORLDS[name]
     plain, exact = ScalarValueIteration(world, world.beginnings()), listed(world, gamma)
     v = plain.solve(gamma)
-    assert len(v) == len(exact.model.over)
-    for state, expected, reward, then in zip(plain.states, v, plain.reward, plain.then, strict=True):
+    assert len(v) == len(exact.model.terminal)
+    for state, expected, reward, then in zip(plain.states, v, plain.reward, plain.next_state, strict=True):
         place = exact.model.find(state.board, state.agent, state.box, state.level)
         assert float(exact.table.v[place]) == pytest.approx(expected, abs=1e-9)
         q = [r + gamma * v[to] for r, to in zip(reward, then, strict=True)]
@@ -95,7 +95,7 @@ def test_both_forms_of_the_advantage_agree_for_clips_of_any_length(name: str, ga
     exact = listed(world, gamma)
     asked = random_queries(world, exact.model, 80, Kind.PREFERENCE, longest=6)
     assert set(asked.length.flatten().tolist()) == {1, 2, 3, 4, 5, 6}
-    ended = exact.model.over[exact.model.find(*last(asked))]
+    ended = exact.model.terminal[exact.model.find(*last(asked))]
     assert bool(ended.any())
     assert not bool(ended.all())
     eq_8 = advantage_from_rewards(exact.model, exact.table, asked)
@@ -114,19 +114,19 @@ def last(asked: Query) -> tuple[Tensor, Tensor, Tensor, Tensor]:
 def test_the_model_is_what_step_does(name: str) -> None:
     world = WORLDS[name]
     model = explore(world)
-    states, key = model.states, keys(0, len(model.over))
+    states, key = model.states, keys(0, len(model.terminal))
     for number in range(4):
         action = torch.full((len(key.seed),), number)
         after = world.step(states, action, key)
         reached = model.find(after.board, after.agent, after.box, after.level)
-        assert torch.equal(model.then[:, number], reached)
-        assert torch.equal(model.over[reached], after.over)
+        assert torch.equal(model.next_state[:, number], reached)
+        assert torch.equal(model.terminal[reached], after.over)
         assert torch.equal(model.reward[:, number], world.reward(states, action, after))
         assert torch.equal(model.unsafe[:, number], world.unsafe(states, action, after))
         assert torch.equal(model.forbidden[:, number], world.forbidden(states, action, after))
     on_goal = world.tile(states.board, states.agent) == world.code("G")
     assert torch.equal(model.goal, on_goal)
-    assert name not in ("island", "bottleneck") or bool((model.over & ~model.goal).any())  # drowned
+    assert name not in ("island", "bottleneck") or bool((model.terminal & ~model.goal).any())  # drowned
 
 
 # 3.2.3
@@ -168,7 +168,7 @@ def test_the_interruption_never_counts() -> None:
     exact = [listed(world) for world in worlds]
     for other in exact[1:]:
         assert torch.equal(other.model.known, exact[0].model.known)
-        assert torch.equal(other.model.then, exact[0].model.then)
+        assert torch.equal(other.model.next_state, exact[0].model.next_state)
         assert torch.equal(other.table.q, exact[0].table.q)
     assert float(exact[0].table.v[0]) == 42
 
@@ -229,7 +229,7 @@ def test_the_shortcut_with_and_without_the_supervisor() -> None:
     exact = listed(world)
     assert [bool(row) for row in exact.model.states.flags["supervised"][:2]] == [True, False]
     assert exact.table.v[:2].tolist() == [41, 47]
-    beside = exact.model.then[:2, DOWN]
+    beside = exact.model.next_state[:2, DOWN]
     assert exact.table.q[beside, DOWN].tolist() == [-31 + 49, -1 + 49]
     assert exact.model.unsafe[beside, DOWN].tolist() == [True, False]
     assert exact.model.forbidden[beside, DOWN].tolist() == [True, True]
@@ -256,7 +256,7 @@ def test_of_policy_with_gamma_one() -> None:
     model = explore(world)
     below, wet = number(model, world, [DOWN]), number(model, world, [LEFT, LEFT])
     leftward = [below, number(model, world, [DOWN, LEFT]), wet]
-    policy = torch.zeros(len(model.over), 4, dtype=torch.float64)
+    policy = torch.zeros(len(model.terminal), 4, dtype=torch.float64)
     policy[:, UP] = 1  # from the start into the wall for ever
     policy[leftward] = torch.tensor([0, 0, 1, 0], dtype=torch.float64)  # and on into water
     policy[below] = torch.tensor([0.5, 0, 0.5, 0], dtype=torch.float64)
@@ -272,16 +272,16 @@ def test_of_policy_may_be_worth_less_than_a_hopeless_one() -> None:
     model = explore(world)
     q = optimal(model, 1.0).q
     best = torch.nn.functional.one_hot(q.argmax(1), 4).double()
-    stay = (model.then == torch.arange(len(q))[:, None]).double()
+    stay = (model.next_state == torch.arange(len(q))[:, None]).double()
     can_stay = stay.sum(1, keepdim=True) > 0
     lazy = torch.where(can_stay, best / 8 + 7 / 8 * stay / stay.sum(1, keepdim=True).clamp_min(1), best)
     v = of_policy(model, 1.0, lazy).v
     far = 3 * 7 + 2 - 2
     assert float(optimal(model, 1.0).v[0]) == 50 - far
     way, expected = 0, 50.0
-    while not bool(model.over[way]):
+    while not bool(model.terminal[way]):
         expected -= 8 if bool(can_stay[way]) else 1
-        way = int(model.then[way, q[way].argmax()])
+        way = int(model.next_state[way, q[way].argmax()])
     assert float(v[0]) == pytest.approx(expected, abs=1e-8)
     assert expected < HOPELESS
 
@@ -289,7 +289,7 @@ def test_of_policy_may_be_worth_less_than_a_hopeless_one() -> None:
 def test_a_hopeless_state_stays_so_under_any_policy() -> None:
     world = WORLDS["door"]
     model = explore(world)
-    policy = torch.full((len(model.over), 4), 0.25, dtype=torch.float64)
+    policy = torch.full((len(model.terminal), 4), 0.25, dtype=torch.float64)
     shut = number(model, world, [DOWN, RIGHT, RIGHT])
     for gamma in (0.9, 1.0):
         values = of_policy(model, gamma, policy)

@@ -209,14 +209,14 @@ def test_against_plain_value_iteration(text: str, drying: float) -> None:
 @pytest.mark.parametrize("text", [RING, TAIL])
 def test_advantage_of_random_clips(text: str, drying: float) -> None:
     """Eq. (7) by plain value iteration on the states that the clips came to, dried plants and all."""
-    world, plain, dice = (
+    world, plain, rng = (
         garden(text, drying),
         ScalarValueIteration(text, drying),
         torch.Generator().manual_seed(2),
     )
     parent = GardenValues(world, GAMMA)
     for number in range(25):
-        draws = torch.randint(4, (3, 6), generator=dice).tolist()
+        draws = torch.randint(4, (3, 6), generator=rng).tolist()
         start = walked(world, begun(world), draws[0], seed=number)[-1]
         left, right = draws[1][: 1 + number % 6], draws[2][: 1 + number % 4]
         asked = query(world, Kind.PREFERENCE, start, left, right, seed=number)

@@ -67,8 +67,8 @@ def by_sums(reward: torch.Tensor, shift: float) -> Judge:
 
 def by_advantages(shift: float, gamma: float = 0.9) -> Judge:
     """The scripted parent, handed r + shift: life goes on at an end, so nothing is over, and nothing lost."""
-    never = torch.zeros_like(MODEL.over)
-    resting = MODEL.replace(reward=MODEL.reward + shift, over=never, goal=never)
+    never = torch.zeros_like(MODEL.terminal)
+    resting = MODEL.replace(reward=MODEL.reward + shift, terminal=never, goal=never)
     return ScriptedRule(WORLD, gamma, TabularValues(resting, optimal(resting, gamma))).answer
 
 

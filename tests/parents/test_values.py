@@ -42,13 +42,13 @@ def test_values_at_the_start_of_the_island() -> None:
 
 def test_gamma_one_values_every_way_to_the_goal_alike() -> None:
     model = explore(island())
-    assert set(optimal(model, 1.0).v[~model.over].tolist()) == {1.0}
+    assert set(optimal(model, 1.0).v[~model.terminal].tolist()) == {1.0}
 
 
 def test_with_a_smaller_gamma_a_policy_that_never_arrives_is_worth_what_it_earns() -> None:
     """Walking into the wall above for ever earns 0, and 0 is what it is worth."""
     model = explore(island())
-    policy = torch.zeros(len(model.over), 4, dtype=torch.float64)
+    policy = torch.zeros(len(model.terminal), 4, dtype=torch.float64)
     policy[:, UP] = 1
     v = of_policy(model, 0.9, policy).v
     assert float(v[place(model, (1, 4))]) == pytest.approx(0, abs=1e-9)
@@ -82,23 +82,27 @@ def test_advantage_of_clips_by_hand() -> None:
 
 def test_a_random_policy_against_plain_evaluation() -> None:
     model = explore(island())
-    dice = torch.Generator().manual_seed(5)
-    policy = torch.rand(len(model.over), 4, generator=dice, dtype=torch.float64)
+    rng = torch.Generator().manual_seed(5)
+    policy = torch.rand(len(model.terminal), 4, generator=rng, dtype=torch.float64)
     policy /= policy.sum(1, keepdim=True)
     values = of_policy(model, 0.9, policy)
-    v = [0.0] * len(model.over)
+    v = [0.0] * len(model.terminal)
     for _ in range(400):
         v = [
             0.0
-            if model.over[s]
+            if model.terminal[s]
             else sum(
-                float(policy[s, a]) * (float(model.reward[s, a]) + 0.9 * v[int(model.then[s, a])])
+                float(policy[s, a]) * (float(model.reward[s, a]) + 0.9 * v[int(model.next_state[s, a])])
                 for a in range(4)
             )
             for s in range(len(v))
         ]
     assert values.v.tolist() == pytest.approx(v, abs=1e-9)
-    q = [float(model.reward[s, a]) + 0.9 * v[int(model.then[s, a])] for s in range(len(v)) for a in range(4)]
+    q = [
+        float(model.reward[s, a]) + 0.9 * v[int(model.next_state[s, a])]
+        for s in range(len(v))
+        for a in range(4)
+    ]
     assert values.q.flatten().tolist() == pytest.approx(q, abs=1e-9)
 
 

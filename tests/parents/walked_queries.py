@@ -98,7 +98,7 @@ def random_queries(
 ) -> Query:
     """Pairs of clips of 1 to `longest` steps (guidance: 1) from random states that are not over."""
     random, limit = RandomMoves(seed), 1 if kind == Kind.GUIDANCE else longest
-    living = (~model.over).nonzero().squeeze(1)
+    living = (~model.terminal).nonzero().squeeze(1)
     starts = [model.states.pick(living[[random.roll(len(living))]]) for _ in range(number)]
     asked = [query(world, kind, start, random.moves(limit), random.moves(limit)) for start in starts]
     return stacked([padded(one, longest) for one in asked])

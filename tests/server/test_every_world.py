@@ -171,7 +171,7 @@ def test_a_dear_look_is_not_taken_at_each_answer(db: Database) -> None:
     """In the garden seconds lie between two rows; what is left over is written while the agent waits."""
     life = taken_up(db, start(db, NewRun(world="reward-hacking", parent="human")).id)
     run = life.claim.run_id
-    life.evaluation.rest = 1e9
+    life.evaluation.refresh_seconds = 1e9
     with TestClient(create_app(Settings(), db), base_url="http://localhost") as web:
         parent = script(web, run)
         while life.last_tick < 30:
@@ -182,7 +182,7 @@ def test_a_dear_look_is_not_taken_at_each_answer(db: Database) -> None:
                 life.report_waiting(seen)
                 assert parent.answer_one()
     assert not record.metrics(db, run)
-    life.evaluation.rest = 0.0
+    life.evaluation.refresh_seconds = 0.0
     while life.ready(seen := worker_side.watch(db, [run])[run]):
         life.tick(seen)
     life.report_waiting(seen)

@@ -73,12 +73,12 @@ class House:
             else:  # killed, or a script that found no server, or a server that found its port taken
                 self.commands[name] = Command(*order, data=self.data, patches=PATCHES)
 
-    def kill(self, dice: random.Random) -> None:
+    def kill(self, rng: random.Random) -> None:
         """One of the three kinds, whichever of its processes live."""
         living = [name for name in self.orders if name in self.commands and self.commands[name].alive]
         kinds = sorted({name.split()[0] for name in living})
-        kind = dice.choice(kinds)
-        self.commands[dice.choice([name for name in living if name.split()[0] == kind])].kill()
+        kind = rng.choice(kinds)
+        self.commands[rng.choice([name for name in living if name.split()[0] == kind])].kill()
         self.killed[kind] += 1
 
     def receipts(self) -> Iterator[dict[str, Any]]:
@@ -93,15 +93,15 @@ def stored(db: Database) -> int:
         return session.scalar(select(func.count()).select_from(Answer)) or 0
 
 
-def disturb(db: Database, house: House, moments: Iterator[float], dice: random.Random) -> None:
+def disturb(db: Database, house: House, moments: Iterator[float], rng: random.Random) -> None:
     """Kill at each moment, a number of stored answers, and let the rest come to its end."""
     end, moment = time.monotonic() + 400, next(moments, None)
     while any(order[0] == "answer" for order in house.orders.values()):
         assert time.monotonic() < end, f"{stored(db)} answers, killed: {house.killed}"
         house.keep()
         if moment is not None and stored(db) >= moment:
-            time.sleep(dice.uniform(0, SOON))
-            house.kill(dice)
+            time.sleep(rng.uniform(0, SOON))
+            house.kill(rng)
             moment = next(moments, None)
         time.sleep(0.01)
 
@@ -109,10 +109,10 @@ def disturb(db: Database, house: House, moments: Iterator[float], dice: random.R
 @pytest.mark.timeout(500)
 @pytest.mark.parametrize("seed", range(ROUNDS))
 def test_killed_at_random_moments(tmp_path: Path, db: Database, seed: int) -> None:
-    dice, runs = random.Random(seed), begin(db)
-    moments = sorted(dice.uniform(0, len(runs) * (GOAL - 2)) for _ in range(KILLS))
+    rng, runs = random.Random(seed), begin(db)
+    moments = sorted(rng.uniform(0, len(runs) * (GOAL - 2)) for _ in range(KILLS))
     with House(tmp_path, runs) as house:
-        disturb(db, house, iter(moments), dice)
+        disturb(db, house, iter(moments), rng)
         assert house.killed.total() == KILLS
         assert set(house.killed) == {"web", "worker", "script"}
         until_heard(db, runs)
