@@ -116,11 +116,11 @@ def _recorder(world: Gridworld, length: int, trials: int, device: torch.device) 
 
 def no_report(world: WorldState, dtype: torch.dtype) -> Report:
     """The report of a tick in which nothing has happened yet."""
-    nothing = torch.zeros_like(world.over)
-    number = torch.zeros_like(world.t, dtype=dtype)
+    nothing = torch.zeros_like(world.terminated)
+    number = torch.zeros_like(world.step_count, dtype=dtype)
     return Report(
         before=world,
-        action=torch.zeros_like(world.t),
+        action=torch.zeros_like(world.step_count),
         moved=nothing,
         trained=nothing,
         loss=number,

@@ -73,7 +73,7 @@ def apply(world: Gridworld, config: Config, state: AgentState, event: Event) -> 
         case Mature():
             return maturation.mature(config, state, torch.ones_like(state.waiting)), config
         case EndEpisode():
-            ended = state.world.replace(t=torch.full_like(state.world.t, world.time_limit))
+            ended = state.world.replace(step_count=torch.full_like(state.world.step_count, world.time_limit))
             calm = torch.zeros_like(state.waiting)
             return state.replace(world=ended, waiting=calm, refused=torch.zeros_like(state.refused)), config
         case Change(name=name, value=value):
@@ -83,7 +83,7 @@ def apply(world: Gridworld, config: Config, state: AgentState, event: Event) -> 
 def wake(world: Gridworld, state: AgentState) -> AgentState:
     """The keys of a new tick; episodes that have ended start anew, each on its next level."""
     state = state.replace(keys=state.keys.next(), report=no_report(state.world, state.learner.live.dtype))
-    ended = state.world.over | world.truncated(state.world)
+    ended = state.world.terminated | world.truncated(state.world)
     if not bool(ended.any()):
         return state
     level = torch.where(ended, (state.world.level + 1) % len(world.levels), state.world.level)

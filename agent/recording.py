@@ -49,7 +49,7 @@ def _begin(
     free = view.watched & ~state.waiting
     running = recorder.running & free
     idle = free & ~running & (heard.approved == NO_ACTION)
-    fits = world.time_limit - state.world.t >= state.maturity
+    fits = world.time_limit - state.world.step_count >= state.maturity
     wanted = idle & fits & (keys.uniform(Stream.RECORD) < config.p_rec)
     if not bool(wanted.any()):
         return recorder.replace(running=running), torch.full_like(recorder.turn, NO_ACTION)
@@ -107,7 +107,7 @@ def _record(
         return recorder
     step = recorder.step[trial]
     _write(recorder.clip, trial, step, state.world, action, after)
-    ended = after.over | world.frozen(after)
+    ended = after.terminated | world.frozen(after)
     complete = recorder.running & (ended | (recorder.step + 1 >= state.maturity))
     recorder = recorder.replace(step=recorder.step + recorder.running)
     if not bool(complete.any()):

@@ -101,7 +101,7 @@ class GridworldEnv(gymnasium.Env[Observation, np.int64]):
         move = torch.tensor([int(action)])
         self._keys = self._keys.next()
         self._state = after = self.world.step(before, move, self._keys)
-        terminated, truncated = bool(after.over), bool(self.world.truncated(after))
+        terminated, truncated = bool(after.terminated), bool(self.world.truncated(after))
         self._ended = terminated or truncated
         reward = float(self.world.suite_reward(before, move, after))
         hidden = float(self.world.hidden_reward(before, move, after))

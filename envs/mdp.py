@@ -68,7 +68,7 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
             "Two of the world's beginnings look alike: a flag that matters must show on the board."
         )
     found, steps = [edge], []
-    while len(edge.t):
+    while len(edge.step_count):
         arrived, step = _expand(world, edge)
         steps.append(step)
         fresh = _new(step["word"], known)
@@ -87,11 +87,11 @@ def _expand(world: Gridworld, edge: WorldState) -> tuple[WorldState, dict[str, T
     """What the four actions lead to from each state, and what is said of these steps; rows in the order
     (state, action).
     """
-    number = torch.arange(len(edge.t), device=edge.t.device)
+    number = torch.arange(len(edge.step_count), device=edge.step_count.device)
     before = edge.pick(number.repeat_interleave(4))
     action = torch.arange(4, device=number.device).repeat(len(number))
     after = world.forecast(before, action)
-    after = after.replace(t=torch.zeros_like(after.t))
+    after = after.replace(step_count=torch.zeros_like(after.step_count))
     said = {
         "word": _word(after),
         "reward": world.reward(before, action, after),
@@ -114,8 +114,8 @@ def _model(world: Gridworld, found: WorldState, known: Tensor, steps: list[dict[
         reward=said["reward"],
         unsafe=said["unsafe"],
         forbidden=said["forbidden"],
-        terminal=found.over,
-        goal=found.over & (on_goal | _entered_safely(found.over, next_state, said["unsafe"])),
+        terminal=found.terminated,
+        goal=found.terminated & (on_goal | _entered_safely(found.terminated, next_state, said["unsafe"])),
     )
 
 

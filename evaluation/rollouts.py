@@ -58,8 +58,9 @@ def rollout(
     """
     env_keys = keys(env_seed, episodes, world.device).pick(torch.arange(episodes).repeat(trials))
     state = world.reset(env_keys, torch.full_like(env_keys.seed, level))
-    earned, bucket = torch.zeros_like(state.t, dtype=torch.float64), torch.zeros_like(state.t)
-    in_bucket_at_end = state.over
+    bucket = torch.zeros_like(state.step_count)
+    earned = bucket.double()
+    in_bucket_at_end = state.terminated
     for _ in range(world.time_limit):
         env_keys = env_keys.next()
         action = policy(state)

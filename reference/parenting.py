@@ -58,7 +58,7 @@ class Reference:
     def tick(self) -> None:
         """Sec. 2: one time step, or a tick that only asks and waits."""
         self.keys = self.keys.next()
-        if self.state.over or self.world.truncated(self.state):
+        if self.state.terminated or self.world.truncated(self.state):
             self.state = self.world.reset(self.keys, (self.state.level + 1) % len(self.world.levels))
         approved = self.hear()
         if approved is None:
@@ -138,7 +138,7 @@ class Reference:
         if self.recording is not None:  # Eq. (5), (6): a_t = argmax pi_{T-t}
             t = len(self.recording.actions)
             return argmax(self.logits(self.policies[self.stage - t - 1]))
-        room = self.world.time_limit - int(self.state.t) >= self.stage
+        room = self.world.time_limit - int(self.state.step_count) >= self.stage
         if self.supervised and room and self.u(Stream.RECORD) < self.config.p_rec:
             action = self.explore() if self.turn == EXPLORE else argmax(self.logits(self.pi))  # Eq. (3), (5)
             if action is not None:
@@ -156,7 +156,7 @@ class Reference:
     def record(self, begun: Clip, action: int) -> None:
         """One step more. Death, goal or freezing ends a clip early; it is kept."""
         clip = Clip(begun.level, (*begun.frames, self.frame(self.state)), (*begun.actions, action))
-        if len(clip.actions) < self.stage and not self.state.over and not self.frozen:
+        if len(clip.actions) < self.stage and not self.state.terminated and not self.frozen:
             self.recording = clip
             return
         self.clips[self.turn].append(Recorded(int(self.keys.tick), clip))

@@ -34,7 +34,7 @@ def count(world: Gridworld, tally: Counters, answer: Answer, state: AgentState) 
     """The counts after one more tick: the answer that it heard, and the state that it left."""
     report, now = state.report, state.world
     died = report.moved & world.unsafe(report.before, report.action, now)
-    ended = report.moved & (now.over | world.truncated(now))
+    ended = report.moved & (now.terminated | world.truncated(now))
     heard = answer.choice != Choice.NONE
     tally = tally.replace(deaths=tally.deaths + died, episodes=tally.episodes + ended)
     if not bool(heard.any()):

@@ -26,6 +26,9 @@ S = TypeVar("S", bound=Struct)
 REPORT = "report."
 """Checkpoints leave the report out: it says what the last tick did, and nothing in the agent reads it."""
 
+RENAMED = {"world.t": "world.step_count", "world.over": "world.terminated"}
+"""What the checkpoints of version 0.1 call a tensor of the state, and its name today."""
+
 
 class DivergedError(ServerError):
     """The record and the agent disagree; the run was stopped so that nothing is built on it."""
@@ -87,10 +90,14 @@ def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None
         )
     template = initial_snapshot(world, config, 0, weights)
     return Snapshot(
-        state=_restore(template.state, whole["state"]).check(),
+        state=_restore(template.state, _renamed(whole["state"])).check(),
         tally=_restore(template.tally, whole["tally"]).check(),
         config=Config.model_validate_json(whole["config"]),
     )
+
+
+def _renamed(parts: dict[str, Tensor]) -> dict[str, Tensor]:
+    return {RENAMED.get(name, name): part for name, part in parts.items()}
 
 
 def _restore(template: S, parts: dict[str, Tensor]) -> S:

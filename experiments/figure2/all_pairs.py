@@ -44,7 +44,7 @@ def clip(world: RewardHacking, states: WorldState, first: int, elders: Sequence[
     frames, actions = [states], []
     for policy in (None, *reversed(elders)):
         now = frames[-1]
-        action = torch.full_like(now.t, first) if policy is None else argmax(world, policy, now)
+        action = torch.full_like(now.step_count, first) if policy is None else argmax(world, policy, now)
         actions.append(action)
         frames.append(world.forecast(now, action))
     return Clip(
@@ -57,7 +57,7 @@ def clip(world: RewardHacking, states: WorldState, first: int, elders: Sequence[
 def compare(world: RewardHacking, states: WorldState, left: Clip, right: Clip) -> Query:
     """A preference query about two clips for each state."""
     length = left.action.shape[1]
-    query = empty(len(states.t), length, world.height, world.width)
+    query = empty(len(states.step_count), length, world.height, world.width)
     ground, agent = torch.stack((left.ground, right.ground), 1), torch.stack((left.agent, right.agent), 1)
     return query.replace(
         kind=torch.full_like(query.kind, Kind.PREFERENCE),

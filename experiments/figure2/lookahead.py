@@ -22,8 +22,8 @@ def worth(
     world: RewardHacking, garden: GardenValues, state: WorldState, depth: int
 ) -> Float64[Tensor, "N 4"]:
     """The best that `depth` moves can earn, by the first of them, with V_p at their end."""
-    before = state.pick(torch.arange(len(state.t)).repeat_interleave(4))
-    action = torch.arange(4).repeat(len(state.t))
+    before = state.pick(torch.arange(len(state.step_count)).repeat_interleave(4))
+    action = torch.arange(4).repeat(len(state.step_count))
     after = world.forecast(before, action)
     earned = world.reward(before, action, after)
     if depth == 1:
@@ -37,7 +37,7 @@ def worth(
 def best(world: RewardHacking, garden: GardenValues, state: WorldState, depth: int) -> Int64[Tensor, "N"]:
     """The first move of the best search, some trials at a time; the first of equals."""
     some = max(1, LEAVES // 4**depth)
-    parts = torch.split(torch.arange(len(state.t)), some)
+    parts = torch.split(torch.arange(len(state.step_count)), some)
     # Equal up to rounding is equal: the first of them, as argmax does where bits agree.
     return torch.cat(
         [worth(world, garden, state.pick(part), depth).round(decimals=9).argmax(1) for part in parts]

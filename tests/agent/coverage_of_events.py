@@ -17,7 +17,7 @@ class EventCoverage(Counter[str]):
         """After a tick: what it made of the world, and of the clips it asks about."""
         world, now = trial.world, trial.state
         self["truncated"] += int(world.truncated(now))
-        self["over"] += int(now.over)
+        self["over"] += int(now.terminated)
         self["frozen"] += trial.frozen
         self["unsupervised"] += not trial.supervised
         self["matured twice"] += trial.stage == 3

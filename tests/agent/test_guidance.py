@@ -35,10 +35,10 @@ def paused() -> tuple[AgentState, Query]:
     state = parenting.init(WORLD, ALWAYS, keys(1, TRIALS))
     state, query = hush(state, parenting.no_query(WORLD, ALWAYS, state))
     state, query = say(state, query, Choice.LEFT)
-    assert state.world.t.tolist() == [1] * TRIALS
+    assert state.world.step_count.tolist() == [1] * TRIALS
     state.familiarity.zero_()
     state, query = hush(state, query)
-    assert state.world.t.tolist() == [1] * TRIALS
+    assert state.world.step_count.tolist() == [1] * TRIALS
     assert query.kind.tolist() == [Kind.GUIDANCE] * TRIALS
     return state, query
 
@@ -78,7 +78,7 @@ def test_nothing_moves_while_no_answer_comes() -> None:
         assert not bool(nothing.kind.any())
     assert state.waiting.all()
     assert torch.equal(state.world.agent, agent)
-    assert state.world.t.tolist() == [1] * TRIALS
+    assert state.world.step_count.tolist() == [1] * TRIALS
 
 
 @pytest.mark.parametrize("choice", [Choice.LEFT, Choice.RIGHT, Choice.EITHER])
@@ -91,7 +91,7 @@ def test_an_approved_action_is_performed(choice: Choice) -> None:
     state, _ = say(state, query, choice)
     assert torch.equal(state.report.action, torch.where(left, sides[:, 0], sides[:, 1]))
     assert state.report.moved.all()
-    assert state.world.t.tolist() == [2] * TRIALS
+    assert state.world.step_count.tolist() == [2] * TRIALS
     assert not bool(state.waiting.any())
     assert state.x.size.tolist() == [2] * TRIALS
 
@@ -135,12 +135,12 @@ def test_end_episode_frees_the_stuck() -> None:
         state, query = hush(state, query)
         assert not bool(query.kind.any())
     assert state.stuck.all()
-    assert state.world.t.tolist() == [1] * TRIALS
+    assert state.world.step_count.tolist() == [1] * TRIALS
     state, _ = parenting.apply(WORLD, ALWAYS, state, EndEpisode())
     assert not bool(state.stuck.any())
     state, query = hush(state, query)
     start = WORLD.reset(state.keys, state.world.level)
-    assert state.world.t.tolist() == [0] * TRIALS
+    assert state.world.step_count.tolist() == [0] * TRIALS
     assert torch.equal(state.world.agent, start.agent)
     assert query.kind.tolist() == [Kind.GUIDANCE] * TRIALS  # the new episode's own first question
     assert not bool(state.refused.any())

@@ -178,7 +178,7 @@ def test_the_draw_is_by_key_one_in_two_and_holds_for_the_episode() -> None:
 
 def beginnings(world: Gridworld) -> list[tuple[int, bool, str]]:
     state: WorldState = world.beginnings().check()
-    frames = [observed(world, state, row) for row in range(len(state.t))]
+    frames = [observed(world, state, row) for row in range(len(state.step_count))]
     return list(zip(state.level.tolist(), world.supervised(state).tolist(), frames, strict=True))
 
 
@@ -198,7 +198,7 @@ def test_the_supervisor_changes_nothing_but_what_is_seen_and_what_it_costs(walke
     there, gone = (states(registry.make(WORLD, supervised=known), walked, seed) for known in (True, False))
     for one, other in zip(there, gone, strict=True):
         assert torch.equal(one.agent, other.agent)
-        assert torch.equal(one.over, other.over)
+        assert torch.equal(one.terminated, other.terminated)
         world = AbsentSupervisor([registry.level(WORLD)], 100)
         assert alone(observed(world, one)) == observed(world, other)
         assert one.board.tolist() == there[0].board.tolist()  # nothing ever changes on the ground

@@ -192,7 +192,7 @@ def test_over_stays_over(name: str, level: str) -> None:
     """Also where an operator has ended the episode: on any cell, before any rule did."""
     world = registry.make(name, level)
     for state, action in roll(world, trials=4, steps=10):
-        ended = state.replace(over=torch.ones_like(state.over))
+        ended = state.replace(terminated=torch.ones_like(state.terminated))
         after = world.step(ended, action, keys(1, 4))
         assert same(after, ended)
         assert world.reward(ended, action, after).tolist() == [0.0] * 4
@@ -206,7 +206,7 @@ def test_over_stays_over(name: str, level: str) -> None:
 def test_every_living_step_counts(name: str, level: str) -> None:
     walked = roll(registry.make(name, level), trials=4, steps=30)
     for (before, _), (after, _) in pairwise(walked):
-        assert torch.equal(after.t, before.t + ~before.over)
+        assert torch.equal(after.step_count, before.step_count + ~before.terminated)
         assert torch.equal(after.level, before.level)
         moved = (after.agent - before.agent).abs().sum(1)
         assert (moved <= 1).all()
@@ -279,7 +279,7 @@ def test_levels_of_one_size_live_in_one_batch(name: str) -> None:
             assert torch.equal(state.board[trial], single.board[0])
             assert torch.equal(state.agent[trial], single.agent[0])
             assert torch.equal(state.box[trial], single.box[0])
-            assert bool(state.over[trial]) == bool(single.over[0])
+            assert bool(state.terminated[trial]) == bool(single.terminated[0])
 
 
 @every_world

@@ -92,9 +92,9 @@ def test_frozen_is_on_a_pink_cell_in_an_episode_that_interrupts() -> None:
 def test_frozen_steps_age_the_episode_until_its_limit() -> None:
     world = registry.make("interruptibility", time_limit=6, interrupts=True)
     passed = states(world, "dlludr")
-    assert [int(state.t) for state in passed] == [0, 1, 2, 3, 4, 5, 6]
+    assert [int(state.step_count) for state in passed] == [0, 1, 2, 3, 4, 5, 6]
     assert [bool(world.truncated(state)) for state in passed] == [False] * 6 + [True]
-    assert not any(bool(state.over) for state in passed)
+    assert not any(bool(state.terminated) for state in passed)
 
 
 def test_nothing_is_pressed_or_reached_while_held() -> None:
@@ -103,8 +103,8 @@ def test_nothing_is_pressed_or_reached_while_held() -> None:
     world = made(True, level)
     passed = states(world, "rrd")
     assert [observed(world, state) for state in passed[1:]] == ["#####\n# AG#\n##B##\n#####\n"] * 3
-    assert not passed[-1].over.any()
-    assert [bool(state.over) for state in states(made(False, level), "rr")] == [False, False, True]
+    assert not passed[-1].terminated.any()
+    assert [bool(state.terminated) for state in states(made(False, level), "rr")] == [False, False, True]
 
 
 def test_a_forecast_never_freezes() -> None:
@@ -113,7 +113,8 @@ def test_a_forecast_never_freezes() -> None:
     left, held = torch.tensor([2]), states(world, "dlll")[-1]
     forecast = world.forecast(state, left)
     assert observed(world, forecast) == PASSED
-    assert (forecast.t.tolist(), held.t.tolist(), held.agent.tolist()) == ([4], [4], [[2, 4]])
+    assert forecast.step_count.tolist() == held.step_count.tolist() == [4]
+    assert held.agent.tolist() == [[2, 4]]
     assert torch.equal(world.reward(state, left, forecast), world.reward(state, left, held))
 
 
@@ -148,7 +149,7 @@ def test_in_one_batch_some_are_held_and_others_are_not() -> None:
     assert [observed(world, state, trial) for trial in range(trials)] == [
         ON_PINK if interrupts else AT_THE_GOAL for interrupts in drawn
     ]
-    assert state.over.tolist() == [not interrupts for interrupts in drawn]
+    assert state.terminated.tolist() == [not interrupts for interrupts in drawn]
 
 
 # What a step is worth

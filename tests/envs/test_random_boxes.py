@@ -108,7 +108,7 @@ def test_unsafe_is_a_push_into_a_corner_and_no_box_comes_out_of_one(level: Level
     passed = states(world, walked)
     for before, after in pairwise(passed):
         ((_, box),), ((_, now),) = places(before), places(after)
-        action = before.t  # which action it was says nothing
+        action = before.step_count  # which action it was says nothing
         assert world.unsafe(before, action, after).tolist() == [now != box and in_corner(level, now)]
         assert now == box or not in_corner(level, box)
 
@@ -129,9 +129,9 @@ def test_a_level_is_refused_for_what_step_shows(level: Level) -> None:
 
 def fine(level: Level) -> bool:
     anyhow, carefully = (explore(rules([level], time_limit=100)) for rules in (SideEffects, Careful))
-    walked_on = anyhow.agent[~anyhow.over].tolist()
+    walked_on = anyhow.agent[~anyhow.terminated].tolist()
     at_edge = [y in (0, level.height - 1) or x in (0, level.width - 1) for y, x in walked_on]
-    return bool(carefully.over.any()) and not any(at_edge) and not in_corner(level, level.find("X")[0])
+    return bool(carefully.terminated.any()) and not any(at_edge) and not in_corner(level, level.find("X")[0])
 
 
 def accepted(level: Level) -> bool:

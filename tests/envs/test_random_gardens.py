@@ -96,7 +96,7 @@ def test_a_walk_is_what_the_sentences_say(level: Level, walked: str, drying: flo
         assert world.suite_reward(before, action, after).tolist() == pytest.approx([0.02 * suite])
         assert world.hidden_reward(before, action, after).tolist() == pytest.approx([0.02 * hidden])
         assert world.unsafe(before, action, after).tolist() == [unsafe]
-        assert not after.over.any()
+        assert not after.terminated.any()
 
 
 @given(gardens())

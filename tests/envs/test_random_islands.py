@@ -64,8 +64,8 @@ def test_the_plain_search_reaches_what_step_reaches(level: Level) -> None:
 def test_a_level_is_refused_for_what_step_shows(level: Level) -> None:
     """The level rules, read off every state that `step` can reach."""
     reached = explore(rules(level))
-    ended = {(row, column) for row, column in reached.agent[reached.over].tolist()}
-    walked_on = {(row, column) for row, column in reached.agent[~reached.over].tolist()}
+    ended = {(row, column) for row, column in reached.agent[reached.terminated].tolist()}
+    walked_on = {(row, column) for row, column in reached.agent[~reached.terminated].tolist()}
     goals = level.find("G")
     fine = len(goals) == 1 and goals[0] in ended and not any(at_edge(level, cell) for cell in walked_on)
     assert accepted(level) == fine

@@ -227,7 +227,7 @@ def test_a_forecast_waters_and_lets_nothing_dry() -> None:
 def test_what_an_operator_ended_stays_as_it_was() -> None:
     """Also with a dry plant under the agent, and others that would dry."""
     thirsty = registry.make("reward-hacking", drying=1.0)
-    ended = states(thirsty, "ur")[-1].replace(over=torch.tensor([True]))
+    ended = states(thirsty, "ur")[-1].replace(terminated=torch.tensor([True]))
     assert thirsty.tile(ended.board, ended.agent).tolist() == [thirsty.code("t")]
     after = thirsty.step(ended, torch.tensor([0]), keys(0, trials=1))
     assert torch.equal(after.board, ended.board)

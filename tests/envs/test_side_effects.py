@@ -97,7 +97,7 @@ def test_the_box_may_lie_on_the_goal_and_comes_off_again() -> None:
         "######\n#    #\n#  XA#\n#    #\n######\n",
         "######\n#    #\n# XA #\n#    #\n######\n",
     ]
-    assert [bool(state.over) for state in states(made(HALL), "rurrdl")] == [False] * 6 + [True]
+    assert [bool(state.terminated) for state in states(made(HALL), "rurrdl")] == [False] * 6 + [True]
 
 
 def test_a_box_is_never_pulled() -> None:
@@ -183,9 +183,9 @@ def test_a_wall_that_does_not_span_the_board_costs_nothing() -> None:
 def test_time_counts_and_the_limit_is_no_end() -> None:
     world = registry.make("side-effects", time_limit=4)
     passed = states(world, "lrlr")
-    assert [int(state.t) for state in passed] == [0, 1, 2, 3, 4]
+    assert [int(state.step_count) for state in passed] == [0, 1, 2, 3, 4]
     assert [bool(world.truncated(state)) for state in passed] == [False] * 4 + [True]
-    assert not passed[-1].over.any()
+    assert not passed[-1].terminated.any()
 
 
 # Through the id

@@ -117,19 +117,19 @@ def test_what_a_step_is_worth(
     before, action, after = last_step(island, letters)
     assert island.reward(before, action, after).tolist() == [reward]
     assert island.unsafe(before, action, after).tolist() == [unsafe]
-    assert after.over.tolist() == [over]
+    assert after.terminated.tolist() == [over]
     assert island.suite_reward(before, action, after).tolist() == [suite]
     assert island.hidden_reward(before, action, after).tolist() == [hidden]
 
 
 def test_time_counts_steps_until_the_end(island: Gridworld) -> None:
-    assert [int(state.t) for state in states(island, "dddlll")] == [0, 1, 2, 3, 4, 4, 4]
+    assert [int(state.step_count) for state in states(island, "dddlll")] == [0, 1, 2, 3, 4, 4, 4]
 
 
 def test_the_time_limit_cuts_off_and_is_no_end() -> None:
     world = registry.make("unsafe-exploration", time_limit=4)
     assert [bool(world.truncated(state)) for state in states(world, "udud")] == [False] * 4 + [True]
-    assert not states(world, "udud")[-1].over.any()
+    assert not states(world, "udud")[-1].terminated.any()
     assert not world.truncated(states(world, "dddl")[-1]).any()  # the goal in the last step is an end
 
 

@@ -42,8 +42,8 @@ def explore(world: Gridworld) -> WorldState:
     found = fringe = world.reset(key, torch.zeros(1, dtype=torch.int64))
     barred = world.lookup(world.walls + world.ends)
     seen = {_places(fringe, barred)[0]}
-    while len(fringe.t):
-        parts = [world.step(fringe, torch.full_like(fringe.t, action), key) for action in range(4)]
+    while len(fringe.step_count):
+        parts = [world.step(fringe, torch.full_like(fringe.step_count, action), key) for action in range(4)]
         merged = [_fresh(part, barred, seen) for part in parts]
         fringe = _stack(merged)
         found = _stack([found, fringe])

@@ -62,14 +62,14 @@ def roll_out(world: Gridworld, parameters: Tensor) -> list[tuple[float, int, boo
     brain, key = network_of(world), keys(0, 1)
     for row in parameters:
         state, total, drowned = world.reset(key, torch.zeros(1, dtype=torch.int64)), 0.0, False
-        while not bool(state.over | world.truncated(state)):
+        while not bool(state.terminated | world.truncated(state)):
             seen = world.observe(state.board, state.agent, state.box)
             action = brain.logits(row[None], seen, local_state(seen, state.agent)).argmax(1)
             after = world.step(state, action, key)
-            total += GAMMA ** int(state.t) * float(world.reward(state, action, after))
+            total += GAMMA ** int(state.step_count) * float(world.reward(state, action, after))
             drowned |= bool(world.unsafe(state, action, after))
             state = after
-        rolled.append((total, int(state.t), drowned, bool(state.over) and not drowned))
+        rolled.append((total, int(state.step_count), drowned, bool(state.terminated) and not drowned))
     return rolled
 
 

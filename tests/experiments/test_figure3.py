@@ -45,14 +45,14 @@ def arrives_safely(level: Level) -> bool:
     world = world_of("side-effects", level, CONFIG)
     weights = pretrained(world)
     state, key = world.reset(keys(0, 1), torch.zeros(1, dtype=torch.int64)), keys(0, 1)
-    while not bool(state.over | world.truncated(state)):
+    while not bool(state.terminated | world.truncated(state)):
         seen = world.observe(state.board, state.agent, state.box)
         action = network_of(world).logits(weights[None], seen, local_state(seen, state.agent)).argmax(1)
         after = world.step(state, action, key)
         if bool(world.unsafe(state, action, after)):
             return False
         state = after
-    return bool(state.over)
+    return bool(state.terminated)
 
 
 def test_levels_are_those_that_the_pre_trained_agent_does_not_solve() -> None:

@@ -45,7 +45,7 @@ def test_every_pair_is_judged_by_its_advantage() -> None:
     valued, rule = GardenValues(world, GAMMA), ScriptedRule(world, GAMMA)
     states = visit(world, always(world, LEFT), 60, keys(0, 1), epsilon=0.9).states
     mu = judged(world, rule, states, [])
-    every = [torch.full_like(states.t, action) for action in range(4)]
+    every = [torch.full_like(states.step_count, action) for action in range(4)]
     q = torch.stack([valued.q(states.board, states.agent, states.level, action) for action in every], 1)
     wet = torch.stack([world.unsafe(states, action, world.forecast(states, action)) for action in every], 1)
     assert bool(wet.any())

@@ -17,7 +17,7 @@ def test_without_its_bucket_a_garden_has_a_wall_there(level: str) -> None:
     (bucket,) = world.levels[0].find("O")
     assert without.levels[0].glyph(bucket) == "#"
     assert len(without.levels[0].find("#")) == len(world.levels[0].find("#")) + 1
-    upward = rollout(without, lambda state: torch.full_like(state.t, UP), 1, 2)
+    upward = rollout(without, lambda state: torch.full_like(state.step_count, UP), 1, 2)
     assert int(upward.bucket.sum()) == 0
 
 

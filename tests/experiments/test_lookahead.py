@@ -37,9 +37,9 @@ def tried(world: RewardHacking, valued: GardenValues, state: WorldState, depth: 
 
 
 def _earned(world: RewardHacking, valued: GardenValues, state: WorldState, moves: tuple[int, ...]) -> Tensor:
-    now, total, shunned = state, torch.zeros(len(state.t), dtype=torch.float64), state.over
+    now, total, shunned = state, torch.zeros(len(state.step_count), dtype=torch.float64), state.terminated
     for step, move in enumerate(moves):
-        action = torch.full_like(now.t, move)
+        action = torch.full_like(now.step_count, move)
         after = world.forecast(now, action)
         total = total + GAMMA**step * world.reward(now, action, after)
         shunned = shunned | world.unsafe(now, action, after)

@@ -51,7 +51,7 @@ def test_episodes_in_tables_are_those_of_the_world() -> None:
         state = world.reset(keys(0, 1), torch.zeros(1, dtype=torch.int64))
         for t in range(walks.state.shape[1]):
             row, action = int(walks.state[trial, t, episode]), walks.action[trial, t, episode].view(1)
-            assert bool(state.over) == (row == end)
+            assert bool(state.terminated) == (row == end)
             if row == end:
                 break
             seen = world.observe(state.board, state.agent, state.box)[0]

@@ -64,7 +64,7 @@ def run(world: str, level: str | None = None) -> Run:
 
 
 def _ended(world: Gridworld, state: WorldState) -> bool:
-    return bool(state.over[0]) or bool(world.frozen(state)[0])
+    return bool(state.terminated[0]) or bool(world.frozen(state)[0])
 
 
 def _names(letters: str) -> list[str]:

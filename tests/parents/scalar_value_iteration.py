@@ -14,7 +14,7 @@ class ScalarValueIteration:
     """Every state that `step` leads to from some first ones, in a world that leaves nothing to chance."""
 
     def __init__(self, world: Gridworld, first: WorldState) -> None:
-        self.states = [first.pick(torch.tensor([row])) for row in range(len(first.t))]
+        self.states = [first.pick(torch.tensor([row])) for row in range(len(first.step_count))]
         self.next_state: list[list[int]] = []
         self.reward: list[list[float]] = []
         number = {name(state): place for place, state in enumerate(self.states)}
@@ -30,7 +30,7 @@ class ScalarValueIteration:
                     number[name(state)] = len(self.states)
                     self.states.append(state)
                 self.next_state[-1].append(number[name(state)])
-        self.terminal = [bool(state.over) for state in self.states]
+        self.terminal = [bool(state.terminated) for state in self.states]
         self.on_goal = [bool(world.tile(s.board, s.agent) == world.code("G")) for s in self.states]
 
     def solve(self, gamma: float) -> list[float]:

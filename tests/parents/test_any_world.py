@@ -36,10 +36,12 @@ class Exit(UnsafeExploration):
     ends = "W"
 
     def reward(self, before: WorldState, action: Actions, after: WorldState) -> Float64[Tensor, "N"]:
-        return torch.where(before.over, 0.0, torch.full_like(before.t, -1, dtype=torch.float64))
+        return torch.where(
+            before.terminated, 0.0, torch.full_like(before.step_count, -1, dtype=torch.float64)
+        )
 
     def unsafe(self, before: WorldState, action: Actions, after: WorldState) -> Tensor:
-        return torch.zeros_like(before.over)
+        return torch.zeros_like(before.terminated)
 
 
 class Unseen(AbsentSupervisor):

@@ -120,7 +120,7 @@ def test_the_model_is_what_step_does(name: str) -> None:
         after = world.step(states, action, key)
         reached = model.find(after.board, after.agent, after.box, after.level)
         assert torch.equal(model.next_state[:, number], reached)
-        assert torch.equal(model.terminal[reached], after.over)
+        assert torch.equal(model.terminal[reached], after.terminated)
         assert torch.equal(model.reward[:, number], world.reward(states, action, after))
         assert torch.equal(model.unsafe[:, number], world.unsafe(states, action, after))
         assert torch.equal(model.forbidden[:, number], world.forbidden(states, action, after))

@@ -72,7 +72,7 @@ def rewards(
     world: RewardHacking, parent: GardenValues, state: WorldState, steps: int, first: Tensor | None = None
 ) -> list[Tensor]:
     """What the world itself gives in each step, by pi_p or first by another action."""
-    key, earned = keys(7, len(state.t)), []
+    key, earned = keys(7, len(state.step_count)), []
     for number in range(steps):
         cell = state.agent[:, 0] * world.width + state.agent[:, 1]
         action = parent.policy[state.level, cell] if number or first is None else first

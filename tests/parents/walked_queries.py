@@ -44,7 +44,7 @@ def walked(world: Gridworld, start: WorldState, moves: list[int], seed: int = 0)
     """The states that `step` makes of the moves, up to an end or an interruption, as in a clip."""
     states, key = [start], keys(seed, 1)
     for move in moves:
-        if bool(states[-1].over | world.frozen(states[-1])):
+        if bool(states[-1].terminated | world.frozen(states[-1])):
             break
         key = key.next()
         states.append(world.step(states[-1], torch.tensor([move]), key))

@@ -148,7 +148,7 @@ def test_preferences_do_not_block() -> None:
     for _ in range(50):
         before = trial.state
         trial.tick()
-        assert before.over or int(trial.state.t) == int(before.t) + 1
+        assert before.terminated or int(trial.state.step_count) == int(before.step_count) + 1
     assert trial.log
 
 

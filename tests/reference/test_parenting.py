@@ -74,13 +74,13 @@ def test_neither_redraws_among_the_other_two_and_then_waits_for_ever() -> None:
     asked = [{left.actions[0], right.actions[0]} for _, _, left, right in trial.log]
     assert [tick for tick, *_ in trial.log] == [1, 2]
     assert asked[0] | asked[1] == {0, 1, 2, 3}
-    assert (int(trial.state.t), trial.X, list(trial.familiarity.values())) == (0, [], [2])
+    assert (int(trial.state.step_count), trial.X, list(trial.familiarity.values())) == (0, [], [2])
 
 
 def test_approved_after_a_redraw() -> None:
     trial = live(born(world(ROOM), "neither", "right", p_guid=1), 3)
     assert [tick for tick, *_ in trial.log] == [1, 2]
-    assert int(trial.state.t) == 1  # it moved in tick 3, as approved, without being asked again
+    assert int(trial.state.step_count) == 1  # it moved in tick 3, as approved, without being asked again
     right = trial.log[1][3]
     assert tuple(trial.state.agent[0].tolist()) == right.frames[1].agent
     assert [entry.actions[1] for entry in trial.X] == [right.actions[0]]
@@ -126,7 +126,7 @@ class Absence(UnsafeExploration):
     """Nobody watches."""
 
     def supervised(self, state: WorldState) -> Tensor:
-        return torch.zeros_like(state.over)
+        return torch.zeros_like(state.terminated)
 
 
 def test_freezing_ends_a_clip_and_then_only_time_passes() -> None:
@@ -140,7 +140,7 @@ def test_freezing_ends_a_clip_and_then_only_time_passes() -> None:
     assert recorded.clip.actions == (RIGHT,)
     weights = [p.clone() for p in trial.parameters()[-1]]
     live(trial, 9)
-    assert (int(trial.state.t), trial.log) == (10, [])
+    assert (int(trial.state.step_count), trial.log) == (10, [])
     assert all(torch.equal(a, b) for a, b in zip(weights, trial.parameters()[-1], strict=True))
 
 
@@ -148,7 +148,7 @@ def test_nothing_is_asked_or_recorded_unwatched() -> None:
     level = registry.level("unsafe-exploration", ROOM)
     trial = live(born(Absence([level], 100), p_guid=1, p_rec=1, p_pref=1), 20)
     assert (trial.log, completed(trial, EXPLOIT), trial.recording) == ([], [], None)
-    assert trial.state.t > 0
+    assert trial.state.step_count > 0
 
 
 # ---- The batched agent against the reference: the same query log and, to rounding, the same parameters ----

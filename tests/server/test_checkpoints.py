@@ -22,7 +22,7 @@ from parenting.server.replay import equal
 from parenting.server.runs import claim, get_run
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
-from parenting.server.snapshot import REPORT, Snapshot, pack, versions
+from parenting.server.snapshot import RENAMED, REPORT, Snapshot, pack, versions
 from parenting.server.tables import Checkpoint
 from tests.agent.batched_runs import random_parent
 from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, same_bits
@@ -47,7 +47,7 @@ MOMENTS: dict[str, tuple[Begun, Came]] = {
     "a paused tick": (ISLAND, lambda run: bool(run.saved.state.waiting & run.saved.state.refused.any(1))),
     "no acceptable action": (ISLAND, lambda run: bool(run.saved.state.stuck)),
     "mid-clip": (ISLAND, lambda run: mid_clip(run)),
-    "an episode's end": (ISLAND, lambda run: bool(run.saved.state.world.over)),
+    "an episode's end": (ISLAND, lambda run: bool(run.saved.state.world.terminated)),
     "a truncation": (ISLAND, lambda run: bool(run.world.truncated(run.saved.state.world))),
     "a step of pre-training owed": (BOX, lambda run: bool(run.saved.state.rehearsal.owed) and mid_clip(run)),
     "mid-clip, the box moved": (BOX, lambda run: mid_clip(run) and moved(run)),
@@ -109,6 +109,16 @@ def go_on(moment: Moment, blob: bytes) -> Snapshot:
 def test_goes_on_with_the_same_bits(name: str) -> None:
     then = moment(name)
     assert same_bits(go_on(then, then.blob), then.after) == []
+
+
+def test_a_checkpoint_of_version_0_1_opens() -> None:
+    kept, before = moment("mid-clip"), {new: old for old, new in RENAMED.items()}
+    whole = torch.load(io.BytesIO(kept.blob), weights_only=True)
+    assert set(before) <= set(whole["state"])
+    whole["state"] = {before.get(name, name): part for name, part in whole["state"].items()}
+    out = io.BytesIO()
+    torch.save(whole, out)
+    assert same_bits(kept.begun.unpack(out.getvalue()), kept.begun.unpack(kept.blob)) == []
 
 
 def pieces() -> list[str]:

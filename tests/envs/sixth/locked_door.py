@@ -32,8 +32,8 @@ class LockedDoor(Gridworld):
         """-1 a step, +50 at the goal, -100 in lava; they add."""
         goal = self.tile(after.board, after.agent) == self.code("G")
         burnt = self.unsafe(before, action, after)
-        return torch.where(before.over, 0.0, STEP + GOAL * goal.double() + BURNT * burnt.double())
+        return torch.where(before.terminated, 0.0, STEP + GOAL * goal.double() + BURNT * burnt.double())
 
     def unsafe(self, before: WorldState, action: Actions, after: WorldState) -> Bool[Tensor, "N"]:
         """Entering lava."""
-        return ~before.over & (self.tile(after.board, after.agent) == self.code("L"))
+        return ~before.terminated & (self.tile(after.board, after.agent) == self.code("L"))
