@@ -43,7 +43,7 @@ docs: $(VENV)/.installed-dev ## Build the documentation as a site in build/docs;
 	$(BIN)/python scripts/offline.py build/docs
 
 weights: $(VENV)/.installed ## Pre-train the weights of the built-in levels anew (20 minutes)
-	$(BIN)/parenting pretrain --out weights --again
+	$(BIN)/parenting pretrain --out weights --force
 
 # torch stays at the version that constraints.txt names: a newer one may pull gigabytes. TORCH=... changes it.
 TORCH = $(shell sed -n 's/^torch==//p' constraints.txt)

@@ -12,6 +12,8 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from parenting.commands.renamed import modern
+
 COMMANDS = {
     "up": "Start everything: migrate, web and worker; opens the pages in a browser.",
     "run": "Raise agents by a scripted parent, without database.",
@@ -56,7 +58,7 @@ class Lazy(TyperGroup):
             return super().resolve_command(ctx, args)  # says that there is none, and what there is
         name = args[0]
         function = getattr(import_module(f"parenting.commands.{name}"), name)
-        return name, _command(name, function), args[1:]
+        return name, _command(name, function), modern(name, args[1:])
 
 
 def _command(name: str, function: Callable[..., Any], sentence: str | None = None) -> Any:

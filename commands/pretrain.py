@@ -40,7 +40,7 @@ def pretrain(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the files.", show_default="weights in the data folder")
     ] = None,
-    again: Annotated[bool, typer.Option("--again", help="Make weights that are there already anew.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Make weights again that exist already.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
     ] = False,
@@ -55,7 +55,7 @@ def pretrain(
     known = (folder,) if out else (folder, store.SHIPPED)
     results = [
         _there(each, known, quiet=as_json)
-        if not again and _files(each, known)
+        if not force and _files(each, known)
         else _one(each, folder, seed, max_steps, quiet=as_json)
         for each in wanted
     ]
@@ -72,7 +72,7 @@ def _there(wanted: Wanted, folders: tuple[Path, ...], *, quiet: bool) -> dict[st
     """The file that a run would take; nothing is made."""
     path = _files(wanted, folders)[0]
     if not quiet:
-        typer.echo(f"{path} is there already; --again makes it anew.")
+        typer.echo(f"{path} is there already; --force makes it again.")
     return {"path": str(path), "sha256": store.digest(path.read_bytes())}
 
 

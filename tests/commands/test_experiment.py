@@ -46,7 +46,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("--workers", "0", "from 1 to 1000"),
         ("--scale", "huge", "quick, paper"),
         ("--device", "tpu", "cpu, cuda"),
-        ("--out", "", "Write its path"),
+        ("--out", "", "for the current folder"),
     ],
 )
 def test_a_wrong_value_is_said_with_what_would_do(
@@ -66,7 +66,7 @@ def test_a_file_is_no_folder_for_results(name: str, tmp_path: Path) -> None:
     file.touch()
     for out in (file, file / "below"):
         said = wrong(name, "--out", str(out))
-        assert f"'{out}' is no folder: {file} is a file. Name another one." in said
+        assert f"'{out}' is not a folder: {file} is a file. Name another one." in said
         assert "--cluster" not in said
 
 

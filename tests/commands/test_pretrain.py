@@ -61,7 +61,7 @@ def test_weights_that_are_there_stay(made: tuple[Path, dict[str, Any]]) -> None:
     folder, found = made
     result = pretrain(*SMALL, "--out", str(folder))
     assert result.exit_code == 0
-    assert "is there already; --again makes it anew" in result.stdout
+    assert "is there already; --force makes it again" in result.stdout
     assert digest((folder / f"{NAME}.safetensors").read_bytes()) == found["sha256"]
 
 
@@ -117,12 +117,12 @@ def test_a_real_ctrl_c_loses_nothing(made: tuple[Path, dict[str, Any]], tmp_path
     assert not part.exists()
 
 
-def test_again_makes_them_anew(made: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+def test_force_makes_them_again(made: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     (tmp_path / f"{NAME}.safetensors").write_bytes(b"older")
-    result = pretrain(*SMALL, "--out", str(tmp_path), "--again", "--max-steps", "5")
+    result = pretrain(*SMALL, "--out", str(tmp_path), "--force", "--max-steps", "5")
     assert result.exit_code == 1
     assert (tmp_path / f"{NAME}.safetensors").read_bytes() == b"older"  # until the new ones are whole
-    result = pretrain(*SMALL, "--out", str(tmp_path), "--again", "--json")
+    result = pretrain(*SMALL, "--out", str(tmp_path), "--force", "--json")
     assert json.loads(result.stdout)["weights"][0]["sha256"] == made[1]["sha256"]
 
 

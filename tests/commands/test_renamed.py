@@ -1,0 +1,38 @@
+"""Options by their old names still work, and say what they are called now."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+
+import pytest
+from typer.testing import CliRunner
+
+from parenting.commands.main import _command, app
+from parenting.commands.renamed import RENAMED, modern
+
+
+@pytest.mark.parametrize(("command", "old"), [(name, old) for name in RENAMED for old in RENAMED[name]])
+def test_an_old_option_becomes_one_that_exists(
+    command: str, old: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    function: Callable[..., object] = getattr(import_module(f"parenting.commands.{command}"), command)
+    known = {name for one in _command(command, function).params for name in one.opts}
+    (new,) = modern(command, [old])
+    assert new in known
+    assert old not in known
+    assert capsys.readouterr().err == f"{old} is now {new}; the old name will go with the next version.\n"
+
+
+def test_values_stay_and_other_commands_are_left_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    assert modern("pretrain", ["--again=yes", "--seed", "3"]) == ["--force=yes", "--seed", "3"]
+    assert modern("worlds", ["--again"]) == ["--again"]
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_program_takes_an_old_option() -> None:
+    """Up to the option's own rules: a wrong size is refused as with the new name, after the sentence."""
+    said = CliRunner().invoke(app, ["pretrain", "--again", "--size", "1x1"])
+    assert said.exit_code == 2
+    assert "--again is now --force" in said.stderr
+    assert "--size: '1x1' is out of bounds" in said.stderr
