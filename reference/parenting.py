@@ -1,8 +1,10 @@
 """PARENTING for one trial, in plain Python: the executable specification. Newcomers start reading here.
 
-Section and equation numbers are those of Frye & Feige, *Parenting* (2019); docs/paper.md decides what the
-paper leaves open. The batched agent (`agent/`) must ask the same queries and learn the same parameters, to
-rounding. The two share the random keys, the config and the world, and nothing else. No reward is read.
+`Reference.tick` is one time step; the methods below it stand in the order of the paper's sections. Section
+and equation numbers are those of Frye & Feige, *Parenting* (2019); docs/paper.md decides what the paper
+leaves open. The batched agent (`agent/`) must ask the same queries and learn the same parameters, to
+rounding. The two share the uniform random draws, the config and the world, and nothing else. No reward is
+read.
 """
 
 from collections import Counter, deque
@@ -13,10 +15,10 @@ import torch
 from torch import Tensor
 
 from parenting.agent.config import Config
-from parenting.envs.gridworld import Gridworld, WorldState, local_state
-from parenting.envs.rng import Stream, gumbel, keys
+from parenting.envs.gridworld import Gridworld, WorldState
+from parenting.envs.rng import Stream, keys
 from reference.clips import Clip, Entry, Frame, Query, Recorded, board, same_moves, same_pair
-from reference.policy import Policy, distinct, flat, loss
+from reference.policy import Policy, distinct, flat, gumbel, local_state, loss
 
 ACTIONS = range(4)  # up, down, left, right
 GUIDANCE, PREFERENCE = "guidance", "preference"  # the kinds of queries
@@ -262,7 +264,7 @@ class Reference:
     def local(self) -> tuple[int, ...]:
         """l(s): the four cells that the agent can reach in its next step, as observed."""
         now = self.frame(self.state)
-        return tuple(local_state(torch.tensor(now.observation), torch.tensor(now.agent)).tolist())
+        return local_state(now.observation, now.agent)
 
     def logits(self, policy: Policy) -> list[float]:
         """A policy's logits here: the mean of its two heads (3.1.1)."""
@@ -273,8 +275,8 @@ class Reference:
 
     def noisy_logits(self, stream: Stream) -> list[float]:
         """The argmax of these is an action drawn from pi_T; the two largest are two distinct ones."""
-        noise = gumbel(self.keys.uniform(stream, 4))[0].tolist()
-        return [z + n for z, n in zip(self.logits(self.pi), noise, strict=True)]
+        draws = self.keys.uniform(stream, 4)[0].tolist()
+        return [z + gumbel(u) for z, u in zip(self.logits(self.pi), draws, strict=True)]
 
     def u(self, stream: Stream) -> float:
         """This tick's draw from a stream, uniform on [0, 1)."""

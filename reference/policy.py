@@ -1,12 +1,14 @@
 """The policy of the reference: its network (Sec. 3.1.1) and its loss (Sec. 2.3)."""
 
 from collections.abc import Sequence
+from functools import cache
+from math import log
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from parenting.envs.gridworld import Gridworld, local_state
+from parenting.envs.gridworld import Gridworld
 from parenting.envs.levels.spec import maze_legend
 from parenting.envs.rng import Keys, Stream
 from reference.clips import Board
@@ -46,11 +48,29 @@ class Policy(nn.Module):
 
     def heads(self, observations: Sequence[Board]) -> tuple[Tensor, Tensor]:
         """The logits [observations, 4] of both heads; the policy is the softmax of their mean."""
-        seen = torch.tensor(observations)
-        l = local_state(seen, (seen == self.agent).nonzero()[:, 1:])
-        near, far = (functional.one_hot(codes, self.codes).double() for codes in (l, seen))
+        l = torch.tensor([local_state(seen, position(seen, self.agent)) for seen in observations])
+        near, far = (functional.one_hot(c, self.codes).double() for c in (l, torch.tensor(observations)))
         far = self.convolutions(far.permute(0, 3, 1, 2)).permute(0, 2, 3, 1)  # flat: row, column, channel
         return self.near(near.flatten(1)), self.far(far.flatten(1))
+
+
+@cache
+def position(observation: Board, code: int) -> tuple[int, int]:
+    """Row and column of the one cell with this code."""
+    return next((y, x) for y, row in enumerate(observation) for x, seen in enumerate(row) if seen == code)
+
+
+@cache
+def local_state(observation: Board, agent: tuple[int, ...]) -> tuple[int, ...]:
+    """l(s): the cells above, below, left and right of the agent, as observed; beyond the edge is wall, 0."""
+    height, width = len(observation), len(observation[0])
+    cells = [(agent[0] + dy, agent[1] + dx) for dy, dx in ((-1, 0), (1, 0), (0, -1), (0, 1))]
+    return tuple(observation[y][x] if 0 <= y < height and 0 <= x < width else 0 for y, x in cells)
+
+
+def gumbel(u: float) -> float:
+    """Standard Gumbel noise: the argmax of (logits + noise) is a draw from their softmax."""
+    return -log(-log(max(u, 2.0**-53)))
 
 
 def padding(side: int) -> tuple[int, int]:
