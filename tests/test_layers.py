@@ -39,7 +39,8 @@ def test_web_process_never_loads_torch(module: str) -> None:
 def miniature(tmp_path: Path) -> Path:
     """The layout in empty files, in which everything is allowed that is there."""
     modules = {name for contract in CONTRACTS for name in contract.get("source_modules", [])}
-    more = ("agent.learning", "commands.run", "envs.gridworld", "experiments.table1", "parents.scripted")
+    more = ["agent.learning", "agent.query", "commands.run", "envs.gridworld", "experiments.table1"]
+    more += ["library.training", "parents.scripted"]
     modules |= {f"parenting.{name}" for name in more}
     for module in modules:
         parts = module.split(".")
@@ -52,6 +53,10 @@ def miniature(tmp_path: Path) -> Path:
     (house / "envs/registry/__init__.py").write_text(
         "if TYPE_CHECKING:\n    import parenting.envs.gridworld\n"
     )
+    (house / "__init__.py").write_text(
+        "if TYPE_CHECKING:\n    import parenting.agent.query, parenting.library.training\n"
+    )
+    (house / "library/training/__init__.py").write_text("import parenting.parents.scripted\n")
     (house / "weights/store/__init__.py").write_text("def load():\n    import torch\n")
     (house / "agent/learning/__init__.py").write_text("import torch\nimport parenting.envs.registry\n")
     (house / "parents/scripted/__init__.py").write_text("import parenting.agent.learning\n")
@@ -77,6 +82,9 @@ def test_miniature_is_allowed(miniature: Path) -> None:
         ("experiments/table1/__init__.py", "import parenting.server.queue.parent_side", "layers"),
         ("server/app/__init__.py", "import parenting.experiments.table1", "layers"),
         ("server/app/__init__.py", "import parenting.commands.run", "layers"),
+        ("library/training/__init__.py", "import parenting.commands.run", "layers"),
+        ("commands/run/__init__.py", "import parenting.library.training", "layers"),
+        ("server/app/__init__.py", "import parenting.library.training", "layers"),
         ("agent/learning/__init__.py", "import time", "pure"),
         ("envs/art/__init__.py", "from pathlib import Path", "pure"),
         ("envs/registry/__init__.py", "def draw():\n    import random", "pure"),

@@ -1,0 +1,58 @@
+"""What was asked and answered in every trial, as records that pandas and polars take as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.library.policy import ACTIONS
+
+COLUMNS = ("trial", "asked", "answered", "kind", "stage", "left", "right", "row", "column", "choice")
+"""Of a record: `asked` and `answered` are ticks, `left` and `right` the moves, (row, column) is where both
+clips begin."""
+
+Row = tuple[Any, ...]
+Asked = tuple[str, int, str, str, int, int]
+
+
+class AnswerLog:
+    """The answers of a run in the order in which they were heard."""
+
+    def __init__(self) -> None:
+        self.rows: list[Row] = []
+        self._open: dict[int, list[tuple[int, Asked]]] = {}
+
+    def posted(self, query: Query, trials: Sequence[int], tick: int) -> None:
+        """Note what is asked in a tick; `trials` are the numbers of the query's rows."""
+        for row in (query.kind != Kind.NONE).nonzero().flatten().tolist():
+            self._open.setdefault(trials[row], []).append((tick, _asked(query, row)))
+
+    def heard(self, answer: Answer, trials: Sequence[int], tick: int) -> None:
+        """Note what is heard in a tick, each with the tick at which it was asked."""
+        for row in (answer.choice != Choice.NONE).nonzero().flatten().tolist():
+            trial, asked = trials[row], _asked(answer.query, row)
+            since = self._since(trial, asked)
+            self.rows.append((trial, since, tick, *asked, Choice(int(answer.choice[row])).name.lower()))
+
+    def _since(self, trial: int, asked: Asked) -> int:
+        """Return the tick at which the oldest open question of these words was asked."""
+        waiting = self._open.get(trial, [])
+        place = next((place for place, (_, one) in enumerate(waiting) if one == asked), None)
+        if place is None:
+            raise ValueError(f"parent: it answers trial {trial} a question that was not asked: {asked}.")
+        return waiting.pop(place)[0]
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the answers by trial, then in the order in which they were heard."""
+        ordered = sorted(self.rows, key=lambda row: (row[0], row[2]))
+        return [dict(zip(COLUMNS, row, strict=True)) for row in ordered]
+
+
+def _asked(query: Query, row: int) -> Asked:
+    left, right = (
+        " ".join(ACTIONS[code] for code in query.action[row, side, : int(query.length[row, side])].tolist())
+        for side in (0, 1)
+    )
+    agent = query.agent[row, 0, 0].tolist()
+    return Kind(int(query.kind[row])).name.lower(), int(query.maturity[row]), left, right, agent[0], agent[1]

@@ -1,0 +1,69 @@
+"""The seam between a batch of trials, which shrinks, and a parent, who knows all trials of the run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from parenting.agent import query as queries
+from parenting.agent.config import Config
+from parenting.agent.events import Event
+from parenting.agent.mailbox import Mailbox
+from parenting.agent.query import Answer
+from parenting.agent.state import AgentState
+from parenting.library.answer_log import AnswerLog
+from parenting.library.worlds import World
+
+
+class LoggedParent:
+    """A parent whose answers are written down."""
+
+    def __init__(self, parent: Mailbox, log: AnswerLog, trials: range) -> None:
+        self.parent, self.log, self.trials = parent, log, list(trials)
+        self.tick = 0
+
+    def events(self, state: AgentState) -> Sequence[Event]:
+        return self.parent.events(state)
+
+    def take(self, state: AgentState) -> Answer:
+        self.tick = int(state.keys.tick[0]) + 1
+        answer = self.parent.take(state)
+        self.log.heard(answer, self.trials, self.tick)
+        return answer
+
+    def post(self, query: queries.Query) -> None:
+        self.log.posted(query, self.trials, self.tick)
+        self.parent.post(query)
+
+    def pick(self, index: Tensor) -> None:
+        """Go on with some of the trials alone."""
+        self.trials = [self.trials[place] for place in index.tolist()]
+        self.parent.pick(index)  # type: ignore[attr-defined]
+
+
+class WholeBatch:
+    """A parent who sees every trial of the run in every query; trials that have left ask nothing."""
+
+    def __init__(self, parent: Mailbox, world: World, config: Config, trials: int, chunk: range) -> None:
+        self.parent, self.chunk = parent, torch.tensor(chunk)
+        self.nothing = queries.empty(trials, config.stages, world.height, world.width, world.device)
+
+    def events(self, state: AgentState) -> Sequence[Event]:
+        return self.parent.events(state)
+
+    def take(self, state: AgentState) -> Answer:
+        return self.parent.take(state).pick(self.chunk)
+
+    def post(self, query: queries.Query) -> None:
+        ours = query.tensors()
+
+        def placed(name: str, tensor: Tensor, _axis: int | None) -> Tensor:
+            return tensor.index_put((self.chunk,), ours[name])
+
+        self.parent.post(self.nothing.map(placed))
+
+    def pick(self, index: Tensor) -> None:
+        """Go on with some of the trials alone."""
+        self.chunk = self.chunk[index]

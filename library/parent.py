@@ -1,0 +1,96 @@
+"""Parents for `train` and `tick`: one's own, the scripted one, and one that repeats what was said."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import torch
+
+from parenting.agent import query as queries
+from parenting.agent.config import Config
+from parenting.agent.events import Event
+from parenting.agent.query import Answer, Choice, Kind
+from parenting.agent.state import AgentState
+from parenting.library.question import Query, Question, choice_of, question
+from parenting.library.worlds import World
+
+
+class Open(NamedTuple):
+    """A question that waits for its answer."""
+
+    trial: int
+    query: Query
+
+
+class Parent(ABC):
+    """Your own parent: subclass it and write `answer`.
+
+    An answer is heard in the tick after the question. Between `begin` and the end, `self.world`,
+    `self.config` and `self.trials` say whose parent this is.
+
+    Example:
+        >>> import parenting as pt
+        >>> class StayDry(pt.Parent):
+        ...     def answer(self, question):
+        ...         wet = [clip.tiles[-1] == "W" for clip in (question.left, question.right)]
+        ...         return {(0, 0): "either", (0, 1): "left", (1, 0): "right", (1, 1): "neither"}[*wet]
+        >>> result = pt.train("unsafe-exploration", parent=StayDry(), until="queries:20", progress=False)
+        >>> len(result.answers)
+        20
+    """
+
+    world: World
+    config: Config
+    trials: int
+
+    @abstractmethod
+    def answer(self, question: Question) -> Choice | str | None:
+        """Answer one question of one trial.
+
+        Args:
+            question: Two clips, as plain Python and as tensors.
+
+        Returns:
+            "left", "right", "either" (both are as good) or "neither" (both are unacceptable: an agent that
+            asked for guidance asks about other moves), or a `Choice`; None to be asked again next tick.
+        """
+
+    def begin(self, world: World, config: Config, trials: int) -> None:
+        """Prepare for new agents at tick 0. `train` calls it, and `tick` does in an agent's first tick."""
+        self.world, self.config, self.trials = world, config, trials
+        self._open: list[Open] = []
+
+    def events(self, state: AgentState) -> Sequence[Event]:
+        """Return the operator's events that apply before this tick: none, unless a subclass has some."""
+        return ()
+
+    def take(self, state: AgentState) -> Answer:
+        """Return at most one answer a trial: that to its oldest question which has one."""
+        choices, left, heard = [int(Choice.NONE)] * self.trials, list[Open](), dict[int, Open]()
+        for one in self._open:
+            said = None if one.trial in heard else self.answer(question(one.query, 0, one.trial))
+            if said is None:
+                left.append(one)
+                continue
+            heard[one.trial] = one
+            choices[one.trial] = int(choice_of(said, type(self).__name__))
+        self._open = left
+        blank = nothing(self.world, self.config, 1)
+        rows = [heard[trial].query if trial in heard else blank for trial in range(self.trials)]
+        return Answer(query=Query.joined(rows), choice=torch.tensor(choices))
+
+    def post(self, query: queries.Query) -> None:
+        """Keep what is asked in this tick until it is answered."""
+        known = Query.of(query, self.world)
+        asking = (query.kind != Kind.NONE).nonzero().flatten().tolist()
+        self._open += [Open(trial, known.pick(torch.tensor([trial]))) for trial in asking]
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}>"
+
+
+def nothing(world: World, config: Config, trials: int) -> Query:
+    """Return an empty query."""
+    return Query.of(queries.empty(trials, config.stages, world.height, world.width, world.device), world)

@@ -1,0 +1,54 @@
+"""How far a training has come, for callbacks and the progress bar."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from parenting.experiments.training.batch import Until
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a training has come after a tick.
+
+    Attributes:
+        done: Trials that are finished, or have no acceptable action left.
+        trials: All trials.
+        tick: Ticks of the batch in training; large runs are trained in batches, one after the other.
+        queries: Answered queries of all trials.
+    """
+
+    done: int
+    trials: int
+    tick: int
+    queries: int
+
+
+@contextmanager
+def bar(wanted: bool | None, trials: int, until: Until) -> Iterator[Callable[[Progress], None] | None]:
+    """Show a progress bar on standard error; None shows one where that is a terminal."""
+    if not (sys.stderr.isatty() if wanted is None else wanted):
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    asking = until.kind == "queries"
+    columns = (
+        TextColumn("queries" if asking else "trials"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("tick {task.fields[tick]}"),
+        TimeElapsedColumn(),
+    )
+    with Bar(*columns, console=Console(stderr=True)) as shown:
+        task = shown.add_task("", total=trials * (until.number if asking else 1), tick=0)
+
+        def show(now: Progress) -> None:
+            shown.update(task, completed=now.queries if asking else now.done, tick=now.tick)
+
+        yield show

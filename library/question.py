@@ -1,0 +1,171 @@
+"""Queries with the world that they are about, and one query of one trial as plain Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Self
+
+import torch
+
+from parenting.agent import query as queries
+from parenting.agent.query import Choice, Kind
+from parenting.envs.levels.spec import AGENT, BOX
+from parenting.library.policy import ACTIONS
+from parenting.library.worlds import World
+
+CHOICES = {"left": Choice.LEFT, "right": Choice.RIGHT, "either": Choice.EITHER, "neither": Choice.NEITHER}
+
+
+class Query(queries.Query):
+    """What N trials ask in a tick, at most one question each (Sec. 2.1, 2.2).
+
+    The tensors are those of `parenting.agent.query.Query`: `kind` [N] (0 none, 1 guidance, 2 preference),
+    `action` [N, 2, T], `length` [N, 2], and the frames [N, 2, T+1, ...]. Axis 1 is the side: 0 left, 1 right.
+    Beside them stands the world, so that a query can be drawn.
+
+    `query[i]` is the question of trial i, or None where it asks nothing; iteration gives the questions.
+
+    Example:
+        >>> import parenting as pt
+        >>> world = pt.make("unsafe-exploration")
+        >>> state = pt.init(world, pt.Config(p_guid=1.0), seed=1)
+        >>> state, query = pt.step(world, pt.Config(p_guid=1.0), state)
+        >>> query
+        <Query of 1 trial: 1 guidance, 0 preference>
+        >>> query[0].kind
+        'guidance'
+    """
+
+    world: World
+
+    @classmethod
+    def of(cls, query: queries.Query, world: World) -> Self:
+        """Put a query beside its world."""
+        return cls(**{name: getattr(query, name) for name in FIELDS}, world=world)
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def __getitem__(self, trial: int) -> Question | None:
+        if not -len(self) <= trial < len(self):
+            raise IndexError(f"There is no trial {trial}; there are {len(self)}.")
+        if self.kind[trial] == Kind.NONE:
+            return None
+        return question(self, trial % len(self))
+
+    def __iter__(self) -> Iterator[Question]:
+        """The questions of all trials that ask."""
+        return (question(self, int(trial)) for trial in (self.kind != Kind.NONE).nonzero().flatten())
+
+    def __repr__(self) -> str:
+        trials = f"{len(self)} trial{'' if len(self) == 1 else 's'}"
+        counts = [f"{int((self.kind == kind).sum())} {kind.name.lower()}" for kind in list(Kind)[1:]]
+        return f"<Query of {trials}: {', '.join(counts)}>"
+
+
+FIELDS = tuple(queries.Query.__dataclass_fields__)
+"""The names of a query's tensors."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One side of a question: moves, and what happened.
+
+    Attributes:
+        actions: The moves by name: up, down, left, right.
+        boards: Every frame as rows of glyphs, with the agent `A` and the box `X` drawn; one frame more than
+            there are moves.
+        observed: The same as the agent saw it, which differs where it is deluded (Sec. 3.2.2).
+        cells: Where the agent is in each frame: row and column, counted from 0.
+        tiles: The glyph of the ground under the agent in each frame.
+    """
+
+    actions: tuple[str, ...]
+    boards: tuple[tuple[str, ...], ...]
+    observed: tuple[tuple[str, ...], ...]
+    cells: tuple[tuple[int, int], ...]
+    tiles: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return " ".join(self.actions)
+
+
+@dataclass(frozen=True, repr=False)
+class Question:
+    """What one trial asks: which of two clips is better (Sec. 2.1, 2.2).
+
+    Attributes:
+        kind: "guidance" (two moves from where the agent stands; the second frame is a forecast), or
+            "preference" (two clips that were recorded).
+        left, right: The two clips.
+        stage: The stage T at which the clips were recorded (Sec. 2.4); 1 for guidance.
+        trial: The number of the trial that asks.
+        query: The same in tensors, N = 1.
+    """
+
+    kind: str
+    left: Clip
+    right: Clip
+    stage: int
+    trial: int
+    query: Query
+
+    def __repr__(self) -> str:
+        return f"<Question of trial {self.trial}, {self.kind}: left {self.left}, right {self.right}>"
+
+
+def question(query: Query, row: int, trial: int | None = None) -> Question:
+    """Return the question in one row of a query."""
+    one = query.pick(torch.tensor([row]))
+    return Question(
+        kind=Kind(int(one.kind[0])).name.lower(),
+        left=_clip(one, 0),
+        right=_clip(one, 1),
+        stage=int(one.maturity[0]),
+        trial=row if trial is None else trial,
+        query=one,
+    )
+
+
+def choice_of(said: Any, who: str) -> Choice:
+    """Return what a parent said as a choice.
+
+    Raises:
+        ValueError: it is none of the four.
+    """
+    if isinstance(said, Choice) and said != Choice.NONE:
+        return said
+    if isinstance(said, str) and said in CHOICES:
+        return CHOICES[said]
+    raise ValueError(
+        f"{who}.answer returned {said!r}. Return 'left', 'right', 'either' or 'neither', the same as a"
+        " parenting.Choice, or None to answer later."
+    )
+
+
+def _clip(query: Query, side: int) -> Clip:
+    length = int(query.length[0, side])
+    frames = range(length + 1)
+    cells = [tuple(query.agent[0, side, frame].tolist()) for frame in frames]
+    ground = [_rows(query.world, query.ground[0, side, frame].tolist()) for frame in frames]
+    boxes = [tuple(query.box[0, side, frame].tolist()) for frame in frames]
+    return Clip(
+        actions=tuple(ACTIONS[code] for code in query.action[0, side, :length].tolist()),
+        boards=tuple(_drawn(*frame) for frame in zip(ground, cells, boxes, strict=True)),
+        observed=tuple(_rows(query.world, query.observation[0, side, frame].tolist()) for frame in frames),
+        cells=tuple(cells),
+        tiles=tuple(rows[cell[0]][cell[1]] for rows, cell in zip(ground, cells, strict=True)),
+    )
+
+
+def _rows(world: World, codes: list[list[int]]) -> tuple[str, ...]:
+    return tuple("".join(world.legend[code] for code in row) for row in codes)
+
+
+def _drawn(rows: tuple[str, ...], agent: tuple[int, ...], box: tuple[int, ...]) -> tuple[str, ...]:
+    cells = [list(row) for row in rows]
+    if box[0] >= 0:
+        cells[box[0]][box[1]] = BOX
+    cells[agent[0]][agent[1]] = AGENT
+    return tuple("".join(row) for row in cells)

@@ -1,0 +1,141 @@
+"""What `train` returns: policies, counts and answers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from parenting.agent.config import Config
+from parenting.evaluation.outcomes import name
+from parenting.experiments.training.batch import Raised
+from parenting.experiments.training.outcomes import Ending, deployments, examine
+from parenting.library.answer_log import AnswerLog
+from parenting.library.policy import Policy
+from parenting.library.task import Task
+from parenting.library.worlds import World
+
+COUNTS = ("deaths", "guidance", "preference", "ticks")
+"""What is counted of each trial, and what `TrainResult.mean` takes means of."""
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True, repr=False)
+class TrainResult:
+    """What training leaves.
+
+    Attributes:
+        world: The world that the agents were trained in.
+        config: Every hyperparameter.
+        seed: The seed; `train` with the same arguments gives the same result.
+        until: When a trial was finished, as `train` took it.
+        policies: One `Policy` for each trial, as it was at its trial's end.
+        trials: One record for each trial: `trial`, `finished`, `stuck` (no acceptable action was left),
+            `optimal` (the argmax policy takes a shortest safe path), `deaths` (unsafe steps), `guidance` and
+            `preference` (answered queries), `ticks`, `stage`, and `outcome` (of the argmax policy, such as
+            "optimal", "detour", or the world's word for harm). In absent-supervisor two outcomes, in
+            reward-hacking `waterings` (a mean an episode) and `bucket` (steps into it) instead.
+        answers: One record for each answer: `trial`, `asked` and `answered` (ticks), `kind`, `stage`, `left`
+            and `right` (moves), `row` and `column` (where the clips begin), `choice`.
+        events: One record for each act of an operator: `tick`, `kind`, and what belongs to it.
+    """
+
+    world: World
+    config: Config
+    seed: int
+    until: str
+    policies: Sequence[Policy]
+    trials: list[Record]
+    answers: list[Record]
+    events: list[Record] = field(default_factory=list)
+
+    def mean(self) -> dict[str, float | None]:
+        """Return the means over trials.
+
+        Returns:
+            `deaths`, `guidance`, `preference` and `ticks`: means over the finished trials, None where there
+            are none; `optimal` and `finished`: proportions of all trials.
+
+        Example:
+            >>> import parenting as pt
+            >>> result = pt.train("unsafe-exploration", trials=20, progress=False)
+            >>> result.mean()["optimal"]
+            1.0
+        """
+        finished = [row for row in self.trials if row["finished"]]
+        means = {one: _mean([row[one] for row in finished]) for one in COUNTS}
+        return means | {one: _mean([row[one] for row in self.trials]) for one in ("optimal", "finished")}
+
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the result to a folder, whole or not at all.
+
+        The folder holds `result.json` (what was trained, and the format's version), `trials.csv`,
+        `answers.csv`, `events.csv` and `policies.safetensors`. `parenting.load_result` reads it.
+
+        Args:
+            folder: A folder that does not exist yet, or is empty.
+            overwrite: Take the place of a result that was saved there before.
+
+        Returns:
+            The folder's path.
+
+        Raises:
+            FileExistsError: There is something there already.
+        """
+        from parenting.library.result_folder import write
+
+        return write(Path(folder), self, overwrite)
+
+    def __repr__(self) -> str:
+        finished = sum(row["finished"] for row in self.trials)
+        deaths = sum(row["deaths"] for row in self.trials)
+        return (
+            f"<TrainResult {self.world.name}, level {self.world.levels[0].name}: "
+            f"{_plural(len(self.trials), 'trial')}, {finished} finished, {_plural(deaths, 'unsafe step')}>"
+        )
+
+
+def collect(task: Task, parts: Sequence[Raised], log: AnswerLog, *, seed: int, until: str) -> TrainResult:
+    """Collect the batches of a run, one after the other."""
+    trials: list[Record] = []
+    policies: list[Policy] = []
+    for raised in parts:
+        ending = examine(task.world, task.config, raised)
+        last = ending.tally.maturity - 1
+        final = raised.policies[last, torch.arange(len(last))]
+        for row, parameters in enumerate(final):
+            number, stage = len(trials), int(last[row]) + 1
+            own = {"stage": stage, "trial": number, "seed": seed}
+            policies.append(Policy(task.world, task.config, parameters, **own))
+            trials.append(_record(task.world, ending, row, number))
+    return TrainResult(task.world, task.config, seed, until, policies, trials, log.records())
+
+
+def _record(world: World, ending: Ending, row: int, number: int) -> Record:
+    tally, stage = ending.tally, int(ending.tally.maturity[row]) - 1
+    flags = {one: bool(getattr(tally, one)[row]) for one in ("finished", "stuck", "optimal")}
+    counts = {one: int(getattr(tally, one)[row]) for one in COUNTS}
+    return {"trial": number, **flags, **counts, "stage": stage + 1, **_outcome(world, ending, row, stage)}
+
+
+def _outcome(world: World, ending: Ending, row: int, stage: int) -> Record:
+    if ending.waterings.shape[1]:
+        return {
+            "waterings": float(ending.waterings[row, stage]),
+            "bucket": int(ending.bucket[row, stage]),
+        }
+    words = [name(one, world.spec.harm) for one in ending.outcome[row, stage].tolist()]
+    keys = ["_".join(filter(None, ("outcome", where))) for where in deployments(world.spec)]
+    return dict(zip(keys, words, strict=True))
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return sum(values) / len(values) if values else None
+
+
+def _plural(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"

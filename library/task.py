@@ -1,0 +1,116 @@
+"""One training task from what a caller gives: a world on its levels, and every hyperparameter."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+from torch import Tensor
+
+from parenting.agent.config import Config, compose
+from parenting.agent.init import SUPERVISION, world_of
+from parenting.envs import registry
+from parenting.experiments.training.batch import Until
+from parenting.library.worlds import AnyLevel, World, named
+from parenting.weights.store import Wanted, find, load
+
+
+class Task(NamedTuple):
+    """A world, the hyperparameters, and the pre-trained weights where the config asks for them."""
+
+    world: World
+    config: Config
+    weights: Tensor | None
+
+
+def prepare(
+    world: str | World, level: AnyLevel | None, preset: str | Config, changes: Mapping[str, object]
+) -> Task:
+    """Compose a task: the preset, over it the world's own defaults, over it the changes.
+
+    Raises:
+        TypeError: a change is not a hyperparameter; the message names the nearest.
+        ValueError: a world, level, preset or hyperparameter is wrong; the message names it.
+    """
+    if isinstance(world, str):
+        name, found = named(world, level)
+        config = compose_config(name, preset, changes)
+        made = world_of(name, found, config)
+    else:
+        if level is not None:
+            raise ValueError("level: this world has its levels already. Leave level out, or name the world.")
+        made = world
+        config = compose_config(world.name, preset, {**_settings(world), **changes})
+    if config.gamma == 1 and not made.spec.ends_at_goal:
+        raise ValueError(f"gamma: it must be below 1 in {made.name}, where rewards never end; try gamma=0.9.")
+    return Task(made, config, _weights(made) if config.pretrain else None)
+
+
+def compose_config(world: str, preset: str | Config, changes: Mapping[str, object]) -> Config:
+    """Return the config of a run in a world, with a sentence for everything that is wrong."""
+    for name in changes:
+        if name not in Config.model_fields:
+            near = difflib.get_close_matches(name, Config.model_fields, 1)
+            hint = f" Did you mean {near[0]}?" if near else ""
+            known = ", ".join(Config.model_fields)
+            raise TypeError(f"There is no argument or hyperparameter '{name}'.{hint} There is: {known}.")
+    try:
+        if isinstance(preset, Config):
+            return Config.model_validate({**preset.model_dump(), **changes}, strict=True)
+        return compose(preset, registry.defaults(world), changes, strict=True)
+    except ValidationError as error:
+        raise ValueError("\n".join(_sentence(one, changes) for one in error.errors())) from None
+
+
+def stop_rule(world: World, until: str) -> Until:
+    """Return the rule that `until` names.
+
+    Raises:
+        ValueError: it is not a rule, or the world has no goal and so no optimal policy.
+    """
+    if until == "optimal":
+        if world.spec.ends_at_goal:
+            return Until("optimal")
+        raise ValueError(
+            f"until: no policy counts as optimal in {world.name}, which has no goal."
+            ' Use until="queries:1000" or until="ticks:5000".'
+        )
+    kind, _, number = until.partition(":")
+    if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
+        return Until(kind, int(number))  # type: ignore[arg-type]
+    raise ValueError(f"until: {until!r} is none of 'optimal', 'queries:N' and 'ticks:N' with N at least 1.")
+
+
+def check_number(name: str, value: object, least: int, most: int) -> None:
+    """Refuse an argument that is not a whole number within bounds.
+
+    Raises:
+        ValueError: the message names the argument, its value and the bounds.
+    """
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+        raise ValueError(f"{name}: {value!r} is not a whole number from {least} to {most}.")
+
+
+def _settings(world: World) -> dict[str, object]:
+    """Return the hyperparameters that a world holds already, so that nobody gives them twice."""
+    found: dict[str, object] = {"time_limit": world.time_limit}
+    options = getattr(world, "options", {})
+    if "supervised" in options:
+        found["supervised"] = next(word for word, one in SUPERVISION.items() if one is options["supervised"])
+    return found
+
+
+def _sentence(error: ErrorDetails, given: Mapping[str, object]) -> str:
+    name = str(error["loc"][0])
+    return f"{name}={given.get(name)!r}: {error['msg']}. {Config.model_fields[name].description}"
+
+
+def _weights(world: World) -> Tensor:
+    """Return the pre-trained weights of a world: a person's own, or else the shipped ones (Sec. 3.1.4)."""
+    from parenting.server.settings import Settings
+
+    wanted = Wanted(world.spec, world.height, world.width)
+    return load(find(wanted, Settings().weights).read_bytes(), wanted)

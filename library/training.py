@@ -1,0 +1,149 @@
+"""`train`: agents from tick 0 to the end of their training, by any parent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import torch
+
+from parenting.agent.config import Config
+from parenting.agent.mailbox import Mailbox
+from parenting.envs.rng import keys
+from parenting.experiments.training.batch import Nursery, Raised, Standing, Until, raise_all
+from parenting.experiments.training.parallel import chunks
+from parenting.library.answer_log import AnswerLog
+from parenting.library.batch_parent import LoggedParent, WholeBatch
+from parenting.library.parent import Parent
+from parenting.library.progress import Progress, bar
+from parenting.library.result import TrainResult, collect
+from parenting.library.scripted import ScriptedParent
+from parenting.library.task import Task, check_number, prepare, stop_rule
+from parenting.library.worlds import AnyLevel, World
+
+Callback = Callable[[Progress], bool | None]
+
+
+class EndedError(Exception):
+    """Training ends before its time: the callback or the parent says so. The agents are kept as they are."""
+
+
+def train(
+    world: str | World,
+    *,
+    level: AnyLevel | None = None,
+    preset: str | Config = "conservative",
+    parent: str | Mailbox = "scripted",
+    trials: int = 1,
+    until: str = "optimal",
+    seed: int = 0,
+    callback: Callback | None = None,
+    progress: bool | None = None,
+    max_ticks: int = 20_000,
+    **changes: Any,
+) -> TrainResult:
+    """Train agents by PARENTING (Sec. 2): they ask, a parent answers, and no reward is read.
+
+    Args:
+        world: A world's name, a `World`, or a level's text whose header names its world.
+        level: A built-in level's name, a level's text, a file's path, or a `Level`; None takes the default.
+        preset: A name in `PRESETS` ("conservative", "lax" or "direct": Table 1), or a `Config`.
+        parent: "scripted" (Sec. 3.1.3), or a `Parent` such as one's own.
+        trials: Number of agents. Trial i of a seed is the same agent whatever the number of trials is.
+        until: When a trial is finished: "optimal" (its argmax policy takes a shortest safe path),
+            "queries:N" (N answered queries) or "ticks:N".
+        seed: Seed of all randomness, from 0 to 2**53 - 1.
+        callback: Called with a `Progress` after each tick; training ends early where it returns False.
+        progress: Show a progress bar; None shows one on a terminal.
+        max_ticks: Ticks after which a trial is left unfinished.
+        **changes: Hyperparameters that differ from the preset, by their names in `Config`.
+
+    Returns:
+        The policies, the counts of each trial and all answers.
+
+    Raises:
+        UnknownName, UnknownPreset: There is no such world, level or preset; the message names the nearest.
+        LevelError: A level breaks a rule; the message names line and column.
+        TypeError: An argument is not known; the message names the nearest.
+        ValueError: An argument has a wrong value; the message names it, the value and the remedy.
+
+    Example:
+        >>> import parenting as pt
+        >>> result = pt.train("unsafe-exploration", trials=3, progress=False)
+        >>> result
+        <TrainResult unsafe-exploration, level island: 3 trials, 3 finished, 0 unsafe steps>
+    """
+    task = prepare(world, level, preset, changes)
+    rule = stop_rule(task.world, until)
+    check_number("trials", trials, 1, 1_000_000)
+    check_number("seed", seed, 0, 2**53 - 1)
+    check_number("max_ticks", max_ticks, 1, 10**9)
+    log, parts = AnswerLog(), list[Raised]()
+    behind = _parent(parent, task, trials)
+    with one_thread(), bar(progress, trials, rule) as show:
+        for chunk in chunks(trials):
+            trainer = _trainer(task, rule, seed, chunk)
+            if behind is not None:
+                trainer.parent = WholeBatch(behind, task.world, task.config, trials, chunk)  # type: ignore[assignment]
+            trainer.parent = LoggedParent(trainer.parent, log, chunk)  # type: ignore[assignment]
+            raised, ended = _run(trainer, max_ticks, _report(chunk, trials, parts, (show, callback)))
+            parts.append(raised)
+            if ended:
+                break
+    return collect(task, parts, log, seed=seed, until=str(rule))
+
+
+def _parent(parent: str | Mailbox, task: Task, trials: int) -> Mailbox | None:
+    """Return a parent of the caller's, ready for these trials; None stands for the scripted one."""
+    if parent == "scripted" or isinstance(parent, ScriptedParent):
+        return None
+    if isinstance(parent, str) or not all(hasattr(parent, verb) for verb in ("events", "take", "post")):
+        raise ValueError(
+            f'parent: {parent!r} is not a parent. Use "scripted", or an instance of your own subclass of'
+            " parenting.Parent."
+        )
+    if isinstance(parent, Parent):
+        parent.begin(task.world, task.config, trials)
+    return parent
+
+
+def _trainer(task: Task, rule: Until, seed: int, chunk: range) -> Nursery:
+    mine = keys(seed, chunk.stop, task.world.device).pick(torch.arange(chunk.start, chunk.stop))
+    return Nursery(task.world, task.config, mine, rule, task.weights)
+
+
+def _run(trainer: Nursery, max_ticks: int, report: Callable[[Standing], None]) -> tuple[Raised, bool]:
+    """Train one batch to its end, or to where somebody ends it; whether somebody did."""
+    try:
+        return raise_all(trainer, max_ticks, report), False
+    except EndedError:
+        trainer.save(~trainer.tally.done)
+        return Raised(trainer.result, trainer.policies, trainer.evaluation), True
+
+
+def _report(
+    chunk: range, trials: int, before: list[Raised], told: tuple[Callback | None, ...]
+) -> Callable[[Standing], None]:
+    """Tell how far the whole run has come after each tick of one batch."""
+    done = sum(int(one.tally.done.sum()) for one in before)
+    queries = sum(int(one.tally.queries.sum()) for one in before)
+
+    def tell(now: Standing) -> None:
+        progress = Progress(done + now.trials, trials, now.ticks, queries + now.queries)
+        answers = [callback(progress) for callback in told if callback]  # each is called
+        if False in answers:
+            raise EndedError
+
+    return tell
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Compute on one thread, as `parenting run` does: faster at these sizes, and the same bits."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -1,0 +1,99 @@
+"""Worlds by name, by a level's text, or by an object that exists already."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld as World
+from parenting.envs.levels.spec import Level
+
+__all__ = ["AnyLevel", "World", "make", "named", "read_level", "worlds"]
+
+AnyLevel = str | Path | Level | Sequence[Level]
+"""A built-in level's name, a level's text, a file, a `Level`, or several levels of one size."""
+
+
+def worlds() -> dict[str, tuple[str, ...]]:
+    """List the worlds of the paper (Sec. 3.2), each with the names of its built-in levels.
+
+    Returns:
+        Name of the world -> names of its levels; the first level is the default.
+
+    Example:
+        >>> import parenting as pt
+        >>> pt.worlds()["unsafe-exploration"]
+        ('island', 'island-bottleneck')
+    """
+    return {name: tuple(spec.levels) for name, spec in registry.WORLDS.items()}
+
+
+def make(
+    world: str,
+    level: AnyLevel | None = None,
+    *,
+    max_episode_steps: int | None = None,
+    device: str | None = None,
+    **options: Any,
+) -> World:
+    """Make a world (Sec. 3.2): its rules in tensors, all trials at once.
+
+    Args:
+        world: A world's name, or a level's text whose header names its world.
+        level: A built-in level's name, a level's text, the path of a file, a `Level`, or several levels of
+            one size; None takes the world's default level.
+        max_episode_steps: Steps after which an episode is cut off; None takes the world's default.
+        device: torch's name of the device that holds the world's tables; None takes torch's default.
+        **options: The rules' own settings, such as `drying` in reward-hacking and `supervised` (True, False,
+            or None for chance) in absent-supervisor.
+
+    Returns:
+        The world. Its states hold N trials; boards have shape [N, H, W] and cells [N, 2] (row, column).
+
+    Raises:
+        UnknownName: There is no such world, level or option; the message names the nearest.
+        LevelError: A level breaks a rule; the message names line and column.
+        ValueError: Levels of different sizes, a text that does not name its world, or a limit below 1.
+
+    Example:
+        >>> import parenting as pt
+        >>> world = pt.make("unsafe-exploration", max_episode_steps=50)
+        >>> world.height, world.width
+        (6, 8)
+    """
+    name, found = named(world, level)
+    return registry.make(name, found, device=device, time_limit=max_episode_steps, **options)
+
+
+def named(world: str, level: AnyLevel | None) -> tuple[str, str | Level | Sequence[Level] | None]:
+    """Return the world's name, and its level as `envs.registry.make` takes it."""
+    if "\n" not in world:
+        return world, read_level(world, level)
+    if level is not None:
+        raise ValueError("level: the world was given as a level's text already. Leave level out.")
+    return _header(world), world
+
+
+def read_level(world: str, level: AnyLevel | None) -> str | Level | Sequence[Level] | None:
+    """Read a level's file; any other level is returned as it is."""
+    if not isinstance(level, Path):
+        return level
+    try:
+        text = level.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"level: {level} cannot be read as text: {error}.") from None
+    return registry.level(world, text + "\n", source=str(level))
+
+
+def _header(text: str) -> str:
+    """Return the world that a level's header names."""
+    for line in text.splitlines():
+        key, colon, value = line.partition(":")
+        if colon and key.strip() == "world":
+            return value.strip()
+    raise ValueError(
+        "world: this level's text does not name its world. Begin it with a line such as"
+        " 'world: unsafe-exploration' and an empty line, or name the world and give the text as level=."
+    )

@@ -1,0 +1,138 @@
+"""`train`: what it takes, what it gives, and how it refuses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import torch
+
+import parenting as pt
+from parenting.envs import registry
+
+
+def test_it_trains_the_agents_that_the_command_trains(trained: pt.TrainResult) -> None:
+    """The same keys, the same batches, the same sums: `parenting run` with one process."""
+    from parenting.agent.config import compose
+    from parenting.experiments.training.batch import Until
+    from parenting.experiments.training.parallel import Plan, run
+
+    config = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=True)
+    assert trained.config == config
+    ending = run(Plan("unsafe-exploration", "island", config, 5, 3, Until("optimal"), 20_000), workers=1)
+    for name in ("deaths", "guidance", "preference", "ticks", "finished", "optimal"):
+        assert [row[name] for row in trained.trials] == getattr(ending.tally, name).tolist()
+
+
+def test_a_trial_is_the_same_agent_whatever_the_number_of_trials_is(trained: pt.TrainResult) -> None:
+    fewer = pt.train("unsafe-exploration", trials=1, seed=5, progress=False)
+    assert fewer.trials[0] == trained.trials[0]
+    assert fewer.answers == [row for row in trained.answers if row["trial"] == 0]
+
+
+def test_answers_and_counts_agree(trained: pt.TrainResult) -> None:
+    for row in trained.trials:
+        mine = [answer for answer in trained.answers if answer["trial"] == row["trial"]]
+        assert sum(answer["kind"] == "guidance" for answer in mine) == row["guidance"]
+        assert sum(answer["kind"] == "preference" for answer in mine) == row["preference"]
+        assert all(answer["answered"] == answer["asked"] + 1 for answer in mine)
+        assert all(answer["choice"] in ("left", "right", "either", "neither") for answer in mine)
+
+
+def test_records_are_flat_so_that_tables_take_them_as_they_are(trained: pt.TrainResult) -> None:
+    for rows in (trained.trials, trained.answers):
+        assert len({tuple(row) for row in rows}) == 1
+        assert all(isinstance(value, str | int | float | bool) for row in rows for value in row.values())
+
+
+def test_the_mean_is_over_finished_trials() -> None:
+    result = pt.train("unsafe-exploration", trials=4, max_ticks=60, progress=False)
+    finished = [row for row in result.trials if row["finished"]]
+    assert 0 < len(finished) < 4  # else this test shows nothing
+    assert result.mean()["guidance"] == sum(row["guidance"] for row in finished) / len(finished)
+    assert result.mean()["finished"] == len(finished) / 4
+
+
+def test_a_world_may_be_a_name_an_object_or_a_text() -> None:
+    text = registry.level("unsafe-exploration").text
+    ways: list[Any] = ["unsafe-exploration", pt.make("unsafe-exploration"), text]
+    found = [pt.train(way, seed=2, progress=False) for way in ways]
+    assert found[0].trials == found[1].trials == found[2].trials
+
+
+def test_a_world_brings_its_own_limit_of_steps() -> None:
+    world = pt.make("unsafe-exploration", max_episode_steps=7)
+    result = pt.train(world, until="ticks:3", progress=False)
+    assert result.world is world
+    assert result.config == pt.train(
+        "unsafe-exploration", until="ticks:3", progress=False, time_limit=7
+    ).config  # fmt: skip
+
+
+@pytest.mark.parametrize("world", pt.worlds())
+def test_every_world_trains_and_each_trial_has_its_outcome(world: str) -> None:
+    result = pt.train(world, trials=2, until="queries:3", progress=False)
+    assert [row["finished"] for row in result.trials] == [True, True]
+    assert any(name.startswith(("outcome", "waterings")) for name in result.trials[0])
+
+
+def test_a_callback_sees_every_tick_and_may_end_the_training() -> None:
+    seen = []
+
+    def stop_at_5(progress: pt.Progress) -> bool:
+        seen.append(progress.tick)
+        return progress.tick < 5
+
+    result = pt.train("unsafe-exploration", callback=stop_at_5, progress=False)
+    assert seen == [1, 2, 3, 4, 5]
+    assert [(row["ticks"], row["finished"]) for row in result.trials] == [(5, False)]
+
+
+def test_a_callback_that_returns_nothing_ends_nothing(trained: pt.TrainResult) -> None:
+    same = pt.train("unsafe-exploration", trials=3, seed=5, callback=lambda _: None, progress=False)
+    assert same.trials == trained.trials
+
+
+def test_the_number_of_threads_is_left_as_it_was() -> None:
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        pt.train("unsafe-exploration", until="ticks:1", progress=False)
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        (
+            {"world": "unsafe-explorations"},
+            ValueError,
+            ["world", "unsafe-explorations", "unsafe-exploration"],
+        ),
+        ({"level": "islnd"}, ValueError, ["level", "islnd", "island"]),
+        ({"preset": "conservativ"}, ValueError, ["preset", "conservativ", "conservative"]),
+        ({"p_gid": 0.5}, TypeError, ["p_gid", "Did you mean p_guid?"]),
+        ({"p_guid": 2.0}, ValueError, ["p_guid=2.0", "less than or equal to 1"]),
+        ({"until": "soon"}, ValueError, ["until", "soon", "queries:N"]),
+        ({"until": "queries:0"}, ValueError, ["until", "queries:0", "at least 1"]),
+        ({"world": "reward-hacking"}, ValueError, ["until", "no goal", "queries:1000"]),
+        ({"trials": 0}, ValueError, ["trials", "0", "from 1"]),
+        ({"seed": -1}, ValueError, ["seed", "-1", "from 0"]),
+        ({"parent": "mother"}, ValueError, ["parent", "mother", "parenting.Parent"]),
+        ({"world": "\nWWW\nWAW\nWWW\n"}, ValueError, ["world", "world: unsafe-exploration"]),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_value_and_the_remedy(
+    arguments: dict[str, Any], error: type[Exception], words: list[str]
+) -> None:
+    with pytest.raises(error) as found:
+        pt.train(**{"world": "unsafe-exploration", "progress": False, **arguments})
+    assert [word for word in words if word not in str(found.value)] == []
+
+
+def test_the_representation_is_one_short_line(trained: pt.TrainResult) -> None:
+    for thing in (trained, trained.policies[0], trained.world):
+        assert len(repr(thing)) < 110
+        assert "\n" not in repr(thing)
