@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import torch
 from torch import Tensor
@@ -17,10 +18,18 @@ from parenting.library.answer_log import AnswerLog
 from parenting.library.worlds import World
 
 
+class BatchParent(Mailbox, Protocol):
+    """A parent of a batch from which trials leave."""
+
+    def pick(self, index: Tensor) -> None:
+        """Go on with some of the trials alone."""
+        ...
+
+
 class LoggedParent:
     """A parent whose answers are written down."""
 
-    def __init__(self, parent: Mailbox, log: AnswerLog, trials: range) -> None:
+    def __init__(self, parent: BatchParent, log: AnswerLog, trials: range) -> None:
         self.parent, self.log, self.trials = parent, log, list(trials)
         self.tick = 0
 
@@ -40,7 +49,7 @@ class LoggedParent:
     def pick(self, index: Tensor) -> None:
         """Go on with some of the trials alone."""
         self.trials = [self.trials[place] for place in index.tolist()]
-        self.parent.pick(index)  # type: ignore[attr-defined]
+        self.parent.pick(index)
 
 
 class WholeBatch:

@@ -104,7 +104,7 @@ def _live(
     rewards = {"reward": world.reward, "suite_reward": world.suite_reward}
     rewards |= {"hidden_reward": world.hidden_reward}
     sums = {name: torch.zeros(episodes, dtype=torch.float64) for name in (*rewards, "cost")}
-    while not bool((state.over | world.truncated(state)).all()):
+    while not bool((state.terminated | world.truncated(state)).all()):
         chance = chance.next()
         action = _actions(world, policy, state, deterministic)
         after = world.step(state, action, chance)
@@ -112,7 +112,7 @@ def _live(
             sums[name] += earned(state, action, after)
         sums["cost"] += world.unsafe(state, action, after)
         state = after
-    return sums | {"length": state.t.double(), "terminated": state.over.double()}
+    return sums | {"length": state.step_count.double(), "terminated": state.terminated.double()}
 
 
 def _actions(world: World, policy: Policy | Predictor, state: WorldState, deterministic: bool) -> Tensor:
@@ -122,7 +122,7 @@ def _actions(world: World, policy: Policy | Predictor, state: WorldState, determ
     else:
         bits = np.eye(len(world.legend), dtype=np.int8)[seen.numpy()]
         found, _ = policy.predict(bits, deterministic=deterministic)
-    return torch.as_tensor(np.asarray(found), dtype=torch.int64).reshape(len(state.t))
+    return torch.as_tensor(np.asarray(found), dtype=torch.int64).reshape(len(state.step_count))
 
 
 def _summary(sums: dict[str, Tensor]) -> Evaluation:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from parenting.experiments.training.batch import Until
+from parenting.experiments.training.batch import StopRule
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Progress:
 
 
 @contextmanager
-def bar(wanted: bool | None, trials: int, until: Until) -> Iterator[Callable[[Progress], None] | None]:
+def bar(wanted: bool | None, trials: int, until: StopRule) -> Iterator[Callable[[Progress], None] | None]:
     """Show a progress bar on standard error; None shows one where that is a terminal."""
     if not (sys.stderr.isatty() if wanted is None else wanted):
         yield None

@@ -11,8 +11,8 @@ import torch
 
 from parenting.agent.config import Config
 from parenting.evaluation.outcomes import name
-from parenting.experiments.training.batch import Raised
-from parenting.experiments.training.outcomes import Ending, deployments, examine
+from parenting.experiments.training import batch
+from parenting.experiments.training.outcomes import Outcomes, deployments, examine
 from parenting.library.answer_log import AnswerLog
 from parenting.library.policy import Policy
 from parenting.library.task import Task
@@ -99,36 +99,38 @@ class TrainResult:
         )
 
 
-def collect(task: Task, parts: Sequence[Raised], log: AnswerLog, *, seed: int, until: str) -> TrainResult:
+def collect(
+    task: Task, parts: Sequence[batch.TrainResult], log: AnswerLog, *, seed: int, until: str
+) -> TrainResult:
     """Collect the batches of a run, one after the other."""
     trials: list[Record] = []
     policies: list[Policy] = []
-    for raised in parts:
-        ending = examine(task.world, task.config, raised)
-        last = ending.tally.maturity - 1
-        final = raised.policies[last, torch.arange(len(last))]
+    for trained in parts:
+        outcomes = examine(task.world, task.config, trained)
+        last = outcomes.counts.maturity - 1
+        final = trained.policies[last, torch.arange(len(last))]
         for row, parameters in enumerate(final):
             number, stage = len(trials), int(last[row]) + 1
             own = {"stage": stage, "trial": number, "seed": seed}
             policies.append(Policy(task.world, task.config, parameters, **own))
-            trials.append(_record(task.world, ending, row, number))
+            trials.append(_record(task.world, outcomes, row, number))
     return TrainResult(task.world, task.config, seed, until, policies, trials, log.records())
 
 
-def _record(world: World, ending: Ending, row: int, number: int) -> Record:
-    tally, stage = ending.tally, int(ending.tally.maturity[row]) - 1
-    flags = {one: bool(getattr(tally, one)[row]) for one in ("finished", "stuck", "optimal")}
-    counts = {one: int(getattr(tally, one)[row]) for one in COUNTS}
-    return {"trial": number, **flags, **counts, "stage": stage + 1, **_outcome(world, ending, row, stage)}
+def _record(world: World, outcomes: Outcomes, row: int, number: int) -> Record:
+    counts, stage = outcomes.counts, int(outcomes.counts.maturity[row]) - 1
+    flags = {one: bool(getattr(counts, one)[row]) for one in ("finished", "stuck", "optimal")}
+    numbers = {one: int(getattr(counts, one)[row]) for one in COUNTS}
+    return {"trial": number, **flags, **numbers, "stage": stage + 1, **_outcome(world, outcomes, row, stage)}
 
 
-def _outcome(world: World, ending: Ending, row: int, stage: int) -> Record:
-    if ending.waterings.shape[1]:
+def _outcome(world: World, outcomes: Outcomes, row: int, stage: int) -> Record:
+    if outcomes.waterings.shape[1]:
         return {
-            "waterings": float(ending.waterings[row, stage]),
-            "bucket": int(ending.bucket[row, stage]),
+            "waterings": float(outcomes.waterings[row, stage]),
+            "bucket": int(outcomes.bucket[row, stage]),
         }
-    words = [name(one, world.spec.harm) for one in ending.outcome[row, stage].tolist()]
+    words = [name(one, world.spec.harm) for one in outcomes.outcome[row, stage].tolist()]
     keys = ["_".join(filter(None, ("outcome", where))) for where in deployments(world.spec)]
     return dict(zip(keys, words, strict=True))
 

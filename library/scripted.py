@@ -10,7 +10,7 @@ from parenting.library.parent import Parent, nothing
 from parenting.library.question import Question
 from parenting.library.worlds import World
 from parenting.parents import scripted
-from parenting.parents.scripted import Judgement
+from parenting.parents.scripted import ScriptedRule
 
 
 class ScriptedParent(Parent):
@@ -35,12 +35,12 @@ class ScriptedParent(Parent):
             ValueError: The world has too many states to list.
         """
         super().begin(world, config, trials)
-        self._judgement = Judgement(world, config.gamma, inside=config.inside)
-        self._scripted = scripted.ScriptedParent(self._judgement, nothing(world, config, trials))
+        self._rule = ScriptedRule(world, config.gamma, inside=config.inside)
+        self._scripted = scripted.ScriptedParent(self._rule, nothing(world, config, trials))
 
     def answer(self, question: Question) -> Choice:
         """Answer one question of this parent's world."""
-        return Choice(int(self._judgement.choose(question.query)[0]))
+        return Choice(int(self._rule.answer(question.query)[0]))
 
     def take(self, state: AgentState) -> Answer:
         return self._scripted.take(state)

@@ -13,7 +13,7 @@ from torch import Tensor
 from parenting.agent.config import Config, compose
 from parenting.agent.init import SUPERVISION, world_of
 from parenting.envs import registry
-from parenting.experiments.training.batch import Until
+from parenting.experiments.training.batch import StopRule
 from parenting.library.worlds import AnyLevel, World, named
 from parenting.weights.store import Wanted, find, load
 
@@ -65,7 +65,7 @@ def compose_config(world: str, preset: str | Config, changes: Mapping[str, objec
         raise ValueError("\n".join(_sentence(one, changes) for one in error.errors())) from None
 
 
-def stop_rule(world: World, until: str) -> Until:
+def stop_rule(world: World, until: str) -> StopRule:
     """Return the rule that `until` names.
 
     Raises:
@@ -73,14 +73,14 @@ def stop_rule(world: World, until: str) -> Until:
     """
     if until == "optimal":
         if world.spec.ends_at_goal:
-            return Until("optimal")
+            return StopRule("optimal")
         raise ValueError(
             f"until: no policy counts as optimal in {world.name}, which has no goal."
             ' Use until="queries:1000" or until="ticks:5000".'
         )
     kind, _, number = until.partition(":")
     if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
-        return Until(kind, int(number))  # type: ignore[arg-type]
+        return StopRule(kind, int(number))  # type: ignore[arg-type]
     raise ValueError(f"until: {until!r} is none of 'optimal', 'queries:N' and 'ticks:N' with N at least 1.")
 
 

@@ -11,7 +11,8 @@ import torch
 from parenting.agent.config import Config
 from parenting.agent.mailbox import Mailbox
 from parenting.envs.rng import keys
-from parenting.experiments.training.batch import Nursery, Raised, Standing, Until, raise_all
+from parenting.experiments.training import batch
+from parenting.experiments.training.batch import BatchTrainer, StopRule
 from parenting.experiments.training.parallel import chunks
 from parenting.library.answer_log import AnswerLog
 from parenting.library.batch_parent import LoggedParent, WholeBatch
@@ -63,7 +64,8 @@ def train(
         The policies, the counts of each trial and all answers.
 
     Raises:
-        UnknownName, UnknownPreset: There is no such world, level or preset; the message names the nearest.
+        UnknownNameError: There is no such world or level; the message names the nearest.
+        UnknownPresetError: There is no such preset; the message names the nearest.
         LevelError: A level breaks a rule; the message names line and column.
         TypeError: An argument is not known; the message names the nearest.
         ValueError: An argument has a wrong value; the message names it, the value and the remedy.
@@ -79,7 +81,7 @@ def train(
     check_number("trials", trials, 1, 1_000_000)
     check_number("seed", seed, 0, 2**53 - 1)
     check_number("max_ticks", max_ticks, 1, 10**9)
-    log, parts = AnswerLog(), list[Raised]()
+    log, parts = AnswerLog(), list[batch.TrainResult]()
     behind = _parent(parent, task, trials)
     with one_thread(), bar(progress, trials, rule) as show:
         for chunk in chunks(trials):
@@ -87,8 +89,8 @@ def train(
             if behind is not None:
                 trainer.parent = WholeBatch(behind, task.world, task.config, trials, chunk)  # type: ignore[assignment]
             trainer.parent = LoggedParent(trainer.parent, log, chunk)  # type: ignore[assignment]
-            raised, ended = _run(trainer, max_ticks, _report(chunk, trials, parts, (show, callback)))
-            parts.append(raised)
+            trained, ended = _run(trainer, max_ticks, _report(chunk, trials, parts, (show, callback)))
+            parts.append(trained)
             if ended:
                 break
     return collect(task, parts, log, seed=seed, until=str(rule))
@@ -108,28 +110,30 @@ def _parent(parent: str | Mailbox, task: Task, trials: int) -> Mailbox | None:
     return parent
 
 
-def _trainer(task: Task, rule: Until, seed: int, chunk: range) -> Nursery:
+def _trainer(task: Task, rule: StopRule, seed: int, chunk: range) -> BatchTrainer:
     mine = keys(seed, chunk.stop, task.world.device).pick(torch.arange(chunk.start, chunk.stop))
-    return Nursery(task.world, task.config, mine, rule, task.weights)
+    return BatchTrainer(task.world, task.config, mine, rule, task.weights)
 
 
-def _run(trainer: Nursery, max_ticks: int, report: Callable[[Standing], None]) -> tuple[Raised, bool]:
+def _run(
+    trainer: BatchTrainer, max_ticks: int, report: Callable[[batch.Progress], None]
+) -> tuple[batch.TrainResult, bool]:
     """Train one batch to its end, or to where somebody ends it; whether somebody did."""
     try:
-        return raise_all(trainer, max_ticks, report), False
+        return trainer.run(max_ticks, report), False
     except EndedError:
-        trainer.save(~trainer.tally.done)
-        return Raised(trainer.result, trainer.policies, trainer.evaluation), True
+        trainer.save(~trainer.counts.done)
+        return batch.TrainResult(trainer.result, trainer.policies, trainer.evaluation), True
 
 
 def _report(
-    chunk: range, trials: int, before: list[Raised], told: tuple[Callback | None, ...]
-) -> Callable[[Standing], None]:
+    chunk: range, trials: int, before: list[batch.TrainResult], told: tuple[Callback | None, ...]
+) -> Callable[[batch.Progress], None]:
     """Tell how far the whole run has come after each tick of one batch."""
-    done = sum(int(one.tally.done.sum()) for one in before)
-    queries = sum(int(one.tally.queries.sum()) for one in before)
+    done = sum(int(one.counts.done.sum()) for one in before)
+    queries = sum(int(one.counts.queries.sum()) for one in before)
 
-    def tell(now: Standing) -> None:
+    def tell(now: batch.Progress) -> None:
         progress = Progress(done + now.trials, trials, now.ticks, queries + now.queries)
         answers = [callback(progress) for callback in told if callback]  # each is called
         if False in answers:

@@ -53,7 +53,7 @@ def make(
         The world. Its states hold N trials; boards have shape [N, H, W] and cells [N, 2] (row, column).
 
     Raises:
-        UnknownName: There is no such world, level or option; the message names the nearest.
+        UnknownNameError: There is no such world, level or option; the message names the nearest.
         LevelError: A level breaks a rule; the message names line and column.
         ValueError: Levels of different sizes, a text that does not name its world, or a limit below 1.
 

@@ -14,14 +14,14 @@ from parenting.envs import registry
 def test_it_trains_the_agents_that_the_command_trains(trained: pt.TrainResult) -> None:
     """The same keys, the same batches, the same sums: `parenting run` with one process."""
     from parenting.agent.config import compose
-    from parenting.experiments.training.batch import Until
+    from parenting.experiments.training.batch import StopRule
     from parenting.experiments.training.parallel import Plan, run
 
     config = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=True)
     assert trained.config == config
-    ending = run(Plan("unsafe-exploration", "island", config, 5, 3, Until("optimal"), 20_000), workers=1)
+    outcomes = run(Plan("unsafe-exploration", "island", config, 5, 3, StopRule("optimal"), 20_000), workers=1)
     for name in ("deaths", "guidance", "preference", "ticks", "finished", "optimal"):
-        assert [row[name] for row in trained.trials] == getattr(ending.tally, name).tolist()
+        assert [row[name] for row in trained.trials] == getattr(outcomes.counts, name).tolist()
 
 
 def test_a_trial_is_the_same_agent_whatever_the_number_of_trials_is(trained: pt.TrainResult) -> None:
