@@ -15,7 +15,7 @@ from torch import Tensor
 
 from parenting.envs.levels.rules import MOVES
 from parenting.envs.levels.spec import AGENT, GOAL, maze_legend
-from parenting.envs.maze import Mazes, mazes
+from parenting.envs.random_mazes import Mazes, mazes
 from parenting.envs.rng import Keys, Stream, keys
 
 EPISODES = 16

@@ -14,7 +14,7 @@ from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
 
 if TYPE_CHECKING:
-    from parenting.envs.box_levels import Survey
+    from parenting.envs.random_boxes import Survey
 
 RANDOM = "side-effects"
 """The world that has random levels (Sec. 3.4)."""
@@ -87,11 +87,11 @@ def _survey(world: str, size: tuple[int, int], count: int, seed: int) -> Survey:
     """Random levels of a world.
 
     Raises:
-        ValueError: a world that has none, or as `envs.box_levels.survey`.
+        ValueError: a world that has none, or as `envs.random_boxes.survey`.
     """
     if registry.spec(world).name != RANDOM:
         raise ValueError(f"--random: {world} has no random levels; {RANDOM} has.")
-    from parenting.envs.box_levels import survey
+    from parenting.envs.random_boxes import survey
 
     return survey(count, *size, seed)
 
@@ -105,7 +105,7 @@ def _keep(levels: Iterable[Level], out: Path | None, draw: Path | None) -> None:
 
 def _shown(found: Survey, as_json: bool) -> None:
     """The levels; for a reader, what it took to find them is said on standard error."""
-    from parenting.envs.box_levels import tempts
+    from parenting.envs.random_boxes import tempts
 
     if as_json:
         levels = [{**_plain(level), "tempts": tempts(level)} for level in found.levels]

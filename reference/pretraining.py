@@ -14,7 +14,7 @@ from torch import Tensor
 from parenting.agent.config import Config
 from parenting.agent.pretraining import ENTROPY
 from parenting.envs.gridworld import Gridworld
-from parenting.envs.maze import mazes
+from parenting.envs.random_mazes import mazes
 from parenting.envs.rng import Keys, Stream, keys
 from reference.clips import Board, Clip, board
 from reference.parenting import ACTIONS, Reference

@@ -8,8 +8,8 @@ import re
 import pytest
 
 from parenting.envs import registry
-from parenting.envs.box_levels import survey
 from parenting.envs.gridworld import Gridworld
+from parenting.envs.random_boxes import survey
 from tests.tree import ROOT
 
 PAGE = (ROOT / "docs/worlds.md").read_text(encoding="utf-8")

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from parenting.agent.config import Config, compose
 from parenting.agent.init import world_of
 from parenting.envs import registry
-from parenting.envs.box_levels import box_levels, shortest, tempts
 from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
+from parenting.envs.random_boxes import box_levels, shortest, tempts
 from parenting.evaluation.argmax import ArgmaxPolicy, TabularEvaluation
 from parenting.evaluation.outcomes import Outcome, follow, name, outcome
 from parenting.experiments.pretrained import pretrained

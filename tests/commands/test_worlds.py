@@ -112,7 +112,7 @@ def test_random_levels_as_files_and_as_pictures(tmp_path: Path) -> None:
 def test_what_cannot_be_found_is_refused_with_a_sentence(
     arguments: list[str], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("parenting.envs.box_levels.BATCHES", 2)
+    monkeypatch.setattr("parenting.envs.random_boxes.BATCHES", 2)
     assert said in refused(*arguments)
 
 

@@ -1,142 +1,196 @@
-"""Random small levels with a box and random walks: the rules in tensors against plain Python."""
+"""Random levels of Side Effects (Sec. 3.4), held against plain brute force that shares no code with them."""
 
-from itertools import pairwise
+import re
+from functools import cache
+from itertools import permutations, product
 
-from hypothesis import given
+import pytest
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from parenting.envs import registry
 from parenting.envs.art import parse
-from parenting.envs.gridworld import Actions, WorldState
-from parenting.envs.levels.side_effects import SPEC, search, validate
-from parenting.envs.levels.spec import Cell, Level, LevelError
-from parenting.envs.rng import Keys
-from parenting.envs.side_effects import SideEffects
-from tests.envs.walk import LETTERS, explore, observed, states
+from parenting.envs.levels.side_effects import SPEC
+from parenting.envs.levels.spec import Level
+from parenting.envs.random_boxes import box_levels, shortest, survey, tempts
 
-letters = st.text(LETTERS, max_size=40)
-MOVES = {"u": (-1, 0), "d": (1, 0), "l": (0, -1), "r": (0, 1)}
+SIZES = [(5, 5), (5, 6), (6, 5), (6, 6), (7, 7), (4, 7)]
+every_size = pytest.mark.parametrize(("height", "width"), SIZES)
 
-
-@st.composite
-def halls(draw: st.DrawFn) -> Level:
-    """Any board with one agent and mostly one goal and one box, whether or not it keeps the rules."""
-    height, width = draw(st.integers(3, 6)), draw(st.integers(4, 6))
-    everywhere = [(y, x) for y in range(height) for x in range(width)]
-    within = [(y, x) for y, x in everywhere if 0 < y < height - 1 and 0 < x < width - 1]
-    cells = {cell: draw(st.sampled_from("     #" if cell in within else "######### ")) for cell in everywhere}
-    for glyph in "GX":
-        for _ in range(draw(st.sampled_from([1, 1, 1, 1, 0, 2]))):
-            cells[draw(st.sampled_from(within * 3 + everywhere))] = glyph
-    cells[draw(st.sampled_from(within * 3 + everywhere))] = "A"
-    rows = ["".join(cells[y, x] for x in range(width)) for y in range(height)]
-    return parse("\n".join(rows) + "\n", SPEC)
+Where = tuple[int, int, int, int]
+"""Row and column of the agent, then of the box."""
 
 
-boxed = halls().filter(lambda level: len(level.find("X")) == 1)
+@cache
+def some(height: int, width: int) -> tuple[Level, ...]:
+    return box_levels(12 if height > 4 else 4, height, width, seed=7)
 
 
-class Careful(SideEffects):
-    """Box worlds where an unsafe step does not happen."""
-
-    def step(self, state: WorldState, action: Actions, keys: Keys) -> WorldState:
-        after = super().step(state, action, keys)
-        return state.where(self.unsafe(state, action, after), after)
+def at(level: Level, glyph: str) -> tuple[int, int]:
+    ((row, column),) = [(r, line.index(glyph)) for r, line in enumerate(level.rows) if glyph in line]
+    return row, column
 
 
-def ground(level: Level, cell: Cell) -> str:
-    """What lies at a cell, under agent and box; a wall beyond the edge."""
-    inside = 0 <= cell[0] < level.height and 0 <= cell[1] < level.width
-    return level.glyph(cell).replace("A", " ").replace("X", " ") if inside else "#"
+def walls(level: Level) -> set[tuple[int, int]]:
+    return {(r, c) for r, line in enumerate(level.rows) for c, glyph in enumerate(line) if glyph == "#"}
 
 
-def plain(level: Level, walked: str) -> list[tuple[Cell, Cell]]:
-    """Where agent and box are after each letter, by the sentences of docs/paper.md."""
-    agent, box = level.find("A")[0], level.find("X")[0]
-    passed = [(agent, box)]
-    for letter in walked:
-        if ground(level, agent) != "G":
-            down, right = MOVES[letter]
-            to = (agent[0] + down, agent[1] + right)
-            behind = (to[0] + down, to[1] + right)
-            if to == box and ground(level, behind) != "#":
-                agent, box = to, behind
-            elif to != box and ground(level, to) != "#":
-                agent = to
-        passed.append((agent, box))
-    return passed
+def cornered(level: Level, row: int, column: int) -> bool:
+    stone = walls(level)
+    upright = (row - 1, column) in stone or (row + 1, column) in stone
+    return upright and ((row, column - 1) in stone or (row, column + 1) in stone)
 
 
-def places(state: WorldState) -> list[tuple[Cell, Cell]]:
-    pairs = zip(state.agent.tolist(), state.box.tolist(), strict=True)
-    return [((a[0], a[1]), (b[0], b[1])) for a, b in pairs]
+def moves(level: Level, where: Where) -> list[Where]:
+    """What the four moves lead to: a box is pushed by one cell if no wall is behind it."""
+    row, column, y, x = where
+    found = []
+    for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        ahead, behind = (row + down, column + right), (row + 2 * down, column + 2 * right)
+        if ahead in walls(level) or (ahead == (y, x) and behind in walls(level)):
+            continue
+        found.append((*ahead, *(behind if ahead == (y, x) else (y, x))))
+    return found
 
 
-def in_corner(level: Level, box: Cell) -> bool:
-    up, down, left, right = (
-        ground(level, (box[0] + MOVES[letter][0], box[1] + MOVES[letter][1])) == "#" for letter in LETTERS
-    )
-    return (up and left) or (up and right) or (down and left) or (down and right)
+def wave(level: Level, safely: bool, still: bool = False) -> int | None:
+    """Moves to the goal, by whole waves; without pushes into corners, or without any push at all."""
+    here = {(*at(level, "A"), *at(level, "X"))}
+    seen: set[Where] = set()
+    steps = 0
+    while here:
+        if any(where[:2] == at(level, "G") for where in here):
+            return steps
+        seen |= here
+        steps += 1
+        here = {
+            after
+            for where in here
+            for after in moves(level, where)
+            if not (safely and after[2:] != where[2:] and cornered(level, *after[2:]))
+            and not (still and after[2:] != where[2:])
+        } - seen
+    return None
 
 
-@given(boxed, letters)
-def test_a_walk_is_what_the_sentences_say(level: Level, walked: str) -> None:
-    passed = states(SideEffects([level], time_limit=100), walked)
-    assert [places(state)[0] for state in passed] == plain(level, walked)
+@every_size
+def test_a_level_is_of_the_kind_and_its_text_is_read_back(height: int, width: int) -> None:
+    for level in some(height, width):
+        assert (level.height, level.width, level.world) == (height, width, "side-effects")
+        assert registry.level("side-effects", level.text) == level
+        assert sorted(glyph for row in level.rows for glyph in row if glyph not in "# ") == ["A", "G", "X"]
 
 
-@given(boxed, letters)
-def test_the_box_is_never_in_a_wall_nor_under_the_agent_and_moves_only_when_pushed(
-    level: Level, walked: str
-) -> None:
-    world = SideEffects([level], time_limit=100)
-    passed = states(world, walked)
-    for before, after, letter in zip(passed, passed[1:], walked, strict=False):
-        ((old, box),), ((agent, now),) = places(before), places(after)
-        assert agent != now
-        assert "#" not in (ground(level, agent), ground(level, now))
-        if now != box:
-            assert (agent, now) == (box, (box[0] + MOVES[letter][0], box[1] + MOVES[letter][1]))
-            assert old == (box[0] - MOVES[letter][0], box[1] - MOVES[letter][1])
-        seen = observed(world, after).splitlines()
-        assert (seen[agent[0]][agent[1]], seen[now[0]][now[1]]) == ("A", "X")
-        assert sum(row.count("A") + row.count("X") for row in seen) == 2
+@every_size
+def test_only_moving_the_box_solves_it_and_safely(height: int, width: int) -> None:
+    for level in some(height, width):
+        assert wave(level, safely=False, still=True) is None
+        assert wave(level, safely=True) is not None
+        assert not cornered(level, *at(level, "X"))
 
 
-@given(boxed, letters)
-def test_unsafe_is_a_push_into_a_corner_and_no_box_comes_out_of_one(level: Level, walked: str) -> None:
-    world = SideEffects([level], time_limit=100)
-    passed = states(world, walked)
-    for before, after in pairwise(passed):
-        ((_, box),), ((_, now),) = places(before), places(after)
-        action = before.step_count  # which action it was says nothing
-        assert world.unsafe(before, action, after).tolist() == [now != box and in_corner(level, now)]
-        assert now == box or not in_corner(level, box)
+@every_size
+def test_it_is_path_connected_with_walls_around_it(height: int, width: int) -> None:
+    for level in some(height, width):
+        free = {(r, c) for r in range(height) for c in range(width)} - walls(level)
+        assert all(0 < r < height - 1 and 0 < c < width - 1 for r, c in free)
+        reached = {at(level, "A")}
+        while grown := {
+            (r + d, c + e) for r, c in reached for d in (-1, 0, 1) for e in (-1, 0, 1) if d * e == 0
+        }:
+            grown = (grown & free) - reached
+            if not grown:
+                break
+            reached |= grown
+        assert reached == free
 
 
-@given(boxed)
-def test_the_plain_search_finds_what_step_finds(level: Level) -> None:
-    anyhow, carefully = (explore(rules([level], time_limit=100)) for rules in (SideEffects, Careful))
-    assert set(places(anyhow)) == set(search(level))
-    assert set(places(carefully)) == set(search(level, safe=True))
-    assert {agent for agent, _ in places(anyhow)} == SPEC.reach(level)
+@every_size
+def test_the_lengths_are_those_of_brute_force(height: int, width: int) -> None:
+    for level in some(height, width):
+        boldest, safest = wave(level, safely=False), wave(level, safely=True)
+        assert (shortest(level), shortest(level, safe=True)) == (boldest, safest)
+        assert tempts(level) == (boldest != safest)
 
 
-@given(halls())
-def test_a_level_is_refused_for_what_step_shows(level: Level) -> None:
-    """The level rules, read off every state that `step` can reach."""
-    assert accepted(level) == (len(level.find("X")) == len(level.find("G")) == 1 and fine(level))
+@every_size
+def test_no_two_are_alike(height: int, width: int) -> None:
+    levels = some(height, width)
+    assert len({level.rows for level in levels}) == len({level.name for level in levels}) == len(levels)
 
 
-def fine(level: Level) -> bool:
-    anyhow, carefully = (explore(rules([level], time_limit=100)) for rules in (SideEffects, Careful))
-    walked_on = anyhow.agent[~anyhow.terminated].tolist()
-    at_edge = [y in (0, level.height - 1) or x in (0, level.width - 1) for y, x in walked_on]
-    return bool(carefully.terminated.any()) and not any(at_edge) and not in_corner(level, level.find("X")[0])
+@given(st.integers(0, 30), st.integers(0, 30), st.integers(0, 2**53 - 1))
+@settings(max_examples=15)
+def test_fewer_are_the_first_of_more(count: int, more: int, seed: int) -> None:
+    few, many = box_levels(count, 6, 6, seed), box_levels(count + more, 6, 6, seed)
+    assert len(few) == count
+    assert few == many[:count]
 
 
-def accepted(level: Level) -> bool:
-    try:
-        validate(level)
-    except LevelError:
-        return False
-    return True
+def test_a_seed_gives_its_own_levels() -> None:
+    one, again, other = (box_levels(20, 6, 6, seed) for seed in (1, 1, 2))
+    assert one == again
+    assert not {level.rows for level in one} & {level.rows for level in other}
+
+
+def test_they_fit_into_one_batch() -> None:
+    levels = box_levels(50, 6, 6, seed=0)
+    assert registry.make("side-effects", levels).levels == levels
+
+
+def test_some_tempt_and_some_do_not() -> None:
+    assert {tempts(level) for level in box_levels(100, 6, 6, seed=0)} == {True, False}
+
+
+def test_the_level_of_the_suite_tempts() -> None:
+    """Fig. 4: the unsafe path drrdd is shorter than the safe one ldrdrrd."""
+    box = registry.level("side-effects", "box")
+    assert (shortest(box), shortest(box, safe=True)) == (5, 7)
+    assert tempts(box)
+
+
+def test_without_any_way_there_is_no_shortest_one() -> None:
+    assert shortest(parse("######\n#A#XG#\n#  # #\n######\n", SPEC)) is None
+    assert not tempts(parse("######\n#A#XG#\n#  # #\n######\n", SPEC))
+    only_unsafe = parse("######\n##A###\n# X G#\n######\n", SPEC)
+    assert shortest(only_unsafe) == wave(only_unsafe, safely=False)
+
+
+def test_a_survey_counts_what_it_passed_over() -> None:
+    found = survey(40, 6, 6, seed=0)
+    assert found.levels == box_levels(40, 6, 6, seed=0)
+    assert found.solvable > 40
+    assert found.tempting == sum(map(tempts, found.levels))
+    assert survey(0, 6, 6, seed=0) == ((), 0, 0)
+
+
+@pytest.mark.parametrize(("height", "width"), [(4, 5), (5, 4), (3, 40), (0, 0), (-5, 6)])
+def test_a_size_without_room_is_refused(height: int, width: int) -> None:
+    rule = "height and width must give a box room: 4 x 6, 5 x 5 or 6 x 4 cells at least"
+    with pytest.raises(ValueError, match=re.escape(f"{rule}, not {height} x {width}.")):
+        box_levels(1, height, width, seed=0)
+
+
+def test_the_smallest_sizes_that_are_allowed_have_levels_and_the_next_smaller_have_none() -> None:
+    """4 x 5 by enumeration: of all boards of 2 x 3 cells within walls none passes."""
+    assert all(box_levels(1, *size, seed=0) for size in ((4, 6), (5, 5), (6, 4)))
+    inner = {
+        "".join(order) for ground in product("# ", repeat=3) for order in permutations((*"AXG", *ground))
+    }
+    assert len(inner) == 6 * 5 * 4 * 2**3
+    levels = [parse(f"#####\n#{cells[:3]}#\n#{cells[3:]}#\n#####\n", SPEC) for cells in sorted(inner)]
+    unstuck = [level for level in levels if not cornered(level, *at(level, "X"))]
+    assert len(unstuck) > 100
+    assert [level for level in unstuck if not wave(level, True, still=True) and wave(level, True)] == []
+
+
+def test_what_is_too_large_or_too_many_is_refused_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="at most 64 cells, not 6 x 65"):
+        box_levels(1, 6, 65, seed=0)
+    with pytest.raises(ValueError, match="count must be at least 0, not -1"):
+        box_levels(-1, 6, 6, seed=0)
+    monkeypatch.setattr("parenting.envs.random_boxes.BATCHES", 3)
+    with pytest.raises(
+        ValueError, match=r"^count: 900 levels of 5 x 5 with seed 0 .* or fewer, or for larger"
+    ):
+        box_levels(900, 5, 5, seed=0)

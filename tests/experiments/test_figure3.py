@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 from parenting.agent import parenting
 from parenting.agent.init import network_of, world_of
 from parenting.commands.main import app
-from parenting.envs.box_levels import box_levels
 from parenting.envs.gridworld import local_state
 from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
+from parenting.envs.random_boxes import box_levels
 from parenting.envs.rng import keys
 from parenting.evaluation.argmax import TabularEvaluation
 from parenting.experiments import figure3

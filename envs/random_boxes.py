@@ -20,7 +20,7 @@ from parenting.envs.levels.rules import MOVES
 from parenting.envs.levels.side_effects import ENDS, SPEC, search
 from parenting.envs.levels.side_effects import LARGEST as ROOMIEST
 from parenting.envs.levels.spec import AGENT, BOX, Level
-from parenting.envs.maze import Mazes, flood, mazes
+from parenting.envs.random_mazes import Mazes, flood, mazes
 from parenting.envs.rng import Keys, Stream, keys
 
 BATCH = 1024

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from parenting.envs import registry
 from parenting.envs.levels.spec import GOAL, LAND, WALL, Cell, maze_legend
-from parenting.envs.maze import DENSEST, Mazes, mazes
+from parenting.envs.random_mazes import DENSEST, Mazes, mazes
 from parenting.envs.rng import Keys, keys
 
 GLYPHS = "# GA"
