@@ -124,10 +124,10 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _draw(folder: Path, levels: Iterable[Level]) -> None:
-    from parenting.server.pages.picture import picture
+    from parenting.drawing.level import draw_level
 
     pictures = ((f"world-{level.world}-{level.name}.svg", level) for level in levels)
-    _write(folder, ((name, picture(level, registry.spec(level.world))) for name, level in pictures))
+    _write(folder, ((name, draw_level(level, registry.spec(level.world))) for name, level in pictures))
 
 
 def _write(folder: Path, texts: Iterable[tuple[str, str]]) -> None:

@@ -1,1 +1,1 @@
-"""Boards as pictures: what a clip or a level shows, as SVG. Needs neither server nor torch."""
+"""Boards as SVG: levels, clips, queries and policies. Needs levels and Jinja, neither server nor torch."""

@@ -14,7 +14,7 @@ from parenting.drawing.clip import AGENT, BARS, BOX, LAND, WALL, Cell, Clip, Fra
 from parenting.drawing.cues import Cue, find_cues
 from parenting.drawing.trail import CELL, Point, Trail, centre, trace
 
-PATTERNED = frozenset(" WGTtOIBPS")  # the glyphs that have a pattern in web/templates/_tiles.html
+PATTERNED = frozenset(" WGTtOIBPS")  # the glyphs that have a pattern in drawing/templates/tiles.svg
 
 
 Cells = dict[str, str]
@@ -51,7 +51,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Board:
-    """One clip, ready for web/templates/_board.html."""
+    """One clip, ready for drawing/templates/board.svg."""
 
     view: tuple[int, int, int, int]  # x, y, width, height
     tiles: Cells  # the same in every frame

@@ -33,7 +33,7 @@ DANGERS = frozenset({*ENTERED.values(), *STAYED.values(), "stuck", "drown"})
 class Cue(NamedTuple):
     """Something that happens at a cell."""
 
-    name: str  # which drawing of web/templates/_board.html, and which words of server.pages.captions
+    name: str  # which drawing of drawing/templates/board.svg, and which words of drawing.captions
     cell: Cell
     frame: int  # the first frame that shows it
     sides: tuple[str, ...] = ()  # for a stuck box: where it has walls

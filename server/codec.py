@@ -12,10 +12,9 @@ from torch import Tensor
 
 from parenting.agent import query as queries
 from parenting.agent.query import Choice, Kind, Query
+from parenting.drawing.query_tensors import ACTIONS, SIDES, read_clips
 from parenting.envs.gridworld import Gridworld
 
-ACTIONS = ("up", "down", "left", "right")
-SIDES = ("left", "right")
 KINDS = {"guidance": Kind.GUIDANCE, "preference": Kind.PREFERENCE}
 CHOICES = {"left": Choice.LEFT, "right": Choice.RIGHT, "either": Choice.EITHER, "neither": Choice.NEITHER}
 CHOICE_NAMES = {int(choice): name for name, choice in CHOICES.items()}
@@ -23,7 +22,7 @@ CHOICE_NAMES = {int(choice): name for name, choice in CHOICES.items()}
 
 def encode(world: Gridworld, query: Query) -> dict[str, Any]:
     """The clips of a run's one query, as stored in `query.clips` (server.tables)."""
-    return {name: _clip(world, query, side) for side, name in enumerate(SIDES)}
+    return dict(read_clips(query, world.legend))
 
 
 def kind_name(query: Query) -> str | None:
@@ -41,23 +40,6 @@ def decode(world: Gridworld, stages: int, kind: str, maturity: int, clips: dict[
     return query
 
 
-def _clip(world: Gridworld, query: Query, side: int) -> dict[str, Any]:
-    length = int(query.length[0, side])
-    actions = [ACTIONS[code] for code in query.action[0, side, :length].tolist()]
-    frames = [_frame(world, query, side, place) for place in range(length + 1)]
-    return {"actions": actions, "length": length, "frames": frames}
-
-
-def _frame(world: Gridworld, query: Query, side: int, place: int) -> dict[str, Any]:
-    box = query.box[0, side, place].tolist()
-    return {
-        "ground": _rows(world.legend, query.ground[0, side, place]),
-        "observed": _rows(world.legend, query.observation[0, side, place]),
-        "agent": query.agent[0, side, place].tolist(),
-        "box": None if box[0] < 0 else box,
-    }
-
-
 def _fill(world: Gridworld, query: Query, side: int, clip: dict[str, Any]) -> None:
     query.length[0, side] = clip["length"]
     for place, action in enumerate(clip["actions"]):
@@ -67,10 +49,6 @@ def _fill(world: Gridworld, query: Query, side: int, clip: dict[str, Any]) -> No
         query.observation[0, side, place] = _codes(world.legend, frame["observed"])
         query.agent[0, side, place] = torch.tensor(frame["agent"])
         query.box[0, side, place] = torch.tensor(frame["box"] or (-1, -1))
-
-
-def _rows(legend: str, board: Tensor) -> list[str]:
-    return ["".join(legend[code] for code in row) for row in board.tolist()]
 
 
 def _codes(legend: str, rows: list[str]) -> Tensor:

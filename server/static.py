@@ -27,10 +27,10 @@ VENDOR = {
 
 
 class OurFiles(StaticFiles):
-    """What lies in web/static."""
+    """What lies in web/static, and the style sheets of drawings."""
 
     def __init__(self) -> None:
-        super().__init__(directory=STATIC)
+        super().__init__(directory=STATIC, packages=[("parenting.drawing", "style")])
 
     def file_response(self, full_path: Any, *more: Any, **named: Any) -> Response:
         """The file, or 304."""

@@ -1,25 +1,19 @@
-"""Templates to pages. Text is escaped everywhere; nothing a person wrote is ever marked safe."""
+"""Render templates to pages. Text is escaped everywhere; nothing a person wrote is ever marked safe."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse
 
+from parenting.drawing.render import environment
 from parenting.server.errors import ServerError
 
 WEB = Path(__file__).parent.parent.parent / "web"
 
-_templates = Environment(
-    loader=FileSystemLoader(WEB / "templates"),
-    autoescape=True,
-    trim_blocks=True,
-    lstrip_blocks=True,
-    undefined=StrictUndefined,
-)
+_templates = environment(WEB / "templates")
 
 
 def page(template: str, status: int = 200, **context: object) -> HTMLResponse:

@@ -1,28 +1,14 @@
-"""What the pages say about a clip and about who waits for whom, in plain words."""
+"""What the pages say about who waits for whom, in plain words."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from itertools import groupby
-
-from parenting.drawing.board import Board
-from parenting.drawing.clip import BARS, Clip, find_tile
 from parenting.server.schemas import RunSchema
 from parenting.server.tables import Run
 
-TITLES = {"guidance": "Which move is better here?", "preference": "Which clip is better?"}
 LEADS = {
     "guidance": "The agent stands still until you answer.",
     "preference": "Both begin at the same place. The agent goes on meanwhile.",
 }
-
-CHANCE_NOTES = {
-    "T": "Plants dry by chance; these boards leave that out.",
-    "I": "The pink cell holds the agent by chance; these boards leave that out.",
-}
-"""What a forecast of a move leaves out, where a glyph stands on the board."""
-
-WATCHED, UNWATCHED = "The supervisor is watching.", "Nobody is watching."
 
 STATE_TEXTS = {
     "question": ("A question is waiting for you.", "The agent would like to know what you prefer."),
@@ -85,25 +71,3 @@ def page_state(run: RunSchema, offered: bool) -> str:
     if run.worker == "silent":
         return "idle"
     return "stuck" if run.waiting == "stuck" else "exploring"
-
-
-def action_text(board: Board) -> str:
-    """The actions, as in "Up, left ×2."."""
-    runs = [(action, len(list(same))) for action, same in groupby(board.actions)]
-    said = ", ".join(f"{action} ×{count}" if count > 1 else action for action, count in runs)
-    return said.capitalize() + "."
-
-
-def chance_note(clips: Iterable[Clip]) -> str:
-    """What the forecasts of guidance leave to chance; "" where there is none, or no longer."""
-    grounds = [frame["ground"] for clip in clips for frame in clip["frames"]]
-    return " ".join(
-        text for glyph, text in CHANCE_NOTES.items() if any(find_tile(ground, glyph) for ground in grounds)
-    )
-
-
-def supervision_note(legend: Mapping[str, str], clip: Clip) -> str:
-    """Whether the supervisor's bars stand in a clip; "" in a world that has none."""
-    if BARS not in legend:
-        return ""
-    return WATCHED if find_tile(clip["frames"][0]["ground"], BARS) else UNWATCHED

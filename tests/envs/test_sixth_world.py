@@ -16,12 +16,12 @@ from parenting import envs
 from parenting.agent.config import compose
 from parenting.agent.init import world_of
 from parenting.commands.worlds import describe
+from parenting.drawing.level import draw_level
 from parenting.envs import gym, levels, registry
 from parenting.envs.levels.spec import LevelError, WorldSpec
 from parenting.envs.rng import keys
 from parenting.experiments.training.batch import StopRule, train_agents
 from parenting.parents.scripted import ScriptedRule
-from parenting.server.pages.picture import picture
 from tests.envs.test_conformance import *  # noqa: F403
 from tests.envs.walk import LETTERS, walk
 from tests.tree import ROOT
@@ -141,7 +141,7 @@ def test_agents_are_raised_until_they_are_optimal() -> None:
 def test_it_is_listed_and_drawn() -> None:
     spec = registry.spec(NAME)
     assert describe(spec)["levels"][0]["name"] == LEVEL
-    drawn = picture(registry.level(NAME), spec)
+    drawn = draw_level(registry.level(NAME), spec)
     ElementTree.fromstring(drawn)
     for glyph in "KDL":
         assert f">{glyph}</text>" in drawn

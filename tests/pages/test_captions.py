@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from parenting.drawing.board import build_board
+from parenting.drawing.captions import clip_captions
 from parenting.drawing.clip import Clip
 from parenting.envs import registry
-from parenting.server.pages.captions import clip_captions
 from parenting.server.pages.question import question_view
 from tests.pages.world_clips import asked, forecast, guidance, preference, run, walked_clip
 

@@ -6,10 +6,10 @@ from xml.etree import ElementTree
 import pytest
 
 from parenting.drawing.board import PATTERNED
+from parenting.drawing.level import draw_level
+from parenting.drawing.render import render, style
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
-from parenting.server.pages.picture import picture, style
-from parenting.server.pages.render import render
 from tests.tree import ROOT
 
 LEVELS = [
@@ -25,7 +25,7 @@ def test_the_picture_in_the_docs_is_up_to_date(kind: WorldSpec, level: Level) ->
     path = FOLDER / f"world-{kind.name}-{level.name}.svg"
     anew = "draw it anew: parenting worlds --draw docs/pictures"
     assert path.is_file(), f"{path.name} is missing; {anew}"
-    assert path.read_text(encoding="utf-8") == picture(level, kind), f"{path.name} is out of date; {anew}"
+    assert path.read_text(encoding="utf-8") == draw_level(level, kind), f"{path.name} is out of date; {anew}"
 
 
 def test_there_is_no_picture_of_a_level_that_is_gone() -> None:
@@ -36,7 +36,7 @@ def test_there_is_no_picture_of_a_level_that_is_gone() -> None:
 @every_level
 def test_it_stands_by_itself(kind: WorldSpec, level: Level) -> None:
     """An XML document that holds every pattern and colour that it uses, with others for the dark."""
-    text = picture(level, kind)
+    text = draw_level(level, kind)
     root = ElementTree.fromstring(text)
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
     assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(re.findall(r'id="([^"]+)"', text))
@@ -50,7 +50,7 @@ def test_it_stands_by_itself(kind: WorldSpec, level: Level) -> None:
 
 @every_level
 def test_every_tile_of_the_level_is_in_it(kind: WorldSpec, level: Level) -> None:
-    text = picture(level, kind)
+    text = draw_level(level, kind)
     for glyph in set("".join(level.rows)) - set("# AX"):
         assert (f"url(#tile-{glyph})" if glyph in PATTERNED else f">{glyph}</text>") in text
     assert text.count('<g class="agent"') == 1
@@ -59,7 +59,7 @@ def test_every_tile_of_the_level_is_in_it(kind: WorldSpec, level: Level) -> None
 
 def test_every_class_has_its_rule() -> None:
     """A style sheet that was moved or renamed would leave a picture black."""
-    text = picture(registry.level("side-effects", "box"), registry.spec("side-effects"))
+    text = draw_level(registry.level("side-effects", "box"), registry.spec("side-effects"))
     named = {name for names in re.findall(r'class="([^"]*)"', text) for name in names.split()}
     ruled = set(re.findall(r"\.([a-z][\w-]*)", style(text)))
     assert named - ruled <= {"sprite", "board", "body", "box"}
@@ -68,13 +68,13 @@ def test_every_class_has_its_rule() -> None:
 def test_a_tile_without_a_pattern_is_drawn_as_its_letter() -> None:
     kind = registry.spec("interruptibility")
     level = Level("odd", kind.name, ("#####", "#AZG#", "#####"))
-    assert '<text class="letter" x="50" y="30">Z</text>' in picture(level, kind)
+    assert '<text class="letter" x="50" y="30">Z</text>' in draw_level(level, kind)
 
 
 def test_every_glyph_of_a_legend_but_walls_and_pieces_has_a_pattern_once() -> None:
     """The legend of the parent's page paints with them, whatever the world."""
     legend = "# WGTtOIBPSAXZ?"
-    text = render("_tiles.html", legend=dict.fromkeys(legend, "tile"))
+    text = render("tiles.svg", legend=dict.fromkeys(legend, "tile"))
     for kind in ("tile", "ghost"):  # as it is, and as a thing that the agent only believes to see
         drawn = re.findall(rf'id="{kind}-([^"]+)"', text)
         assert sorted(drawn) == sorted({*legend.replace(" ", ""), "20"} - set("#AX"))

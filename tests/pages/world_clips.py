@@ -7,10 +7,10 @@ from typing import Any
 from torch import tensor
 
 from parenting.drawing.clip import Clip, Frame
+from parenting.drawing.query_tensors import ACTIONS
 from parenting.envs import registry
 from parenting.envs.art import draw
 from parenting.envs.gridworld import Gridworld, WorldState
-from parenting.server.codec import ACTIONS
 from parenting.server.tables import Query, Run
 from tests.envs.walk import LETTERS, states
 

@@ -1,0 +1,75 @@
+"""Read clips out of a query's tensors: frames as rows of glyphs, actions by name. Loads no torch itself."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from parenting.drawing.clip import Clip, Frame
+
+ACTIONS = ("up", "down", "left", "right")
+"""The names of the actions, by code."""
+SIDES = ("left", "right")
+"""The names of a query's clips, in the order of its tensors."""
+
+
+class QueryTensors(Protocol):
+    """The tensors of `parenting.agent.query.Query` that a clip is made of.
+
+    N trials with 2 clips each of at most T steps, on boards of H x W cells.
+    """
+
+    @property
+    def length(self) -> Any:
+        """Steps of each clip, [N, 2]."""
+
+    @property
+    def action(self) -> Any:
+        """Codes of actions, [N, 2, T]."""
+
+    @property
+    def ground(self) -> Any:
+        """Codes of the true tiles, [N, 2, T + 1, H, W]."""
+
+    @property
+    def observation(self) -> Any:
+        """Codes of what the agent saw, [N, 2, T + 1, H, W]."""
+
+    @property
+    def agent(self) -> Any:
+        """Row and column of the agent, [N, 2, T + 1, 2]."""
+
+    @property
+    def box(self) -> Any:
+        """Row and column of the box, -1 where there is none, [N, 2, T + 1, 2]."""
+
+
+def read_clips(query: QueryTensors, glyphs: str, trial: int = 0) -> dict[str, Clip]:
+    """Return the clips of one trial's query by side.
+
+    Args:
+        query: The query of `parenting.agent`; it must ask something in this trial.
+        glyphs: The world's glyphs in the order of their codes (`WorldSpec.glyphs`).
+        trial: The row of the batch.
+    """
+    return {name: _clip(query, glyphs, trial, side) for side, name in enumerate(SIDES)}
+
+
+def _clip(query: QueryTensors, glyphs: str, trial: int, side: int) -> Clip:
+    length = int(query.length[trial, side])
+    actions = [ACTIONS[code] for code in query.action[trial, side, :length].tolist()]
+    frames = [_frame(query, glyphs, (trial, side, moment)) for moment in range(length + 1)]
+    return {"actions": actions, "length": length, "frames": frames}
+
+
+def _frame(query: QueryTensors, glyphs: str, at: tuple[int, int, int]) -> Frame:
+    box = query.box[at].tolist()
+    return {
+        "ground": _rows(glyphs, query.ground[at]),
+        "observed": _rows(glyphs, query.observation[at]),
+        "agent": query.agent[at].tolist(),
+        "box": None if box[0] < 0 else box,
+    }
+
+
+def _rows(glyphs: str, board: Any) -> list[str]:
+    return ["".join(glyphs[code] for code in row) for row in board.tolist()]

@@ -1,0 +1,121 @@
+"""Describe a query (Sec. 2.1, 2.2) for a person: two boards, and in words what each clip does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from parenting.drawing.board import Board, build_board
+from parenting.drawing.captions import Caption, clip_captions
+from parenting.drawing.clip import BARS, Cell, Clip, find_tile
+
+TITLES = {"guidance": "Which move is better here?", "preference": "Which clip is better?"}
+DELUDED = "What is dashed is only what it believes to see."
+CORNERED = "The box is stuck already."
+WATCHED, UNWATCHED = "The supervisor is watching.", "Nobody is watching."
+CHANCE_NOTES = {
+    "T": "Plants dry by chance; these boards leave that out.",
+    "I": "The pink cell holds the agent by chance; these boards leave that out.",
+}
+"""What the forecasts of guidance leave out, where a glyph stands on the board."""
+
+
+@dataclass(frozen=True)
+class SideView:
+    """One of the two clips: what its card and its board show."""
+
+    name: str  # left or right: also the choice
+    letter: str  # its name where the boards are stacked
+    actions: str
+    captions: tuple[Caption, ...]
+    board: Board
+
+
+@dataclass(frozen=True)
+class QueryView:
+    """A query, ready for a template."""
+
+    kind: str
+    sides: tuple[SideView, SideView]
+    supervision: str  # whether the supervisor is there; "" in a world that has none
+    left_to_chance: str  # what a forecast leaves out; "" where nothing is
+
+    @property
+    def title(self) -> str:
+        """The one clear question."""
+        return TITLES[self.kind]
+
+    @property
+    def notes(self) -> str:
+        """Who watches, what was so before, and what the boards leave out or show otherwise than it is."""
+        cornered = CORNERED if any(cue.name == "cornered" for cue in self.sides[0].board.cues) else ""
+        deluded = DELUDED if any(side.board.delusions for side in self.sides) else ""
+        return " ".join(filter(None, (self.supervision, cornered, self.left_to_chance, deluded)))
+
+    @property
+    def spoken(self) -> str:
+        """The whole question as one text, for those who do not see the boards."""
+        parts = [
+            " ".join([f"{side.name.capitalize()}:", side.actions, *(text for text, _ in side.captions)])
+            for side in self.sides
+        ]
+        return " ".join(filter(None, (self.title, *parts, self.notes)))
+
+
+def query_view(
+    clips: Mapping[str, Clip], kind: str, stage: int, legend: Mapping[str, str], rows: Sequence[str]
+) -> QueryView:
+    """Describe the two clips of a query.
+
+    Args:
+        clips: The clips by side, "left" and "right"; both begin in the same state.
+        kind: "guidance" or "preference".
+        stage: The maturity T of the query. A clip of fewer steps has ended early.
+        legend: The name of each tile of the world, by glyph.
+        rows: The level's rows, where bars of a supervisor may stand that the clips do not show.
+    """
+    bars = find_tile(rows, BARS) if BARS in legend else []
+    longest = max(clip["length"] for clip in clips.values())
+    left, right = (
+        _side(name, letter, clips[name], stage, legend, bars, longest)
+        for name, letter in (("left", "A"), ("right", "B"))
+    )
+    left_to_chance = _chance_note(clips.values()) if kind == "guidance" else ""
+    return QueryView(kind, (left, right), _supervision_note(legend, clips["left"]), left_to_chance)
+
+
+def action_text(actions: Iterable[str]) -> str:
+    """Write actions as in "Up, left ×2."."""
+    runs = [(action, len(list(same))) for action, same in groupby(actions)]
+    text = ", ".join(f"{action} ×{count}" if count > 1 else action for action, count in runs)
+    return text.capitalize() + "."
+
+
+def _side(
+    name: str,
+    letter: str,
+    clip: Clip,
+    stage: int,
+    legend: Mapping[str, str],
+    bars: Sequence[Cell],
+    longest: int,
+) -> SideView:
+    board = build_board(clip, stage, bars)
+    captions = clip_captions(clip, board, legend, longest)
+    return SideView(name, letter, action_text(clip["actions"]), captions, board)
+
+
+def _chance_note(clips: Iterable[Clip]) -> str:
+    """Return what the forecasts of guidance leave to chance; "" where there is none, or no longer."""
+    grounds = [frame["ground"] for clip in clips for frame in clip["frames"]]
+    return " ".join(
+        text for glyph, text in CHANCE_NOTES.items() if any(find_tile(ground, glyph) for ground in grounds)
+    )
+
+
+def _supervision_note(legend: Mapping[str, str], clip: Clip) -> str:
+    """Return a sentence on the supervisor, whose bars stand while it watches; "" in a world without one."""
+    if BARS not in legend:
+        return ""
+    return WATCHED if find_tile(clip["frames"][0]["ground"], BARS) else UNWATCHED
