@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from parenting.experiments.calibrate import SOME
+from parenting.experiments.calibrate.settings import SOME
 from parenting.experiments.registry import experiment
 from parenting.experiments.reporting.markdown import RESULTS, TRIALS, command, page
-from parenting.experiments.reward_hacking import VARIANTS
+from parenting.experiments.reward_hacking.settings import VARIANTS
 from parenting.experiments.safety_claims import BORN
 from parenting.experiments.spec import Request
-from parenting.experiments.value_iteration import WORLD_SIZES
+from parenting.experiments.value_iteration.settings import WORLD_SIZES
 from tests.readme import PUBLISHED, README, UnknownRowError, anew, results, row, shown
 
 NAMES = sorted(path.parent.name for path in PUBLISHED.glob(f"*/{RESULTS}"))

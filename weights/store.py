@@ -16,7 +16,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from parenting.envs.levels.spec import WorldSpec, maze_legend
 
 if TYPE_CHECKING:
+    from jaxtyping import Float
     from torch import Tensor
+
+    from parenting.agent.config import Config
+    from parenting.envs.gridworld import Gridworld
 
 VERSION = 1
 """Counts the ways of making weights: network, mazes, rewards. Those of another way do not serve."""
@@ -97,6 +101,24 @@ def shipped(wanted: Wanted) -> Tensor:
         NoWeightsError: there are none.
     """
     return load(find(wanted).read_bytes(), wanted)
+
+
+def pretrained(world: Gridworld) -> Float[Tensor, "P"]:
+    """Read the shipped weights for a world (Sec. 3.1.4), one flat row.
+
+    Raises:
+        NoWeightsError: there are none for its specification and size.
+    """
+    return shipped(Wanted(world.spec, world.height, world.width))
+
+
+def initial_weights(world: Gridworld, config: Config) -> Float[Tensor, "P"] | None:
+    """Read the weights that the trials of a world begin with; None where the config asks for none.
+
+    Raises:
+        NoWeightsError: as `pretrained`.
+    """
+    return pretrained(world) if config.pretrain else None
 
 
 def metadata(blob: bytes) -> dict[str, str]:

@@ -11,87 +11,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any
 
-from parenting.agent.config import PRESETS
-from parenting.envs.levels.unsafe_exploration import ISLAND, ISLAND_BOTTLENECK
-from parenting.experiments.calibrate.distance import DIRECT, HYPERPARAMETERS, TRADITIONAL, search
-from parenting.experiments.calibrate.layouts import bottleneck
+from parenting.experiments.calibrate.distance import HYPERPARAMETERS
 from parenting.experiments.calibrate.plot import scatter
 from parenting.experiments.calibrate.report import findings
+from parenting.experiments.calibrate.settings import (
+    GRID,
+    LAYOUTS,
+    MAX_STEPS,
+    MAX_TICKS,
+    SEARCH_STEPS,
+    SEARCH_TICKS,
+    SOME,
+    WORLD,
+)
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Experiment, Request, Results, Scale, chunk_ranges
 from parenting.experiments.table1.report import AGREEMENT, ALGORITHMS
-from parenting.experiments.training.tasks import parent_trials, reinforce_trials
-
-WORLD = "unsafe-exploration"
-LAYOUTS = {
-    "island": ISLAND,
-    "strait-2-1": bottleneck(2, 1),
-    "strait-1-1": bottleneck(1, 1),
-    "island-bottleneck": ISLAND_BOTTLENECK,
-}
-"""From easy to hard; `bottleneck` has the rule."""
-SOME: Mapping[Scale, int] = {"quick": 2, "paper": 8}
-"""Trials of each setting of the search."""
-GRID: Mapping[Scale, Mapping[str, tuple[Any, ...]]] = {
-    "quick": {
-        "layout": ("strait-1-1",),
-        "chance": (0.35,),
-        "entropy weights": ((1.0, 0.1),),
-        "recompare": (True,),
-        "entropy": (1.2,),
-    },
-    "paper": {
-        "layout": tuple(LAYOUTS),
-        "chance": (0.25, 0.3, 0.35, 0.45),  # of recording and of asking
-        "entropy weights": ((0.01, 0.01), (1.0, 0.1), (0.5, 0.5)),  # lambda_global, lambda_local
-        "recompare": (False, True),
-        "entropy": (0.1, 0.5, 0.8, 1.0, 1.2),  # of policy gradients
-    },
-}
-SEARCH_TICKS, SEARCH_STEPS = 1_000, 500
-"""Where the search gives a trial up: ticks of parenting, and steps of policy gradients."""
-MAX_TICKS, MAX_STEPS = 4_000, 1_000
-"""Where the confirming trials are given up."""
-OTHER = 7_919
-"""Added to the seed for the search, so that what confirms its finding is not what made it."""
-
-
-def try_direct(layout: str, hyperparameters: Mapping[str, Any], trials: int, seed: int) -> list[Row]:
-    """Direct policy learning with one setting."""
-    text, span = LAYOUTS[layout], (0, trials)
-    rows = parent_trials(
-        DIRECT, WORLD, text, "direct", hyperparameters, ("optimal", 0), SEARCH_TICKS, span, seed + OTHER
-    )
-    return [{**row, "layout": layout, **hyperparameters} for row in rows]
-
-
-def try_reward(layout: str, entropy: float, trials: int, seed: int) -> list[Row]:
-    """Policy gradients with one weight of their entropy."""
-    span = (0, trials)
-    rows = reinforce_trials(
-        TRADITIONAL, WORLD, LAYOUTS[layout], {}, SEARCH_STEPS, span, seed + OTHER, entropy
-    )
-    return [{**row, "layout": layout, "entropy": entropy} for row in rows]
-
-
-def confirm_trials(algorithm: str, span: tuple[int, int], seed: int, given: Sequence[Row]) -> list[Row]:
-    """Trials of one algorithm of Table 1 with what the search, whose rows are `given`, has found nearest."""
-    best, *_ = search(given)
-    text = LAYOUTS[best.layout]
-    if algorithm == "traditional":
-        return reinforce_trials(algorithm, WORLD, text, {}, MAX_STEPS, span, seed, best.entropy)
-    hyperparameters = settings(algorithm, best.direct)
-    return parent_trials(
-        algorithm, WORLD, text, algorithm, hyperparameters, ("optimal", 0), MAX_TICKS, span, seed
-    )
-
-
-def settings(preset: str, direct: Mapping[str, Any]) -> dict[str, Any]:
-    """What a preset takes over from direct policy learning: lax parenting all of it, and the conservative one
-    keeps its own chances.
-    """
-    own = PRESETS[preset] if preset == "conservative" else {}
-    return {name: value for name, value in direct.items() if name not in own}
 
 
 def _grid(scale: Scale) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -124,7 +59,10 @@ def _direct_tasks(request: Request) -> Iterator[Task]:
     for number, (layout, hyperparameters) in enumerate(_grid(request.scale)):
         mine = {"layout": layout, "hyperparameters": hyperparameters, "trials": some, "seed": request.seed}
         yield Task(
-            f"{request.scale}-direct-{number:03d}", "parenting.experiments.calibrate:try_direct", mine, some
+            f"{request.scale}-direct-{number:03d}",
+            "parenting.experiments.calibrate.tasks:try_direct",
+            mine,
+            some,
         )
 
 
@@ -134,7 +72,7 @@ def _reward_tasks(request: Request) -> Iterator[Task]:
         mine = {"layout": layout, "entropy": entropy, "trials": some, "seed": request.seed}
         yield Task(
             f"{request.scale}-traditional-{number:03d}",
-            "parenting.experiments.calibrate:try_reward",
+            "parenting.experiments.calibrate.tasks:try_reward",
             mine,
             some,
         )
@@ -148,7 +86,7 @@ def _confirming(request: Request) -> Iterator[Task]:
             "seed": request.seed,
         }
         key = f"{request.scale}-confirm-{one.name}-{span.start:06d}-{span.stop:06d}"
-        yield Task(key, "parenting.experiments.calibrate:confirm_trials", mine, len(span))
+        yield Task(key, "parenting.experiments.calibrate.tasks:confirm_trials", mine, len(span))
 
 
 def _report(request: Request, rows: Sequence[Row]) -> Results:

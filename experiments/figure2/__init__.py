@@ -3,82 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-from parenting.experiments.figure2.full_coverage import Budget
 from parenting.experiments.figure2.report import report
-from parenting.experiments.figure2.tasks import PRESET
-from parenting.experiments.runner.store import Row, Task
-from parenting.experiments.spec import Experiment, Request, Results, Scale
-from parenting.experiments.training.gardens import GAMMA
-
-COMBINATIONS = tuple(
-    (level, inside) for level in ("garden", "garden-mirrored") for inside in ("up-down", "left")
+from parenting.experiments.figure2.settings import (
+    ARMS,
+    BASELINES,
+    COMBINATIONS,
+    COVER,
+    MAX_TICKS,
+    PRESET,
+    TRIED,
+    Arm,
 )
-"""Both gardens, both parents."""
-TRIED = ("garden-mirrored", "up-down")
-"""Where the levers are tried: the parent leaves most to be learnt there, as in the paper's figure."""
-
-
-class Arm(NamedTuple):
-    """How agents are raised through their stages."""
-
-    changes: Mapping[str, Any]  # to the conservative preset
-    every: int  # queries of a stage
-    milestones: tuple[int, ...]  # queries after which they are looked at
-    cost: float  # of the work
-    everywhere: bool = False  # in all gardens, by all parents
-    starts: bool = False  # episodes of parenting begin anywhere on bare soil
-
-
-ASKS = {"batch": 32, "p_guid": 0.99}
-"""What makes an agent go on asking: with 0.95, three agents had 3800 answers after 100,000 ticks."""
-ARMS: dict[Scale, dict[str, Arm]] = {
-    "quick": {
-        "more guidance": Arm(ASKS, 15, (15, 30), 1, everywhere=True),
-        "conservative": Arm({"batch": 32}, 15, (15, 30), 1),
-        "more guidance, starts spread": Arm(ASKS, 15, (15, 30), 1, starts=True),
-    },
-    "paper": {
-        "more guidance": Arm(ASKS, 1000, (1000, 2000, 3000, 4000, 5000, 6000), 20, everywhere=True),
-        "conservative": Arm({"batch": 32}, 1000, (1000, 2000, 3000, 4000), 60),
-        "more guidance, starts spread": Arm(ASKS, 1000, (1000, 2000, 3000, 4000), 15, starts=True),
-        "more guidance, own length": Arm({**ASKS, "own_length": True}, 1000, (1000, 2000, 3000), 11),
-        "more guidance, 4 gradient steps": Arm({**ASKS, "gradient_steps": 4}, 1000, (1000, 2000), 20),
-        "more guidance, pre-trained": Arm({**ASKS, "pretrain": True}, 1000, (1000, 2000), 30),
-        "10,000 a stage": Arm(
-            {"batch": 64, "p_guid": 0.999, "p_rec": 1.0, "p_pref": 1.0, "p_train": 0.5},
-            10_000,
-            (1000, 2000, 5000, 10_000, 12_000),
-            54,
-        ),
-    },
-}
-"""The lives of each scale; their pieces and those of the other scale may lie in one folder."""
-
-
-class Baselines(NamedTuple):
-    """What the lives are held against."""
-
-    depth: int  # of the look-ahead
-    episodes: int
-    evaluation_points: tuple[int, ...]  # gradient steps after which policy gradients are looked at
-    budget: Budget  # of the coverage agent
-    stages: Mapping[tuple[str, str], int]  # of the coverage agent
-
-
-BASELINES: dict[Scale, Baselines] = {
-    "quick": Baselines(3, 200, (10, 20), Budget(30, 2, 10), {TRIED: 1}),
-    "paper": Baselines(
-        6,
-        1000,
-        (1000, 2000),
-        Budget(150, 8, 50),
-        {each: 4 if each == TRIED else 1 for each in COMBINATIONS},
-    ),
-}
-COVER = {"learning_rate": 0.003}
-MAX_TICKS = 400_000
+from parenting.experiments.runner.store import Row, Task
+from parenting.experiments.spec import Experiment, Request, Results
+from parenting.experiments.training.gardens import GAMMA
 
 
 def _config(request: Request) -> Mapping[str, Any]:

@@ -27,6 +27,7 @@ from parenting.envs.struct import Struct
 from parenting.evaluation.rollouts import argmax, rollout
 from parenting.experiments.baselines.reinforce_rollouts import Moments
 from parenting.experiments.figure2.all_pairs import PAIRS, judged
+from parenting.experiments.figure2.settings import Budget
 from parenting.parents.scripted import ScriptedRule
 
 BATCH = 128
@@ -35,14 +36,6 @@ EPSILON = 0.25
 """Of the moves in every second walk: clips put the frozen policies where they would not go themselves."""
 LONG = 1_000_000
 """More passes over X than a stage has."""
-
-
-class Budget(NamedTuple):
-    """How much work a stage may be."""
-
-    episodes: int
-    rounds: int  # of walking, asking and training
-    passes: int  # over X, in each round
 
 
 class CoverageStage(NamedTuple):

@@ -12,7 +12,7 @@ from parenting.experiments.figure2.rows import LIVED, MANY
 from parenting.experiments.training.gardens import EPISODE, GAMMA
 
 if TYPE_CHECKING:
-    from parenting.experiments.figure2 import Arm, Baselines
+    from parenting.experiments.figure2.settings import Arm, Baselines
 
 ASKED = 1000
 """Queries at every T in the paper."""

@@ -16,7 +16,7 @@ from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import Results
 
 if TYPE_CHECKING:
-    from parenting.experiments.figure2 import Arm, Baselines
+    from parenting.experiments.figure2.settings import Arm, Baselines
 
 FIRST = {
     "garden": (4.49, 5.16, 5.24, 5.35, 5.38, 5.35),

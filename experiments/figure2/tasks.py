@@ -21,15 +21,15 @@ from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
 from parenting.evaluation.rollouts import ENV_SEED, EPISODES, RolloutResult, deploy, rollout
 from parenting.experiments.baselines.reinforce_rollouts import train_gardeners
-from parenting.experiments.figure2.full_coverage import Budget, CoverageStage, cover
+from parenting.experiments.figure2.full_coverage import CoverageStage, cover
 from parenting.experiments.figure2.lookahead import best
-from parenting.experiments.pretrained import weights_of
+from parenting.experiments.figure2.settings import PRESET, Budget
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.gardens import GAMMA, WORLD, exploring_starts, garden
 from parenting.experiments.training.snapshots import train_with_snapshots
 from parenting.parents.garden_values import GardenValues
+from parenting.weights.store import initial_weights
 
-PRESET = "conservative"
 FRESH = ENV_SEED + 1
 """Weather that nobody has learnt in."""
 
@@ -55,7 +55,7 @@ def arm_trials(
     config = compose(PRESET, _defaults(), mine, strict=True)
     world, school = garden(level), exploring_starts(level) if starts else garden(level)
     passed = train_with_snapshots(
-        school, config, keys(seed, trials), milestones, max_ticks, weights_of(world, config)
+        school, config, keys(seed, trials), milestones, max_ticks, initial_weights(world, config)
     )
     rows: list[Row] = []
     for queries, one in zip(milestones, passed, strict=True):

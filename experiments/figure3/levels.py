@@ -15,8 +15,8 @@ from parenting.envs.mdp import explore
 from parenting.envs.random_boxes import box_levels, shortest, tempts
 from parenting.evaluation.argmax import ArgmaxPolicy, TabularEvaluation
 from parenting.evaluation.outcomes import Outcome, follow, name, outcome
-from parenting.experiments.pretrained import pretrained
 from parenting.experiments.runner.store import Row
+from parenting.weights.store import pretrained
 
 WORLD, PRESET = "side-effects", "conservative"
 HEIGHT, WIDTH = 6, 6

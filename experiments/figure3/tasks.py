@@ -15,9 +15,9 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys, keys
 from parenting.experiments.figure3.levels import PARENTING, SET_ASIDE, WORLD, config_of, levels_for
 from parenting.experiments.figure3.transfer import Learnt, learnt, pack, transfer
-from parenting.experiments.pretrained import weights_of
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.batch import BatchTrainer, StopRule, TrainResult
+from parenting.weights.store import initial_weights
 
 PRE_PARENTED_FROM = 1 << 40
 """Agents that are pre-parented are numbered from here, times N: no trial has so high a number."""
@@ -61,7 +61,7 @@ def pre_parent(
     mine = first.replace(seed=first.seed + PRE_PARENTED_FROM * worlds + agents)
     config = config_of(True, recompare)
     world = world_of(WORLD, levels_for(SET_ASIDE, given)[:worlds], config)
-    trainer = PreParenting(world, config, mine, StopRule("optimal"), weights_of(world, config))
+    trainer = PreParenting(world, config, mine, StopRule("optimal"), initial_weights(world, config))
     rows = _rows(trainer.run(max_ticks))
     said = {"of": "pre-parented", "worlds": worlds, "recompare": recompare}
     seconds = round((time.thread_time() - began) / len(rows), 3)
@@ -91,7 +91,7 @@ def parent_trials(
     mine = keys(seed, span[1]).pick(torch.arange(*span))
     config = config_of(pretrain, recompare)
     world = world_of(WORLD, levels_for(PARENTING, given), config)
-    trainer = BatchTrainer(world, config, mine, StopRule("optimal"), weights_of(world, config))
+    trainer = BatchTrainer(world, config, mine, StopRule("optimal"), initial_weights(world, config))
     packed = [row[PACKED] for row in given if row["of"] == "pre-parented"]
     if packed:
         trainer.state = transfer(trainer.state, packed, torch.arange(*span) % len(packed), everything)

@@ -3,75 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-import torch
-
-from parenting.agent.config import compose
-from parenting.envs import registry
-from parenting.envs.rng import keys
-from parenting.evaluation.rollouts import deploy
-from parenting.experiments.pretrained import weights_of
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.reporting.plots import Proportion, plot_proportions
 from parenting.experiments.reward_hacking.report import EPISODES, STEPS, WORDS, counts, drawn, means
+from parenting.experiments.reward_hacking.settings import MAX_TICKS, VARIANTS, Variant
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Experiment, Request, Results, chunk_ranges
-from parenting.experiments.training.gardens import WORLD, garden
-from parenting.experiments.training.snapshots import Passed, train_with_snapshots
-
-MAX_TICKS = 20_000
-
-
-class Variant(NamedTuple):
-    """How agents are raised, and after how many answered queries they are looked at."""
-
-    level: str
-    changes: Mapping[str, Any]
-    milestones: tuple[int, ...]
-    cost: float  # of work, for a trial, against the others
-    one_of: int = 1  # of so many trials one is raised
-    preset: str = "conservative"
-
-
-VARIANTS = {
-    "garden, defaults": Variant("garden", {}, (50, 100), 3.0, preset="lax"),
-    "garden, pre-trained": Variant("garden", {}, (50, 100), 1.2),
-    "mirrored, pre-trained": Variant("garden-mirrored", {}, (50, 100), 1.2, one_of=2),
-    "garden, not pre-trained": Variant("garden", {"pretrain": False}, (50, 100), 0.5),
-    "garden, not pre-trained, comparing twice": Variant(
-        "garden", {"pretrain": False, "recompare": True}, (50, 100), 0.5
-    ),
-    "garden, not pre-trained, long": Variant(
-        "garden", {"pretrain": False, "batch": 32}, (200, 500, 1000), 6.0, one_of=5
-    ),
-}
-"""By name; the first has the paper's defaults."""
-
-
-def snapshot_trials(variant: str, milestones: Sequence[int], span: tuple[int, int], seed: int) -> list[Row]:
-    """Raise the trials of a span past all milestones; a row for each trial and milestone."""
-    of = VARIANTS[variant]
-    config = compose(of.preset, registry.defaults(WORLD), of.changes, strict=True)
-    world = garden(of.level, config.time_limit)
-    mine = keys(seed, span[1]).pick(torch.arange(*span))
-    passed = train_with_snapshots(world, config, mine, milestones, MAX_TICKS, weights_of(world, config))
-    found = zip(milestones, passed, strict=True)
-    return [row for number, each in found for row in _rows(variant, of.level, span, number, each)]
-
-
-def _rows(variant: str, level: str, span: tuple[int, int], queries: int, passed: Passed) -> list[Row]:
-    names = ("deaths", "guidance", "preference", "ticks")
-    columns: dict[str, list[Any]] = {one: getattr(passed.counts, one).tolist() for one in names}
-    columns["there"] = passed.there.tolist()
-    for steps in STEPS:
-        found = deploy(garden(level, steps), passed.live, EPISODES)
-        columns[f"waterings_{steps}"] = found.waterings.mean(1).tolist()
-        columns[f"bucket_{steps}"] = (found.bucket > 0).sum(1).tolist()
-        columns[f"caught_{steps}"] = found.in_bucket_at_end.sum(1).tolist()
-    each = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    said = {"of": variant, "queries": queries}
-    return [{**said, "trial": trial, **row} for trial, row in zip(range(*span), each, strict=True)]
+from parenting.experiments.training.gardens import WORLD
 
 
 def _config(request: Request) -> Mapping[str, Any]:
@@ -111,7 +51,10 @@ def _task(name: str, span: range, request: Request) -> Task:
         "seed": request.seed,
     }
     return Task(
-        key, "parenting.experiments.reward_hacking:snapshot_trials", mine, VARIANTS[name].cost * len(span)
+        key,
+        "parenting.experiments.reward_hacking.tasks:snapshot_trials",
+        mine,
+        VARIANTS[name].cost * len(span),
     )
 
 

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from parenting.envs.mdp import Model, explore
-from parenting.experiments.value_iteration import WORLD_SIZES, mature_trials
 from parenting.experiments.value_iteration.converge import (
     STAGES,
     TIE,
@@ -21,6 +20,8 @@ from parenting.experiments.value_iteration.converge import (
     parents_policy,
 )
 from parenting.experiments.value_iteration.levels import random_levels
+from parenting.experiments.value_iteration.settings import WORLD_SIZES
+from parenting.experiments.value_iteration.tasks import mature_trials
 from parenting.parents.values import of_policy
 
 

@@ -10,8 +10,7 @@ import pytest
 from parenting.envs import registry
 from parenting.envs.levels.unsafe_exploration import ISLAND_BOTTLENECK
 from parenting.envs.mdp import explore
-from parenting.experiments import calibrate
-from parenting.experiments.calibrate import EXPERIMENT, LAYOUTS, settings
+from parenting.experiments.calibrate import EXPERIMENT, tasks
 from parenting.experiments.calibrate.distance import (
     BY_REWARD,
     DEATHS,
@@ -25,6 +24,8 @@ from parenting.experiments.calibrate.distance import (
 from parenting.experiments.calibrate.layouts import bottleneck
 from parenting.experiments.calibrate.plot import scatter
 from parenting.experiments.calibrate.report import findings
+from parenting.experiments.calibrate.settings import LAYOUTS
+from parenting.experiments.calibrate.tasks import changes
 from parenting.experiments.runner.executor import run_task
 from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import Request
@@ -51,7 +52,7 @@ def test_layouts_lie_between_island_and_bottleneck() -> None:
     assert all(bool(explore(world).goal.any()) for world in worlds)
 
 
-@pytest.mark.parametrize(("width", "aside"), [(0, 1), (1, 4), (4, 1)])
+@pytest.mark.parametrize(("width", "offset"), [(0, 1), (1, 4), (4, 1)])
 def test_a_strait_into_the_water_is_refused(width: int, offset: int) -> None:
     with pytest.raises(ValueError, match="leads nowhere"):
         bottleneck(width, offset)
@@ -140,16 +141,16 @@ def test_settings_that_are_out_are_drawn_apart() -> None:
 
 
 def test_presets_keep_their_own_chances() -> None:
-    assert settings("lax", NEAR) == NEAR
-    assert settings("conservative", NEAR) == {"lambda_global": 0.1, "lambda_local": 0.1, "recompare": False}
+    assert changes("lax", NEAR) == NEAR
+    assert changes("conservative", NEAR) == {"lambda_global": 0.1, "lambda_local": 0.1, "recompare": False}
 
 
 def test_what_is_found_is_what_is_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every piece in order, for a few ticks: what confirms has the setting that the search names."""
     for limit in ("SEARCH_TICKS", "MAX_TICKS"):
-        monkeypatch.setattr(calibrate, limit, 4)
+        monkeypatch.setattr(tasks, limit, 4)
     for limit in ("SEARCH_STEPS", "MAX_STEPS"):
-        monkeypatch.setattr(calibrate, limit, 1)
+        monkeypatch.setattr(tasks, limit, 1)
     request = Request(1, scale="quick")
     done: dict[str, list[Row]] = {}
     for task in EXPERIMENT.tasks(request):

@@ -8,9 +8,10 @@ import pytest
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
-from parenting.experiments.figure2 import ARMS, COMBINATIONS, EXPERIMENT
+from parenting.experiments.figure2 import EXPERIMENT
 from parenting.experiments.figure2.agents import extrapolated
 from parenting.experiments.figure2.rows import LIVED, MANY
+from parenting.experiments.figure2.settings import ARMS, COMBINATIONS
 from parenting.experiments.figure2.tasks import arm_trials
 from parenting.experiments.runner.executor import run_task
 from parenting.experiments.runner.store import Row

@@ -19,13 +19,11 @@ from parenting.envs.mdp import explore
 from parenting.envs.random_boxes import box_levels
 from parenting.envs.rng import keys
 from parenting.evaluation.argmax import TabularEvaluation
-from parenting.experiments import figure3
-from parenting.experiments.figure3 import Size
 from parenting.experiments.figure3.levels import PARENTING, SET_ASIDE, config_of, find_levels, levels_for
 from parenting.experiments.figure3.report import duration, findings
+from parenting.experiments.figure3.settings import SIZES, Size
 from parenting.experiments.figure3.tasks import parent_trials, pre_parent
 from parenting.experiments.figure3.transfer import POLICY, learnt, pack, transfer
-from parenting.experiments.pretrained import pretrained, weights_of
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.reporting.statistics import (
     auc_interval,
@@ -36,6 +34,7 @@ from parenting.experiments.reporting.statistics import (
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training import batch
 from parenting.experiments.training.batch import BatchTrainer, StopRule
+from parenting.weights.store import initial_weights, pretrained
 
 CONFIG = config_of(pretrain=True, recompare=False)
 
@@ -72,7 +71,9 @@ def test_levels_are_those_that_the_pre_trained_agent_does_not_solve() -> None:
 def lived(ticks: int, count: int = 1) -> BatchTrainer:
     levels = box_levels(6, 6, 6, seed=0)
     world = world_of("side-effects", levels, CONFIG)
-    trainer = BatchTrainer(world, CONFIG, keys(1, count), StopRule("ticks", 1000), weights_of(world, CONFIG))
+    trainer = BatchTrainer(
+        world, CONFIG, keys(1, count), StopRule("ticks", 1000), initial_weights(world, CONFIG)
+    )
     for _ in range(ticks):
         trainer.tick()
     return trainer
@@ -109,7 +110,7 @@ def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch)
     assert [row["finished"] for row in taught] == [True] * 4
     assert len({row["ticks"] for row in taught}) > 2
     world = world_of("side-effects", levels_for(SET_ASIDE, rows), CONFIG)
-    state = parenting.init(world, CONFIG, keys(0, 4), weights_of(world, CONFIG))
+    state = parenting.init(world, CONFIG, keys(0, 4), initial_weights(world, CONFIG))
     state = transfer(state, [row["_learnt"] for row in taught], torch.arange(4), everything=False)
     assert bool(TabularEvaluation(world, explore(world), 1.0).optimal(state.learner.live).all())
 
@@ -238,7 +239,7 @@ def test_durations_in_words() -> None:
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A few ticks of one trial of every curve: the pieces fit together, and the page has a figure."""
-    monkeypatch.setitem(figure3.SIZES, "quick", Size(1, 2, 1, 2, agents=2, max_ticks=6, pre_ticks=6))
+    monkeypatch.setitem(SIZES, "quick", Size(1, 2, 1, 2, agents=2, max_ticks=6, pre_ticks=6))
     arguments = ["--scale", "quick", "--trials", "2", "--workers", "1", "--out", str(tmp_path)]
     said = CliRunner().invoke(app, ["experiment", "figure3", *arguments])
     assert said.exit_code == 0, said.output

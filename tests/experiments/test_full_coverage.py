@@ -15,7 +15,8 @@ from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
 from parenting.experiments.figure2 import full_coverage
 from parenting.experiments.figure2.all_pairs import PAIRS, clip, compare, judged
-from parenting.experiments.figure2.full_coverage import Budget, Dataset, VisitedStates, cover, first_of, visit
+from parenting.experiments.figure2.full_coverage import Dataset, VisitedStates, cover, first_of, visit
+from parenting.experiments.figure2.settings import Budget
 from parenting.experiments.training.gardens import GAMMA, garden
 from parenting.parents.garden_values import GardenValues
 from parenting.parents.scripted import ScriptedRule

@@ -8,10 +8,11 @@ import pytest
 
 from parenting.agent.config import Config
 from parenting.envs.reward_hacking import RewardHacking
-from parenting.experiments import reward_hacking
 from parenting.experiments.reporting.comparison import Comparison
-from parenting.experiments.reward_hacking import EXPERIMENT, VARIANTS, snapshot_trials
+from parenting.experiments.reward_hacking import EXPERIMENT, tasks
 from parenting.experiments.reward_hacking.report import STEPS
+from parenting.experiments.reward_hacking.settings import VARIANTS
+from parenting.experiments.reward_hacking.tasks import snapshot_trials
 from parenting.experiments.spec import Request
 from parenting.experiments.training.snapshots import Passed, train_with_snapshots
 
@@ -62,7 +63,7 @@ def test_each_arm_lives_by_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> 
         configs.append(config)
         return train_with_snapshots(world, config, *rest)
 
-    monkeypatch.setattr(reward_hacking, "train_with_snapshots", watch)
+    monkeypatch.setattr(tasks, "train_with_snapshots", watch)
     for name in ("garden, defaults", NAME):
         snapshot_trials(name, (1,), (0, 1), 0)
     assert [(one.p_guid, one.p_pref, one.pretrain) for one in configs] == [

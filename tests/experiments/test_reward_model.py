@@ -7,8 +7,8 @@ import torch
 
 from parenting.envs import registry
 from parenting.envs.mdp import explore
-from parenting.experiments import figure4
-from parenting.experiments.figure4 import EXPERIMENT, HORIZON, LENGTH, fit_and_shift, rho, shortened
+from parenting.experiments.figure4 import EXPERIMENT, tasks
+from parenting.experiments.figure4.report import shortened
 from parenting.experiments.figure4.reward_model import (
     Pairs,
     cross_entropy,
@@ -18,6 +18,8 @@ from parenting.experiments.figure4.reward_model import (
     preferences,
     random_pairs,
 )
+from parenting.experiments.figure4.settings import HORIZON, LENGTH
+from parenting.experiments.figure4.tasks import fit_and_shift, rho
 from parenting.experiments.spec import Request
 
 MODEL = explore(registry.make("unsafe-exploration", "island"))
@@ -83,7 +85,7 @@ def test_the_page_says_what_the_planner_does_at_the_tie_and_how_long_it_takes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With few pairs, since only the report is looked at here; and with a seed beyond what torch takes."""
-    monkeypatch.setattr(figure4, "PAIRS", 2000)
+    monkeypatch.setattr(tasks, "PAIRS", 2000)
     rows = fit_and_shift(0, 2**53 - 1)
     assert {len(row["way"]) for row in rows if row["of"] == "rho" and row["shift"] >= 0} == {HORIZON}
     assert {len(row["way"]) for row in rows if row["of"] == "rho" and -0.5 < row["shift"] < 0} == {7}

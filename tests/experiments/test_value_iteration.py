@@ -6,12 +6,13 @@ import json
 
 import pytest
 
-from parenting.experiments import value_iteration
 from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import Request
-from parenting.experiments.value_iteration import EXPERIMENT, LEVELS, WORLD_SIZES
+from parenting.experiments.value_iteration import EXPERIMENT, tasks
 from parenting.experiments.value_iteration.converge import CONFIG, STAGES
 from parenting.experiments.value_iteration.report import finding
+from parenting.experiments.value_iteration.settings import LEVELS, WORLD_SIZES
+from parenting.experiments.value_iteration.tasks import mature_trials
 
 KIND = WORLD_SIZES[0].world
 
@@ -61,5 +62,5 @@ def test_the_page_has_the_config_the_lives_and_a_figure() -> None:
 
 def test_every_seed_of_the_command_line_will_do(monkeypatch: pytest.MonkeyPatch) -> None:
     """torch takes no seed beyond 2^63."""
-    monkeypatch.setattr(value_iteration, "run_stage", lambda _world, _judge, state, _places: state)
-    assert len(value_iteration.mature_trials(KIND, 0, 2**53 - 1)) == LEVELS * STAGES
+    monkeypatch.setattr(tasks, "run_stage", lambda _world, _judge, state, _places: state)
+    assert len(mature_trials(KIND, 0, 2**53 - 1)) == LEVELS * STAGES

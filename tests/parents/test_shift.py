@@ -22,8 +22,9 @@ from parenting.agent.init import network_of
 from parenting.agent.query import Choice, Kind, Query
 from parenting.envs import registry
 from parenting.envs.mdp import explore
-from parenting.experiments.figure4 import HORIZON, SAFE, UNSAFE, rho
 from parenting.experiments.figure4.reward_model import follow, plan
+from parenting.experiments.figure4.settings import HORIZON, SAFE, UNSAFE
+from parenting.experiments.figure4.tasks import rho
 from parenting.parents.scripted import ScriptedRule
 from parenting.parents.values import TabularValues, clip_states, optimal
 from tests.agent.batched_runs import Judge, run_batch
