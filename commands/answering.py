@@ -199,11 +199,11 @@ class Answering:
 
 
 def _why(run: dict[str, Any]) -> str:
-    """Why nothing is asked."""
-    if run["status"] == "paused":
-        return f"Run {run['id']} is paused: resume it on its page."
-    if run["worker"] == "silent":
-        return f"No worker raises run {run['id']}. Start one: parenting worker."
-    if run["open"]["guidance"] or run["open"]["preference"]:
-        return f"Somebody else holds the questions of run {run['id']}."
-    return f"The agent of run {run['id']} explores, at tick {run['tick']}."
+    """Say why nothing is asked."""
+    name, tick = f"run {run['id']}", run["tick"]
+    sentences = {
+        "paused": f"R{name[1:]} is paused: resume it on its page.",
+        "no_worker": f"No worker raises {name}. Start one: parenting worker.",
+        "question": f"Somebody else holds the questions of {name}.",
+    }
+    return sentences.get(run["state"], f"The agent of {name} explores, at tick {tick}.")

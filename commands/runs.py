@@ -14,8 +14,9 @@ from rich.text import Text
 
 from parenting.commands.database import database
 from parenting.commands.errors import friendly_errors
-from parenting.server.runs import OVER, list_runs
+from parenting.server.runs import list_runs
 from parenting.server.schemas import RunSchema, run_schema
+from parenting.server.statuses import STATE_LABELS, RunState
 
 COLUMNS = ("run", "name", "world", "level", "parent", "now", "stage", "tick", "answers", "optimal")
 NARROW = ("name", "level", "parent")
@@ -74,17 +75,5 @@ def _row(run: RunSchema) -> dict[str, str]:
 
 
 def now(run: RunSchema) -> str:
-    """Who waits for whom."""
-    if run.status in OVER or run.status == "paused":
-        return run.status
-    if run.resting:
-        return "rests at its goal"
-    if run.worker == "silent":
-        return "waits for a worker"
-    if run.waiting == "stuck":
-        return "stuck: end its episode"
-    if run.open.guidance:
-        return "waits for guidance"
-    if run.waiting == "preferences":
-        return "waits for preferences"
-    return "explores"
+    """Say who waits for whom, or how the run ended."""
+    return run.status if run.state is RunState.OVER else STATE_LABELS[run.state]

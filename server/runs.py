@@ -17,10 +17,10 @@ from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
+from parenting.server.statuses import LIVING, OVER, QueryStatus, RunStatus
 from parenting.server.tables import Query, Run
 
 CLAIM_SECONDS = 5.0
-OVER = ("stopped", "finished", "failed")
 PROGRESS_FIELDS = frozenset({"tick", "waiting", "optimal", "versions", "maturity", "speed"})
 """What a worker reports of an agent."""
 
@@ -85,7 +85,7 @@ def open_counts(db: Database, run_id: int) -> Open:
         return open_in(session, run_id)
 
 
-def set_status(db: Database, run_id: int, status: str, reason: str | None = None) -> Run:
+def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None = None) -> Run:
     """Pause, resume (`active`) or stop a run, for the operator.
 
     Doing it twice is doing it once. Stopping withdraws what is open.
@@ -132,7 +132,7 @@ def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
 def claim(db: Database, worker: str, seconds: float = CLAIM_SECONDS) -> Sequence[Claim]:
     """Take every living run that is free, or whose worker gave no sign of life for `seconds`."""
     late = db.clock() - timedelta(seconds=seconds)
-    living = (Run.status.in_(("active", "paused")), or_(Run.worker.is_(None), Run.heartbeat < late))
+    living = (Run.status.in_(LIVING), or_(Run.worker.is_(None), Run.heartbeat < late))
     with db.read() as session:  # nothing to claim is the common case, and takes no lock
         if session.scalars(select(Run.id).where(*living).limit(1)).first() is None:
             return []
@@ -181,7 +181,7 @@ def report_progress(db: Database, mine: Claim, **fields: Any) -> Run:
         return run
 
 
-def finish(db: Database, mine: Claim, status: str, reason: str, error: str | None = None) -> Run:
+def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str | None = None) -> Run:
     """End a run as `finished` or `failed`, with a sentence for people and, if it failed, the details.
 
     Withdraws what is open.
@@ -243,9 +243,9 @@ def held(session: Session, mine: Claim) -> Run:
     return run
 
 
-def held_status(session: Session, mine: Claim) -> str:
+def held_status(session: Session, mine: Claim) -> RunStatus:
     """`held`, for those who need no more of the run than its status: what a tick writes."""
-    status: str | None = session.execute(_MINE, vars(mine)).scalar()
+    status: RunStatus | None = session.execute(_MINE, vars(mine)).scalar()
     return held(session, mine).status if status is None else status
 
 
@@ -257,7 +257,7 @@ def open_in(session: Session, run_id: int) -> Open:
 def open_by_run(session: Session, run_ids: Sequence[int]) -> dict[int, Open]:
     """`open_in` for many runs at once."""
     rows = select(Query.run_id, Query.kind, func.count()).where(
-        Query.status == "open", Query.run_id.in_(run_ids)
+        Query.status == QueryStatus.OPEN, Query.run_id.in_(run_ids)
     )
     counts = {(row[0], row[1]): row[2] for row in session.execute(rows.group_by(Query.run_id, Query.kind))}
     return {i: Open(counts.get((i, "guidance"), 0), counts.get((i, "preference"), 0)) for i in run_ids}
@@ -265,13 +265,13 @@ def open_by_run(session: Session, run_ids: Sequence[int]) -> dict[int, Open]:
 
 def withdraw_in(session: Session, run_id: int, kind: str | None = None) -> None:
     """Withdraw the open queries of a run (of one kind), in a transaction that is already open."""
-    rows = update(Query).where(Query.run_id == run_id, Query.status == "open")
+    rows = update(Query).where(Query.run_id == run_id, Query.status == QueryStatus.OPEN)
     if kind is not None:
         rows = rows.where(Query.kind == kind)
-    session.execute(rows.values(status="withdrawn"))
+    session.execute(rows.values(status=QueryStatus.WITHDRAWN))
 
 
-def _become(session: Session, run: Run, status: str, reason: str | None) -> None:
+def _become(session: Session, run: Run, status: RunStatus, reason: str | None) -> None:
     run.status, run.reason = status, reason
     if status in OVER:
         run.waiting = None

@@ -10,15 +10,13 @@ from pydantic import BaseModel, ConfigDict
 
 from parenting.agent.config import Config, Inside
 from parenting.server.db import Database
-from parenting.server.runs import OVER, Open, find, open_by_run, open_in
+from parenting.server.runs import Open, find, open_by_run, open_in
+from parenting.server.statuses import OVER, QueryStatus, RunState, RunStatus, Waiting
 from parenting.server.tables import Answer, Metric, Query, Run
 
 SILENT_AFTER = timedelta(seconds=5)
 
 # The words of server.tables, as types: a test holds them equal.
-RunStatus = Literal["active", "paused", "stopped", "finished", "failed"]
-QueryStatus = Literal["open", "answered", "applied", "withdrawn"]
-Waiting = Literal["guidance", "preferences", "stuck"]
 Kind = Literal["guidance", "preference"]
 Choice = Literal["left", "right", "either", "neither"]
 By = Literal["human", "scripted"]
@@ -62,8 +60,12 @@ class RunSchema(Schema):
     speed: float | None
     """Ticks a second, as last measured."""
     waiting: Waiting | None
-    """Whom it waits for: its parent's guidance, fewer open preference questions, or the operator (*stuck*:
-    no action was acceptable, so the episode has to be ended); null while it lives.
+    """Why it does not tick: it waits for guidance, for fewer open preference questions, or for the operator
+    (*stuck*: no action was acceptable, so the episode has to be ended); null while it ticks.
+    """
+    state: RunState
+    """Who waits for whom, in one word: over, paused, resting (the goal is reached), question (one waits for a
+    person), no_worker, stuck, or exploring. The first that holds, in this order.
     """
     goal: int | None
     """Answered questions after which the run rests; null: never."""
@@ -252,11 +254,27 @@ def metric_schemas(rows: Sequence[Metric]) -> list[MetricSchema]:
 
 
 def _run_schema(run: Run, opened: Open, now: datetime) -> RunSchema:
-    made = ("open", "worker", "resting")
+    made = ("open", "worker", "resting", "state")
     own = {name: getattr(run, name) for name in RunSchema.model_fields if name not in made}
     shown = OpenSchema(guidance=opened.guidance, preference=opened.preference)
     resting = run.status not in OVER and run.goal is not None and run.answers >= run.goal
-    return RunSchema(**own, open=shown, worker=_worker(run, now), resting=resting)
+    state = _state(run, opened, resting, now)
+    return RunSchema(**own, open=shown, worker=_worker(run, now), resting=resting, state=state)
+
+
+def _state(run: Run, opened: Open, resting: bool, now: datetime) -> RunState:
+    """Say who waits for whom; pages, script and command show this and compute nothing of their own."""
+    if run.status in OVER:
+        return RunState.OVER
+    if run.status is RunStatus.PAUSED:
+        return RunState.PAUSED
+    if resting:
+        return RunState.RESTING
+    if run.parent == "human" and (opened.guidance or opened.preference):
+        return RunState.QUESTION
+    if _worker(run, now) == "silent":
+        return RunState.NO_WORKER
+    return RunState.STUCK if run.waiting is Waiting.STUCK else RunState.EXPLORING
 
 
 def _worker(run: Run, now: datetime) -> Literal["alive", "silent", "done"]:

@@ -31,6 +31,7 @@ from parenting.server.snapshot import (
     unpack,
     versions,
 )
+from parenting.server.statuses import Waiting
 from parenting.server.tables import Run
 
 log = structlog.get_logger()
@@ -102,14 +103,14 @@ class RunSession:
         """Say who waits for whom, and save what was lived: nothing happens here for a while."""
         if self._news:
             self._measure(at_once=False)
-        reason = None
+        reason: Waiting | None = None
         if bool(self.saved.state.stuck):
-            reason = "stuck"
+            reason = Waiting.STUCK
         elif seen.open_guidance:
-            reason = "guidance"
+            reason = Waiting.GUIDANCE
         elif seen.open_preferences:
-            reason = "preferences"
-        if reason != self.waiting or (reason == "stuck" and self.last_tick != self._stuck_at):
+            reason = Waiting.PREFERENCES
+        if reason != self.waiting or (reason is Waiting.STUCK and self.last_tick != self._stuck_at):
             self.waiting, self._stuck_at = reason, self.last_tick
             runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
         self.save_if_due()

@@ -6,8 +6,10 @@ Times are UTC. JSON is readable by eye; the shape of a clip is described at `Que
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from datetime import UTC, datetime
-from typing import Any, ClassVar
+from enum import StrEnum
+from typing import Any, ClassVar, Generic, TypeVar
 
 from sqlalchemy import (
     JSON,
@@ -26,33 +28,13 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-RUN_STATUSES = {
-    "active": "The agent lives, or waits for its parent.",
-    "paused": "The operator paused it; no tick passes until it is resumed.",
-    "stopped": "The operator stopped it for good; its open questions were withdrawn.",
-    "finished": "It reached what it was started for.",
-    "failed": "The worker could not go on; the reason says why.",
-}
-"""What a run can be, a sentence each; the column is held to these words by a CHECK."""
-
-QUERY_STATUSES = {
-    "open": "It waits for an answer.",
-    "answered": "It was answered; the agent has not heard it yet.",
-    "applied": "The agent has heard the answer, at the answer's `applied_tick`.",
-    "withdrawn": "It is no longer asked: the run ended, or the operator ended the episode.",
-}
-"""What a query can be, a sentence each."""
-
-WAITING = {
-    "guidance": "The agent waits for guidance before it moves.",
-    "preferences": "The agent waits until fewer preference questions are open.",
-    "stuck": "No action was acceptable: the operator has to end the episode.",
-}
-"""Whom a run waits for when it does not tick; null while it lives."""
+from parenting.server.statuses import QUERY_STATUSES, RUN_STATUSES, WAITING, QueryStatus, RunStatus, Waiting
 
 KINDS = ("guidance", "preference")
 CHOICES = ("left", "right", "either", "neither")
 PARENTS = ("human", "scripted")
+
+E = TypeVar("E", bound=StrEnum)
 
 
 class Utc(TypeDecorator[datetime]):
@@ -68,6 +50,25 @@ class Utc(TypeDecorator[datetime]):
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
         """Back to UTC, with its zone."""
         return None if value is None else value.replace(tzinfo=UTC)
+
+
+class Word(TypeDecorator[E], Generic[E]):
+    """A member of an enumeration, stored as its text."""
+
+    impl = Text
+    cache_ok = True
+
+    def __init__(self, words: type[E]) -> None:
+        self.words = words
+        super().__init__()
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
+        """To text."""
+        return None if value is None else str(value)
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> E | None:
+        """Back to the member."""
+        return None if value is None else self.words(value)
 
 
 class Table(DeclarativeBase):
@@ -87,10 +88,13 @@ class Table(DeclarativeBase):
         datetime: Utc,
         dict[str, Any]: JSON(none_as_null=True),
         bytes: LargeBinary,
+        RunStatus: Word(RunStatus),
+        QueryStatus: Word(QueryStatus),
+        Waiting: Word(Waiting),
     }
 
 
-def _one_of(column: str, words: Any, nullable: bool = False) -> CheckConstraint:
+def _one_of(column: str, words: Iterable[str], nullable: bool = False) -> CheckConstraint:
     listed = ", ".join(f"'{word}'" for word in words)
     rule = f"{column} IN ({listed})"
     return CheckConstraint(f"{column} IS NULL OR {rule}" if nullable else rule, name=column)
@@ -120,10 +124,10 @@ class Run(Table):
     seed: Mapped[int] = mapped_column(BigInteger)
     parent: Mapped[str]
     # where it is
-    status: Mapped[str] = mapped_column(default="active")
+    status: Mapped[RunStatus] = mapped_column(default=RunStatus.ACTIVE)
     reason: Mapped[str | None]
     tick: Mapped[int] = mapped_column(default=0)  # the last tick reported, for display
-    waiting: Mapped[str | None]
+    waiting: Mapped[Waiting | None]
     optimal: Mapped[bool] = mapped_column(default=False)
     maturity: Mapped[int] = mapped_column(default=1, server_default=text("1"))  # the stage T, for display
     speed: Mapped[float | None]  # ticks a second lately, for display
@@ -174,7 +178,7 @@ class Query(Table):
     clips: Mapped[dict[str, Any]]
     """{"left": CLIP, "right": CLIP}, CLIP = {"actions": ["up", ...], "length": n, "frames": [n + 1 of
     {"ground": [rows], "observed": [rows], "agent": [row, column], "box": [row, column] or null}]}."""
-    status: Mapped[str] = mapped_column(default="open")
+    status: Mapped[QueryStatus] = mapped_column(default=QueryStatus.OPEN)
     posted: Mapped[datetime]
     policy_stage: Mapped[int | None]  # which policy asked: the stage T that it was in, and
     policy_steps: Mapped[int | None]  # its gradient steps in that stage; null: asked before these were kept

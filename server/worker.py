@@ -27,6 +27,7 @@ from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
 from parenting.server.session import RunSession, goal_reached
 from parenting.server.settings import Settings
+from parenting.server.statuses import OVER, RunStatus
 
 log = structlog.get_logger()
 
@@ -97,9 +98,9 @@ class Worker:
         ticked = False
         found = worker_side.watch(self.db, list(self.claims))
         for run_id, seen in sorted(found.items(), key=lambda item: not item[1].answers):
-            if seen.status in runs.OVER:
+            if seen.status in OVER:
                 self._end(run_id)
-            elif seen.status == "active" and not self.stopping:
+            elif seen.status is RunStatus.ACTIVE and not self.stopping:
                 ticked |= self._guarded(run_id, seen)
         return ticked
 
@@ -118,7 +119,7 @@ class Worker:
         except Exception as error:
             log.error("run failed", run=run_id, error=repr(error))
             reason = f"The agent could not go on: {error}"
-            runs.finish(self.db, self.claims[run_id], "failed", reason, traceback.format_exc())
+            runs.finish(self.db, self.claims[run_id], RunStatus.FAILED, reason, traceback.format_exc())
             self._drop(run_id)
         return False
 
@@ -136,7 +137,7 @@ class Worker:
             go_on = session.tick()
         if session.finished():
             session.save()
-            runs.finish(self.db, session.claim, "finished", "Its argmax policy is optimal.")
+            runs.finish(self.db, session.claim, RunStatus.FINISHED, "Its argmax policy is optimal.")
             self._drop(run_id)
         return True
 

@@ -18,6 +18,7 @@ from parenting.server.migrate import require_current, upgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.runs import list_runs, set_status
 from parenting.server.settings import Settings
+from parenting.server.statuses import RunStatus
 from tests.services import read_compose
 from tests.tree import ROOT
 
@@ -42,7 +43,7 @@ def writing(db: Database) -> Iterator[None]:
 
     def write() -> None:
         while not done.is_set():
-            for status in ("paused", "active"):
+            for status in (RunStatus.PAUSED, RunStatus.ACTIVE):
                 set_status(db, 1, status)
             wrote.set()
 

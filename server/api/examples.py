@@ -64,6 +64,7 @@ RUN: dict[str, Any] = {
     "maturity": 1,
     "speed": 41.5,
     "waiting": "guidance",
+    "state": "question",
     "goal": 50,
     "resting": False,
     "pace": None,
@@ -72,6 +73,7 @@ RUN: dict[str, Any] = {
     "open": {"guidance": 1, "preference": 0},
     "worker": "alive",
 }
+STOPPED = {"status": "stopped", "reason": "Stopped by the operator.", "state": "over", "worker": "done"}
 QUERY: dict[str, Any] = {
     "id": 7,
     "run": 1,
@@ -168,9 +170,9 @@ SHOWN = {
     "get_run": Shown(RUN),
     "list_metrics": Shown(_rows(METRIC)),
     "list_operator_events": Shown(_rows(*EVENTS)),
-    "pause_run": Shown({**RUN, "status": "paused"}),
+    "pause_run": Shown({**RUN, "status": "paused", "state": "paused"}),
     "resume_run": Shown(RUN),
-    "stop_run": Shown({**RUN, "status": "stopped", "reason": "Stopped by the operator.", "worker": "done"}),
+    "stop_run": Shown({**RUN, **STOPPED}),
     "mature_run": Shown(RUN),
     "end_episode": Shown(RUN),
     "change_run": Shown(RUN, {"ask less": {"name": "p_guid", "value": 0.5}}),

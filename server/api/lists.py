@@ -10,7 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from parenting.agent.events import Event
 from parenting.server import tables
 from parenting.server.new_run import LARGEST_INT
-from parenting.server.schemas import AskedSchema, MetricSchema, QueryStatus, RunSchema, Schema
+from parenting.server.schemas import AskedSchema, MetricSchema, RunSchema, Schema
+from parenting.server.statuses import QueryStatus
 
 Row = TypeVar("Row")
 Place = Annotated[int, Field(ge=-1, le=LARGEST_INT)]

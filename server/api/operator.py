@@ -11,6 +11,7 @@ from parenting.server.api.responses import write_responses
 from parenting.server.deps import Db, notify_worker
 from parenting.server.record import add_event
 from parenting.server.schemas import RunSchema, run_schema
+from parenting.server.statuses import RunStatus
 
 router = APIRouter(tags=["operator"])
 
@@ -20,19 +21,19 @@ REPLIES = write_responses(404, 409)
 @router.post("/runs/{run_id}/pause", summary="Pause a run", responses=REPLIES)
 def pause_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
     """Let no tick pass until the run is resumed. Twice is once."""
-    return _become(request, db, run_id, "paused")
+    return _become(request, db, run_id, RunStatus.PAUSED)
 
 
 @router.post("/runs/{run_id}/resume", summary="Resume a run", responses=REPLIES)
 def resume_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
     """Let a paused run go on. Twice is once."""
-    return _become(request, db, run_id, "active")
+    return _become(request, db, run_id, RunStatus.ACTIVE)
 
 
 @router.post("/runs/{run_id}/stop", summary="Stop a run", responses=REPLIES)
 def stop_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
     """End a run for good; its open questions are withdrawn. Twice is once."""
-    return _become(request, db, run_id, "stopped", "Stopped by the operator.")
+    return _become(request, db, run_id, RunStatus.STOPPED, "Stopped by the operator.")
 
 
 @router.post("/runs/{run_id}/goal", summary="Set a run's goal", responses=REPLIES)
@@ -72,7 +73,7 @@ def change_run(request: Request, run_id: RunId, body: ChangeBody, db: Db) -> Run
     return _happen(request, db, run_id, Change(name=body.name, value=body.value))
 
 
-def _become(request: Request, db: Db, run_id: int, status: str, reason: str | None = None) -> RunSchema:
+def _become(request: Request, db: Db, run_id: int, status: RunStatus, reason: str | None = None) -> RunSchema:
     runs.set_status(db, run_id, status, reason)
     notify_worker(request)
     return run_schema(db, run_id)

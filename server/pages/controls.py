@@ -19,6 +19,7 @@ from parenting.server.pages.dashboard import dashboard_page
 from parenting.server.pages.operator_log import PROBABILITIES, probabilities
 from parenting.server.pages.render import redirect
 from parenting.server.pages.start import FormFields
+from parenting.server.statuses import RunStatus
 
 router = APIRouter(include_in_schema=False)
 
@@ -43,7 +44,8 @@ def set_status(
     back: Back = "dashboard",
 ) -> Response:
     """Pause, resume or stop, then back to where the button was."""
-    runs.set_status(db, run_id, status, "Stopped by the operator." if status == "stopped" else None)
+    reason = "Stopped by the operator." if status == "stopped" else None
+    runs.set_status(db, run_id, RunStatus(status), reason)
     return _back(request, run_id, back)
 
 

@@ -18,6 +18,7 @@ from sqlalchemy.orm import Session
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
 from parenting.server.runs import lock
+from parenting.server.statuses import QueryStatus
 from parenting.server.tables import Answer, Query, Run
 
 LEASE_SECONDS = 60.0
@@ -206,7 +207,7 @@ def rests(session: Session, run_id: int) -> bool:
 
 
 def _urgent(run_id: int) -> Select[Query]:
-    rows = select(Query).where(Query.run_id == run_id, Query.status == "open")
+    rows = select(Query).where(Query.run_id == run_id, Query.status == QueryStatus.OPEN)
     return rows.order_by(guidance_first(), Query.tick).limit(1)
 
 
@@ -219,8 +220,8 @@ _RUN_OF = select(Query.run_id).where(Query.id == bindparam("query_id"))
 _STANDING = select(Answer).where(Answer.query_id == bindparam("query_id"), Answer.standing)
 _ANSWERED = (
     update(Query)
-    .where(Query.id == bindparam("query_id"), Query.status == "open")
-    .values(status="answered")
+    .where(Query.id == bindparam("query_id"), Query.status == QueryStatus.OPEN)
+    .values(status=QueryStatus.ANSWERED)
     .returning(Query.id)
     .execution_options(synchronize_session=False)
 )
@@ -236,7 +237,7 @@ _FREE = or_(Query.leased_until.is_(None), Query.leased_until <= bindparam("now")
 _OFFER = (
     select(Query)
     .join(Run, Run.id == Query.run_id)
-    .where(Query.run_id == bindparam("run_id"), Query.status == "open", or_(_KEPT, _FREE))
+    .where(Query.run_id == bindparam("run_id"), Query.status == QueryStatus.OPEN, or_(_KEPT, _FREE))
     .where(or_(Run.goal.is_(None), Run.answers < Run.goal))
     .order_by(case((_KEPT, 0), else_=1), guidance_first(), Query.tick)
     .limit(1)

@@ -23,6 +23,7 @@ from sqlalchemy.orm import Session
 from parenting.server.db import Database
 from parenting.server.queue.parent_side import guidance_first
 from parenting.server.runs import Claim, held, held_status, withdraw_in
+from parenting.server.statuses import LIVING, QueryStatus, RunStatus
 from parenting.server.tables import Answer, Event, Query, Run
 
 
@@ -31,7 +32,7 @@ class Watch:
     """What a worker has to know of a run before it ticks; read at once, cheap enough for a poll."""
 
     run_id: int
-    status: str
+    status: RunStatus
     fencing_token: int
     worker: str | None
     open_guidance: int
@@ -61,7 +62,7 @@ _HIGH = select(
 _PENDING = (
     select(Answer, Query)
     .join(Query, Answer.query_id == Query.id)
-    .where(Query.run_id == _RUN, Query.status == "answered", Answer.standing)
+    .where(Query.run_id == _RUN, Query.status == QueryStatus.ANSWERED, Answer.standing)
     .order_by(guidance_first(), Query.tick)
     .limit(1)
 )
@@ -77,11 +78,13 @@ _WATCH = select(
     Run.status,
     Run.fencing_token,
     Run.worker,
-    _number(Query.run_id == Run.id, Query.status == "open", Query.kind == "guidance").label("open_guidance"),
-    _number(Query.run_id == Run.id, Query.status == "open", Query.kind == "preference").label(
+    _number(Query.run_id == Run.id, Query.status == QueryStatus.OPEN, Query.kind == "guidance").label(
+        "open_guidance"
+    ),
+    _number(Query.run_id == Run.id, Query.status == QueryStatus.OPEN, Query.kind == "preference").label(
         "open_preferences"
     ),
-    _number(Query.run_id == Run.id, Query.status == "answered").label("answers"),
+    _number(Query.run_id == Run.id, Query.status == QueryStatus.ANSWERED).label("answers"),
     Run.answers.label("answered"),
     Run.goal,
     Run.pace,
@@ -131,7 +134,10 @@ def post_query(
             return int(known)
         query = Query(run_id=mine.run_id, tick=tick, kind=kind, maturity=maturity, clips=clips)
         query.policy_stage, query.policy_steps = policy or (None, None)
-        query.posted, query.status = db.clock(), "open" if status in ("active", "paused") else "withdrawn"
+        query.posted, query.status = (
+            db.clock(),
+            QueryStatus.OPEN if status in LIVING else QueryStatus.WITHDRAWN,
+        )
         session.add(query)
         session.flush()
         return query.id
@@ -158,7 +164,7 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
         held_status(session, mine)
         found = _pending(session, mine.run_id)
         if found is not None:
-            found.answer.applied_tick, found.query.status = tick, "applied"
+            found.answer.applied_tick, found.query.status = tick, QueryStatus.APPLIED
         return found
 
 
@@ -199,8 +205,8 @@ def withdraw(db: Database, mine: Claim, query_id: int) -> None:
         run = held(session, mine)
         session.execute(
             update(Query)
-            .where(Query.id == query_id, Query.run_id == run.id, Query.status == "open")
-            .values(status="withdrawn")
+            .where(Query.id == query_id, Query.run_id == run.id, Query.status == QueryStatus.OPEN)
+            .values(status=QueryStatus.WITHDRAWN)
         )
 
 

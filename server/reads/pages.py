@@ -11,13 +11,14 @@ from sqlalchemy.orm import aliased
 from parenting.server.db import Database
 from parenting.server.queue.parent_side import LEASE_SECONDS, guidance_first, rests
 from parenting.server.runs import lock
+from parenting.server.statuses import QueryStatus
 from parenting.server.tables import Metric, Query, Run
 
 _SHOWN: BindParameter[Sequence[int]] = bindparam("shown", expanding=True)
 _other = aliased(Query)
 _ANSWERS_TO_COME = (
     select(func.count())
-    .where(_other.run_id == Run.id, _other.status == "open", _other.id.in_(_SHOWN))
+    .where(_other.run_id == Run.id, _other.status == QueryStatus.OPEN, _other.id.in_(_SHOWN))
     .correlate(Run)
     .scalar_subquery()
 )
@@ -29,7 +30,7 @@ _FREE = or_(
 _AHEAD = (
     select(Query)
     .join(Run, Run.id == Query.run_id)
-    .where(Run.id == bindparam("run_id"), Query.status == "open", Query.id.not_in(_SHOWN), _FREE)
+    .where(Run.id == bindparam("run_id"), Query.status == QueryStatus.OPEN, Query.id.not_in(_SHOWN), _FREE)
     .where(or_(Run.goal.is_(None), Run.answers + _ANSWERS_TO_COME < Run.goal))
     .order_by(guidance_first(), Query.tick)
     .limit(1)
@@ -63,7 +64,7 @@ def lease_ahead(
 def may_lease(db: Database, run_id: int, client_id: str) -> bool:
     """Whether some open question is free, or held for this client already."""
     free = or_(Query.leased_until.is_(None), Query.leased_until <= db.clock(), Query.leased_by == client_id)
-    rows = select(Query.id).where(Query.run_id == run_id, Query.status == "open", free)
+    rows = select(Query.id).where(Query.run_id == run_id, Query.status == QueryStatus.OPEN, free)
     with db.read() as session:
         return not rests(session, run_id) and session.scalars(rows.limit(1)).first() is not None
 

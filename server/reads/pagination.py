@@ -17,6 +17,7 @@ from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.record import metrics
 from parenting.server.runs import find
+from parenting.server.statuses import QueryStatus
 from parenting.server.tables import Answer, Event, Metric, Query, Run
 
 Row = TypeVar("Row")
@@ -47,7 +48,9 @@ def runs_before(db: Database, before: int | None, limit: int) -> Page[Run]:
         return _cut(session.scalars(rows).all(), limit, lambda run: run.id)
 
 
-def asked_after(db: Database, run_id: int, tick: int, limit: int, status: str | None = None) -> Page[Asked]:
+def asked_after(
+    db: Database, run_id: int, tick: int, limit: int, status: QueryStatus | None = None
+) -> Page[Asked]:
     """The questions that a run asked after a tick, oldest first, of one status if it is named.
 
     Raises:

@@ -19,6 +19,7 @@ from parenting.server.db import Database
 from parenting.server.queue import parent_side
 from parenting.server.reads.answers import every
 from parenting.server.settings import Settings
+from parenting.server.statuses import OVER, RunStatus
 from parenting.server.worker import Worker
 from tests.commands.asking import asked, begin
 from tests.server.serving import free_port, parenting
@@ -79,9 +80,9 @@ def test_a_goal(db: Database, raising: None) -> None:
 
 
 def test_a_run_that_is_over(db: Database, web: httpx2.Client) -> None:
-    for run, status in enumerate(("stopped", "finished", "failed"), start=1):
+    for run, status in enumerate(OVER, start=1):
         begin(db)
-        if status == "stopped":
+        if status is RunStatus.STOPPED:
             runs.set_status(db, run, status)
         else:
             (mine,) = runs.claim(db, "test", -1)
@@ -99,9 +100,9 @@ def test_patience_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.Cli
     assert (
         "No worker raises run 1. Start one: parenting worker. Nothing was asked for 0.3 s.\n" in said.stdout
     )
-    runs.set_status(db, 1, "paused")
+    runs.set_status(db, 1, RunStatus.PAUSED)
     assert "Run 1 is paused: resume it on its page." in answer("--patience", "0.3").stdout
-    runs.set_status(db, 1, "active")
+    runs.set_status(db, 1, RunStatus.ACTIVE)
     (query,) = asked(db, 1, 1)
     parent_side.lease(db, 1, "somebody")
     assert "Somebody else holds the questions of run 1." in answer("--patience", "0.3").stdout

@@ -16,6 +16,7 @@ from parenting.server.queue.parent_side import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim
 from parenting.server.schemas import run_schema
+from parenting.server.statuses import RunStatus
 from tests.server.conftest import CLIPS
 
 
@@ -60,32 +61,30 @@ def test_a_narrow_terminal_gets_fewer_columns(
     monkeypatch.setattr("parenting.commands.runs.WIDE", 80)
     head, only = listed()
     assert head.split() == ["run", "world", "now", "stage", "tick", "answers", "optimal"]
-    assert only.split() == ["1", "unsafe-exploration", "explores", "1", "of", "2", "0", "0", "no"]
+    assert only.split() == ["1", "unsafe-exploration", "exploring", "1", "of", "2", "0", "0", "no"]
 
 
 def test_who_waits_for_whom(db: Database, mine: Claim) -> None:
-    assert "explores" in now()
+    assert "exploring" in now()
     runs.report_progress(db, mine, tick=12, optimal=True)
     assert now().split()[-1] == "yes"
     query = post_query(db, mine, 12, "guidance", 1, CLIPS)
-    assert "waits for guidance" in now()
+    assert "a question waits" in now()
     answer(db, query, "left", "me", "human")
-    runs.report_progress(db, mine, waiting="preferences")
-    assert "waits for preferences" in now()
     runs.report_progress(db, mine, waiting="stuck")
-    assert "stuck: end its episode" in now()
+    assert "no action acceptable" in now()
     runs.set_goal(db, mine.run_id, 1)
-    assert "rests at its goal" in now()
+    assert "goal reached" in now()
     assert "1 of 1" in now()
-    runs.set_status(db, mine.run_id, "paused")
+    runs.set_status(db, mine.run_id, RunStatus.PAUSED)
     assert "paused" in now()
-    runs.finish(db, mine, "finished", "Its argmax policy is optimal.")
+    runs.finish(db, mine, RunStatus.FINISHED, "Its argmax policy is optimal.")
     assert "finished" in now()
 
 
 def test_no_worker(db: Database) -> None:
     start(db, NewRun(world="unsafe-exploration"))
-    assert "waits for a worker" in now()
+    assert "no worker" in now()
 
 
 def test_as_json_it_is_what_the_api_says(db: Database, mine: Claim) -> None:

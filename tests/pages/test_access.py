@@ -13,6 +13,7 @@ from playwright.sync_api import Page, expect
 from parenting.server import record, runs
 from parenting.server.db import Database
 from parenting.server.queue import parent_side
+from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import until
@@ -56,7 +57,7 @@ def lives(db: Database) -> None:
         db, fixtures.ask(db, third, 41, "guidance", fixtures.guidance("up", "left")), "left", "me", "human"
     )
     _, fourth = fixtures.start_run(db)
-    runs.finish(db, fourth, "failed", "The agent could not go on.")
+    runs.finish(db, fourth, RunStatus.FAILED, "The agent could not go on.")
 
 
 def violations(page: Page) -> list[str]:

@@ -10,6 +10,7 @@ from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.queue import parent_side
 from parenting.server.runs import Claim
+from parenting.server.statuses import RunStatus
 from parenting.server.tables import Query
 from tests.pages.browser_tabs import BrowserTabs, given, shown, until
 
@@ -194,11 +195,11 @@ def test_who_waits_is_told_as_it_changes(tabs: BrowserTabs, db: Database, mine: 
     expect(page.get_by_text("The agent has found the optimal way.")).to_be_visible()
     page.get_by_role("button", name="End this episode").click()
     runs.report_progress(db, mine, waiting=None)
-    runs.set_status(db, 1, "paused")
+    runs.set_status(db, 1, RunStatus.PAUSED)
     expect(page.get_by_role("heading", name="The run is paused")).to_be_visible()
     page.get_by_role("button", name="Resume").click()
     expect(page.get_by_role("heading", name="exploring on its own")).to_be_visible()
-    runs.set_status(db, 1, "stopped", "Stopped by the operator.")
+    runs.set_status(db, 1, RunStatus.STOPPED, "Stopped by the operator.")
     expect(page.get_by_role("heading", name="This run is over")).to_be_visible()
 
 

@@ -13,6 +13,7 @@ from parenting.server.db import Database
 from parenting.server.queue import worker_side
 from parenting.server.record import list_events
 from parenting.server.runs import Claim, get_run, set_status
+from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 
 PROBABILITIES = {"p_guid": "0.95", "p_rec": "0.8", "p_pref": "0.8", "p_train": "1"}
@@ -175,7 +176,7 @@ def test_a_run_that_is_over_takes_nothing(
     client: httpx2.Client, db: Database, mine: Claim, path: str, data: dict[str, Any]
 ) -> None:
     client.post("/runs/1/event", data={"kind": "mature"})
-    set_status(db, 1, "stopped", "Stopped by the operator.")
+    set_status(db, 1, RunStatus.STOPPED, "Stopped by the operator.")
     page = client.get("/runs/1").text
     assert 'method="post"' not in page
     assert "Ended the stage" in page
@@ -193,7 +194,7 @@ def test_other_sites_can_do_nothing(client: httpx2.Client, mine: Claim, path: st
 
 
 def test_a_run_that_failed_says_why(client: httpx2.Client, db: Database, mine: Claim) -> None:
-    runs.finish(db, mine, "failed", "The agent could not go on: it was lost.", "Traceback: secret")
+    runs.finish(db, mine, RunStatus.FAILED, "The agent could not go on: it was lost.", "Traceback: secret")
     for path in ("/runs/1", "/runs/1/parent", "/"):
         page = client.get(path).text
         assert "The agent could not go on: it was lost." in page

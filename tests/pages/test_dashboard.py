@@ -14,6 +14,7 @@ from parenting.server.queue.worker_side import watch
 from parenting.server.reads.pages import latest_metrics, sampled_metrics
 from parenting.server.runs import claim, get_run, report_progress, set_status
 from parenting.server.session import RunSession
+from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 
 
@@ -83,7 +84,7 @@ def test_who_waits_is_told(client: httpx2.Client, db: Database) -> None:
     assert 'data-state="exploring">' in client.get("/runs/1").text
     fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "down"))
     assert "A question waits for the parent." in client.get("/runs/1").text
-    set_status(db, 1, "paused")
+    set_status(db, 1, RunStatus.PAUSED)
     assert 'data-state="paused">' in client.get("/runs/1").text
     report_progress(db, mine, optimal=True)
     assert '<dd id="now-optimal">optimal</dd>' in client.get("/runs/1").text

@@ -11,6 +11,7 @@ from parenting.server.db import Database
 from parenting.server.notify import Notifier
 from parenting.server.queue import parent_side, worker_side
 from parenting.server.settings import Settings
+from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
 
@@ -61,13 +62,13 @@ def test_the_buttons_go_by_what_holds(tabs: BrowserTabs, db: Database) -> None:
         expect(page.get_by_role("button", name=name).or_(page.get_by_role("link", name=name))).to_be_visible()
     for name in ("Resume", "50 more"):
         expect(page.get_by_role("button", name=name)).to_be_hidden()
-    runs.set_status(db, 1, "paused")
+    runs.set_status(db, 1, RunStatus.PAUSED)
     expect(page.get_by_role("button", name="Resume")).to_be_visible()
     expect(page.get_by_role("button", name="Pause")).to_be_hidden()
-    runs.set_status(db, 1, "active")
+    runs.set_status(db, 1, RunStatus.ACTIVE)
     runs.report_progress(db, mine, waiting="stuck")
     expect(page.get_by_role("button", name="End the episode")).to_have_count(2)
-    runs.set_status(db, 1, "stopped", "Stopped by the operator.")
+    runs.set_status(db, 1, RunStatus.STOPPED, "Stopped by the operator.")
     expect(page.get_by_text("Stopped by the operator.")).to_be_visible()
     expect(page.get_by_role("button", name=re.compile("Pause|Set|Change|episode"))).to_have_count(0)
 

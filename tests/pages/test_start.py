@@ -13,6 +13,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.pages.start import PAGE
 from parenting.server.queue.parent_side import answer
 from parenting.server.runs import get_run, let_go, list_runs, report_progress, set_goal, set_status
+from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 
 FORM = {
@@ -164,7 +165,7 @@ def test_a_wrong_number_among_the_settings(client: httpx2.Client, field: str, va
 
 def test_hundreds_of_runs_are_listed_page_by_page(client: httpx2.Client, db: Database) -> None:
     for seed in range(2 * PAGE + 5):
-        set_status(db, start(db, NewRun(world="unsafe-exploration", seed=seed)).id, "stopped")
+        set_status(db, start(db, NewRun(world="unsafe-exploration", seed=seed)).id, RunStatus.STOPPED)
     seen, path = [], "/"
     while path:
         page = client.get(path).text
@@ -188,16 +189,16 @@ def test_the_list_says_who_waits_for_whom(client: httpx2.Client, db: Database) -
     assert chips() == ["no action acceptable"]
     query = fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "down"))
     assert chips() == ["a question waits"]
-    set_status(db, 1, "paused")
+    set_status(db, 1, RunStatus.PAUSED)
     assert chips() == ["paused"]
-    set_status(db, 1, "active")
+    set_status(db, 1, RunStatus.ACTIVE)
     set_goal(db, 1, 1)
     answer(db, query, "left", "me", "human")
     assert chips() == ["goal reached"]
     set_goal(db, 1, None)
     let_go(db, [mine])
     assert chips() == ["no worker"]
-    set_status(db, 1, "stopped")
+    set_status(db, 1, RunStatus.STOPPED)
     assert chips() == ["stopped"]
 
 

@@ -152,9 +152,6 @@ def test_examples_have_the_fields_of_real_replies(client: httpx2.Client, run: An
 @pytest.mark.parametrize(
     ("words", "known"),
     [
-        (schemas.RunStatus, tables.RUN_STATUSES),
-        (schemas.QueryStatus, tables.QUERY_STATUSES),
-        (schemas.Waiting, tables.WAITING),
         (schemas.Kind, tables.KINDS),
         (schemas.Choice, tables.CHOICES),
         (schemas.By, tables.PARENTS),

@@ -10,6 +10,7 @@ from parenting.server.errors import BusyError
 from parenting.server.queue.parent_side import get_query
 from parenting.server.queue.worker_side import take_answer
 from parenting.server.runs import Claim, set_status
+from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 from tests.server.conftest import CLIP, CLIPS, Clock
 from tests.server.test_api import WORLD, wrong
@@ -77,7 +78,7 @@ def test_same_answer_gets_the_same_reply_whatever_happened_since(
         "received": "2026-11-22T12:00:00Z",
     }
     take_answer(db, mine, 6)
-    set_status(db, mine.run_id, "stopped")
+    set_status(db, mine.run_id, RunStatus.STOPPED)
     clock.pass_seconds(1000)
     again = reply(client, guidance)
     assert (again.status_code, again.content) == (200, first.content)

@@ -8,6 +8,7 @@ import pytest
 from parenting.server.db import Database
 from parenting.server.queue.worker_side import take_events, watch
 from parenting.server.runs import Claim, get_run, set_status
+from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 from tests.server.test_api import wrong
 from tests.server.test_api_questions import lease, reply
@@ -103,7 +104,7 @@ def test_wrong_pace(client: httpx2.Client, run: Run, body: dict[str, Any]) -> No
 def test_nothing_is_done_to_a_run_that_is_over(
     client: httpx2.Client, db: Database, run: Run, verb: str, body: dict[str, Any]
 ) -> None:
-    set_status(db, run.id, "stopped")
+    set_status(db, run.id, RunStatus.STOPPED)
     before = client.get(f"/api/v1/runs/{run.id}").json()
     refused = post(client, run.id, verb, **body)
     assert (refused.status_code, refused.json()["error"]["code"]) == (409, "conflict")

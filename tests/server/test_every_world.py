@@ -24,6 +24,7 @@ from parenting.server.queue import worker_side
 from parenting.server.runs import claim, get_run, set_status
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
+from parenting.server.statuses import RunStatus
 from parenting.server.tables import Weights
 from parenting.server.worker import Worker
 from tests.server.raising import Begun, inline, last, same_bits, script
@@ -162,7 +163,7 @@ def test_a_garden_goes_on_until_it_is_stopped(settings: Settings, db: Database) 
     assert row["optimal"] == 0
     assert not worker.sessions[run].finished()
     assert get_run(db, run).status == "active"
-    set_status(db, run, "stopped")
+    set_status(db, run, RunStatus.STOPPED)
     worker._round()
     assert run not in worker.sessions
 

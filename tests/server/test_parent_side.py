@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 
 import pytest
-from sqlalchemy import func, select
+from sqlalchemy import func, select, text
 from sqlalchemy.exc import IntegrityError
 
 from parenting.server.db import Database
@@ -21,7 +21,8 @@ from parenting.server.queue.parent_side import (
 )
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, get_run, set_status
-from parenting.server.tables import Answer, Query, Run
+from parenting.server.statuses import RunStatus
+from parenting.server.tables import Answer, Run
 from tests.server.conftest import CLIPS, Clock
 
 
@@ -105,7 +106,7 @@ def test_late_answer_is_taken_if_nobody_else_answered(
 
 
 def test_withdrawn_question_takes_no_answer(db: Database, run: Run, guidance: int) -> None:
-    set_status(db, run.id, "stopped")
+    set_status(db, run.id, RunStatus.STOPPED)
     with pytest.raises(Conflict, match="withdrawn"):
         answer(db, guidance, "left", "a", "human")
     assert leased(db, run) is None
@@ -204,4 +205,4 @@ def test_lease_writes_nothing_when_there_is_nothing(db: Database, run: Run) -> N
 
 def test_statuses_are_held_by_the_database(db: Database, guidance: int) -> None:
     with pytest.raises(IntegrityError, match=r"CHECK.*status"), db.write() as session:
-        session.get_one(Query, guidance).status = "lost"
+        session.execute(text("UPDATE query SET status = 'lost' WHERE id = :id"), {"id": guidance})

@@ -16,6 +16,7 @@ from parenting.server.record import (
     write_metrics,
 )
 from parenting.server.runs import Claim, claim, set_status
+from parenting.server.statuses import RunStatus
 from parenting.server.tables import Checkpoint, Run
 from tests.server.conftest import Clock
 
@@ -30,7 +31,7 @@ def test_events_are_kept_in_order(db: Database, run: Run) -> None:
 
 
 def test_nothing_happens_to_a_run_that_is_over(db: Database, run: Run) -> None:
-    set_status(db, run.id, "stopped")
+    set_status(db, run.id, RunStatus.STOPPED)
     with pytest.raises(Conflict, match="is stopped"):
         add_event(db, run.id, "mature", {})
     with pytest.raises(NotFound):

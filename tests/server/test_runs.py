@@ -18,6 +18,7 @@ from parenting.server.runs import (
     report_progress,
     set_status,
 )
+from parenting.server.statuses import OVER, RunStatus
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock
 
@@ -32,19 +33,19 @@ def test_unknown_run(db: Database) -> None:
         get_run(db, 7)
 
 
-@pytest.mark.parametrize("status", ["paused", "stopped"])
-def test_doing_it_twice_is_doing_it_once(db: Database, run: Run, status: str) -> None:
+@pytest.mark.parametrize("status", [RunStatus.PAUSED, RunStatus.STOPPED])
+def test_doing_it_twice_is_doing_it_once(db: Database, run: Run, status: RunStatus) -> None:
     set_status(db, run.id, status)
     assert set_status(db, run.id, status).status == status
 
 
 def test_paused_run_goes_on_and_stopped_one_does_not(db: Database, run: Run) -> None:
-    set_status(db, run.id, "paused")
-    assert set_status(db, run.id, "active").status == "active"
-    set_status(db, run.id, "stopped", "Enough.")
+    set_status(db, run.id, RunStatus.PAUSED)
+    assert set_status(db, run.id, RunStatus.ACTIVE).status == "active"
+    set_status(db, run.id, RunStatus.STOPPED, "Enough.")
     assert get_run(db, run.id).reason == "Enough."
     with pytest.raises(Conflict, match="is stopped; it cannot become active"):
-        set_status(db, run.id, "active")
+        set_status(db, run.id, RunStatus.ACTIVE)
 
 
 def test_one_worker_a_run(db: Database, run: Run, clock: Clock) -> None:
@@ -74,8 +75,8 @@ def test_run_that_was_let_go_is_free_at_once(db: Database, mine: ClaimOf) -> Non
     assert next_claim.fencing_token == 2
 
 
-@pytest.mark.parametrize("status", ["stopped", "finished", "failed"])
-def test_run_that_is_over_is_not_claimed(db: Database, run: Run, mine: ClaimOf, status: str) -> None:
+@pytest.mark.parametrize("status", OVER)
+def test_run_that_is_over_is_not_claimed(db: Database, run: Run, mine: ClaimOf, status: RunStatus) -> None:
     let_go(db, [mine])
     set_status(db, run.id, status)
     assert claim(db, "b") == []
@@ -99,18 +100,18 @@ def test_report_shows_where_the_agent_is(db: Database, mine: ClaimOf) -> None:
 def test_finished_run_withdraws_what_is_open_and_keeps_its_reason(
     db: Database, mine: ClaimOf, guidance: int
 ) -> None:
-    finish(db, mine, "failed", "It diverged.", "details")
+    finish(db, mine, RunStatus.FAILED, "It diverged.", "details")
     found = get_run(db, mine.run_id)
     assert (found.status, found.reason, found.error) == ("failed", "It diverged.", "details")
     assert get_query(db, guidance).status == "withdrawn"
-    assert finish(db, mine, "finished", "Too late.").status == "failed"
+    assert finish(db, mine, RunStatus.FINISHED, "Too late.").status == "failed"
 
 
 def test_finish_is_fenced(db: Database, mine: ClaimOf, clock: Clock) -> None:
     clock.pass_seconds(6)
     claim(db, "b")
     with pytest.raises(LostClaimError):
-        finish(db, mine, "finished", "It is optimal.")
+        finish(db, mine, RunStatus.FINISHED, "It is optimal.")
     assert get_run(db, mine.run_id).status == "active"
 
 
@@ -118,7 +119,7 @@ def test_stopping_touches_its_own_run_only(db: Database, run: Run, mine: ClaimOf
     other = start(db, NewRun(world="unsafe-exploration"))
     (theirs,) = claim(db, "b")
     theirs_open = post_query(db, theirs, 5, "guidance", 1, CLIPS)
-    set_status(db, run.id, "stopped")
+    set_status(db, run.id, RunStatus.STOPPED)
     assert get_query(db, guidance).status == "withdrawn"
     assert get_query(db, theirs_open).status == "open"
     assert get_run(db, other.id).status == "active"

@@ -28,6 +28,7 @@ from parenting.server.queue.worker_side import post_query, take_answer, take_eve
 from parenting.server.record import add_event, write_metrics
 from parenting.server.runs import Claim, claim, finish, set_status
 from parenting.server.settings import Settings
+from parenting.server.statuses import RunStatus
 from parenting.server.workers import sign
 from tests.server.conftest import CLIPS
 
@@ -44,8 +45,8 @@ def lived(db: Database) -> None:
     for _ in range(RUNS):
         start(db, NewRun(world="unsafe-exploration", config={"stages": 3}, name="schema"))
     mine, _, third, _ = claim(db, "worker-1")
-    set_status(db, 2, "stopped", "Stopped by the operator.")
-    finish(db, third, "failed", "It could not go on.")
+    set_status(db, 2, RunStatus.STOPPED, "Stopped by the operator.")
+    finish(db, third, RunStatus.FAILED, "It could not go on.")
     _live(db, mine)
     sign(db, "worker-1")
 

@@ -16,6 +16,7 @@ from parenting.server.queue.worker_side import (
 )
 from parenting.server.record import add_event
 from parenting.server.runs import Claim, claim, get_run, open_counts, report_progress, set_status
+from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock
 
@@ -147,7 +148,7 @@ def test_withdraw_leaves_an_answer_alone(db: Database, mine: Claim, guidance: in
 
 
 def test_question_of_a_stopped_run_is_never_open(db: Database, run: Run, mine: Claim) -> None:
-    set_status(db, run.id, "stopped")
+    set_status(db, run.id, RunStatus.STOPPED)
     assert get_query(db, post_query(db, mine, 1, "guidance", 1, CLIPS)).status == "withdrawn"
 
 

@@ -15,6 +15,7 @@ from parenting.server.record import add_event, load_checkpoints
 from parenting.server.runs import Claim, claim, get_run, set_goal, set_pace, set_status
 from parenting.server.session import RunSession, idle
 from parenting.server.settings import Settings
+from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 from parenting.server.worker import Worker
 from parenting.server.workers import SILENT_SECONDS, alive, sign, sign_off
@@ -119,7 +120,7 @@ def test_ticks_that_are_lived_again_do_not_keep_the_pace(db: Database) -> None:
 
 @pytest.mark.parametrize("verb", [set_goal, set_pace])
 def test_a_run_that_is_over_takes_neither(db: Database, run: Run, verb: object) -> None:
-    set_status(db, run.id, "stopped")
+    set_status(db, run.id, RunStatus.STOPPED)
     assert callable(verb)
     with pytest.raises(Conflict, match="is stopped"):
         verb(db, run.id, 3)
@@ -139,7 +140,7 @@ def test_a_stopped_run_is_saved_as_it_was(db: Database, settings: Settings) -> N
     worker._round()
     tick = worker.sessions[run].last_tick
     assert tick > 0
-    set_status(db, run, "stopped")
+    set_status(db, run, RunStatus.STOPPED)
     worker._round()
     assert load_checkpoints(db, run)[0].tick == tick
 
