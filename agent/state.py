@@ -110,6 +110,10 @@ class AgentState(Struct):
     rehearsal: Rehearsal
     report: Report
 
+    def __repr__(self) -> str:
+        trials = len(self.waiting)
+        return f"<AgentState of {trials} trial{'' if trials == 1 else 's'} at tick {int(self.keys.tick[0])}>"
+
     @property
     def stuck(self) -> Bool[Tensor, "N"]:
         """Paused, and every action refused: *no acceptable action*."""

@@ -69,6 +69,11 @@ class Gridworld(ABC):
         drawn = [code if glyph in self.hides else self.code(AGENT) for code, glyph in enumerate(self.legend)]
         self._drawn = self._tensor(drawn).to(torch.uint8)
 
+    def __repr__(self) -> str:
+        levels = ", ".join(level.name for level in self.levels)
+        size = f"{self.height} x {self.width}"
+        return f"<{type(self).__name__}: {levels}, {size}, episodes of at most {self.time_limit} steps>"
+
     # The life of an episode
 
     def reset(self, keys: Keys, level: Int64[Tensor, "N"]) -> WorldState:

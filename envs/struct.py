@@ -23,7 +23,13 @@ class Struct:
     def __init_subclass__(cls, **options: Any) -> None:
         """Make every subclass a frozen dataclass, so that no field is assigned to by accident."""
         super().__init_subclass__(**options)
-        dataclass(frozen=True, eq=False)(cls)
+        dataclass(frozen=True, eq=False, repr=False)(cls)
+
+    def __repr__(self) -> str:
+        """Name the fields with their shapes: the numbers themselves would fill a screen."""
+        shapes = [f"{name} {tuple(tensor.shape)}" for name, tensor, _ in self.leaves()]
+        more = f", and {len(shapes) - 4} more" if len(shapes) > 5 else ""
+        return f"<{type(self).__name__}: {', '.join(shapes[:4] if more else shapes)}{more}>"
 
     def replace(self, **changes: Any) -> Self:
         """The same record with some fields changed."""

@@ -26,12 +26,12 @@ class AnswerLog:
     def posted(self, query: Query, trials: Sequence[int], tick: int) -> None:
         """Note what is asked in a tick; `trials` are the numbers of the query's rows."""
         for row in (query.kind != Kind.NONE).nonzero().flatten().tolist():
-            self._open.setdefault(trials[row], []).append((tick, _asked(query, row)))
+            self._open.setdefault(trials[row], []).append((tick, describe(query, row)))
 
     def heard(self, answer: Answer, trials: Sequence[int], tick: int) -> None:
         """Note what is heard in a tick, each with the tick at which it was asked."""
         for row in (answer.choice != Choice.NONE).nonzero().flatten().tolist():
-            trial, asked = trials[row], _asked(answer.query, row)
+            trial, asked = trials[row], describe(answer.query, row)
             since = self._since(trial, asked)
             self.rows.append((trial, since, tick, *asked, Choice(int(answer.choice[row])).name.lower()))
 
@@ -49,7 +49,8 @@ class AnswerLog:
         return [dict(zip(COLUMNS, row, strict=True)) for row in ordered]
 
 
-def _asked(query: Query, row: int) -> Asked:
+def describe(query: Query, row: int) -> Asked:
+    """Return what one trial asks, in words."""
     left, right = (
         " ".join(ACTIONS[code] for code in query.action[row, side, : int(query.length[row, side])].tolist())
         for side in (0, 1)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import torch
 from torch import Tensor
 
 from parenting.agent import query as queries
-from parenting.agent.config import Config
 from parenting.agent.events import Event
 from parenting.agent.mailbox import Mailbox
 from parenting.agent.query import Answer
 from parenting.agent.state import AgentState
 from parenting.library.answer_log import AnswerLog
-from parenting.library.worlds import World
+from parenting.library.parent import Parent
+from parenting.library.task import Task
 
 
 class BatchParent(Mailbox, Protocol):
@@ -55,18 +55,26 @@ class LoggedParent:
 class WholeBatch:
     """A parent who sees every trial of the run in every query; trials that have left ask nothing."""
 
-    def __init__(self, parent: Mailbox, world: World, config: Config, trials: int, chunk: range) -> None:
-        self.parent, self.chunk = parent, torch.tensor(chunk)
-        self.nothing = queries.empty(trials, config.stages, world.height, world.width, world.device)
+    def __init__(
+        self, parent: Mailbox, task: Task, trials: int, chunk: range, done: Callable[[], Tensor]
+    ) -> None:
+        """Place the trials of a chunk among all; `done` says which of those that are left are done."""
+        world, config = task.world, task.config
+        self.parent, self.chunk, self.done = parent, torch.tensor(chunk), done
+        self.size = config.stages, world.height, world.width, world.device
+        self.nothing = queries.empty(trials, *self.size)
 
     def events(self, state: AgentState) -> Sequence[Event]:
         return self.parent.events(state)
 
     def take(self, state: AgentState) -> Answer:
+        if isinstance(self.parent, Parent):
+            self.parent.in_training = self.chunk[~self.done()].tolist()
         return self.parent.take(state).pick(self.chunk)
 
     def post(self, query: queries.Query) -> None:
-        ours = query.tensors()
+        asking = queries.empty(len(self.chunk), *self.size).where(self.done(), query)
+        ours = asking.tensors()
 
         def placed(name: str, tensor: Tensor, _axis: int | None) -> Tensor:
             return tensor.index_put((self.chunk,), ours[name])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import torch
@@ -27,8 +27,8 @@ class Open(NamedTuple):
 class Parent(ABC):
     """Your own parent: subclass it and write `answer`.
 
-    An answer is heard in the tick after the question. Between `begin` and the end, `self.world`,
-    `self.config` and `self.trials` say whose parent this is.
+    An answer is heard in the tick after the question. From `begin` on, `self.world`, `self.config` and
+    `self.trials` say whose parent this is, and `self.in_training` which trials may still ask.
 
     Example:
         >>> import parenting as pt
@@ -60,6 +60,7 @@ class Parent(ABC):
     def begin(self, world: World, config: Config, trials: int) -> None:
         """Prepare for new agents at tick 0. `train` calls it, and `tick` does in an agent's first tick."""
         self.world, self.config, self.trials = world, config, trials
+        self.in_training: Sequence[int] = range(trials)
         self._open: list[Open] = []
 
     def events(self, state: AgentState) -> Sequence[Event]:
@@ -68,27 +69,34 @@ class Parent(ABC):
 
     def take(self, state: AgentState) -> Answer:
         """Return at most one answer a trial: that to its oldest question which has one."""
-        choices, left, heard = [int(Choice.NONE)] * self.trials, list[Open](), dict[int, Open]()
+        left, heard = list[Open](), dict[int, tuple[Query, Choice]]()
         for one in self._open:
+            if one.trial not in self.in_training:
+                continue
             said = None if one.trial in heard else self.answer(question(one.query, 0, one.trial))
             if said is None:
                 left.append(one)
-                continue
-            heard[one.trial] = one
-            choices[one.trial] = int(choice_of(said, type(self).__name__))
+            else:
+                heard[one.trial] = one.query, choice_of(said, type(self).__name__)
         self._open = left
-        blank = nothing(self.world, self.config, 1)
-        rows = [heard[trial].query if trial in heard else blank for trial in range(self.trials)]
-        return Answer(query=Query.joined(rows), choice=torch.tensor(choices))
+        return compose_answer(self, heard)
 
     def post(self, query: queries.Query) -> None:
         """Keep what is asked in this tick until it is answered."""
         known = Query.of(query, self.world)
         asking = (query.kind != Kind.NONE).nonzero().flatten().tolist()
-        self._open += [Open(trial, known.pick(torch.tensor([trial]))) for trial in asking]
+        self._open += [Open(trial, known.row(trial)) for trial in asking]
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}>"
+
+
+def compose_answer(parent: Parent, heard: Mapping[int, tuple[Query, Choice]]) -> Answer:
+    """Return the answers of a tick: those that were heard, by trial, and silence elsewhere."""
+    blank = nothing(parent.world, parent.config, 1), Choice.NONE
+    each = [heard.get(trial, blank) for trial in range(parent.trials)]
+    choices = torch.tensor([int(choice) for _, choice in each])
+    return Answer(query=Query.joined([query for query, _ in each]), choice=choices)
 
 
 def nothing(world: World, config: Config, trials: int) -> Query:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 import torch
@@ -58,6 +58,10 @@ class Query(queries.Query):
         """The questions of all trials that ask."""
         return (question(self, int(trial)) for trial in (self.kind != Kind.NONE).nonzero().flatten())
 
+    def row(self, trial: int) -> Self:
+        """Return the query of one trial alone, N = 1."""
+        return self.pick(torch.tensor([trial], device=self.kind.device))
+
     def __repr__(self) -> str:
         trials = f"{len(self)} trial{'' if len(self) == 1 else 's'}"
         counts = [f"{int((self.kind == kind).sum())} {kind.name.lower()}" for kind in list(Kind)[1:]]
@@ -109,7 +113,7 @@ class Question:
     right: Clip
     stage: int
     trial: int
-    query: Query
+    query: Query = field(compare=False)
 
     def __repr__(self) -> str:
         return f"<Question of trial {self.trial}, {self.kind}: left {self.left}, right {self.right}>"
@@ -117,7 +121,7 @@ class Question:
 
 def question(query: Query, row: int, trial: int | None = None) -> Question:
     """Return the question in one row of a query."""
-    one = query.pick(torch.tensor([row]))
+    one = query.row(row)
     return Question(
         kind=Kind(int(one.kind[0])).name.lower(),
         left=_clip(one, 0),

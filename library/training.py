@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import torch
+from torch import Tensor
 
 from parenting.agent.config import Config
 from parenting.agent.mailbox import Mailbox
@@ -87,7 +89,7 @@ def train(
         for chunk in chunks(trials):
             trainer = _trainer(task, rule, seed, chunk)
             if behind is not None:
-                trainer.parent = WholeBatch(behind, task.world, task.config, trials, chunk)  # type: ignore[assignment]
+                trainer.parent = WholeBatch(behind, task, trials, chunk, partial(_done, trainer))  # type: ignore[assignment]
             trainer.parent = LoggedParent(trainer.parent, log, chunk)  # type: ignore[assignment]
             trained, ended = _run(trainer, max_ticks, _report(chunk, trials, parts, (show, callback)))
             parts.append(trained)
@@ -108,6 +110,11 @@ def _parent(parent: str | Mailbox, task: Task, trials: int) -> Mailbox | None:
     if isinstance(parent, Parent):
         parent.begin(task.world, task.config, trials)
     return parent
+
+
+def _done(trainer: BatchTrainer) -> Tensor:
+    """Return which of the trials in the batch are done: they stay in it until a tenth of it is."""
+    return trainer.counts.done
 
 
 def _trainer(task: Task, rule: StopRule, seed: int, chunk: range) -> BatchTrainer:

@@ -12,12 +12,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from parenting.agent.config import PRESETS, Config
     from parenting.agent.query import Answer, Choice
+    from parenting.agent.state import AgentState
     from parenting.library.evaluating import Evaluation, evaluate
+    from parenting.library.loop import Tick, configure, init, step, tick
     from parenting.library.parent import Parent
     from parenting.library.policy import Policy
-    from parenting.library.policy_file import load_policy
+    from parenting.library.policy_file import FormatError, load_policy
     from parenting.library.progress import Progress
-    from parenting.library.question import Query
+    from parenting.library.question import Query, Question
+    from parenting.library.replay import ReplayError, ReplayParent
     from parenting.library.result import TrainResult
     from parenting.library.result_folder import load_result
     from parenting.library.scripted import ScriptedParent
@@ -26,21 +29,31 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "PRESETS": "agent.config",
+    "AgentState": "agent.state",
     "Answer": "agent.query",
     "Choice": "agent.query",
     "Config": "agent.config",
     "Evaluation": "library.evaluating",
+    "FormatError": "library.policy_file",
     "Parent": "library.parent",
     "Policy": "library.policy",
     "Progress": "library.progress",
     "Query": "library.question",
+    "Question": "library.question",
+    "ReplayError": "library.replay",
+    "ReplayParent": "library.replay",
     "ScriptedParent": "library.scripted",
+    "Tick": "library.loop",
     "TrainResult": "library.result",
     "World": "library.worlds",
+    "configure": "library.loop",
     "evaluate": "library.evaluating",
+    "init": "library.loop",
     "load_policy": "library.policy_file",
     "load_result": "library.result_folder",
     "make": "library.worlds",
+    "step": "library.loop",
+    "tick": "library.loop",
     "train": "library.training",
     "worlds": "library.worlds",
 }
@@ -48,21 +61,31 @@ _MODULES = {
 
 __all__ = [
     "PRESETS",
+    "AgentState",
     "Answer",
     "Choice",
     "Config",
     "Evaluation",
+    "FormatError",
     "Parent",
     "Policy",
     "Progress",
     "Query",
+    "Question",
+    "ReplayError",
+    "ReplayParent",
     "ScriptedParent",
+    "Tick",
     "TrainResult",
     "World",
+    "configure",
     "evaluate",
+    "init",
     "load_policy",
     "load_result",
     "make",
+    "step",
+    "tick",
     "train",
     "worlds",
 ]
