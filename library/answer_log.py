@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from parenting.agent.query import Answer, Choice, Kind, Query
-from parenting.library.policy import ACTIONS
+from parenting.drawing.query_tensors import ACTIONS
 
 COLUMNS = ("trial", "asked", "answered", "kind", "stage", "left", "right", "row", "column", "choice")
 """Of a record: `asked` and `answered` are ticks, `left` and `right` the moves, (row, column) is where both

@@ -19,8 +19,6 @@ from parenting.library.worlds import World
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-ACTIONS = ("up", "down", "left", "right")
-
 
 class Policy:
     """What one agent has learnt: pi(a|s) of Sec. 3.1.1, on the world that it was trained in.
@@ -146,6 +144,11 @@ class Policy:
         with torch.no_grad():
             layers = self._network.unpack(self.parameters[None])
             return self._network.heads(layers, seen[None], near[None]).logits[0].double()
+
+    def _repr_html_(self) -> str:
+        from parenting.library.show import show
+
+        return show(self)._repr_html_()
 
     def __repr__(self) -> str:
         return f"<Policy {self.world.name}, level {self.world.levels[0].name}, stage {self.stage}>"

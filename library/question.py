@@ -10,8 +10,9 @@ import torch
 
 from parenting.agent import query as queries
 from parenting.agent.query import Choice, Kind
+from parenting.drawing import clip as drawing
+from parenting.drawing.query_tensors import read_clips
 from parenting.envs.levels.spec import AGENT, BOX
-from parenting.library.policy import ACTIONS
 from parenting.library.worlds import World
 
 CHOICES = {"left": Choice.LEFT, "right": Choice.RIGHT, "either": Choice.EITHER, "neither": Choice.NEITHER}
@@ -61,6 +62,11 @@ class Query(queries.Query):
     def row(self, trial: int) -> Self:
         """Return the query of one trial alone, N = 1."""
         return self.pick(torch.tensor([trial], device=self.kind.device))
+
+    def _repr_html_(self) -> str:
+        from parenting.library.show import show
+
+        return show(self)._repr_html_()
 
     def __repr__(self) -> str:
         trials = f"{len(self)} trial{'' if len(self) == 1 else 's'}"
@@ -115,6 +121,11 @@ class Question:
     trial: int
     query: Query = field(compare=False)
 
+    def _repr_html_(self) -> str:
+        from parenting.library.show import show
+
+        return show(self)._repr_html_()
+
     def __repr__(self) -> str:
         return f"<Question of trial {self.trial}, {self.kind}: left {self.left}, right {self.right}>"
 
@@ -122,10 +133,11 @@ class Question:
 def question(query: Query, row: int, trial: int | None = None) -> Question:
     """Return the question in one row of a query."""
     one = query.row(row)
+    clips = read_clips(one, one.world.legend)
     return Question(
         kind=Kind(int(one.kind[0])).name.lower(),
-        left=_clip(one, 0),
-        right=_clip(one, 1),
+        left=_clip(clips["left"]),
+        right=_clip(clips["right"]),
         stage=int(one.maturity[0]),
         trial=row if trial is None else trial,
         query=one,
@@ -148,28 +160,22 @@ def choice_of(said: Any, who: str) -> Choice:
     )
 
 
-def _clip(query: Query, side: int) -> Clip:
-    length = int(query.length[0, side])
-    frames = range(length + 1)
-    cells = [tuple(query.agent[0, side, frame].tolist()) for frame in frames]
-    ground = [_rows(query.world, query.ground[0, side, frame].tolist()) for frame in frames]
-    boxes = [tuple(query.box[0, side, frame].tolist()) for frame in frames]
+def _clip(clip: drawing.Clip) -> Clip:
+    moments = clip["frames"]
+    cells = tuple((moment["agent"][0], moment["agent"][1]) for moment in moments)
     return Clip(
-        actions=tuple(ACTIONS[code] for code in query.action[0, side, :length].tolist()),
-        boards=tuple(_drawn(*frame) for frame in zip(ground, cells, boxes, strict=True)),
-        observed=tuple(_rows(query.world, query.observation[0, side, frame].tolist()) for frame in frames),
-        cells=tuple(cells),
-        tiles=tuple(rows[cell[0]][cell[1]] for rows, cell in zip(ground, cells, strict=True)),
+        actions=tuple(clip["actions"]),
+        boards=tuple(_drawn(moment) for moment in moments),
+        observed=tuple(tuple(moment["observed"]) for moment in moments),
+        cells=cells,
+        tiles=tuple(moment["ground"][y][x] for moment, (y, x) in zip(moments, cells, strict=True)),
     )
 
 
-def _rows(world: World, codes: list[list[int]]) -> tuple[str, ...]:
-    return tuple("".join(world.legend[code] for code in row) for row in codes)
-
-
-def _drawn(rows: tuple[str, ...], agent: tuple[int, ...], box: tuple[int, ...]) -> tuple[str, ...]:
-    cells = [list(row) for row in rows]
-    if box[0] >= 0:
-        cells[box[0]][box[1]] = BOX
-    cells[agent[0]][agent[1]] = AGENT
+def _drawn(moment: drawing.Frame) -> tuple[str, ...]:
+    """Return the ground with box and agent on it."""
+    cells = [list(row) for row in moment["ground"]]
+    for glyph, place in ((BOX, moment["box"]), (AGENT, moment["agent"])):
+        if place is not None:
+            cells[place[0]][place[1]] = glyph
     return tuple("".join(row) for row in cells)

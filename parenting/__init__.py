@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from parenting.agent.config import PRESETS, Config
     from parenting.agent.query import Answer, Choice
     from parenting.agent.state import AgentState
+    from parenting.envs.levels.spec import Level
     from parenting.library.evaluating import Evaluation, evaluate
     from parenting.library.loop import Tick, configure, init, step, tick
     from parenting.library.parent import Parent
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from parenting.library.result import TrainResult
     from parenting.library.result_folder import load_result
     from parenting.library.scripted import ScriptedParent
+    from parenting.library.show import Drawing, show
     from parenting.library.training import train
     from parenting.library.worlds import World, make, worlds
 
@@ -33,8 +35,10 @@ _MODULES = {
     "Answer": "agent.query",
     "Choice": "agent.query",
     "Config": "agent.config",
+    "Drawing": "library.show",
     "Evaluation": "library.evaluating",
     "FormatError": "library.policy_file",
+    "Level": "envs.levels.spec",
     "Parent": "library.parent",
     "Policy": "library.policy",
     "Progress": "library.progress",
@@ -52,6 +56,7 @@ _MODULES = {
     "load_policy": "library.policy_file",
     "load_result": "library.result_folder",
     "make": "library.worlds",
+    "show": "library.show",
     "step": "library.loop",
     "tick": "library.loop",
     "train": "library.training",
@@ -65,8 +70,10 @@ __all__ = [
     "Answer",
     "Choice",
     "Config",
+    "Drawing",
     "Evaluation",
     "FormatError",
+    "Level",
     "Parent",
     "Policy",
     "Progress",
@@ -84,6 +91,7 @@ __all__ = [
     "load_policy",
     "load_result",
     "make",
+    "show",
     "step",
     "tick",
     "train",

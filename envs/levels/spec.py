@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 
 Cell = tuple[int, int]
 """Row and column, counted from 0 at the top left."""
@@ -67,6 +68,11 @@ class Level:
     def find(self, glyphs: str) -> list[Cell]:
         """The cells that show any of these glyphs, row by row."""
         return [(y, x) for y, row in enumerate(self.rows) for x, glyph in enumerate(row) if glyph in glyphs]
+
+    def _repr_html_(self) -> str:
+        """The level as a notebook shows it. Named as a string, as rules are: drawing is a layer above."""
+        shown: str = import_module("parenting.library.show").show(self)._repr_html_()
+        return shown
 
     def wrong(self, cell: Cell, rule: str) -> LevelError:
         """The error that refuses this level for breaking `rule` at a cell."""

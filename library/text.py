@@ -1,0 +1,29 @@
+"""Clips as text: rows of glyphs, frame by frame, for terminals."""
+
+from __future__ import annotations
+
+from parenting.library.question import Clip, Question
+
+WIDTH = 100
+"""Characters of a line at most; frames that do not fit go below the others."""
+GAP = "   "
+ASKS = {"guidance": "Which move is better?", "preference": "Which clip is better?"}
+
+
+def both_clips(question: Question) -> str:
+    """Return a question as text: what it asks, then both clips, each from its first frame to its last."""
+    parts = [f"{question.kind}: {ASKS[question.kind]}"]
+    for name, clip in (("left", question.left), ("right", question.right)):
+        parts += [f"{name}: {clip}", frames(clip)]
+    return "\n".join(parts)
+
+
+def frames(clip: Clip) -> str:
+    """Return the frames side by side, as many in a line as fit."""
+    boards = clip.boards
+    width = len(boards[0][0]) + len(GAP)
+    together = max(1, WIDTH // width)
+    blocks = [boards[place : place + together] for place in range(0, len(boards), together)]
+    return "\n\n".join(
+        "\n".join((GAP.join(rows)).rstrip() for rows in zip(*block, strict=True)) for block in blocks
+    )
