@@ -14,6 +14,7 @@ from torch import Tensor
 from parenting.agent.config import Config
 from parenting.agent.init import network_of
 from parenting.library import observation as observations
+from parenting.library.policy_file import FormatError, about_world, read_tensors, world_from, write_tensors
 from parenting.library.worlds import World
 
 if TYPE_CHECKING:
@@ -127,9 +128,15 @@ class Policy:
         Returns:
             The path of the file.
         """
-        from parenting.library.policy_file import write
-
-        return write(Path(path), self)
+        about = {
+            **about_world(self.world),
+            "config": self.config.model_dump(mode="json"),
+            "stage": self.stage,
+            "trial": self.trial,
+            "seed": self.seed,
+        }
+        write_tensors(Path(path), {"parameters": self.parameters}, "policy", about)
+        return Path(path)
 
     def seed_actions(self, seed: int) -> None:
         """Begin the draws of `predict(deterministic=False)` anew from a seed."""
@@ -152,3 +159,31 @@ class Policy:
 
     def __repr__(self) -> str:
         return f"<Policy {self.world.name}, level {self.world.levels[0].name}, stage {self.stage}>"
+
+
+def load_policy(path: str | Path) -> Policy:
+    """Read a policy that `Policy.save` wrote.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The policy, on the world and level that it was trained in.
+
+    Raises:
+        FormatError: There is no such file, it is not a policy, it is damaged, or a later version wrote it.
+
+    Example:
+        >>> import parenting as pt
+        >>> result = pt.train("unsafe-exploration", seed=3, progress=False)
+        >>> file = result.policies[0].save("careful.safetensors")
+        >>> pt.load_policy(file)
+        <Policy unsafe-exploration, level island, stage 1>
+    """
+    tensors, about = read_tensors(Path(path), "policy")
+    try:
+        config = Config.model_validate(about["config"])
+        own = {name: about[name] for name in ("stage", "trial", "seed")}
+        return Policy(world_from(about, config), config, tensors["parameters"], **own)
+    except (KeyError, TypeError, ValueError) as error:
+        raise FormatError(f"{path} is damaged: {error}.") from None

@@ -14,7 +14,6 @@ from torch import Tensor
 
 from parenting.agent.config import Config
 from parenting.envs import registry
-from parenting.library.policy import Policy
 from parenting.library.worlds import World
 from parenting.weights.store import metadata
 
@@ -39,47 +38,6 @@ def world_from(about: dict[str, Any], config: Config) -> World:
     """Make the world that `about_world` described."""
     levels = [registry.level(about["world"], text) for text in about["levels"]]
     return registry.make(about["world"], levels, time_limit=config.time_limit, **about["options"])
-
-
-def write(path: Path, policy: Policy) -> Path:
-    """Write one policy."""
-    about = {
-        **about_world(policy.world),
-        "config": policy.config.model_dump(mode="json"),
-        "stage": policy.stage,
-        "trial": policy.trial,
-        "seed": policy.seed,
-    }
-    write_tensors(path, {"parameters": policy.parameters}, "policy", about)
-    return path
-
-
-def load_policy(path: str | Path) -> Policy:
-    """Read a policy that `Policy.save` wrote.
-
-    Args:
-        path: The file.
-
-    Returns:
-        The policy, on the world and level that it was trained in.
-
-    Raises:
-        FormatError: There is no such file, it is not a policy, it is damaged, or a later version wrote it.
-
-    Example:
-        >>> import parenting as pt
-        >>> result = pt.train("unsafe-exploration", seed=3, progress=False)
-        >>> file = result.policies[0].save("careful.safetensors")
-        >>> pt.load_policy(file)
-        <Policy unsafe-exploration, level island, stage 1>
-    """
-    tensors, about = read_tensors(Path(path), "policy")
-    try:
-        config = Config.model_validate(about["config"])
-        own = {name: about[name] for name in ("stage", "trial", "seed")}
-        return Policy(world_from(about, config), config, tensors["parameters"], **own)
-    except (KeyError, TypeError, ValueError) as error:
-        raise FormatError(f"{path} is damaged: {error}.") from None
 
 
 def write_tensors(path: Path, tensors: dict[str, Tensor], kind: str, about: dict[str, Any]) -> None:

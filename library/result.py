@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import torch
 
@@ -15,13 +14,12 @@ from parenting.experiments.training import batch
 from parenting.experiments.training.outcomes import Outcomes, deployments, examine
 from parenting.library.answer_log import AnswerLog
 from parenting.library.policy import Policy
+from parenting.library.result_folder import Fields, Record, read, write
 from parenting.library.task import Task
 from parenting.library.worlds import World
 
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 """What is counted of each trial, and what `TrainResult.mean` takes means of."""
-
-Record = dict[str, Any]
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,9 +84,8 @@ class TrainResult:
         Raises:
             FileExistsError: There is something there already.
         """
-        from parenting.library.result_folder import write
-
-        return write(Path(folder), self, overwrite)
+        fields = Fields(*(getattr(self, name) for name in Fields._fields))
+        return write(Path(folder), fields, self.mean(), overwrite)
 
     def __repr__(self) -> str:
         finished = sum(row["finished"] for row in self.trials)
@@ -97,6 +94,28 @@ class TrainResult:
             f"<TrainResult {self.world.name}, level {self.world.levels[0].name}: "
             f"{_plural(len(self.trials), 'trial')}, {finished} finished, {_plural(deaths, 'unsafe step')}>"
         )
+
+
+def load_result(folder: str | Path) -> TrainResult:
+    """Read a result that `TrainResult.save` wrote.
+
+    Args:
+        folder: The result's folder.
+
+    Returns:
+        The result: equal records, and policies with the same weights bit for bit.
+
+    Raises:
+        FormatError: There is no such folder, it is damaged, or a later version wrote it.
+
+    Example:
+        >>> import parenting as pt
+        >>> result = pt.train("unsafe-exploration", trials=2, progress=False)
+        >>> again = pt.load_result(result.save("two-agents"))
+        >>> again.trials == result.trials
+        True
+    """
+    return TrainResult(*read(Path(folder)))
 
 
 def collect(

@@ -9,7 +9,7 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 
@@ -24,7 +24,9 @@ from parenting.library.policy_file import (
     world_from,
     write_tensors,
 )
-from parenting.library.result import Record, TrainResult
+from parenting.library.worlds import World
+
+Record = dict[str, Any]
 
 TABLES = ("trials", "answers", "events")
 ABOUT, POLICIES = "result.json", "policies.safetensors"
@@ -37,7 +39,20 @@ READERS: Mapping[str, Callable[[str], Any]] = {
 """How a column's cells are read, by the type that `result.json` gives it. An empty cell is None."""
 
 
-def write(folder: Path, result: TrainResult, overwrite: bool) -> Path:
+class Fields(NamedTuple):
+    """A result as it is stored: the fields of `TrainResult`, in their order."""
+
+    world: World
+    config: Config
+    seed: int
+    until: str
+    policies: Sequence[Policy]
+    trials: list[Record]
+    answers: list[Record]
+    events: list[Record]
+
+
+def write(folder: Path, result: Fields, mean: Mapping[str, float | None], overwrite: bool) -> Path:
     """Write a result beside its place, then move it there."""
     taken = folder.is_file() or (folder.is_dir() and any(folder.iterdir()))
     if taken and not (overwrite and (folder / ABOUT).is_file()):
@@ -46,7 +61,7 @@ def write(folder: Path, result: TrainResult, overwrite: bool) -> Path:
     fresh, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
     fresh.mkdir(parents=True)
     try:
-        _fill(fresh, result)
+        _fill(fresh, result, mean)
         if folder.exists():
             folder.replace(old)
         fresh.replace(folder)
@@ -56,44 +71,30 @@ def write(folder: Path, result: TrainResult, overwrite: bool) -> Path:
     return folder
 
 
-def load_result(folder: str | Path) -> TrainResult:
-    """Read a result that `TrainResult.save` wrote.
-
-    Args:
-        folder: The result's folder.
-
-    Returns:
-        The result: equal records, and policies with the same weights bit for bit.
+def read(folder: Path) -> Fields:
+    """Read what `write` wrote.
 
     Raises:
         FormatError: There is no such folder, it is damaged, or a later version wrote it.
-
-    Example:
-        >>> import parenting as pt
-        >>> result = pt.train("unsafe-exploration", trials=2, progress=False)
-        >>> again = pt.load_result(result.save("two-agents"))
-        >>> again.trials == result.trials
-        True
     """
-    path = Path(folder)
     try:
-        about = json.loads((path / ABOUT).read_text(encoding="utf-8"))
+        about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
     except OSError as error:
         raise FormatError(
-            f"{path} is not a saved result: {ABOUT} cannot be read ({error.strerror})."
+            f"{folder} is not a saved result: {ABOUT} cannot be read ({error.strerror})."
         ) from None
     except ValueError as error:
-        raise FormatError(f"{path / ABOUT} is damaged: {error}.") from None
-    check_format(path / ABOUT, about, "result")
+        raise FormatError(f"{folder / ABOUT} is damaged: {error}.") from None
+    check_format(folder / ABOUT, about, "result")
     try:
-        return _read(path, about)
+        return _read(folder, about)
     except FormatError:
         raise
     except (KeyError, OSError, TypeError, ValueError) as error:
-        raise FormatError(f"{path} is damaged: {error}.") from None
+        raise FormatError(f"{folder} is damaged: {error}.") from None
 
 
-def _fill(folder: Path, result: TrainResult) -> None:
+def _fill(folder: Path, result: Fields, mean: Mapping[str, float | None]) -> None:
     about = {
         "format": FORMAT,
         "kind": "result",
@@ -101,7 +102,7 @@ def _fill(folder: Path, result: TrainResult) -> None:
         "config": result.config.model_dump(mode="json"),
         "seed": result.seed,
         "until": result.until,
-        "mean": result.mean(),
+        "mean": dict(mean),
         "columns": {name: _types(getattr(result, name)) for name in TABLES},
     }
     (folder / ABOUT).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
@@ -111,7 +112,7 @@ def _fill(folder: Path, result: TrainResult) -> None:
     write_tensors(folder / POLICIES, {"parameters": parameters}, "policies", about_world(result.world))
 
 
-def _read(folder: Path, about: dict[str, Any]) -> TrainResult:
+def _read(folder: Path, about: dict[str, Any]) -> Fields:
     config = Config.model_validate(about["config"])
     world = world_from(about, config)
     tables = {name: _rows(folder / f"{name}.csv", about["columns"][name]) for name in TABLES}
@@ -120,7 +121,7 @@ def _read(folder: Path, about: dict[str, Any]) -> TrainResult:
         Policy(world, config, one, stage=row["stage"], trial=row["trial"], seed=about["seed"])
         for one, row in zip(parameters, tables["trials"], strict=True)
     ]
-    return TrainResult(world, config, about["seed"], about["until"], policies, **tables)
+    return Fields(world, config, about["seed"], about["until"], policies, **tables)
 
 
 def _types(records: Sequence[Record]) -> dict[str, str]:

@@ -17,13 +17,12 @@ if TYPE_CHECKING:
     from parenting.library.evaluating import Evaluation, evaluate
     from parenting.library.loop import Tick, configure, init, step, tick
     from parenting.library.parent import Parent
-    from parenting.library.policy import Policy
-    from parenting.library.policy_file import FormatError, load_policy
+    from parenting.library.policy import Policy, load_policy
+    from parenting.library.policy_file import FormatError
     from parenting.library.progress import Progress
     from parenting.library.question import Query, Question
     from parenting.library.replay import ReplayError, ReplayParent
-    from parenting.library.result import TrainResult
-    from parenting.library.result_folder import load_result
+    from parenting.library.result import TrainResult, load_result
     from parenting.library.scripted import ScriptedParent
     from parenting.library.show import Drawing, show
     from parenting.library.training import train
@@ -53,8 +52,8 @@ _MODULES = {
     "configure": "library.loop",
     "evaluate": "library.evaluating",
     "init": "library.loop",
-    "load_policy": "library.policy_file",
-    "load_result": "library.result_folder",
+    "load_policy": "library.policy",
+    "load_result": "library.result",
     "make": "library.worlds",
     "show": "library.show",
     "step": "library.loop",

@@ -57,7 +57,9 @@ def miniature(tmp_path: Path) -> Path:
         "if TYPE_CHECKING:\n    import parenting.agent.query, parenting.library.training\n"
     )
     (house / "library/training/__init__.py").write_text("import parenting.parents.scripted\n")
-    (house / "weights/store/__init__.py").write_text("def load():\n    import torch\n")
+    (house / "weights/store/__init__.py").write_text(
+        "if TYPE_CHECKING:\n    import parenting.envs.gridworld\ndef load():\n    import torch\n"
+    )
     (house / "agent/learning/__init__.py").write_text("import torch\nimport parenting.envs.registry\n")
     (house / "parents/scripted/__init__.py").write_text("import parenting.agent.learning\n")
     (house / "experiments/table1/__init__.py").write_text("import parenting.parents.scripted\n")
