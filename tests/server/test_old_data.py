@@ -1,0 +1,156 @@
+"""A data folder written by version 0.1.0 opens, exports the same bytes, and goes on with the same bits."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tarfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import text
+from torch import Tensor
+from typer.testing import CliRunner
+
+from parenting.commands.main import app
+from parenting.server import runs
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect
+from parenting.server.errors import NotFound, SetupError
+from parenting.server.export import lines
+from parenting.server.migrate import downgrade, require_current, upgrade
+from parenting.server.queue import parent_side, worker_side
+from parenting.server.record import add_event
+from parenting.server.replay import relive
+from parenting.server.session import RunSession
+from parenting.server.settings import Settings
+from parenting.server.snapshot import versions
+from tests.tree import ROOT
+
+OLD = ROOT / "tests/old/0.1.0"
+EXPECTED = json.loads((OLD / "expected.json").read_text())
+RUNS = (1, 2, 3)
+PAGES = ("/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/api/v1/runs/{}/queries")
+
+
+@pytest.fixture
+def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Settings:
+    with tarfile.open(OLD / "data.tar.xz") as archive:
+        archive.extractall(tmp_path, filter="data")
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "data"))
+    return Settings(data=tmp_path / "data", database_url=None)
+
+
+@pytest.fixture
+def unmigrated(settings: Settings) -> Iterator[Database]:
+    database = connect(settings)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def db(unmigrated: Database) -> Database:
+    upgrade(unmigrated)
+    return unmigrated
+
+
+@pytest.fixture
+def same_build(db: Database) -> None:
+    """Other builds of torch give other bits, so that there is nothing to compare."""
+    there = runs.get_run(db, 1).versions
+    if there != versions():
+        pytest.skip(f"the sample was written with {there}; here is {versions()}")
+
+
+def test_it_is_refused_until_its_tables_are_brought_up_to_date(unmigrated: Database) -> None:
+    with pytest.raises(SetupError, match=r"older version of Parenting\. Run: parenting migrate"):
+        require_current(unmigrated)
+    assert upgrade(unmigrated) is True
+    require_current(unmigrated)
+
+
+def test_the_way_back_leads_to_the_tables_of_the_old_version(unmigrated: Database) -> None:
+    def tables() -> list[tuple[str, str]]:
+        with unmigrated.read() as session:
+            rows = session.execute(text("SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL"))
+            return sorted((row[0], "".join(row[1].split())) for row in rows)
+
+    before = tables()
+    upgrade(unmigrated)
+    assert tables() != before
+    downgrade(unmigrated, "0003")
+    assert tables() == before
+
+
+def test_the_commands_list_it(db: Database) -> None:
+    found = json.loads(CliRunner().invoke(app, ["runs", "--json"]).stdout)
+    names = ["no checkpoint yet", "half answered", "finished"]
+    assert [run["name"] for run in found] == names
+    assert [run["state"] for run in found] == ["question", "question", "over"]
+    assert [run["tick"] for run in found] == [12, 44, 28]
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_its_export_is_the_same_to_the_byte(db: Database, settings: Settings, run: int) -> None:
+    old = (settings.data / f"run-{run}.jsonl").read_text(encoding="utf-8")
+    assert old.count("\n") == runs.get_run(db, run).answers > 0
+    assert "".join(lines(db, run)) == old
+
+
+@pytest.mark.parametrize("run", RUNS)
+@pytest.mark.parametrize(
+    "path", ["/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/api/v1/runs/{}/queries"]
+)
+def test_its_pages_open(db: Database, settings: Settings, path: str, run: int) -> None:
+    with TestClient(create_app(settings, db), base_url="http://localhost") as client:
+        page = client.get(path.format(run), follow_redirects=True)
+    assert page.status_code == 200, page.text
+    assert "went wrong" not in page.text
+
+
+def test_a_question_of_the_old_version_is_leased_and_answered(db: Database, settings: Settings) -> None:
+    with TestClient(create_app(settings, db), base_url="http://localhost") as client:
+        question = client.post("/api/v1/runs/2/queries/lease", json={"client_id": "new-tab"})
+        assert question.status_code == 200, question.text
+        body = {"choice": "left", "client_id": "new-tab"}
+        stored = client.post(f"/api/v1/queries/{question.json()['id']}/answer", json=body)
+    assert stored.json()["number"] == 17
+
+
+@pytest.mark.parametrize("run", [1, 2])
+def test_it_is_replayed_to_the_same_bits(db: Database, same_build: None, run: int) -> None:
+    found = relive(db, run)
+    assert (found.parted, list(found.differ)) == (None, [])
+    assert found.tick == {1: 28, 2: 13}[run]
+
+
+def test_without_a_checkpoint_there_is_nothing_to_compare(db: Database) -> None:
+    with pytest.raises(NotFound, match="Run 3 has no checkpoint yet"):
+        relive(db, 3)
+
+
+@pytest.mark.parametrize("run", [2, 3])
+def test_it_goes_on_with_the_bits_of_the_old_version(db: Database, same_build: None, run: int) -> None:
+    expected = EXPECTED[str(run)]
+    mine = {claim.run_id: claim for claim in runs.claim(db, "worker", -1)}[run]
+    session = RunSession(db, mine, runs.get_run(db, run), lambda: None)
+    while session.last_tick < expected["tick"]:
+        seen = worker_side.watch(db, [run])[run]
+        if session.ready(seen):
+            session.tick(seen)
+        elif bool(session.saved.state.stuck):
+            add_event(db, run, "end_episode", {})
+        else:
+            query = parent_side.lease(db, run, "tab")
+            assert query is not None
+            parent_side.answer(db, query.id, "left", "tab", "human")
+    state = session.saved.state
+    assert runs.get_run(db, run).answers == expected["answers"]
+    assert digest(state.learner.live) == expected["parameters"]
+    assert digest(state.familiarity) == expected["familiarity"]
+
+
+def digest(tensor: Tensor) -> str:
+    return hashlib.sha256(tensor.contiguous().numpy().tobytes()).hexdigest()
