@@ -23,10 +23,10 @@ class Dataset(Struct):
     """
 
     s0: UInt8[Tensor, "N S H W"]  # the first states, as observed
-    near: UInt8[Tensor, "N S 4"]  # their local states l(s)
+    local_state: UInt8[Tensor, "N S 4"]  # their local states l(s)
     digest: Int64[Tensor, "N S"]
     states: Int64[Tensor, "N"]
-    at: Int64[Tensor, "N R"]  # the row's state
+    state_index: Int64[Tensor, "N R"]  # the row's state
     a0: Int64[Tensor, "N R 2"]  # the first actions of both clips
     mu: Float64[Tensor, "N R 2"]  # Eq. (1), summed over the row's entries
     rows: Int64[Tensor, "N"]
@@ -37,7 +37,7 @@ class Entry(Struct):
     """What Eq. (2) sees of one answered query."""
 
     s0: UInt8[Tensor, "N H W"]
-    near: UInt8[Tensor, "N 4"]
+    local_state: UInt8[Tensor, "N 4"]
     a0: Int64[Tensor, "N 2"]
     mu: Float64[Tensor, "N 2"]
 
@@ -50,10 +50,10 @@ def empty(trials: int, height: int, width: int, device: str | torch.device = "cp
 
     return Dataset(
         s0=zeros(8, height, width, dtype=torch.uint8),
-        near=zeros(8, 4, dtype=torch.uint8),
+        local_state=zeros(8, 4, dtype=torch.uint8),
         digest=zeros(8),
         states=zeros(),
-        at=zeros(8),
+        state_index=zeros(8),
         a0=zeros(8, 2),
         mu=zeros(8, 2, dtype=torch.float64),
         rows=zeros(),
@@ -77,19 +77,26 @@ def clear(x: Dataset, mask: Bool[Tensor, "N"]) -> Dataset:
     """Nothing left to train on where `mask` holds (`own_length`); the count of entries stays."""
     height, width = x.s0.shape[2:]
     fresh = empty(len(mask), height, width, x.s0.device)
-    widened = _pad(fresh, x.s0.shape[1], x.at.shape[1])
+    widened = _pad(fresh, x.s0.shape[1], x.state_index.shape[1])
     return widened.where(mask, x).replace(size=x.size)
 
 
 def _room(x: Dataset) -> Dataset:
     """Twice the room where one more state or row would not fit. What a trial holds does not depend on it."""
-    states, rows = x.s0.shape[1], x.at.shape[1]
+    states, rows = x.s0.shape[1], x.state_index.shape[1]
     full = int(x.states.max()) == states, int(x.rows.max()) == rows
     return _pad(x, states * (2 if full[0] else 1), rows * (2 if full[1] else 1)) if any(full) else x
 
 
 def _pad(x: Dataset, states: int, rows: int) -> Dataset:
-    room = {"s0": states, "near": states, "digest": states, "at": rows, "a0": rows, "mu": rows}
+    room = {
+        "s0": states,
+        "local_state": states,
+        "digest": states,
+        "state_index": rows,
+        "a0": rows,
+        "mu": rows,
+    }
 
     def widen(name: str, tensor: Tensor, _axis: int | None) -> Tensor:
         if name not in room or tensor.shape[1] == room[name]:
@@ -107,20 +114,24 @@ def _place_state(x: Dataset, entry: Entry, trial: Int64[Tensor, "n"]) -> tuple[D
     same = taken & (x.digest[trial] == digest[:, None])
     known = same.any(1)
     state = torch.where(known, same.int().argmax(1), x.states[trial])
-    x.s0[trial, state], x.near[trial, state], x.digest[trial, state] = entry.s0, entry.near, digest
+    x.s0[trial, state], x.local_state[trial, state], x.digest[trial, state] = (
+        entry.s0,
+        entry.local_state,
+        digest,
+    )
     x.states[trial] += (~known).long()
     return x, state
 
 
 def _place_row(x: Dataset, entry: Entry, trial: Int64[Tensor, "n"], state: Int64[Tensor, "n"]) -> Dataset:
-    taken = torch.arange(x.at.shape[1], device=trial.device) < x.rows[trial, None]
-    here = taken & (x.at[trial] == state[:, None])
+    taken = torch.arange(x.state_index.shape[1], device=trial.device) < x.rows[trial, None]
+    here = taken & (x.state_index[trial] == state[:, None])
     alike = here & (x.a0[trial] == entry.a0[:, None]).all(-1)
     swapped = here & (x.a0[trial] == entry.a0.flip(1)[:, None]).all(-1)
     known = alike.any(1) | swapped.any(1)
     row = torch.where(known, (alike | swapped).int().argmax(1), x.rows[trial])
     turn = swapped.any(1)[:, None]
-    x.at[trial, row] = state
+    x.state_index[trial, row] = state
     x.a0[trial, row] = torch.where(turn, entry.a0.flip(1), entry.a0)
     x.mu[trial, row] += torch.where(turn, entry.mu.flip(1), entry.mu)
     x.rows[trial] += (~known).long()

@@ -35,4 +35,4 @@ class Change(BaseModel):
 
 
 Event = Annotated[Mature | EndEpisode | Change, Field(discriminator="kind")]
-"""One of the operator's events, as stored in the table `event` and taken by `agent.parenting.live`."""
+"""One of the operator's events, as stored in the table `event` and taken by `agent.parenting.tick`."""

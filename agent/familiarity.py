@@ -9,14 +9,14 @@ from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
 
-def places(codes: int) -> int:
+def n_local_states(codes: int) -> int:
     """How many local states there are: each of the 4 cells within reach holds one of `codes` things."""
     return int(codes**4)
 
 
-def place(near: UInt8[Tensor, "N 4"], codes: int) -> Int64[Tensor, "N"]:
+def local_state_index(local_state: UInt8[Tensor, "N 4"], codes: int) -> Int64[Tensor, "N"]:
     """The number of a local state l(s)."""
-    up, down, left, right = near.long().unbind(-1)
+    up, down, left, right = local_state.long().unbind(-1)
     return ((up * codes + down) * codes + left) * codes + right
 
 

@@ -9,7 +9,7 @@ from torch import Tensor
 from parenting.agent import dataset, familiarity
 from parenting.agent.config import Config
 from parenting.agent.dataset import Entry
-from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
 from parenting.envs.rng import Stream, gumbel
@@ -22,10 +22,10 @@ class View(Struct):
     """What a trial sees and would do now; the policy does not change between asking and acting."""
 
     observation: UInt8[Tensor, "N H W"]
-    near: UInt8[Tensor, "N 4"]
+    local_state: UInt8[Tensor, "N 4"]
     logits: Float[Tensor, "N 4"]
-    steering: Bool[Tensor, "N"]  # not frozen: what it does makes a difference
-    watched: Bool[Tensor, "N"]  # steering, and a supervisor is present: only then may it ask (Sec. 3.2.5)
+    active: Bool[Tensor, "N"]  # not frozen: what it does makes a difference
+    supervised: Bool[Tensor, "N"]  # active, and a supervisor is present: only then may it ask (Sec. 3.2.5)
 
 
 class Heard(Struct):
@@ -40,8 +40,8 @@ def hear(config: Config, state: AgentState, answer: Answer) -> tuple[AgentState,
     query, choice = answer.query, answer.choice
     if not bool((choice != Choice.NONE).any()):
         return state, _nothing_heard(state)
-    guided = (query.kind == Kind.GUIDANCE) & (choice != Choice.NONE)
-    reviewed = (query.kind == Kind.PREFERENCE) & (choice != Choice.NONE)
+    guided = (query.kind == QueryKind.GUIDANCE) & (choice != Choice.NONE)
+    reviewed = (query.kind == QueryKind.PREFERENCE) & (choice != Choice.NONE)
     state = state.replace(
         x=_store(config, state, answer),
         answered=state.answered + (guided | (reviewed & (query.maturity == state.maturity))),
@@ -56,12 +56,12 @@ def _nothing_heard(state: AgentState) -> Heard:
 def _store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset:
     query, choice = answer.query, answer.choice
     first = query.observation[:, 0, 0]
-    learnt = (query.kind != Kind.NONE) & (choice != Choice.NONE) & (choice != Choice.NEITHER)
+    learnt = (query.kind != QueryKind.NONE) & (choice != Choice.NONE) & (choice != Choice.NEITHER)
     if not bool(learnt.any()):
         return state.x
     trained = query.maturity == state.maturity if config.own_length else learnt
     entry = Entry(
-        s0=first, near=local_state(first, query.agent[:, 0, 0]), a0=query.action[:, :, 0], mu=answer.mu
+        s0=first, local_state=local_state(first, query.agent[:, 0, 0]), a0=query.action[:, :, 0], mu=answer.mu
     )
     return dataset.add(state.x, entry, learnt, trained)
 
@@ -87,10 +87,10 @@ def ask(
     """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi; redraw after
     *neither*.
     """
-    undecided = view.watched & ~state.waiting & (heard.approved == NO_ACTION)
+    undecided = view.supervised & ~state.waiting & (heard.approved == NO_ACTION)
     if not bool((undecided | heard.redraw).any()):
         return state, query
-    where = familiarity.place(view.near, len(world.legend))
+    where = familiarity.local_state_index(view.local_state, len(world.legend))
     f = state.familiarity.gather(1, where[:, None]).squeeze(1)
     pausing = undecided & (state.keys.uniform(Stream.ASK) < familiarity.ask_chance(f, config.p_guid))
     asking = pausing | heard.redraw
@@ -109,15 +109,15 @@ def _candidates(world: Gridworld, state: AgentState, view: View, asking: Tensor,
     perturbed = (view.logits.double() + noise).masked_fill(state.refused, -torch.inf)
     pair = perturbed.topk(2, dim=1).indices
     sides = torch.where(state.keys.uniform(Stream.SIDES)[:, None] < 0.5, pair, pair.flip(1))
-    now = [state.world, state.world]
-    then = [world.forecast(state.world, sides[:, side]) for side in (0, 1)]
+    before = [state.world, state.world]
+    after = [world.forecast(state.world, sides[:, side]) for side in (0, 1)]
     asked = query.replace(
-        kind=torch.full_like(query.kind, Kind.GUIDANCE),
+        kind=torch.full_like(query.kind, QueryKind.GUIDANCE),
         maturity=torch.ones_like(query.maturity),
         level=state.world.level,
         action=_first(query.action, sides),
         length=torch.ones_like(query.length),
-        **_frames(world, query, now, then),
+        **_frames(world, query, before, after),
     )
     return asked.where(asking, query)
 
@@ -129,13 +129,13 @@ def _first(action: Tensor, sides: Tensor) -> Tensor:
 
 
 def _frames(
-    world: Gridworld, query: Query, now: list[WorldState], then: list[WorldState]
+    world: Gridworld, query: Query, before: list[WorldState], after: list[WorldState]
 ) -> dict[str, Tensor]:
-    ground, agent, box = map(torch.zeros_like, (query.ground, query.agent, query.box))
-    for time, states in enumerate((now, then)):
-        ground[:, :, time] = torch.stack([state.board for state in states], 1)
+    board, agent, box = map(torch.zeros_like, (query.board, query.agent, query.box))
+    for time, states in enumerate((before, after)):
+        board[:, :, time] = torch.stack([state.board for state in states], 1)
         agent[:, :, time] = torch.stack([state.agent for state in states], 1)
         box[:, :, time] = torch.stack([state.box for state in states], 1)
     observation = torch.zeros_like(query.observation)
-    observation[:, :, :2] = world.observe(ground[:, :, :2], agent[:, :, :2], box[:, :, :2])
-    return {"ground": ground, "agent": agent, "box": box, "observation": observation}
+    observation[:, :, :2] = world.observe(board[:, :, :2], agent[:, :, :2], box[:, :, :2])
+    return {"board": board, "agent": agent, "box": box, "observation": observation}

@@ -11,8 +11,8 @@ from torch import Tensor
 
 from parenting.agent import dataset, familiarity
 from parenting.agent.config import Config
-from parenting.agent.policy import Network, network
-from parenting.agent.state import AgentState, Asked, Clip, Learner, Recorder, Rehearsal, Report, Ring
+from parenting.agent.policy import Network, network_for
+from parenting.agent.state import AgentState, Asked, Learner, Recorder, Rehearsal, Ring, RunningClip, TickInfo
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.levels.spec import Level, maze_legend
@@ -41,46 +41,46 @@ def init(
         world=start,
         maturity=zeros() + 1,
         answered=zeros(),
-        familiarity=zeros(familiarity.places(len(world.legend))),
+        familiarity=zeros(familiarity.n_local_states(len(world.legend))),
         waiting=zeros(dtype=torch.bool),
         refused=zeros(4, dtype=torch.bool),
         x=dataset.empty(trials, world.height, world.width, device),
         recorder=_recorder(world, config.stages, trials, device),
         learner=_learner(network_of(world), config, keys, weights),
         rehearsal=_rehearsal(network_of(world), config, keys),
-        report=no_report(start, getattr(torch, config.dtype)),
+        info=no_info(start, getattr(torch, config.dtype)),
     )
 
 
-def _rehearsal(brain: Network, config: Config, keys: Keys) -> Rehearsal:
-    trials, size = len(keys.seed), brain.size if config.pretrain else 0
+def _rehearsal(network: Network, config: Config, keys: Keys) -> Rehearsal:
+    trials, size = len(keys.seed), network.size if config.pretrain else 0
     first = torch.zeros(trials, size, dtype=getattr(torch, config.dtype), device=keys.seed.device)
     nothing = torch.zeros_like(keys.tick)
-    return Rehearsal(first=first, second=torch.zeros_like(first), steps=nothing, owed=nothing.bool())
+    return Rehearsal(exp_avg=first, exp_avg_sq=torch.zeros_like(first), steps=nothing, owed=nothing.bool())
 
 
-def _start(brain: Network, config: Config, keys: Keys, weights: Tensor | None) -> Float[Tensor, "N P"]:
+def _start(network: Network, config: Config, keys: Keys, weights: Tensor | None) -> Float[Tensor, "N P"]:
     dtype = getattr(torch, config.dtype)
     if config.pretrain != (weights is not None):
         wanted = "needs pre-trained weights" if config.pretrain else "takes no pre-trained weights"
         raise ValueError(f"A run with pretrain = {config.pretrain} {wanted}.")
     if weights is None:
-        return brain.start(keys, dtype)
-    if weights.shape != (brain.size,):
+        return network.init_params(keys, dtype)
+    if weights.shape != (network.size,):
         raise ValueError(
-            f"weights must hold {brain.size} numbers for this world, not {tuple(weights.shape)}."
+            f"weights must hold {network.size} numbers for this world, not {tuple(weights.shape)}."
         )
     return weights.to(keys.seed.device, dtype).repeat(len(keys.seed), 1)
 
 
-def _learner(brain: Network, config: Config, keys: Keys, weights: Tensor | None) -> Learner:
-    live = _start(brain, config, keys, weights)
+def _learner(network: Network, config: Config, keys: Keys, weights: Tensor | None) -> Learner:
+    params = _start(network, config, keys, weights)
     return Learner(
-        live=live,
-        first=torch.zeros_like(live),
-        second=torch.zeros_like(live),
+        params=params,
+        exp_avg=torch.zeros_like(params),
+        exp_avg_sq=torch.zeros_like(params),
         steps=torch.zeros_like(keys.tick),
-        elders=live.new_zeros(config.stages - 1, *live.shape),
+        frozen=params.new_zeros(config.stages - 1, *params.shape),
     )
 
 
@@ -90,14 +90,14 @@ def _recorder(world: Gridworld, length: int, trials: int, device: torch.device) 
 
     byte, flag = torch.int8, torch.bool
     board = (length + 1, world.height, world.width)
-    clip = Clip(
-        ground=zeros(*board, dtype=torch.uint8),
+    clip = RunningClip(
+        board=zeros(*board, dtype=torch.uint8),
         agent=zeros(length + 1, 2, dtype=byte),
         box=zeros(length + 1, 2, dtype=byte),
         action=zeros(length, dtype=byte),
     )
     ring = Ring(
-        ground=zeros(2, 16, *board, dtype=torch.uint8),
+        board=zeros(2, 16, *board, dtype=torch.uint8),
         agent=zeros(2, 16, length + 1, 2, dtype=byte),
         box=zeros(2, 16, length + 1, 2, dtype=byte),
         action=zeros(2, 16, length, dtype=byte),
@@ -106,19 +106,21 @@ def _recorder(world: Gridworld, length: int, trials: int, device: torch.device) 
         tick=zeros(2, 16),
         first=zeros(2, 16),
         digest=zeros(2, 16),
-        here=zeros(2, 16, dtype=flag),
-        open=zeros(2, 16, dtype=flag),
+        stored=zeros(2, 16, dtype=flag),
+        searchable=zeros(2, 16, dtype=flag),
         count=zeros(2),
     )
     asked = Asked(pair=zeros(16), compared=zeros(16), count=zeros())
-    return Recorder(running=zeros(dtype=flag), turn=zeros(), step=zeros(), clip=clip, ring=ring, asked=asked)
+    return Recorder(
+        running=zeros(dtype=flag), next_kind=zeros(), step=zeros(), clip=clip, ring=ring, asked=asked
+    )
 
 
-def no_report(world: WorldState, dtype: torch.dtype) -> Report:
-    """The report of a tick in which nothing has happened yet."""
+def no_info(world: WorldState, dtype: torch.dtype) -> TickInfo:
+    """The record of a tick in which nothing has happened yet."""
     nothing = torch.zeros_like(world.terminated)
     number = torch.zeros_like(world.step_count, dtype=dtype)
-    return Report(
+    return TickInfo(
         before=world,
         action=torch.zeros_like(world.step_count),
         moved=nothing,
@@ -131,7 +133,7 @@ def no_report(world: WorldState, dtype: torch.dtype) -> Report:
 
 def network_of(world: Gridworld) -> Network:
     """The policy's architecture for a world (Sec. 3.1.1); it knows the goal of mazes, too (Sec. 3.1.4)."""
-    return network(world.height, world.width, len(maze_legend(world.legend)))
+    return network_for(world.height, world.width, len(maze_legend(world.legend)))
 
 
 def world_of(name: str, level: str | Level | Sequence[Level] | None, config: Config) -> Gridworld:

@@ -23,8 +23,8 @@ class Rows(NamedTuple):
     """The rows of X in one gradient step, trimmed to what the fullest trial needs."""
 
     s0: UInt8[Tensor, "N S H W"]
-    near: UInt8[Tensor, "N S 4"]
-    at: Int64[Tensor, "N R"]
+    local_state: UInt8[Tensor, "N S 4"]
+    state_index: Int64[Tensor, "N R"]
     a0: Int64[Tensor, "N R 2"]
     mu: Float[Tensor, "N R 2"]
 
@@ -32,7 +32,7 @@ class Rows(NamedTuple):
     def weight(self) -> Float[Tensor, "N S"]:
         """How many entries start at each state."""
         entries = self.mu.sum(-1)
-        return entries.new_zeros(self.near.shape[:2]).scatter_add_(1, self.at, entries)
+        return entries.new_zeros(self.local_state.shape[:2]).scatter_add_(1, self.state_index, entries)
 
     def of(self, trial: Int64[Tensor, "K"]) -> Rows:
         """Those of some trials, in order."""
@@ -56,13 +56,13 @@ def train(network: Network, config: Config, state: AgentState, acted: Bool[Tenso
         return state
     for step in range(config.gradient_steps):
         rows = choose(config, state.x, state.keys, step).of(trial)
-        parameters = taken(state.learner.live, trial)
+        parameters = taken(state.learner.params, trial)
         terms, gradient = differentiate(network, config, parameters, rows)
-        adam(state.learner.live, state.learner, gradient, training, config.learning_rate)
+        adam(state.learner.params, state.learner, gradient, training, config.learning_rate)
     entries = rows.mu.sum((-1, -2)).clamp_min(1)
     means = {name: total / entries for name, total in terms._asdict().items()}
     told = {name: mean.new_zeros(len(training)).index_put((trial,), mean) for name, mean in means.items()}
-    return state.replace(report=state.report.replace(trained=training, **told))
+    return state.replace(info=state.info.replace(trained=training, **told))
 
 
 def taken(every: Tensor, trial: Int64[Tensor, "K"]) -> Tensor:
@@ -73,9 +73,9 @@ def taken(every: Tensor, trial: Int64[Tensor, "K"]) -> Tensor:
 def choose(config: Config, x: Dataset, keys: Keys, step: int) -> Rows:
     """All rows of X, or `batch` of them drawn by key without replacement."""
     rows, states = max(1, int(x.rows.max())), max(1, int(x.states.max()))
-    at, a0, mu = x.at[:, :rows], x.a0[:, :rows], x.mu[:, :rows]
+    at, a0, mu = x.state_index[:, :rows], x.a0[:, :rows], x.mu[:, :rows]
     if config.batch is None or rows <= config.batch:
-        return Rows(x.s0[:, :states], x.near[:, :states], at, a0, mu)
+        return Rows(x.s0[:, :states], x.local_state[:, :states], at, a0, mu)
     place = torch.arange(rows, device=at.device)
     noise = keys.at(Stream.BATCH, 65536 * step + place).masked_fill(place >= x.rows[:, None], 2.0)
     picked = noise.topk(config.batch, dim=1, largest=False).indices
@@ -83,16 +83,16 @@ def choose(config: Config, x: Dataset, keys: Keys, step: int) -> Rows:
     state = at.gather(1, picked)
     every = torch.arange(len(at), device=at.device)[:, None]
     own = torch.arange(config.batch, device=at.device).expand_as(state)
-    return Rows(x.s0[every, state], x.near[every, state], own, a0.gather(1, both), mu.gather(1, both))
+    return Rows(x.s0[every, state], x.local_state[every, state], own, a0.gather(1, both), mu.gather(1, both))
 
 
 def differentiate(
     network: Network, config: Config, parameters: Float[Tensor, "N P"], rows: Rows
 ) -> tuple[Terms, Float[Tensor, "N P"]]:
     """The terms of the objective and its gradient, each trial's by itself."""
-    layers = network.learnable(parameters)
+    layers = network.leaf_params(parameters)
     with torch.enable_grad():
-        terms = objective(network.heads(layers, rows.s0, rows.near), rows)
+        terms = objective(network.heads(layers, rows.s0, rows.local_state), rows)
         value = (
             terms.loss
             - config.lambda_global * terms.entropy_global
@@ -108,7 +108,7 @@ def objective(heads: Heads, rows: Rows) -> Terms:
     With logits z, pi(a_i) / (pi(a_0) + pi(a_1)) is sigmoid(z[a_i] - z[a_other]), and -log of it a softplus.
     """
     mu = rows.mu.to(heads.local.dtype)
-    z = heads.logits.gather(1, rows.at[:, :, None].expand(-1, -1, 4)).gather(2, rows.a0)
+    z = heads.logits.gather(1, rows.state_index[:, :, None].expand(-1, -1, 4)).gather(2, rows.a0)
     margin = z[..., 0] - z[..., 1]
     loss = mu[..., 0] * F.softplus(-margin) + mu[..., 1] * F.softplus(margin)
     weight = rows.weight.to(heads.local.dtype)
@@ -125,17 +125,17 @@ def entropy(logits: Float[Tensor, "N S 4"]) -> Float[Tensor, "N S"]:
     return -(logs.exp() * logs).sum(-1)
 
 
-class Moments(Protocol):
+class AdamState(Protocol):
     """What Adam remembers between its steps."""
 
     @property
-    def first(self) -> Float[Tensor, "N P"]:
-        """The first moments."""
+    def exp_avg(self) -> Float[Tensor, "N P"]:
+        """The running mean of the gradient."""
         ...
 
     @property
-    def second(self) -> Float[Tensor, "N P"]:
-        """The second moments."""
+    def exp_avg_sq(self) -> Float[Tensor, "N P"]:
+        """The running mean of its square."""
         ...
 
     @property
@@ -145,8 +145,8 @@ class Moments(Protocol):
 
 
 def adam(
-    live: Float[Tensor, "N P"],
-    moments: Moments,
+    params: Float[Tensor, "N P"],
+    moments: AdamState,
     gradient: Float[Tensor, "K P"],
     training: Bool[Tensor, "N"],
     rate: float,
@@ -163,10 +163,10 @@ def adam(
         return list(compress(every.unbind(), chosen))
 
     torch._fused_adam_(
-        rows(live),
+        rows(params),
         list(gradient.unbind()),
-        rows(moments.first),
-        rows(moments.second),
+        rows(moments.exp_avg),
+        rows(moments.exp_avg_sq),
         [],
         rows(moments.steps.to(torch.float32)),
         lr=rate,

@@ -36,11 +36,11 @@ def mature(config: Config, state: AgentState, ripe: Bool[Tensor, "N"]) -> AgentS
 
 def _freeze(learner: Learner, maturity: Int64[Tensor, "N"], ripe: Bool[Tensor, "N"]) -> Learner:
     trial = ripe.nonzero().squeeze(1)
-    elders = learner.elders.clone()
-    elders[maturity[trial] - 1, trial] = learner.live[trial]
+    frozen = learner.frozen.clone()
+    frozen[maturity[trial] - 1, trial] = learner.params[trial]
     return learner.replace(
-        elders=elders,
-        first=learner.first.masked_fill(ripe[:, None], 0),
-        second=learner.second.masked_fill(ripe[:, None], 0),
+        frozen=frozen,
+        exp_avg=learner.exp_avg.masked_fill(ripe[:, None], 0),
+        exp_avg_sq=learner.exp_avg_sq.masked_fill(ripe[:, None], 0),
         steps=learner.steps.masked_fill(ripe, 0),
     )

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from parenting.agent.config import Config
 from parenting.agent.guidance import View
-from parenting.agent.query import Kind, Query
+from parenting.agent.query import Query, QueryKind
 from parenting.agent.state import AgentState, Asked, Recorder, Ring
 from parenting.envs.fingerprint import fingerprint, together, unordered
 from parenting.envs.gridworld import Gridworld
@@ -43,27 +43,27 @@ def store(
 ) -> Recorder:
     """File finished clips with their kind's ring; the newest overwrites the oldest. In place."""
     trial = complete.nonzero().squeeze(1)
-    kind = recorder.turn[trial]
+    kind = recorder.next_kind[trial]
     ring = _room(recorder.ring)
     place = ring.count[trial, kind] % CAPACITY
     clip, length = recorder.clip.pick(trial), recorder.step[trial]
     at = (trial, kind, place)
-    ring.ground[at], ring.agent[at], ring.box[at] = clip.ground, clip.agent, clip.box
+    ring.board[at], ring.agent[at], ring.box[at] = clip.board, clip.agent, clip.box
     ring.action[at], ring.length[at], ring.level[at] = clip.action, length.to(torch.int8), level[trial]
-    first = world.observe(clip.ground[:, 0], clip.agent[:, 0].long(), clip.box[:, 0].long())
+    first = world.observe(clip.board[:, 0], clip.agent[:, 0].long(), clip.box[:, 0].long())
     ring.first[at] = fingerprint(first.flatten(1))
-    ring.digest[at] = digest(clip.ground, clip.agent, clip.box, clip.action, length, level[trial])
-    ring.tick[at], ring.here[at], ring.open[at] = tick[trial], True, True
+    ring.digest[at] = digest(clip.board, clip.agent, clip.box, clip.action, length, level[trial])
+    ring.tick[at], ring.stored[at], ring.searchable[at] = tick[trial], True, True
     ring.count[trial, kind] += 1
-    turn = torch.where(complete, 1 - recorder.turn, recorder.turn)
-    return recorder.replace(ring=ring, running=recorder.running & ~complete, turn=turn)
+    turn = torch.where(complete, 1 - recorder.next_kind, recorder.next_kind)
+    return recorder.replace(ring=ring, running=recorder.running & ~complete, next_kind=turn)
 
 
 def digest(
-    ground: Tensor, agent: Tensor, box: Tensor, action: Tensor, length: Tensor, level: Tensor
+    board: Tensor, agent: Tensor, box: Tensor, action: Tensor, length: Tensor, level: Tensor
 ) -> Tensor:
     """A clip's fingerprint: true frames, agent, box, actions, length, level. Any leading axes."""
-    parts = (ground.flatten(-3), agent.flatten(-2), box.flatten(-2), action)
+    parts = (board.flatten(-3), agent.flatten(-2), box.flatten(-2), action)
     return together(*map(fingerprint, parts), length.long(), level)
 
 
@@ -73,9 +73,11 @@ def forget(recorder: Recorder, mask: Bool[Tensor, "N"]) -> Recorder:
     keep = ~mask[:, None, None]
     return recorder.replace(
         running=recorder.running & ~mask,
-        turn=recorder.turn.masked_fill(mask, EXPLOIT),
+        next_kind=recorder.next_kind.masked_fill(mask, EXPLOIT),
         ring=ring.replace(
-            here=ring.here & keep, open=ring.open & keep, count=ring.count.masked_fill(mask[:, None], 0)
+            stored=ring.stored & keep,
+            searchable=ring.searchable & keep,
+            count=ring.count.masked_fill(mask[:, None], 0),
         ),
     )
 
@@ -84,13 +86,13 @@ def pair(
     world: Gridworld, config: Config, state: AgentState, view: View, steered: Bool[Tensor, "N"], query: Query
 ) -> tuple[AgentState, Query]:
     """After a step, with probability p_pref, ask about the newest pair. Remembers whatever this tick asks."""
-    trying = steered & view.watched & (state.keys.uniform(Stream.PREFER) < config.p_pref)
+    trying = steered & view.supervised & (state.keys.uniform(Stream.PREFER) < config.p_pref)
     recorder = state.recorder
     found = _search(config, recorder, state.maturity, trying)
     if len(found.trial):
         query = _ask(world, state, found, query)
-        recorder.ring.here[found.trial, EXPLOIT, found.exploit] = False
-        recorder.ring.here[found.trial, EXPLORE, found.explore] = False
+        recorder.ring.stored[found.trial, EXPLOIT, found.exploit] = False
+        recorder.ring.stored[found.trial, EXPLORE, found.explore] = False
     recorder = recorder.replace(asked=_remember(config, recorder.asked, query))
     return state.replace(recorder=recorder), query
 
@@ -99,23 +101,23 @@ def _search(
     config: Config, recorder: Recorder, maturity: Int64[Tensor, "N"], trying: Bool[Tensor, "N"]
 ) -> Pair:
     ring = recorder.ring
-    trial = (trying & (ring.here & ring.open).flatten(1).any(1)).nonzero().squeeze(1)
+    trial = (trying & (ring.stored & ring.searchable).flatten(1).any(1)).nonzero().squeeze(1)
     found: list[Tensor] = []
     while len(trial):
         capacity = ring.tick.shape[2]
-        candidate = (ring.here[trial] & ring.open[trial]).flatten(1)
+        candidate = (ring.stored[trial] & ring.searchable[trial]).flatten(1)
         newest = torch.where(candidate, ring.tick[trial].flatten(1), -1).max(1)
         later, kind = newest.indices % capacity, newest.indices // capacity
         partner = _partner(config, recorder, maturity, trial, kind, later)
         paired = partner >= 0
-        ring.open[trial[~paired], kind[~paired], later[~paired]] = False
+        ring.searchable[trial[~paired], kind[~paired], later[~paired]] = False
         exploit, explore = (
             torch.where(kind == EXPLOIT, later, partner),
             torch.where(kind == EXPLOIT, partner, later),
         )
         found.append(torch.stack((trial, exploit, explore))[:, paired])
         trial = trial[~paired]
-        trial = trial[(ring.here[trial] & ring.open[trial]).flatten(1).any(1)]
+        trial = trial[(ring.stored[trial] & ring.searchable[trial]).flatten(1).any(1)]
     every = torch.cat(found, dim=1) if found else torch.zeros(3, 0, dtype=torch.int64, device=trying.device)
     return Pair(*every)
 
@@ -131,7 +133,9 @@ def _partner(
     """The newest older clip of the other kind that starts alike, acts otherwise, is not known; or -1."""
     ring, other = recorder.ring, 1 - kind
     tick = ring.tick[trial, other]
-    matches = ring.here[trial, other] & (ring.first[trial, other] == ring.first[trial, kind, later][:, None])
+    matches = ring.stored[trial, other] & (
+        ring.first[trial, other] == ring.first[trial, kind, later][:, None]
+    )
     matches &= ring.action[trial, other, :, 0] != ring.action[trial, kind, later, 0][:, None]
     matches &= ring.level[trial, other] == ring.level[trial, kind, later][:, None]  # a query has one level
     matches &= tick < ring.tick[trial, kind, later][:, None]
@@ -151,16 +155,16 @@ def _ask(world: Gridworld, state: AgentState, found: Pair, query: Query) -> Quer
     kinds = torch.where(leftward[:, None], torch.tensor([EXPLOIT, EXPLORE]), torch.tensor([EXPLORE, EXPLOIT]))
     places = torch.stack((found.exploit, found.explore), 1).gather(1, kinds)
     at = (trial[:, None], kinds, places)
-    ground, agent, box = ring.ground[at], ring.agent[at].long(), ring.box[at].long()
+    board, agent, box = ring.board[at], ring.agent[at].long(), ring.box[at].long()
     frames = {
-        "ground": ground,
+        "board": board,
         "agent": agent,
         "box": box,
-        "observation": _observations(world, ground, agent, box, ring.length[at]),
+        "observation": _observations(world, board, agent, box, ring.length[at]),
     }
     parts = {
         **frames,
-        "kind": torch.full_like(trial, Kind.PREFERENCE),
+        "kind": torch.full_like(trial, QueryKind.PREFERENCE),
         "action": ring.action[at].long(),
         "length": ring.length[at].long(),
         "maturity": state.maturity[trial],
@@ -171,16 +175,16 @@ def _ask(world: Gridworld, state: AgentState, found: Pair, query: Query) -> Quer
     )
 
 
-def _observations(world: Gridworld, ground: Tensor, agent: Tensor, box: Tensor, length: Tensor) -> Tensor:
+def _observations(world: Gridworld, board: Tensor, agent: Tensor, box: Tensor, length: Tensor) -> Tensor:
     """What the agent saw in each frame; zero beyond a clip's length, as everything there is."""
-    frame = torch.arange(ground.shape[2], device=ground.device)
+    frame = torch.arange(board.shape[2], device=board.device)
     within = frame <= length[:, :, None]
-    return world.observe(ground, agent, box) * within[..., None, None]
+    return world.observe(board, agent, box) * within[..., None, None]
 
 
-def comparison(seen: Tensor, one: Tensor, other: Tensor, maturity: Tensor) -> Int64[Tensor, "..."]:
+def comparison(observation: Tensor, one: Tensor, other: Tensor, maturity: Tensor) -> Int64[Tensor, "..."]:
     """One word for: these two first actions were compared in this state at this stage."""
-    return together(seen, (1 << one) + (1 << other), maturity)
+    return together(observation, (1 << one) + (1 << other), maturity)
 
 
 def same_pair(config: Config, one: Tensor, other: Tensor, maturity: Tensor) -> Int64[Tensor, "..."]:
@@ -194,16 +198,16 @@ def same_pair(config: Config, one: Tensor, other: Tensor, maturity: Tensor) -> I
 
 def _remember(config: Config, asked: Asked, query: Query) -> Asked:
     """Keep the digest of what is asked, guidance too, and which actions it compares where. In place."""
-    trial = (query.kind != Kind.NONE).nonzero().squeeze(1)
+    trial = (query.kind != QueryKind.NONE).nonzero().squeeze(1)
     if not len(trial):
         return asked
     asked, query = _more(asked), query.pick(trial)
     place = asked.count[trial]
-    clips = digest(query.ground, query.agent, query.box, query.action, query.length, query.level[:, None])
+    clips = digest(query.board, query.agent, query.box, query.action, query.length, query.level[:, None])
     one, other = clips.unbind(1)
     asked.pair[trial, place] = same_pair(config, one, other, query.maturity)
-    seen, first = fingerprint(query.observation[:, 0, 0].flatten(1)), query.action[:, :, 0]
-    asked.compared[trial, place] = comparison(seen, first[:, 0], first[:, 1], query.maturity)
+    observation, first = fingerprint(query.observation[:, 0, 0].flatten(1)), query.action[:, :, 0]
+    asked.compared[trial, place] = comparison(observation, first[:, 0], first[:, 1], query.maturity)
     asked.count[trial] += 1
     return asked
 

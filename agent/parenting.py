@@ -18,31 +18,31 @@ from parenting.agent import query as queries
 from parenting.agent.config import Config
 from parenting.agent.events import Change, EndEpisode, Event, Mature
 from parenting.agent.guidance import View
-from parenting.agent.init import init, network_of, no_report
+from parenting.agent.init import init, network_of, no_info
 from parenting.agent.mailbox import Mailbox
 from parenting.agent.policy import Network
 from parenting.agent.query import Answer, Query
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld, local_state
 
-__all__ = ["apply", "beat", "init", "live", "no_query", "rehearse", "step"]
+__all__ = ["apply", "init", "live", "no_query", "rehearse", "step", "tick"]
 
 
 def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Query]:
     """One tick of PARENTING for every trial (Sec. 2). Reads no reward, does no I/O. Consumes `state`."""
-    brain = network_of(world)
-    state = wake(world, state)
-    view = perceive(world, brain, state)
+    network = network_of(world)
+    state = reset_finished(world, state)
+    view = observe(world, network, state)
     query = no_query(world, config, state)
     state, heard = guidance.hear(config, state, answer)  # 2.1  answers enter X; "neither": ask again
     state, query = guidance.ask(world, config, state, view, heard, query)  # 2.1  unfamiliar? pause and ask
-    state, steered = recording.act(world, brain, config, state, view, heard)  # 2.2, 2.4  move, and clips
+    state, steered = recording.act(world, network, config, state, view, heard)  # 2.2, 2.4  move, and clips
     state, query = pairing.pair(world, config, state, view, steered, query)  # 2.2  a matching pair of clips
-    state = learning.train(brain, config, state, steered)  # 2.3  gradient steps on X with p_train
+    state = learning.train(network, config, state, steered)  # 2.3  gradient steps on X with p_train
     return maturation.grow(config, state), query  # 2.4  pi_T -> pi_{T+1}
 
 
-def beat(
+def tick(
     world: Gridworld, config: Config, state: AgentState, parent: Mailbox
 ) -> tuple[AgentState, Config, Query]:
     """One tick with its parent: the operator's events, an answer, a step, a question; then mazes."""
@@ -63,7 +63,7 @@ def live(
 ) -> Iterator[tuple[AgentState, Config, Query]]:
     """A life, one item a tick; whoever iterates decides when the next may be."""
     while True:
-        state, config, query = beat(world, config, state, parent)
+        state, config, query = tick(world, config, state, parent)
         yield state, config, query
 
 
@@ -80,9 +80,9 @@ def apply(world: Gridworld, config: Config, state: AgentState, event: Event) -> 
             return state, config.model_copy(update={name: value})
 
 
-def wake(world: Gridworld, state: AgentState) -> AgentState:
+def reset_finished(world: Gridworld, state: AgentState) -> AgentState:
     """The keys of a new tick; episodes that have ended start anew, each on its next level."""
-    state = state.replace(keys=state.keys.next(), report=no_report(state.world, state.learner.live.dtype))
+    state = state.replace(keys=state.keys.next(), info=no_info(state.world, state.learner.params.dtype))
     ended = state.world.terminated | world.truncated(state.world)
     if not bool(ended.any()):
         return state
@@ -91,18 +91,18 @@ def wake(world: Gridworld, state: AgentState) -> AgentState:
     return state.replace(world=world.reset(state.keys, level).where(ended, state.world), recorder=recorder)
 
 
-def perceive(world: Gridworld, brain: Network, state: AgentState) -> View:
+def observe(world: Gridworld, network: Network, state: AgentState) -> View:
     """What each trial sees, and its policy's logits there."""
-    now = state.world
-    observation = world.observe(now.board, now.agent, now.box)
-    near = local_state(observation, now.agent)
-    steering = ~world.frozen(now)
+    here = state.world
+    observation = world.observe(here.board, here.agent, here.box)
+    near = local_state(observation, here.agent)
+    active = ~world.frozen(here)
     return View(
         observation=observation,
-        near=near,
-        logits=brain.logits(state.learner.live, observation, near),
-        steering=steering,
-        watched=steering & world.supervised(now),
+        local_state=near,
+        logits=network.logits(state.learner.params, observation, near),
+        active=active,
+        supervised=active & world.supervised(here),
     )
 
 

@@ -24,43 +24,43 @@ FILTERS = (16, 32, 64, 64)
 ACTIONS = 4
 
 
-class Side(NamedTuple):
-    """A convolution's cells of padding before and behind one side, and the length that is left."""
+class Padding(NamedTuple):
+    """A convolution's padding before and after one axis, in cells, and the length of its output."""
 
     before: int
-    behind: int
+    after: int
     length: int
 
 
-def side(length: int) -> Side:
+def padding(length: int) -> Padding:
     """Longer than 3 shrinks by 2; 3 shrinks to 2 (one cell behind); 2 or less keeps its size (ours)."""
     if length > 3:
-        return Side(0, 0, length - 2)
-    return Side(0, 1, 2) if length == 3 else Side(1, 1, length)
+        return Padding(0, 0, length - 2)
+    return Padding(0, 1, 2) if length == 3 else Padding(1, 1, length)
 
 
 class Layer(NamedTuple):
-    """Weights `[rows, columns]` and biases, at `start` of the row; convolutions have sides."""
+    """Weights `[fan_in, fan_out]` and biases, at `start` of the row; a convolution has a padding."""
 
-    rows: int
-    columns: int
+    fan_in: int
+    fan_out: int
     start: int
-    sides: tuple[Side, Side] | None = None
+    padding: tuple[Padding, Padding] | None = None
 
     @property
     def bias(self) -> int:
         """Where the biases begin."""
-        return self.start + self.rows * self.columns
+        return self.start + self.fan_in * self.fan_out
 
     @property
     def end(self) -> int:
         """Where the layer ends."""
-        return self.bias + self.columns
+        return self.bias + self.fan_out
 
     @property
-    def fans(self) -> tuple[int, int]:
+    def glorot_fans(self) -> tuple[int, int]:
         """Numbers of inputs and outputs as Glorot initialisation counts them."""
-        return (self.rows, 9 * self.columns) if self.sides else (self.rows, self.columns)
+        return (self.fan_in, 9 * self.fan_out) if self.padding else (self.fan_in, self.fan_out)
 
 
 class Heads(NamedTuple):
@@ -78,10 +78,10 @@ class Heads(NamedTuple):
 class Affine(NamedTuple):
     """One layer's weights and biases, stacked over the trials."""
 
-    weight: Float[Tensor, "N rows columns"]
-    bias: Float[Tensor, "N 1 columns"]
+    weight: Float[Tensor, "N fan_in fan_out"]
+    bias: Float[Tensor, "N 1 fan_out"]
 
-    def __call__(self, x: Float[Tensor, "N B rows"]) -> Float[Tensor, "N B columns"]:
+    def __call__(self, x: Float[Tensor, "N B fan_in"]) -> Float[Tensor, "N B fan_out"]:
         """Every trial's inputs through its own layer."""
         return torch.baddbmm(self.bias, x, self.weight)
 
@@ -100,38 +100,38 @@ class Network:
         self._add(HIDDEN, ACTIONS)
         self.size = self.layers[-1].end
 
-    def _add(self, rows: int, columns: int, sides: tuple[Side, Side] | None = None) -> None:
-        self.layers.append(Layer(rows, columns, self.layers[-1].end if self.layers else 0, sides))
+    def _add(self, fan_in: int, fan_out: int, pads: tuple[Padding, Padding] | None = None) -> None:
+        self.layers.append(Layer(fan_in, fan_out, self.layers[-1].end if self.layers else 0, pads))
 
     def _add_convolutions(self) -> int:
         height, width, channels = self.height, self.width, self.codes
         for filters in FILTERS:
             if height <= 2 and width <= 2:
                 break
-            sides = side(height), side(width)
-            self._add(9 * channels, filters, sides)
-            height, width, channels = sides[0].length, sides[1].length, filters
+            pads = padding(height), padding(width)
+            self._add(9 * channels, filters, pads)
+            height, width, channels = pads[0].length, pads[1].length, filters
         return height * width * channels
 
     @cached_property
     def convolutions(self) -> list[Layer]:
         """The layers that are convolutions, in order."""
-        return [layer for layer in self.layers if layer.sides]
+        return [layer for layer in self.layers if layer.padding]
 
     @cached_property
     def sizes(self) -> list[int]:
         """How many weights and how many biases the layers have, by turns."""
-        return [size for layer in self.layers for size in (layer.rows * layer.columns, layer.columns)]
+        return [size for layer in self.layers for size in (layer.fan_in * layer.fan_out, layer.fan_out)]
 
-    def start(self, keys: Keys, dtype: torch.dtype) -> Float[Tensor, "N P"]:
+    def init_params(self, keys: Keys, dtype: torch.dtype) -> Float[Tensor, "N P"]:
         """Glorot uniform weights and zero biases, drawn from the trials' keys (ours, as TensorFlow 1.12)"""
         parameters = torch.zeros(keys.seed.shape[0], self.size, dtype=dtype, device=keys.seed.device)
         for number, layer in enumerate(self.layers):
-            bound = sqrt(6 / sum(layer.fans))
-            drawn = (2 * keys.uniform(Stream.WEIGHTS + number, layer.rows, layer.columns) - 1) * bound
-            if layer.sides:
+            bound = sqrt(6 / sum(layer.glorot_fans))
+            drawn = (2 * keys.uniform(Stream.WEIGHTS + number, layer.fan_in, layer.fan_out) - 1) * bound
+            if layer.padding:
                 # drawn as (channel, row, column), kept as (row, column, channel): patches are copied in runs
-                split = drawn.view(-1, layer.rows // 9, 9, layer.columns)
+                split = drawn.view(-1, layer.fan_in // 9, 9, layer.fan_out)
                 drawn = split.transpose(1, 2).flatten(1, 2)
             parameters[:, layer.start : layer.bias] = drawn.flatten(1).to(dtype)
         return parameters
@@ -140,11 +140,11 @@ class Network:
         """The layers' weights and biases, as views of the flat rows."""
         parts = parameters.split_with_sizes(self.sizes, dim=1)
         return [
-            Affine(weight.view(-1, layer.rows, layer.columns), bias.unsqueeze(1))
+            Affine(weight.view(-1, layer.fan_in, layer.fan_out), bias.unsqueeze(1))
             for layer, weight, bias in zip(self.layers, parts[::2], parts[1::2], strict=True)
         ]
 
-    def learnable(self, parameters: Float[Tensor, "N P"]) -> list[Affine]:
+    def leaf_params(self, parameters: Float[Tensor, "N P"]) -> list[Affine]:
         """The same as leaves of a graph of their own: what `gradient` differentiates by."""
         return [
             Affine(*(part.detach().requires_grad_() for part in layer)) for layer in self.unpack(parameters)
@@ -156,17 +156,17 @@ class Network:
         return torch.cat([part.flatten(1) for part in parts], dim=1)
 
     def heads(
-        self, layers: list[Affine], seen: UInt8[Tensor, "N S H W"], near: UInt8[Tensor, "N S 4"]
+        self, layers: list[Affine], observation: UInt8[Tensor, "N S H W"], local_state: UInt8[Tensor, "N S 4"]
     ) -> Heads:
-        """Both heads' logits in S states a trial: `seen` the observations, `near` their local states l(s)."""
+        """Both heads' logits in S states a trial: `observation`, and `local_state`, its l(s)."""
         local_in, local_out, *convolutions, dense, out = layers
-        x = self._one_hot(near, out.weight.dtype).flatten(2)
+        x = self._one_hot(local_state, out.weight.dtype).flatten(2)
         local = local_out(local_in(x).relu_())
-        y = self._one_hot(seen, out.weight.dtype)
+        y = self._one_hot(observation, out.weight.dtype)
         for layer, affine in zip(self.convolutions, convolutions, strict=True):
-            assert layer.sides
-            patches = _patches(y, layer.sides)
-            y = affine(patches.flatten(1, 3)).relu_().view(*patches.shape[:4], layer.columns)
+            assert layer.padding
+            patches = _patches(y, layer.padding)
+            y = affine(patches.flatten(1, 3)).relu_().view(*patches.shape[:4], layer.fan_out)
         return Heads(local, out(dense(y.flatten(2)).relu_()))
 
     def _one_hot(self, codes: UInt8[Tensor, "*places"], dtype: torch.dtype) -> Float[Tensor, "*places O"]:
@@ -175,15 +175,20 @@ class Network:
         return (codes.unsqueeze(-1) == kinds).to(dtype)
 
     def logits(
-        self, parameters: Float[Tensor, "N P"], seen: UInt8[Tensor, "N H W"], near: UInt8[Tensor, "N 4"]
+        self,
+        parameters: Float[Tensor, "N P"],
+        observation: UInt8[Tensor, "N H W"],
+        local_state: UInt8[Tensor, "N 4"],
     ) -> Float[Tensor, "N 4"]:
         """The logits of pi in one state a trial."""
         with torch.no_grad():
-            return self.heads(self.unpack(parameters), seen.unsqueeze(1), near.unsqueeze(1)).logits.squeeze(1)
+            return self.heads(
+                self.unpack(parameters), observation.unsqueeze(1), local_state.unsqueeze(1)
+            ).logits.squeeze(1)
 
 
 @cache
-def network(height: int, width: int, codes: int) -> Network:
+def network_for(height: int, width: int, codes: int) -> Network:
     """The one network for this size of board and legend."""
     return Network(height, width, codes)
 
@@ -214,11 +219,11 @@ class _Patches(torch.autograd.Function):
         return total
 
 
-def _patches(x: Float[Tensor, "N S H W C"], sides: tuple[Side, Side]) -> Float[Tensor, "N S H2 W2 9C"]:
-    """The patches of a grid, padded first where its sides ask for it."""
-    tall, wide = sides
-    if tall.before or tall.behind or wide.before or wide.behind:
-        x = F.pad(x, (0, 0, wide.before, wide.behind, tall.before, tall.behind))
+def _patches(x: Float[Tensor, "N S H W C"], pads: tuple[Padding, Padding]) -> Float[Tensor, "N S H2 W2 9C"]:
+    """The patches of a grid, padded first where it has a padding."""
+    tall, wide = pads
+    if tall.before or tall.after or wide.before or wide.after:
+        x = F.pad(x, (0, 0, wide.before, wide.after, tall.before, tall.after))
     patches: Tensor = _Patches.apply(x)  # type: ignore[no-untyped-call]
     return patches
 

@@ -32,8 +32,8 @@ RATE = 0.001
 class Visits(NamedTuple):
     """The distinct states that a trial's episodes came by, with their shares in the gradient."""
 
-    seen: UInt8[Tensor, "N V H W"]
-    near: UInt8[Tensor, "N V 4"]
+    observation: UInt8[Tensor, "N V H W"]
+    local_state: UInt8[Tensor, "N V 4"]
     worth: Float[Tensor, "N V 4"]  # normalised returns to go, summed by action, over the number of steps
     share: Float[Tensor, "N V"]  # of all steps
 
@@ -48,10 +48,10 @@ def rehearse(world: Gridworld, network: Network, config: Config, state: AgentSta
     mine = state.rehearsal
     trial = mine.owed.nonzero().squeeze(1)
     if len(trial):
-        live, keys = state.learner.live, state.keys.pick(trial)
-        gradient, _ = policy_gradient(network, taken(live, trial), pool(*_size(world)), keys)
-        adam(live, mine, gradient, mine.owed, RATE)
-    return state.replace(rehearsal=mine.replace(owed=state.report.trained))
+        params, keys = state.learner.params, state.keys.pick(trial)
+        gradient, _ = policy_gradient(network, taken(params, trial), pool(*_size(world)), keys)
+        adam(params, mine, gradient, mine.owed, RATE)
+    return state.replace(rehearsal=mine.replace(owed=state.info.trained))
 
 
 def _size(world: Gridworld) -> tuple[int, int, str, str]:
@@ -64,7 +64,7 @@ def policy_gradient(
     """The gradient of one step, each trial's by itself, and the mean return of its 16 episodes."""
     batch = draw_mazes(pool, keys)
     with torch.no_grad():
-        logits = network.heads(network.unpack(parameters), batch.seen, batch.near).logits
+        logits = network.heads(network.unpack(parameters), batch.observation, batch.local_state).logits
     walks = walk(batch, logits.double().softmax(2), keys)
     earned = returns_to_go(walks)
     visits = visited(batch, walks, earned, logits.dtype)
@@ -79,7 +79,7 @@ def returns_to_go(walks: Walks) -> Float64[Tensor, "N T E"]:
 
 def visited(batch: Batch, walks: Walks, earned: Float64[Tensor, "N T E"], dtype: torch.dtype) -> Visits:
     """All steps of the episodes, summed over the distinct states that they were taken in."""
-    rows = batch.seen.shape[1]
+    rows = batch.observation.shape[1]
     steps = walks.alive.sum((1, 2))
     share = _total(walks.state, walks.alive.double() / steps[:, None, None], rows + 1)[:, :rows]
     taken = 4 * walks.state + walks.action
@@ -89,8 +89,8 @@ def visited(batch: Batch, walks: Walks, earned: Float64[Tensor, "N T E"], dtype:
     place = came.long().argsort(dim=1, descending=True, stable=True)[:, : int(came.sum(1).max())]
     every = torch.arange(len(place), device=place.device)[:, None]
     return Visits(
-        seen=batch.seen[every, place],
-        near=batch.near[every, place],
+        observation=batch.observation[every, place],
+        local_state=batch.local_state[every, place],
         worth=worth[every, place].to(dtype),
         share=share[every, place].to(dtype),
     )
@@ -114,9 +114,9 @@ def differentiate(
     network: Network, parameters: Float[Tensor, "N P"], visits: Visits, weight: float = ENTROPY
 ) -> Float[Tensor, "N P"]:
     """The gradient of REINFORCE's loss, less the entropy by its `weight`, at the distinct states."""
-    layers = network.learnable(parameters)
+    layers = network.leaf_params(parameters)
     with torch.enable_grad():
-        logits = network.heads(layers, visits.seen, visits.near).logits
+        logits = network.heads(layers, visits.observation, visits.local_state).logits
         gain = (visits.worth * logits.log_softmax(2)).sum((1, 2))
         open_minded = (visits.share * entropy(logits)).sum(1)
         return network.gradient(-gain - weight * open_minded, layers)

@@ -26,16 +26,16 @@ CELLS = 1 << 17
 """Cells of boards that are looked at together in an exam."""
 
 
-class Pupil(Struct):
+class TrainState(Struct):
     """A policy in pre-training and all that its next step depends on. One trial."""
 
-    live: Float[Tensor, "N P"]
+    params: Float[Tensor, "N P"]
     moments: Rehearsal
     tick: Int64[Tensor, "N"]
     returns: Float[Tensor, "steps"]  # the mean return of each step so far
 
 
-class Exam(NamedTuple):
+class EvalResult(NamedTuple):
     """What the policy does in mazes outside the pool."""
 
     solved: float  # the share of mazes that its argmax solves
@@ -43,7 +43,7 @@ class Exam(NamedTuple):
     gap: float  # between the two largest logits, mean over their states
 
 
-class School:
+class Pretrainer:
     """Pre-training for one size of board and one legend, on one device."""
 
     def __init__(self, network: Network, glyphs: str, seed: int = 0, device: str = "cpu") -> None:
@@ -53,14 +53,14 @@ class School:
         self.outside = outside(network.height, network.width, glyphs, device)
         self.device = device
 
-    def enrol(self) -> Pupil:
+    def init(self) -> TrainState:
         """A policy at step 0."""
-        live = self.network.start(keys(self.seed, 1, self.device), torch.float32)
-        return Pupil(
-            live=live,
+        params = self.network.init_params(keys(self.seed, 1, self.device), torch.float32)
+        return TrainState(
+            params=params,
             moments=Rehearsal(
-                first=torch.zeros_like(live),
-                second=torch.zeros_like(live),
+                exp_avg=torch.zeros_like(params),
+                exp_avg_sq=torch.zeros_like(params),
                 steps=torch.zeros(1, dtype=torch.int64, device=self.device),
                 owed=torch.ones(1, dtype=torch.bool, device=self.device),
             ),
@@ -68,30 +68,30 @@ class School:
             returns=torch.zeros(0),
         )
 
-    def teach(self, pupil: Pupil) -> Pupil:
+    def update(self, train_state: TrainState) -> TrainState:
         """One step: 16 whole episodes and one step of Adam. An interruption leaves `pupil` as it was."""
-        tick, live, moments = pupil.tick + 1, pupil.live.clone(), pupil.moments.clone()
+        tick, params, moments = train_state.tick + 1, train_state.params.clone(), train_state.moments.clone()
         found, earned = policy_gradient(
-            self.network, live, self.pool, keys(self.seed, 1, self.device).replace(tick=tick)
+            self.network, params, self.pool, keys(self.seed, 1, self.device).replace(tick=tick)
         )
-        adam(live, moments, found, moments.owed, RATE)
-        returns = torch.cat((pupil.returns, earned.float().cpu()))
-        return Pupil(live=live, moments=moments, tick=tick, returns=returns)
+        adam(params, moments, found, moments.owed, RATE)
+        returns = torch.cat((train_state.returns, earned.float().cpu()))
+        return TrainState(params=params, moments=moments, tick=tick, returns=returns)
 
-    def converged(self, pupil: Pupil) -> bool:
+    def converged(self, train_state: TrainState) -> bool:
         """Whether there is no more to learn: by the returns, and by mazes that it has never seen."""
-        steps = len(pupil.returns)
+        steps = len(train_state.returns)
         if steps < 2 * WINDOW or steps % LOOK_EVERY:
             return False
-        last, before = pupil.returns[-WINDOW:].mean(), pupil.returns[-2 * WINDOW : -WINDOW].mean()
-        return bool(last - before < GAIN) and self.examine(pupil.live[0]).solved >= SOLVES
+        last, before = train_state.returns[-WINDOW:].mean(), train_state.returns[-2 * WINDOW : -WINDOW].mean()
+        return bool(last - before < GAIN) and self.evaluate(train_state.params[0]).solved >= SOLVES
 
-    def examine(self, weights: Float[Tensor, "P"]) -> Exam:
+    def evaluate(self, weights: Float[Tensor, "P"]) -> EvalResult:
         """The argmax policy in the mazes outside the pool."""
         logits = _logits(self.network, weights, self.outside)
         real = torch.arange(logits.shape[1], device=logits.device) < self.outside.size[:, None]
         two = logits.topk(2, dim=2).values
-        return Exam(
+        return EvalResult(
             solved=float(_solved(self.outside, logits.argmax(2)).double().mean()),
             entropy=float(entropy(logits)[real].mean()),
             gap=float((two[..., 0] - two[..., 1])[real].mean()),
@@ -112,20 +112,20 @@ def _logits(network: Network, weights: Float[Tensor, "P"], mazes: Pool) -> Float
 def _logits_in(
     network: Network, weights: Float[Tensor, "P"], mazes: Pool, maze: Int64[Tensor, "K"]
 ) -> Float[Tensor, "K S 4"]:
-    near = mazes.near[maze]
-    state = torch.arange(near.shape[1], device=weights.device).expand(len(maze), -1)
-    seen = mazes.seen(maze[:, None].expand_as(state), state)
+    local_state = mazes.local_state[maze]
+    state = torch.arange(local_state.shape[1], device=weights.device).expand(len(maze), -1)
+    observation = mazes.observation(maze[:, None].expand_as(state), state)
     with torch.no_grad():
         layers = network.unpack(weights[None])
-        heads = network.heads(layers, seen.flatten(0, 1)[None], near.flatten(0, 1)[None])
-    return heads.logits.view(near.shape)
+        heads = network.heads(layers, observation.flatten(0, 1)[None], local_state.flatten(0, 1)[None])
+    return heads.logits.view(local_state.shape)
 
 
 def _solved(mazes: Pool, action: Int64[Tensor, "M S"]) -> Bool[Tensor, "M"]:
     """Whether a policy that always takes `action` arrives before an episode is cut off."""
-    then = mazes.then.gather(2, action[:, :, None]).squeeze(2)
+    next_state = mazes.next_state.gather(2, action[:, :, None]).squeeze(2)
     at = mazes.first
     for _ in range(LIMIT):
-        onward = then.gather(1, at.clamp_min(0)[:, None]).squeeze(1)
+        onward = next_state.gather(1, at.clamp_min(0)[:, None]).squeeze(1)
         at = torch.where(at == ARRIVED, at, onward)
     return at == ARRIVED

@@ -29,21 +29,23 @@ OUTSIDE, OUTSIDE_SEED = 500, 1902
 BLOCK = 8
 """Steps whose draws are made at once."""
 ARRIVED = -1
-"""In `Pool.then`: this action reaches the goal."""
+"""In `Pool.next_state`: this action reaches the goal."""
 
 
 class Pool(NamedTuple):
     """M mazes as tables. The states of a maze are its free cells but the goal; S is the most that any has."""
 
-    board: UInt8[Tensor, "M H W"]  # the ground, without the agent
+    board: UInt8[Tensor, "M H W"]  # without the agent
     cell: Int64[Tensor, "M S"]  # where the agent stands, cells counted row by row
-    near: UInt8[Tensor, "M S 4"]  # l(s)
-    then: Int64[Tensor, "M S 4"]  # the state that each action leads to, or ARRIVED
+    local_state: UInt8[Tensor, "M S 4"]  # l(s)
+    next_state: Int64[Tensor, "M S 4"]  # the state that each action leads to, or ARRIVED
     first: Int64[Tensor, "M"]  # the state at the start
     size: Int64[Tensor, "M"]  # how many states there are
     agent: int  # the agent's code
 
-    def seen(self, maze: Int64[Tensor, "*some"], state: Int64[Tensor, "*some"]) -> UInt8[Tensor, "*some H W"]:
+    def observation(
+        self, maze: Int64[Tensor, "*some"], state: Int64[Tensor, "*some"]
+    ) -> UInt8[Tensor, "*some H W"]:
         """What the agent sees in states of mazes."""
         board = self.board[maze].flatten(-2)
         drawn = board.scatter(-1, self.cell[maze, state].unsqueeze(-1), self.agent)
@@ -82,12 +84,12 @@ def tables(drawn: Mazes, glyphs: str) -> Pool:
     cell = states.long().argsort(dim=1, descending=True, stable=True)[:, :most]
     number = (states.long().cumsum(1) - 1).masked_fill(goal, ARRIVED)
     ahead = _ahead(flat, cell, width)
-    near = _here(flat, ahead)
+    local_state = _here(flat, ahead)
     return Pool(
         board=drawn.board,
         cell=cell,
-        near=near,
-        then=_here(number, torch.where(near == 0, cell[:, :, None], ahead)),  # walls stop it
+        local_state=local_state,
+        next_state=_here(number, torch.where(local_state == 0, cell[:, :, None], ahead)),  # walls stop it
         first=number.gather(1, drawn.start[:, None]).squeeze(1),
         size=count,
         agent=glyphs.index(AGENT),
@@ -108,9 +110,9 @@ def _here(flat: Tensor, cell: Int64[Tensor, "M S 4"]) -> Tensor:
 class Batch(NamedTuple):
     """The states of the mazes that each trial has drawn, one after the other. The last row is the goal."""
 
-    seen: UInt8[Tensor, "N R H W"]
-    near: UInt8[Tensor, "N R 4"]
-    then: Int64[Tensor, "N R1 4"]
+    observation: UInt8[Tensor, "N R H W"]
+    local_state: UInt8[Tensor, "N R 4"]
+    next_state: Int64[Tensor, "N R1 4"]
     first: Int64[Tensor, "N E"]
 
 
@@ -125,13 +127,13 @@ def draw_mazes(pool: Pool, keys: Keys) -> Batch:
     episode = torch.searchsorted(end, place, right=True).clamp_max(EPISODES - 1)
     shift, which = offset.gather(1, episode), maze.gather(1, episode)
     state = (place - shift).clamp_max(pool.cell.shape[1] - 1)
-    then = pool.then[which, state]
-    then = torch.where(then == ARRIVED, rows, then + shift[:, :, None])
-    goal = then.new_full((len(maze), 1, 4), rows)
+    next_state = pool.next_state[which, state]
+    next_state = torch.where(next_state == ARRIVED, rows, next_state + shift[:, :, None])
+    goal = next_state.new_full((len(maze), 1, 4), rows)
     return Batch(
-        seen=pool.seen(which, state),
-        near=pool.near[which, state],
-        then=torch.cat((then, goal), 1),
+        observation=pool.observation(which, state),
+        local_state=pool.local_state[which, state],
+        next_state=torch.cat((next_state, goal), 1),
         first=pool.first[maze] + offset,
     )
 
@@ -149,7 +151,7 @@ def walk(batch: Batch, chance: Float64[Tensor, "N R 4"], keys: Keys, limit: int 
     """Every episode to its end; `chance` is pi(a|s) in each row."""
     goal = chance.shape[1]
     below = torch.nn.functional.pad(chance.cumsum(2)[:, :, :3], (0, 0, 0, 1))
-    then, at = batch.then.flatten(1), batch.first
+    next_state, at = batch.next_state.flatten(1), batch.first
     states, actions = [], []
     for t in range(limit):
         if t % BLOCK == 0:
@@ -159,7 +161,7 @@ def walk(batch: Batch, chance: Float64[Tensor, "N R 4"], keys: Keys, limit: int 
         action = (u[:, t % BLOCK, :, None] >= below.gather(1, at[:, :, None].expand(-1, -1, 3))).sum(2)
         states.append(at)
         actions.append(action)
-        at = then.gather(1, 4 * at + action)
+        at = next_state.gather(1, 4 * at + action)
     state = torch.stack(states, 1)
     return Walks(state, torch.stack(actions, 1), state != goal, at == goal)
 

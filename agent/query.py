@@ -13,7 +13,7 @@ from torch import Tensor
 from parenting.envs.struct import Struct
 
 
-class Kind(IntEnum):
+class QueryKind(IntEnum):
     """What a query is: none this tick, guidance before a move (Sec. 2.1), or a preference between clips (Sec.
     2.2).
     """
@@ -43,7 +43,7 @@ class Query(Struct):
 
     kind: Int64[Tensor, "N"]
     observation: UInt8[Tensor, "N 2 T1 H W"]  # what the agent saw; T1 = T + 1
-    ground: UInt8[Tensor, "N 2 T1 H W"]  # what was true, without agent and box
+    board: UInt8[Tensor, "N 2 T1 H W"]  # what was true, without agent and box
     agent: Int64[Tensor, "N 2 T1 2"]  # row and column
     box: Int64[Tensor, "N 2 T1 2"]  # (-1, -1) where there is none
     action: Int64[Tensor, "N 2 T"]
@@ -81,7 +81,7 @@ def empty(trials: int, length: int, height: int, width: int, device: str | torch
     return Query(
         kind=zeros(),
         observation=zeros(*frames, dtype=torch.uint8),
-        ground=zeros(*frames, dtype=torch.uint8),
+        board=zeros(*frames, dtype=torch.uint8),
         agent=zeros(2, length + 1, 2),
         box=zeros(2, length + 1, 2),
         action=zeros(2, length),

@@ -14,7 +14,7 @@ from parenting.agent.config import Config
 from parenting.agent.guidance import NO_ACTION, Heard, View
 from parenting.agent.pairing import EXPLORE, comparison
 from parenting.agent.policy import Network, draw
-from parenting.agent.state import AgentState, Clip, Recorder
+from parenting.agent.state import AgentState, Recorder, RunningClip
 from parenting.envs.fingerprint import fingerprint
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.rng import Stream, gumbel
@@ -35,8 +35,8 @@ def act(
     before = state.world
     after = world.step(before, action, state.keys).where(moving, before)
     recorder = _record(world, state, recorder, action, after)
-    report = state.report.replace(before=before, action=action, moved=moving)
-    return state.replace(world=after, recorder=recorder, report=report), moving & view.steering
+    info = state.info.replace(before=before, action=action, moved=moving)
+    return state.replace(world=after, recorder=recorder, info=info), moving & view.active
 
 
 def _begin(
@@ -46,15 +46,15 @@ def _begin(
     begin.
     """
     recorder, keys = state.recorder, state.keys
-    free = view.watched & ~state.waiting
+    free = view.supervised & ~state.waiting
     running = recorder.running & free
     idle = free & ~running & (heard.approved == NO_ACTION)
     fits = world.time_limit - state.world.step_count >= state.maturity
     wanted = idle & fits & (keys.uniform(Stream.RECORD) < config.p_rec)
     if not bool(wanted.any()):
-        return recorder.replace(running=running), torch.full_like(recorder.turn, NO_ACTION)
+        return recorder.replace(running=running), torch.full_like(recorder.next_kind, NO_ACTION)
     first = best = view.logits.argmax(1)
-    exploring = recorder.turn == EXPLORE
+    exploring = recorder.next_kind == EXPLORE
     if bool((wanted & exploring).any()):
         permitted = _permitted(config, state, view, best)
         noise = gumbel(keys.uniform(Stream.EXPLORE, 4)).masked_fill(~permitted, -torch.inf)
@@ -74,8 +74,8 @@ def _permitted(
     permitted = actions != best[:, None]
     if config.recompare:
         return permitted
-    seen = fingerprint(view.observation.flatten(1))[:, None]
-    words = comparison(seen, actions, best[:, None], state.maturity[:, None])
+    observation = fingerprint(view.observation.flatten(1))[:, None]
+    words = comparison(observation, actions, best[:, None], state.maturity[:, None])
     asked = state.recorder.asked
     return permitted & ~(words[:, :, None] == asked.compared[:, None, :]).any(2)
 
@@ -94,7 +94,9 @@ def _action(
     if not len(trial):
         return action
     age = (state.maturity - state.recorder.step)[trial]
-    logits = network.logits(state.learner.elders[age - 1, trial], view.observation[trial], view.near[trial])
+    logits = network.logits(
+        state.learner.frozen[age - 1, trial], view.observation[trial], view.local_state[trial]
+    )
     return action.index_put((trial,), logits.argmax(1))
 
 
@@ -116,7 +118,7 @@ def _record(
 
 
 def _write(
-    clip: Clip,
+    clip: RunningClip,
     trial: Int64[Tensor, "n"],
     step: Int64[Tensor, "n"],
     before: WorldState,
@@ -125,14 +127,16 @@ def _write(
 ) -> None:
     first = step == 0
     fresh = trial[first]
-    for part in (clip.ground, clip.agent, clip.box, clip.action):
+    for part in (clip.board, clip.agent, clip.box, clip.action):
         part[fresh] = 0  # what lies beyond a clip's length is zero, whatever was recorded before
     _frame(clip, fresh, step[first], before)
     clip.action[trial, step] = action[trial].to(torch.int8)
     _frame(clip, trial, step + 1, after)
 
 
-def _frame(clip: Clip, trial: Int64[Tensor, "n"], place: Int64[Tensor, "n"], world: WorldState) -> None:
-    clip.ground[trial, place] = world.board[trial]
+def _frame(
+    clip: RunningClip, trial: Int64[Tensor, "n"], place: Int64[Tensor, "n"], world: WorldState
+) -> None:
+    clip.board[trial, place] = world.board[trial]
     clip.agent[trial, place] = world.agent[trial].to(torch.int8)
     clip.box[trial, place] = world.box[trial].to(torch.int8)

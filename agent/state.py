@@ -1,6 +1,8 @@
-"""All that an agent is between two ticks. Checkpoints hold every field but the report."""
+"""All that an agent is between two ticks. Checkpoints hold every field but `info`."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 from jaxtyping import Bool, Float, Int8, Int64, UInt8
 from torch import Tensor
@@ -12,13 +14,13 @@ from parenting.envs.struct import Struct
 
 
 class Learner(Struct):
-    """The policy that trains, pi_T, and Adam's state. `elders` are the frozen pi_1 .. pi_{T-1} (Sec. 2.4)."""
+    """The policy that trains, pi_T, and Adam's state. `frozen` are pi_1 .. pi_{T-1} (Sec. 2.4)."""
 
-    live: Float[Tensor, "N P"]
-    first: Float[Tensor, "N P"]  # Adam's first moments
-    second: Float[Tensor, "N P"]  # Adam's second moments
+    params: Float[Tensor, "N P"]
+    exp_avg: Float[Tensor, "N P"]  # Adam's running mean of the gradient
+    exp_avg_sq: Float[Tensor, "N P"]  # Adam's running mean of its square
     steps: Int64[Tensor, "N"]  # gradient steps of this stage
-    elders: Float[Tensor, "M N P"]
+    frozen: Float[Tensor, "M N P"]
 
 
 class Rehearsal(Struct):
@@ -27,16 +29,16 @@ class Rehearsal(Struct):
     P0 is P, or 0 in a run without pre-training.
     """
 
-    first: Float[Tensor, "N P0"]  # Adam's first moments
-    second: Float[Tensor, "N P0"]  # Adam's second moments
+    exp_avg: Float[Tensor, "N P0"]  # Adam's running mean of the gradient
+    exp_avg_sq: Float[Tensor, "N P0"]  # Adam's running mean of its square
     steps: Int64[Tensor, "N"]  # gradient steps
     owed: Bool[Tensor, "N"]  # the last tick trained
 
 
-class Clip(Struct):
+class RunningClip(Struct):
     """The clip that is being recorded."""
 
-    ground: UInt8[Tensor, "N T1 H W"]
+    board: UInt8[Tensor, "N T1 H W"]
     agent: Int8[Tensor, "N T1 2"]
     box: Int8[Tensor, "N T1 2"]
     action: Int8[Tensor, "N T"]
@@ -45,7 +47,7 @@ class Clip(Struct):
 class Ring(Struct):
     """Finished clips of both kinds; the newest overwrite the oldest."""
 
-    ground: UInt8[Tensor, "N 2 C T1 H W"]
+    board: UInt8[Tensor, "N 2 C T1 H W"]
     agent: Int8[Tensor, "N 2 C T1 2"]
     box: Int8[Tensor, "N 2 C T1 2"]
     action: Int8[Tensor, "N 2 C T"]
@@ -54,8 +56,8 @@ class Ring(Struct):
     tick: Int64[Tensor, "N 2 C"]  # when the clip was completed
     first: Int64[Tensor, "N 2 C"]  # fingerprint of the first observation
     digest: Int64[Tensor, "N 2 C"]  # fingerprint of the whole clip
-    here: Bool[Tensor, "N 2 C"]  # stored, and not asked about yet
-    open: Bool[Tensor, "N 2 C"]  # may still have an older partner
+    stored: Bool[Tensor, "N 2 C"]  # stored, and not asked about yet
+    searchable: Bool[Tensor, "N 2 C"]  # may still have an older partner
     count: Int64[Tensor, "N 2"]  # clips ever stored
 
 
@@ -74,14 +76,14 @@ class Recorder(Struct):
     """
 
     running: Bool[Tensor, "N"]
-    turn: Int64[Tensor, "N"]  # the kind of the running clip, or of the next one
+    next_kind: Int64[Tensor, "N"]  # the kind of the running clip, or of the next one
     step: Int64[Tensor, "N"]  # steps of the running clip
-    clip: Clip
+    clip: RunningClip
     ring: Ring
     asked: Asked
 
 
-class Report(Struct):
+class TickInfo(Struct):
     """What the last tick did, for whoever watches. No part of the agent reads it, no checkpoint holds it."""
 
     before: WorldState  # the world before the move
@@ -108,13 +110,38 @@ class AgentState(Struct):
     recorder: Recorder
     learner: Learner
     rehearsal: Rehearsal
-    report: Report
+    info: TickInfo
 
     def __repr__(self) -> str:
         trials = len(self.waiting)
         return f"<AgentState of {trials} trial{'' if trials == 1 else 's'} at tick {int(self.keys.tick[0])}>"
 
     @property
-    def stuck(self) -> Bool[Tensor, "N"]:
+    def all_refused(self) -> Bool[Tensor, "N"]:
         """Paused, and every action refused: *no acceptable action*."""
         return self.waiting & self.refused.all(1)
+
+
+RENAMED = {
+    "world.t": "world.step_count",
+    "world.over": "world.terminated",
+    "x.near": "x.local_state",
+    "x.at": "x.state_index",
+    "recorder.turn": "recorder.next_kind",
+    "recorder.clip.ground": "recorder.clip.board",
+    "recorder.ring.ground": "recorder.ring.board",
+    "recorder.ring.here": "recorder.ring.stored",
+    "recorder.ring.open": "recorder.ring.searchable",
+    "learner.live": "learner.params",
+    "learner.first": "learner.exp_avg",
+    "learner.second": "learner.exp_avg_sq",
+    "learner.elders": "learner.frozen",
+    "rehearsal.first": "rehearsal.exp_avg",
+    "rehearsal.second": "rehearsal.exp_avg_sq",
+}
+"""The names of tensors of the state in version 0.1, and their names today."""
+
+
+def current_names(parts: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Stored tensors by the names that they have today, whichever version stored them."""
+    return {RENAMED.get(name, name): part for name, part in parts.items()}

@@ -77,7 +77,9 @@ def episodes(world: Gridworld, state: AgentState) -> Walks:
     network = network_of(world)
     batch = draw_mazes(pool(world.height, world.width, world.legend), state.keys)
     with torch.no_grad():
-        logits = network.heads(network.unpack(state.learner.live), batch.seen, batch.near).logits
+        logits = network.heads(
+            network.unpack(state.learner.params), batch.observation, batch.local_state
+        ).logits
     return walk(batch, logits.double().softmax(2), state.keys)
 
 

@@ -94,11 +94,11 @@ def products(network: Network, states: int) -> list[Product]:
     found: list[Product] = []
     first = {network.layers[0], network.layers[2]}  # of the local head, and of the global one
     for layer in network.layers:
-        places = layer.sides[0].length * layer.sides[1].length if layer.sides else 1
+        places = layer.padding[0].length * layer.padding[1].length if layer.padding else 1
         batch = states * places
-        found += [Product(batch, layer.rows, layer.columns), Product(layer.rows, batch, layer.columns)]
+        found += [Product(batch, layer.fan_in, layer.fan_out), Product(layer.fan_in, batch, layer.fan_out)]
         if layer not in first:
-            found.append(Product(batch, layer.columns, layer.rows))
+            found.append(Product(batch, layer.fan_out, layer.fan_in))
     return found
 
 
@@ -106,7 +106,9 @@ def looks(network: Network) -> list[Product]:
     """The products of one look at one state."""
     return [
         Product(
-            layer.sides[0].length * layer.sides[1].length if layer.sides else 1, layer.rows, layer.columns
+            layer.padding[0].length * layer.padding[1].length if layer.padding else 1,
+            layer.fan_in,
+            layer.fan_out,
         )
         for layer in network.layers
     ]
@@ -160,15 +162,15 @@ def measure(trainer: BatchTrainer, trials: int, repeats: int) -> Line:
     network, config = network_of(trainer.world), trainer.config
     state = copies(trainer, trials).state
     rows = learning.choose(config, state.x, state.keys, 0)
-    states = rows.near.shape[1]
+    states = rows.local_state.shape[1]
     every = torch.ones(trials, dtype=torch.bool)
 
     def step() -> object:
-        return learning.differentiate(network, config, state.learner.live, rows)
+        return learning.differentiate(network, config, state.learner.params, rows)
 
     def whole_step() -> None:
-        _, gradient = learning.differentiate(network, config, state.learner.live, rows)
-        learning.adam(state.learner.live, state.learner, gradient, every, 0.0)
+        _, gradient = learning.differentiate(network, config, state.learner.params, rows)
+        learning.adam(state.learner.params, state.learner, gradient, every, 0.0)
 
     acts = (
         step,
@@ -207,7 +209,7 @@ def live(batch: BatchTrainer) -> tuple[float, list[float]]:
     began = perf_counter()
     for _ in range(TICKS):
         batch.tick()
-        trained.append(float(batch.state.report.trained.double().mean()))
+        trained.append(float(batch.state.info.trained.double().mean()))
     return (perf_counter() - began) / TICKS, trained
 
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from parenting.server.replay import Relived
 
 PIECES = {
-    "learner.live": "the policy in training",
-    "learner.elders": "the frozen policies",
+    "learner.params": "the policy in training",
+    "learner.frozen": "the frozen policies",
     "learner": "Adam's state",
     "rehearsal": "pre-training's state",
     "x": "dataset X",
@@ -81,5 +81,10 @@ def _piece(name: str) -> str:
 
 
 def _as_json(found: Relived) -> str:
+    """Pieces of state have the names that `--json` has given them since version 0.1."""
+    from parenting.agent.state import RENAMED
+
+    former = {new: old for old, new in RENAMED.items()}
     names = ("run", "equal", "tick", "checkpoint", "answers", "events", "parted")
-    return json.dumps({**{name: getattr(found, name) for name in names}, "differ": list(found.differ)})
+    differ = [former.get(name, name) for name in found.differ]
+    return json.dumps({**{name: getattr(found, name) for name in names}, "differ": differ})

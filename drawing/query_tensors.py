@@ -27,7 +27,7 @@ class QueryTensors(Protocol):
         """Codes of actions, [N, 2, T]."""
 
     @property
-    def ground(self) -> Any:
+    def board(self) -> Any:
         """Codes of the true tiles, [N, 2, T + 1, H, W]."""
 
     @property
@@ -64,7 +64,7 @@ def _clip(query: QueryTensors, glyphs: str, trial: int, side: int) -> Clip:
 def _frame(query: QueryTensors, glyphs: str, at: tuple[int, int, int]) -> Frame:
     box = query.box[at].tolist()
     return {
-        "ground": _rows(glyphs, query.ground[at]),
+        "ground": _rows(glyphs, query.board[at]),
         "observed": _rows(glyphs, query.observation[at]),
         "agent": query.agent[at].tolist(),
         "box": None if box[0] < 0 else box,

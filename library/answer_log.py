@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.drawing.query_tensors import ACTIONS
 
 COLUMNS = ("trial", "asked", "answered", "kind", "stage", "left", "right", "row", "column", "choice")
@@ -25,7 +25,7 @@ class AnswerLog:
 
     def posted(self, query: Query, trials: Sequence[int], tick: int) -> None:
         """Note what is asked in a tick; `trials` are the numbers of the query's rows."""
-        for row in (query.kind != Kind.NONE).nonzero().flatten().tolist():
+        for row in (query.kind != QueryKind.NONE).nonzero().flatten().tolist():
             self._open.setdefault(trials[row], []).append((tick, describe(query, row)))
 
     def heard(self, answer: Answer, trials: Sequence[int], tick: int) -> None:
@@ -56,4 +56,11 @@ def describe(query: Query, row: int) -> Asked:
         for side in (0, 1)
     )
     agent = query.agent[row, 0, 0].tolist()
-    return Kind(int(query.kind[row])).name.lower(), int(query.maturity[row]), left, right, agent[0], agent[1]
+    return (
+        QueryKind(int(query.kind[row])).name.lower(),
+        int(query.maturity[row]),
+        left,
+        right,
+        agent[0],
+        agent[1],
+    )

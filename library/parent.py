@@ -11,7 +11,7 @@ import torch
 from parenting.agent import query as queries
 from parenting.agent.config import Config
 from parenting.agent.events import Event
-from parenting.agent.query import Answer, Choice, Kind
+from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.agent.state import AgentState
 from parenting.library.question import Query, Question, choice_of, question
 from parenting.library.worlds import World
@@ -84,7 +84,7 @@ class Parent(ABC):
     def post(self, query: queries.Query) -> None:
         """Keep what is asked in this tick until it is answered."""
         known = Query.of(query, self.world)
-        asking = (query.kind != Kind.NONE).nonzero().flatten().tolist()
+        asking = (query.kind != QueryKind.NONE).nonzero().flatten().tolist()
         self._open += [Open(trial, known.row(trial)) for trial in asking]
 
     def __repr__(self) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Self
 import torch
 
 from parenting.agent import query as queries
-from parenting.agent.query import Choice, Kind
+from parenting.agent.query import Choice, QueryKind
 from parenting.drawing import clip as drawing
 from parenting.drawing.query_tensors import read_clips
 from parenting.envs.levels.spec import AGENT, BOX
@@ -51,13 +51,13 @@ class Query(queries.Query):
     def __getitem__(self, trial: int) -> Question | None:
         if not -len(self) <= trial < len(self):
             raise IndexError(f"There is no trial {trial}; there are {len(self)}.")
-        if self.kind[trial] == Kind.NONE:
+        if self.kind[trial] == QueryKind.NONE:
             return None
         return question(self, trial % len(self))
 
     def __iter__(self) -> Iterator[Question]:
         """The questions of all trials that ask."""
-        return (question(self, int(trial)) for trial in (self.kind != Kind.NONE).nonzero().flatten())
+        return (question(self, int(trial)) for trial in (self.kind != QueryKind.NONE).nonzero().flatten())
 
     def row(self, trial: int) -> Self:
         """Return the query of one trial alone, N = 1."""
@@ -70,7 +70,7 @@ class Query(queries.Query):
 
     def __repr__(self) -> str:
         trials = f"{len(self)} trial{'' if len(self) == 1 else 's'}"
-        counts = [f"{int((self.kind == kind).sum())} {kind.name.lower()}" for kind in list(Kind)[1:]]
+        counts = [f"{int((self.kind == kind).sum())} {kind.name.lower()}" for kind in list(QueryKind)[1:]]
         return f"<Query of {trials}: {', '.join(counts)}>"
 
 
@@ -135,7 +135,7 @@ def question(query: Query, row: int, trial: int | None = None) -> Question:
     one = query.row(row)
     clips = read_clips(one, one.world.legend)
     return Question(
-        kind=Kind(int(one.kind[0])).name.lower(),
+        kind=QueryKind(int(one.kind[0])).name.lower(),
         left=_clip(clips["left"]),
         right=_clip(clips["right"]),
         stage=int(one.maturity[0]),

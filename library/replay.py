@@ -7,7 +7,7 @@ from typing import Any
 
 from parenting.agent import query as queries
 from parenting.agent.config import Config
-from parenting.agent.query import Choice, Kind
+from parenting.agent.query import Choice, QueryKind
 from parenting.agent.state import AgentState
 from parenting.library.answer_log import describe
 from parenting.library.parent import Parent, compose_answer
@@ -76,7 +76,7 @@ class ReplayParent(Parent):
     def post(self, query: queries.Query) -> None:
         """Hold what is asked against the record."""
         known = Query.of(query, self.world)
-        for trial in (query.kind != Kind.NONE).nonzero().flatten().tolist():
+        for trial in (query.kind != QueryKind.NONE).nonzero().flatten().tolist():
             row = self._by_question.get((trial, self._tick))
             if row is None:
                 continue  # it was still open when the recording ended

@@ -54,7 +54,7 @@ class GardenValues:
     def alpha(self, query: Query) -> Float64[Tensor, "N 2"]:
         """Eq. (7) of both clips, each to its own length, on the boards as they truly were."""
         real = _steps(query)
-        board, agent = query.ground[:, :, :-1][real], query.agent[:, :, :-1][real]
+        board, agent = query.board[:, :, :-1][real], query.agent[:, :, :-1][real]
         level = query.level[:, None, None].expand(real.shape)[real]
         gain = torch.zeros(real.shape, dtype=torch.float64, device=real.device)
         gain[real] = self.q(board, agent, level, query.action[real]) - self.v(board, agent, level)
@@ -76,7 +76,7 @@ class GardenValues:
 
     def _in_bucket(self, query: Query) -> Bool[Tensor, "N 2 T"]:
         """Which steps end in the bucket."""
-        board, agent = query.ground[:, :, 1:], query.agent[:, :, 1:]
+        board, agent = query.board[:, :, 1:], query.agent[:, :, 1:]
         tile = self.world.tile(board.flatten(0, 2), agent.flatten(0, 2)).view(query.action.shape)
         return _steps(query) & (tile == self.world.code("O"))
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import torch
 
 from parenting.agent.events import Event
-from parenting.agent.query import Answer, Kind, Query
+from parenting.agent.query import Answer, Query, QueryKind
 from parenting.agent.state import AgentState
 
 
@@ -73,6 +73,6 @@ def same(one: Query, other: Query) -> bool:
     """Whether both ask the same in every trial. What a trial that asks nothing holds does not matter."""
     if not torch.equal(one.kind, other.kind):
         return False
-    asking = one.kind != Kind.NONE
+    asking = one.kind != QueryKind.NONE
     theirs = other.pick(asking).tensors()
     return all(torch.equal(part, theirs[name]) for name, part in one.pick(asking).tensors().items())

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from parenting.agent.config import Inside
 from parenting.agent.events import Event
-from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import Model
@@ -61,11 +61,11 @@ class ScriptedRule:
         choice = torch.where(gap > 0, int(Choice.LEFT), int(Choice.RIGHT))
         choice = torch.where(gap.abs() <= TIE, int(Choice.EITHER), choice)
         choice = torch.where(self.refuses(query), int(Choice.NEITHER), choice)
-        return torch.where(query.kind == Kind.NONE, int(Choice.NONE), choice)
+        return torch.where(query.kind == QueryKind.NONE, int(Choice.NONE), choice)
 
     def refuses(self, query: Query) -> Bool[Tensor, "N"]:
         """Both actions of a guidance query are unsafe; never so for clips."""
-        return self.values.unsafe(query).all(1) & (query.kind == Kind.GUIDANCE)
+        return self.values.unsafe(query).all(1) & (query.kind == QueryKind.GUIDANCE)
 
 
 class ScriptedParent:

@@ -178,9 +178,9 @@ def clip_states(model: Model, query: Query) -> Int64[Tensor, "N 2 T1"]:
     """The model's states of both clips' frames; beyond a clip's length, and where nothing is asked, the first
     state.
     """
-    frame = torch.arange(query.ground.shape[2], device=query.kind.device)
+    frame = torch.arange(query.board.shape[2], device=query.kind.device)
     real = (frame <= query.length[..., None]) & (query.kind > 0)[:, None, None]
     at = torch.zeros_like(real, dtype=torch.int64)
     level = query.level[:, None, None].expand(real.shape)[real]
-    at[real] = model.find(query.ground[real], query.agent[real], query.box[real], level)
+    at[real] = model.find(query.board[real], query.agent[real], query.box[real], level)
     return at

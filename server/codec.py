@@ -11,11 +11,11 @@ import torch
 from torch import Tensor
 
 from parenting.agent import query as queries
-from parenting.agent.query import Choice, Kind, Query
+from parenting.agent.query import Choice, Query, QueryKind
 from parenting.drawing.query_tensors import ACTIONS, SIDES, read_clips
 from parenting.envs.gridworld import Gridworld
 
-KINDS = {"guidance": Kind.GUIDANCE, "preference": Kind.PREFERENCE}
+KINDS = {"guidance": QueryKind.GUIDANCE, "preference": QueryKind.PREFERENCE}
 CHOICES = {"left": Choice.LEFT, "right": Choice.RIGHT, "either": Choice.EITHER, "neither": Choice.NEITHER}
 CHOICE_NAMES = {int(choice): name for name, choice in CHOICES.items()}
 
@@ -28,7 +28,7 @@ def encode(world: Gridworld, query: Query) -> dict[str, Any]:
 def kind_name(query: Query) -> str | None:
     """The kind of a run's one query by its name; None where nothing is asked."""
     kind = int(query.kind[0])
-    return None if kind == Kind.NONE else Kind(kind).name.lower()
+    return None if kind == QueryKind.NONE else QueryKind(kind).name.lower()
 
 
 def decode(world: Gridworld, stages: int, kind: str, maturity: int, clips: dict[str, Any]) -> Query:
@@ -45,7 +45,7 @@ def _fill(world: Gridworld, query: Query, side: int, clip: dict[str, Any]) -> No
     for place, action in enumerate(clip["actions"]):
         query.action[0, side, place] = ACTIONS.index(action)
     for place, frame in enumerate(clip["frames"]):
-        query.ground[0, side, place] = _codes(world.legend, frame["ground"])
+        query.board[0, side, place] = _codes(world.legend, frame["ground"])
         query.observation[0, side, place] = _codes(world.legend, frame["observed"])
         query.agent[0, side, place] = torch.tensor(frame["agent"])
         query.box[0, side, place] = torch.tensor(frame["box"] or (-1, -1))

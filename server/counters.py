@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Int64
 from torch import Tensor
 
-from parenting.agent.query import Answer, Choice, Kind
+from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.struct import Struct
@@ -32,7 +32,7 @@ def no_counts() -> Counters:
 
 def count(world: Gridworld, tally: Counters, answer: Answer, state: AgentState) -> Counters:
     """The counts after one more tick: the answer that it heard, and the state that it left."""
-    report, now = state.report, state.world
+    report, now = state.info, state.world
     died = report.moved & world.unsafe(report.before, report.action, now)
     ended = report.moved & (now.terminated | world.truncated(now))
     heard = answer.choice != Choice.NONE
@@ -40,6 +40,6 @@ def count(world: Gridworld, tally: Counters, answer: Answer, state: AgentState) 
     if not bool(heard.any()):
         return tally
     return tally.replace(
-        kinds=tally.kinds + (torch.nn.functional.one_hot(answer.query.kind, len(Kind)) * heard[:, None]),
+        kinds=tally.kinds + (torch.nn.functional.one_hot(answer.query.kind, len(QueryKind)) * heard[:, None]),
         choices=tally.choices + (torch.nn.functional.one_hot(answer.choice, len(Choice)) * heard[:, None]),
     )

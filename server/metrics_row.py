@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from parenting.agent.query import Choice, Kind
+from parenting.agent.query import Choice, QueryKind
 from parenting.evaluation.argmax import Evaluation
 from parenting.server.snapshot import Snapshot
 
@@ -14,19 +14,19 @@ NOTHING_LEARNT: Row = {"loss": None, "entropy_global": None, "entropy_local": No
 
 def learnt(saved: Snapshot) -> Row:
     """The last gradient step: loss (Eq. 2) and both entropies, a mean over the entries of X."""
-    report = saved.state.report
+    report = saved.state.info
     return {name: float(getattr(report, name)[0]) for name in NOTHING_LEARNT}
 
 
 def measure(saved: Snapshot, evaluation: Evaluation) -> Row:
     """Counts since initial_snapshot, and what the argmax policy does from the start."""
     state, tally = saved.state, saved.tally
-    live = state.learner.live
+    live = state.learner.params
     return {
         "deaths": int(tally.deaths[0]),
         "episodes": int(tally.episodes[0]),
-        "guidance": int(tally.kinds[0, Kind.GUIDANCE]),
-        "preference": int(tally.kinds[0, Kind.PREFERENCE]),
+        "guidance": int(tally.kinds[0, QueryKind.GUIDANCE]),
+        "preference": int(tally.kinds[0, QueryKind.PREFERENCE]),
         **{choice.name.lower(): int(tally.choices[0, choice]) for choice in Choice if choice != Choice.NONE},
         "return": float(evaluation.returns(live)[0]),
         "optimal_return": evaluation.best(),

@@ -30,7 +30,7 @@ from parenting.server.errors import NotFound
 from parenting.server.record import load_checkpoints
 from parenting.server.runs import get_run
 from parenting.server.snapshot import (
-    REPORT,
+    INFO,
     DivergedError,
     Snapshot,
     initial_snapshot,
@@ -162,7 +162,7 @@ def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
 
 
 def _beat(world: Gridworld, saved: Snapshot, parent: ReplayParent) -> Snapshot:
-    state, config, _ = parenting.beat(world, saved.config, saved.state, parent)
+    state, config, _ = parenting.tick(world, saved.config, saved.state, parent)
     return Snapshot(state, count(world, saved.tally, parent.now.answer, state), config)
 
 
@@ -213,7 +213,7 @@ def differences(one: Snapshot, other: Snapshot) -> list[str]:
         wrong += [
             prefix + name
             for name, part in ours.tensors().items()
-            if not name.startswith(REPORT) and not equal(part, expected[name])
+            if not name.startswith(INFO) and not equal(part, expected[name])
         ]
     return wrong
 

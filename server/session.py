@@ -10,7 +10,7 @@ import structlog
 from parenting.agent import parenting
 from parenting.agent.config import Config
 from parenting.agent.init import world_of
-from parenting.agent.query import Kind, Query
+from parenting.agent.query import Query, QueryKind
 from parenting.evaluation.argmax import evaluation
 from parenting.parents.scripted import ScriptedRule
 from parenting.server import record, runs
@@ -97,14 +97,16 @@ class RunSession:
             return True
         if seen.open_guidance or seen.open_preferences > self.saved.config.max_open_preferences:
             return False
-        return not bool(self.saved.state.waiting) or (seen.answers > 0 and not bool(self.saved.state.stuck))
+        return not bool(self.saved.state.waiting) or (
+            seen.answers > 0 and not bool(self.saved.state.all_refused)
+        )
 
     def report_waiting(self, seen: Watch) -> None:
         """Say who waits for whom, and save what was lived: nothing happens here for a while."""
         if self._news:
             self._measure(at_once=False)
         reason: Waiting | None = None
-        if bool(self.saved.state.stuck):
+        if bool(self.saved.state.all_refused):
             reason = Waiting.STUCK
         elif seen.open_guidance:
             reason = Waiting.GUIDANCE
@@ -130,7 +132,7 @@ class RunSession:
         """
         replayed = self.last_tick < self.record_ends
         self.parent.expect(replayed or bool(seen and seen.answers), replayed or bool(seen and seen.events))
-        state, config, query = parenting.beat(self.world, self.saved.config, self.saved.state, self.parent)
+        state, config, query = parenting.tick(self.world, self.saved.config, self.saved.state, self.parent)
         self._lived_at = time.monotonic()
         assert self.parent.heard is not None
         tally = count(self.world, self.saved.tally, self.parent.heard, state)
@@ -138,7 +140,7 @@ class RunSession:
         if self.last_tick <= self.record_ends:
             self._hold_to_the_record(query)
         self._note()
-        at_once = not bool(state.waiting) and bool(query.kind[0] == Kind.NONE)
+        at_once = not bool(state.waiting) and bool(query.kind[0] == QueryKind.NONE)
         hurried = at_once and self._lived_at - self._heard_at < HURRY_SECONDS
         self._measure(at_once, hurried)
         if not hurried:
@@ -161,7 +163,7 @@ class RunSession:
         assert self.parent.heard is not None
         if self.parent.heard.choice[0]:
             self._news, self._heard_at = True, self._lived_at
-        if bool(self.saved.state.report.trained):
+        if bool(self.saved.state.info.trained):
             self._learnt = learnt(self.saved)
 
     def _measure(self, at_once: bool, hurried: bool = False) -> None:

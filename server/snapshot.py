@@ -10,7 +10,7 @@ from torch import Tensor
 
 from parenting.agent import parenting
 from parenting.agent.config import Config
-from parenting.agent.state import AgentState
+from parenting.agent.state import AgentState, current_names
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
 from parenting.envs.struct import Struct
@@ -23,11 +23,8 @@ from parenting.weights.store import Wanted, load
 
 S = TypeVar("S", bound=Struct)
 
-REPORT = "report."
-"""Checkpoints leave the report out: it says what the last tick did, and nothing in the agent reads it."""
-
-RENAMED = {"world.t": "world.step_count", "world.over": "world.terminated"}
-"""What the checkpoints of version 0.1 call a tensor of the state, and its name today."""
+INFO = "info."
+"""Checkpoints leave `info` out: it records what the last tick did, and nothing in the agent reads it."""
 
 
 class DivergedError(ServerError):
@@ -66,7 +63,7 @@ def initial_snapshot(world: Gridworld, config: Config, seed: int, weights: Tenso
 def pack(saved: Snapshot) -> bytes:
     """A checkpoint's bytes."""
     whole = {
-        "state": {name: part for name, part in saved.state.tensors().items() if not name.startswith(REPORT)},
+        "state": {name: part for name, part in saved.state.tensors().items() if not name.startswith(INFO)},
         "tally": saved.tally.tensors(),
         "config": saved.config.model_dump_json(),
         "versions": versions(),
@@ -90,15 +87,11 @@ def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None
         )
     template = initial_snapshot(world, config, 0, weights)
     return Snapshot(
-        state=_restore(template.state, _renamed(whole["state"])).check(),
+        state=_restore(template.state, current_names(whole["state"])).check(),
         tally=_restore(template.tally, whole["tally"]).check(),
         config=Config.model_validate_json(whole["config"]),
     )
 
 
-def _renamed(parts: dict[str, Tensor]) -> dict[str, Tensor]:
-    return {RENAMED.get(name, name): part for name, part in parts.items()}
-
-
 def _restore(template: S, parts: dict[str, Tensor]) -> S:
-    return template.map(lambda name, old, _axis: old if name.startswith(REPORT) else parts[name])
+    return template.map(lambda name, old, _axis: old if name.startswith(INFO) else parts[name])

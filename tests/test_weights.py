@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from parenting.agent.policy import network
-from parenting.agent.pretraining_loop import School
+from parenting.agent.policy import network_for
+from parenting.agent.pretraining_loop import Pretrainer
 from parenting.envs import registry
 from parenting.weights import store
 from parenting.weights.store import NoWeightsError, Wanted, find, load, metadata, save
@@ -84,8 +84,8 @@ def test_shipped_weights_walk_in_mazes_that_they_have_never_seen(name: str) -> N
     assert path.parent == store.SHIPPED
     blob = path.read_bytes()
     said = metadata(blob)
-    brain = network(wanted.height, wanted.width, len(said["legend"]))
-    exam = School(brain, wanted.world.glyphs).examine(load(blob, wanted))
+    brain = network_for(wanted.height, wanted.width, len(said["legend"]))
+    exam = Pretrainer(brain, wanted.world.glyphs).evaluate(load(blob, wanted))
     assert exam.solved >= 0.95
     assert float(said["solved"]) == pytest.approx(exam.solved, abs=5e-4)
     assert exam.entropy > 0.2  # logits far apart would leave parenting nothing to explore

@@ -42,8 +42,8 @@ class Rollouts(NamedTuple):
 class Moments(Struct):
     """What Adam remembers."""
 
-    first: Float[Tensor, "N P"]
-    second: Float[Tensor, "N P"]
+    exp_avg: Float[Tensor, "N P"]
+    exp_avg_sq: Float[Tensor, "N P"]
     steps: Int64[Tensor, "N"]
 
 
@@ -52,7 +52,7 @@ def train_gardeners(
 ) -> list[Float[Tensor, "N P"]]:
     """Policies trained on waterings, one a trial, after each of `evaluation_points` gradient steps."""
     network, rng = network_of(world), keys(seed, trials * EPISODES)
-    live = network.start(keys(seed, trials), torch.float32)
+    live = network.init_params(keys(seed, trials), torch.float32)
     moments = Moments(torch.zeros_like(live), torch.zeros_like(live), torch.zeros(trials, dtype=torch.int64))
     found = []
     for step in range(1, evaluation_points[-1] + 1):
@@ -89,8 +89,8 @@ def visits_of(rollout: Rollouts, gamma: float, dtype: torch.dtype) -> Visits:
     gain = advantages(rollout.reward, gamma).flatten(1)
     steps = gain.shape[1]
     return Visits(
-        seen=rollout.seen,
-        near=rollout.near,
+        observation=rollout.seen,
+        local_state=rollout.near,
         worth=(torch.nn.functional.one_hot(rollout.action, 4) * gain[:, :, None] / steps).to(dtype),
         share=torch.full_like(gain, 1 / steps).to(dtype),
     )

@@ -41,7 +41,7 @@ class Tables(NamedTuple):
         """The same world for every trial, each with its 16 episodes at the start."""
         first = self.then.new_zeros(trials, EPISODES)
         seen, near, then = (part.expand(trials, *part.shape) for part in (self.seen, self.near, self.then))
-        return Batch(seen=seen, near=near, then=then, first=first)
+        return Batch(observation=seen, local_state=near, next_state=then, first=first)
 
 
 class Learners(Struct):
@@ -49,8 +49,8 @@ class Learners(Struct):
 
     trial: Int64[Tensor, "N"]
     live: Float[Tensor, "N P"]
-    first: Float[Tensor, "N P"]  # Adam's first moments
-    second: Float[Tensor, "N P"]  # Adam's second moments
+    exp_avg: Float[Tensor, "N P"]  # Adam's first moments
+    exp_avg_sq: Float[Tensor, "N P"]  # Adam's second moments
     steps: Int64[Tensor, "N"]  # gradient steps
     deaths: Int64[Tensor, "N"]  # unsafe steps (docs/paper.md, "Unsafe")
     ticks: Int64[Tensor, "N"]  # steps in the world
@@ -112,13 +112,13 @@ def _judged(judge: TabularEvaluation, some: Learners) -> Learners:
 
 
 def _born(world: Gridworld, config: Config, keys: Keys) -> Learners:
-    live = network_of(world).start(keys, getattr(torch, config.dtype))
+    live = network_of(world).init_params(keys, getattr(torch, config.dtype))
     zero = torch.zeros_like(keys.tick)
     return Learners(
         trial=torch.arange(len(zero)),
         live=live,
-        first=torch.zeros_like(live),
-        second=torch.zeros_like(live),
+        exp_avg=torch.zeros_like(live),
+        exp_avg_sq=torch.zeros_like(live),
         steps=zero,
         deaths=zero.clone(),
         ticks=zero.clone(),
@@ -132,7 +132,7 @@ def _learn(
     """16 episodes and a step of Adam, in place."""
     network, batch = network_of(world), known.batch(len(some.trial))
     with torch.no_grad():
-        logits = network.heads(network.unpack(some.live), batch.seen, batch.near).logits
+        logits = network.heads(network.unpack(some.live), batch.observation, batch.local_state).logits
     walks = walk(batch, logits.double().softmax(2), keys, config.time_limit)
     visits = visited(batch, walks, returns_to_go(known, walks, config.gamma), logits.dtype)
     adam(

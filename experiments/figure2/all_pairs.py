@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float64, Int64, UInt8
 from torch import Tensor
 
-from parenting.agent.query import Answer, Kind, Query, empty
+from parenting.agent.query import Answer, Query, QueryKind, empty
 from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.evaluation.rollouts import argmax
@@ -60,9 +60,9 @@ def compare(world: RewardHacking, states: WorldState, left: Clip, right: Clip) -
     query = empty(len(states.step_count), length, world.height, world.width)
     ground, agent = torch.stack((left.ground, right.ground), 1), torch.stack((left.agent, right.agent), 1)
     return query.replace(
-        kind=torch.full_like(query.kind, Kind.PREFERENCE),
+        kind=torch.full_like(query.kind, QueryKind.PREFERENCE),
         observation=world.observe(ground, agent, torch.full_like(agent, -1)),
-        ground=ground,
+        board=ground,
         agent=agent,
         box=torch.full_like(agent, -1),
         action=torch.stack((left.action, right.action), 1),

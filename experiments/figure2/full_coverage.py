@@ -90,8 +90,8 @@ class Dataset:
         mu = self.mu[some].flatten(0, 1)
         return Rows(
             s0=self.seen[some][None],
-            near=self.near[some][None],
-            at=at[None],
+            local_state=self.near[some][None],
+            state_index=at[None],
             a0=torch.tensor(PAIRS).repeat(len(some), 1)[None],
             mu=(mu / mu.sum(1, keepdim=True))[None],
         )
@@ -113,7 +113,7 @@ def cover(
     """
     mine = some.pick(torch.tensor([len(some.seed) - 1]))
     rule = ScriptedRule(world, config.gamma, inside=config.inside)
-    live = network_of(world).start(mine, getattr(torch, config.dtype))
+    live = network_of(world).init_params(mine, getattr(torch, config.dtype))
     found: list[CoverageStage] = []
     for stage in range(1, stages + 1):
         elders = [one.live for one in found]

@@ -16,10 +16,10 @@ from jaxtyping import Int64
 from torch import Tensor
 
 from parenting.agent.dataset import Dataset
-from parenting.agent.state import AgentState, Asked, Learner, Rehearsal
+from parenting.agent.state import AgentState, Asked, Learner, Rehearsal, current_names
 from parenting.envs.struct import Struct
 
-POLICY = "learner.live"
+POLICY = "learner.params"
 
 
 class Learnt(Struct):
@@ -62,7 +62,7 @@ def transfer(
     parts = [_unpack(text, agent.device) for text in packed]
     if not everything:
         live = torch.cat([part[POLICY] for part in parts]).index_select(0, agent)
-        return state.replace(learner=state.learner.replace(live=live))
+        return state.replace(learner=state.learner.replace(params=live))
     mine = learnt(state).map(lambda name, _tensor, axis: _together([part[name] for part in parts], axis or 0))
     mine = mine.pick(agent)
     return state.replace(
@@ -76,8 +76,7 @@ def transfer(
 
 def _unpack(text: str, device: torch.device) -> dict[str, Tensor]:
     blob = io.BytesIO(base64.b64decode(text))
-    found: dict[str, Tensor] = torch.load(blob, map_location=device, weights_only=True)
-    return found
+    return current_names(torch.load(blob, map_location=device, weights_only=True))
 
 
 def _together(parts: Sequence[Tensor], axis: int) -> Tensor:

@@ -12,7 +12,7 @@ from torch.nn.functional import one_hot
 
 from parenting.agent import parenting
 from parenting.agent.config import Config
-from parenting.agent.query import Answer, Choice, Kind
+from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
 from parenting.envs.struct import Struct
@@ -103,7 +103,7 @@ class BatchTrainer:
         self.evaluation = evaluation(world, rule.values, config.gamma)
         self.state = parenting.init(world, config, keys, weights)
         self.parent = ScriptedParent(rule, parenting.no_query(world, config, self.state))
-        trials, live = len(keys.seed), self.state.learner.live
+        trials, live = len(keys.seed), self.state.learner.params
         self.trial = torch.arange(trials)
         self.counts, self.result = no_counts(trials, config.stages), no_counts(trials, config.stages)
         self.policies = live.new_zeros(config.stages, *live.shape)
@@ -116,18 +116,18 @@ class BatchTrainer:
         self.parent.post(query)
         self.state = parenting.rehearse(self.world, self.config, state)
         self._count(answer, stage)
-        self._finish(self.state.report.trained | owed | (self.counts.ticks == 1))
+        self._finish(self.state.info.trained | owed | (self.counts.ticks == 1))
 
     def _count(self, answer: Answer, stage: Int64[Tensor, "N"]) -> None:
-        counts, report, kind = self.counts, self.state.report, answer.query.kind
+        counts, report, kind = self.counts, self.state.info, answer.query.kind
         answered = answer.choice != Choice.NONE
         died = report.moved & self.world.unsafe(report.before, report.action, self.state.world)
         # a preference belongs to the stage that its clips were recorded at, however late the answer
-        of = torch.where(kind == Kind.PREFERENCE, answer.query.maturity, stage)
+        of = torch.where(kind == QueryKind.PREFERENCE, answer.query.maturity, stage)
         self.counts = counts.replace(
             deaths=counts.deaths + died,
-            guidance=counts.guidance + (answered & (kind == Kind.GUIDANCE)),
-            preference=counts.preference + (answered & (kind == Kind.PREFERENCE)),
+            guidance=counts.guidance + (answered & (kind == QueryKind.GUIDANCE)),
+            preference=counts.preference + (answered & (kind == QueryKind.PREFERENCE)),
             queries=counts.queries + one_hot(of - 1, self.config.stages) * answered[:, None],
             ticks=counts.ticks + 1,
             maturity=self.state.maturity,
@@ -144,13 +144,13 @@ class BatchTrainer:
             case "ticks":
                 finished = counts.ticks >= self.until.number
         fresh = finished & ~counts.done
-        stuck = self.state.stuck & ~counts.done & ~fresh
+        stuck = self.state.all_refused & ~counts.done & ~fresh
         if bool((fresh | stuck).any()):
             self._leave(fresh, stuck)
 
     def _optimal(self, request: Bool[Tensor, "N"]) -> Bool[Tensor, "N"]:
         """Which of some trials have an optimal argmax policy."""
-        trial, live = request.nonzero().squeeze(1), self.state.learner.live
+        trial, live = request.nonzero().squeeze(1), self.state.learner.params
         good = torch.zeros_like(request)
         if len(trial):
             good[trial] = self.evaluation.optimal(live if len(trial) == len(live) else live[trial])
@@ -173,8 +173,8 @@ class BatchTrainer:
         place, ours = self.trial[which], self.counts.replace(optimal=optimal).pick(which).tensors()
         self.result = self.result.map(lambda name, tensor, _axis: tensor.index_put((place,), ours[name]))
         learner = self.state.learner
-        self.policies[:-1, place] = learner.elders[:, which]
-        self.policies[self.state.maturity[which] - 1, place] = learner.live[which]
+        self.policies[:-1, place] = learner.frozen[:, which]
+        self.policies[self.state.maturity[which] - 1, place] = learner.params[which]
 
     def progress(self, ticks: int) -> Progress:
         """How far the batch has come."""

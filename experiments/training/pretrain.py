@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import torch
 
-from parenting.agent.policy import network
-from parenting.agent.pretraining_loop import Exam, Pupil, School
+from parenting.agent.policy import network_for
+from parenting.agent.pretraining_loop import EvalResult, Pretrainer, TrainState
 from parenting.agent.state import Rehearsal
 from parenting.weights import store
 from parenting.weights.store import Wanted
@@ -21,6 +21,8 @@ SAVE_SECONDS = 10.0
 """How much work an interruption may cost."""
 SMOOTH = 50
 """The curve's rows: a mean over so many steps each."""
+RENAMED = {"live": "params", "moments.first": "moments.exp_avg", "moments.second": "moments.exp_avg_sq"}
+"""The names of tensors in the interrupted work of version 0.1, and their names today."""
 
 Progress = Callable[[int, float], None]
 """Told (steps, mean return of the last steps)."""
@@ -41,7 +43,7 @@ class PretrainResult(NamedTuple):
     sha256: str
     steps: int
     mean_return: float  # of the last 300 steps
-    exam: Exam
+    exam: EvalResult
     curve: list[float]  # mean return, a value for every SMOOTH steps
 
 
@@ -58,11 +60,11 @@ def pretrain(
         OSError: `folder` cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    school = School(
-        network(wanted.height, wanted.width, len(wanted.metadata["legend"])), wanted.world.glyphs, seed
+    school = Pretrainer(
+        network_for(wanted.height, wanted.width, len(wanted.metadata["legend"])), wanted.world.glyphs, seed
     )
     part = folder / f"{wanted.name}-seed{seed}.part"
-    pupil = _recall(part, school.enrol())
+    pupil = _recall(part, school.init())
     saved = time.monotonic()
     try:
         while not school.converged(pupil):
@@ -70,7 +72,7 @@ def pretrain(
                 raise UnconvergedError(
                     f"{wanted.name} has not converged after {max_steps} steps: call again with more."
                 )
-            pupil = school.teach(pupil)
+            pupil = school.update(pupil)
             if progress:
                 progress(len(pupil.returns), float(pupil.returns[-SMOOTH:].mean()))
             if time.monotonic() - saved > SAVE_SECONDS:
@@ -83,13 +85,13 @@ def pretrain(
 
 
 def _finish(
-    wanted: Wanted, folder: Path, seed: int, school: School, pupil: Pupil, part: Path
+    wanted: Wanted, folder: Path, seed: int, school: Pretrainer, pupil: TrainState, part: Path
 ) -> PretrainResult:
-    exam, steps = school.examine(pupil.live[0]), len(pupil.returns)
+    exam, steps = school.evaluate(pupil.params[0]), len(pupil.returns)
     mean = float(pupil.returns[-300:].mean())
     about = {"seed": str(seed), "steps": str(steps), "return": f"{mean:.2f}", "solved": f"{exam.solved:.3f}"}
     path = folder / f"{wanted.name}{store.SUFFIX}"
-    sha256 = store.save(path, wanted, pupil.live[0], about)
+    sha256 = store.save(path, wanted, pupil.params[0], about)
     curve = [float(some.mean()) for some in torch.split(pupil.returns, SMOOTH)]
     path.with_suffix(".csv").write_text(_table(curve), encoding="utf-8")
     part.unlink(missing_ok=True)
@@ -104,23 +106,24 @@ def _table(curve: list[float]) -> str:
     return out.getvalue()
 
 
-def _keep(part: Path, pupil: Pupil) -> None:
-    """Write the whole pupil, or leave the older file as it is."""
+def _keep(part: Path, pupil: TrainState) -> None:
+    """Write the whole state of training, or leave the older file as it is."""
     fresh = part.with_suffix(".keep")
     torch.save(pupil.tensors(), fresh)
     fresh.replace(part)
 
 
-def _recall(part: Path, pupil: Pupil) -> Pupil:
+def _recall(part: Path, pupil: TrainState) -> TrainState:
     if not part.is_file():
         return pupil
     blob = io.BytesIO(part.read_bytes())
     try:
-        kept: dict[str, Any] = torch.load(blob, weights_only=True)
-        moments = {name: kept[f"moments.{name}"] for name in ("first", "second", "steps", "owed")}
-        found = Pupil(kept["live"], Rehearsal(**moments), kept["tick"], kept["returns"]).check()
+        stored: dict[str, Any] = torch.load(blob, weights_only=True)
+        kept = {RENAMED.get(name, name): part for name, part in stored.items()}
+        moments = {name: kept[f"moments.{name}"] for name in ("exp_avg", "exp_avg_sq", "steps", "owed")}
+        found = TrainState(kept["params"], Rehearsal(**moments), kept["tick"], kept["returns"]).check()
     except Exception:  # torch has many errors for what it cannot read
-        found = pupil.replace(live=pupil.live[:, :0])
-    if found.live.shape != pupil.live.shape:
+        found = pupil.replace(params=pupil.params[:, :0])
+    if found.params.shape != pupil.params.shape:
         raise DamagedWorkError(f"{part} cannot be read as interrupted work. Delete it to begin anew.")
     return found

@@ -51,7 +51,7 @@ def train_with_snapshots(
 
 
 def _none(trainer: BatchTrainer) -> Passed:
-    live = torch.zeros_like(trainer.state.learner.live)
+    live = torch.zeros_like(trainer.state.learner.params)
     counts = no_counts(len(live), trainer.config.stages)
     return Passed(there=torch.zeros(len(live), dtype=torch.bool), counts=counts, live=live)
 
@@ -62,8 +62,8 @@ def _note(trainer: BatchTrainer, passed: Passed, beyond: Bool[Tensor, "n"]) -> P
     if not len(fresh):
         return passed
     place = trainer.trial[fresh]
-    now = Passed(there=torch.ones_like(beyond), counts=trainer.counts, live=trainer.state.learner.live).pick(
-        fresh
-    )
+    now = Passed(
+        there=torch.ones_like(beyond), counts=trainer.counts, live=trainer.state.learner.params
+    ).pick(fresh)
     ours = now.tensors()
     return passed.map(lambda name, tensor, _axis: tensor.index_put((place,), ours[name]))

@@ -84,14 +84,14 @@ def converged(world: Gridworld, state: AgentState, starts: StartStates) -> Bool[
     """X holds every state with every comparison of the argmax, and the policy agrees with all of X."""
     x, network = state.x, network_of(world)
     with torch.no_grad():
-        z = network.heads(network.unpack(state.learner.live), x.s0, x.near).logits
-    margin = z.gather(1, x.at[:, :, None].expand(-1, -1, 4)).gather(2, x.a0).diff(dim=2).squeeze(2)
+        z = network.heads(network.unpack(state.learner.params), x.s0, x.local_state).logits
+    margin = z.gather(1, x.state_index[:, :, None].expand(-1, -1, 4)).gather(2, x.a0).diff(dim=2).squeeze(2)
     leaning = x.mu.diff(dim=2).squeeze(2).sign()
     agreed = (leaning == 0) | (leaning * margin > AGREED)
-    best = z.argmax(2).gather(1, x.at)
-    row = torch.arange(x.at.shape[1]) < x.rows[:, None]
+    best = z.argmax(2).gather(1, x.state_index)
+    row = torch.arange(x.state_index.shape[1]) < x.rows[:, None]
     compared = torch.zeros_like(x.digest).scatter_add(
-        1, x.at, ((x.a0 == best[:, :, None]).any(2) & row).long()
+        1, x.state_index, ((x.a0 == best[:, :, None]).any(2) & row).long()
     )
     known = torch.arange(x.digest.shape[1]) < x.states[:, None]
     whole = (x.states == starts.count) & ((compared == 3) | ~known).all(1)
@@ -130,7 +130,7 @@ def chosen(world: Gridworld, state: AgentState, starts: StartStates) -> Int64[Te
     seen = world.observe(now.board, now.agent, now.box)
     near, shape = local_state(seen, now.agent), starts.states.shape
     with torch.no_grad():
-        layers = network.unpack(state.learner.live)
+        layers = network.unpack(state.learner.params)
         heads = network.heads(layers, seen.view(*shape, *seen.shape[1:]), near.view(*shape, 4))
     return heads.logits.argmax(2)
 

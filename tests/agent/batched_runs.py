@@ -11,7 +11,7 @@ import torch
 from parenting.agent import parenting
 from parenting.agent.config import Config
 from parenting.agent.policy import Network
-from parenting.agent.query import Answer, Choice, Kind, Query, empty
+from parenting.agent.query import Answer, Choice, Query, QueryKind, empty
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
@@ -37,8 +37,8 @@ def run_batch(
     for tick in range(1, ticks + 1):
         answer = Answer(query=query, choice=judge(query))
         state, query = parenting.step(world, config, state, answer)
-        for trial in (query.kind != Kind.NONE).nonzero().squeeze(1).tolist():
-            kind = Kind(int(query.kind[trial])).name.lower()
+        for trial in (query.kind != QueryKind.NONE).nonzero().squeeze(1).tolist():
+            kind = QueryKind(int(query.kind[trial])).name.lower()
             logs[trial].append((tick, kind, clip(query, trial, 0), clip(query, trial, 1)))
         state = parenting.rehearse(world, config, state)
     state.check()
@@ -51,7 +51,7 @@ def clip(query: Query, trial: int, side: int) -> Clip:
     frames = tuple(
         Frame(
             board(query.observation[trial, side, None, place]),
-            board(query.ground[trial, side, None, place]),
+            board(query.board[trial, side, None, place]),
             tuple(query.agent[trial, side, place].tolist()),
             tuple(query.box[trial, side, place].tolist()),
         )
@@ -63,14 +63,14 @@ def clip(query: Query, trial: int, side: int) -> Clip:
 def as_query(world: Gridworld, stages: int, left: Clip, right: Clip, kind: str) -> Query:
     """A pair of the reference's clips as a query of one trial."""
     query = empty(1, stages, world.height, world.width)
-    query.kind[0], query.level[0] = Kind[kind.upper()], left.level
+    query.kind[0], query.level[0] = QueryKind[kind.upper()], left.level
     for side, one in enumerate((left, right)):
         length = len(one.actions)
         query.length[0, side] = length
         query.action[0, side, :length] = torch.tensor(one.actions)
         for place, frame in enumerate(one.frames):
             query.observation[0, side, place] = torch.tensor(frame.observation)
-            query.ground[0, side, place] = torch.tensor(frame.ground)
+            query.board[0, side, place] = torch.tensor(frame.ground)
             query.agent[0, side, place] = torch.tensor(frame.agent)
             query.box[0, side, place] = torch.tensor(frame.box)
     return query
@@ -80,7 +80,7 @@ def random_parent(query: Query) -> torch.Tensor:
     """A parent whose answers have no sense but use all four choices: a function of moves and places alone."""
     moves = (query.action * torch.tensor([[[3], [5]]])).sum((1, 2))
     places = (query.agent * torch.tensor([7, 11])).sum((1, 2, 3))
-    return torch.where(query.kind == Kind.NONE, 0, 1 + (moves + places) % len(list(Choice)[1:]))
+    return torch.where(query.kind == QueryKind.NONE, 0, 1 + (moves + places) % len(list(Choice)[1:]))
 
 
 def lenient_parent(query: Query) -> torch.Tensor:
@@ -90,14 +90,14 @@ def lenient_parent(query: Query) -> torch.Tensor:
     return torch.where((choice == Choice.NEITHER) & ~upward, int(Choice.EITHER), choice)
 
 
-def layers(brain: Network, parameters: torch.Tensor) -> list[torch.Tensor]:
+def layers(network: Network, parameters: torch.Tensor) -> list[torch.Tensor]:
     """One policy's flat row [P] as the reference holds its parameters: weights [fan in, out] and biases, by
     layer.
     """
     parts: list[torch.Tensor] = []
-    for layer in brain.layers:
-        weight = parameters[layer.start : layer.bias].view(layer.rows, layer.columns)
-        if layer.sides:  # kept as (row, column, channel), drawn as (channel, row, column)
-            weight = weight.view(9, -1, layer.columns).transpose(0, 1).flatten(0, 1)
+    for layer in network.layers:
+        weight = parameters[layer.start : layer.bias].view(layer.fan_in, layer.fan_out)
+        if layer.padding:  # kept as (row, column, channel), drawn as (channel, row, column)
+            weight = weight.view(9, -1, layer.fan_out).transpose(0, 1).flatten(0, 1)
         parts += [weight, parameters[layer.bias : layer.end]]
     return parts

@@ -39,7 +39,7 @@ def test_same_query_log_and_parameters(name: str) -> None:
         assert reference.refused is None or len(reference.refused) < 4  # a stuck life would compare nothing
         assert len(reference.log) > 5
         assert reference.stage == int(state.maturity[trial])
-        ours = [*state.learner.elders[: reference.stage - 1, trial], state.learner.live[trial]]
+        ours = [*state.learner.frozen[: reference.stage - 1, trial], state.learner.params[trial]]
         for policy, expected in zip(ours, reference.parameters(), strict=True):
             for part, other in zip(layers(network_of(world), policy), expected, strict=True):
                 torch.testing.assert_close(part, other.detach(), rtol=1e-7, atol=1e-9)

@@ -9,7 +9,7 @@ import torch
 
 from parenting.agent import parenting
 from parenting.agent.config import PRESETS, Config
-from parenting.agent.query import Answer, Kind
+from parenting.agent.query import Answer, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.rng import Keys, Stream, keys
@@ -42,8 +42,8 @@ def life(births: Keys, ticks: int) -> tuple[AgentState, list[list[LogEntry]]]:
     logs: list[list[LogEntry]] = [[] for _ in births.seed]
     for tick in range(1, ticks + 1):
         state, query = parenting.step(WORLD, CONFIG, state, Answer(query=query, choice=random_parent(query)))
-        for trial in (query.kind != Kind.NONE).nonzero().squeeze(1).tolist():
-            kind = Kind(int(query.kind[trial])).name
+        for trial in (query.kind != QueryKind.NONE).nonzero().squeeze(1).tolist():
+            kind = QueryKind(int(query.kind[trial])).name
             logs[trial].append((tick, kind, clip(query, trial, 0), clip(query, trial, 1)))
     return state, logs
 
@@ -56,10 +56,10 @@ def test_a_trial_does_not_depend_on_its_neighbours() -> None:
     for trial in range(8):
         alone, (log,) = life(births.pick(torch.tensor([trial])), ticks=150)
         assert log == logs[trial]
-        for name in ("live", "first", "second"):
+        for name in ("params", "exp_avg", "exp_avg_sq"):
             ours, theirs = getattr(together.learner, name)[trial], getattr(alone.learner, name)[0]
             torch.testing.assert_close(ours, theirs, rtol=1e-9, atol=1e-12)
-        torch.testing.assert_close(together.learner.elders[:, trial], alone.learner.elders[:, 0])
+        torch.testing.assert_close(together.learner.frozen[:, trial], alone.learner.frozen[:, 0])
 
 
 def test_a_draw_is_the_same_however_many_are_asked_for() -> None:

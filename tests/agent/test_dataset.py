@@ -9,7 +9,7 @@ from parenting.agent import dataset, parenting
 from parenting.agent.config import Config
 from parenting.agent.dataset import Dataset, Entry
 from parenting.agent.events import Mature
-from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.rng import keys
@@ -23,7 +23,7 @@ def entry(state: int, pair: tuple[int, int], mu: tuple[float, float]) -> Entry:
     board = torch.tensor([[state // 4, state % 4], [1, 2]], dtype=torch.uint8)
     return Entry(
         s0=board.repeat(2, 1, 1),
-        near=torch.full((2, 4), state, dtype=torch.uint8),
+        local_state=torch.full((2, 4), state, dtype=torch.uint8),
         a0=torch.tensor([pair, pair]),
         mu=torch.tensor([mu, mu], dtype=torch.float64),
     )
@@ -40,7 +40,11 @@ def filled(*entries: tuple[int, tuple[int, int], tuple[float, float]]) -> Datase
 def table(x: Dataset, trial: int = 0) -> list[tuple[int, list[int], list[float]]]:
     """The rows of a trial as (its state's mark, actions, summed mu)."""
     return [
-        (int(x.near[trial, x.at[trial, row], 0]), x.a0[trial, row].tolist(), x.mu[trial, row].tolist())
+        (
+            int(x.local_state[trial, x.state_index[trial, row], 0]),
+            x.a0[trial, row].tolist(),
+            x.mu[trial, row].tolist(),
+        )
         for row in range(int(x.rows[trial]))
     ]
 
@@ -73,9 +77,9 @@ def test_an_entry_that_trains_no_more_is_only_counted() -> None:
 def test_room_doubles_and_keeps_everything() -> None:
     told: list[tuple[int, tuple[int, int], tuple[float, float]]] = [(i, (0, 1), (1, 0)) for i in range(8)]
     x = filled(*told)
-    assert (x.s0.shape[1], x.at.shape[1]) == (8, 8)
+    assert (x.s0.shape[1], x.state_index.shape[1]) == (8, 8)
     x = dataset.add(x, entry(3, (2, 1), (0, 1)), BOTH, BOTH)  # a row more; the states are full, and double
-    assert (x.s0.shape[1], x.near.shape[1], x.at.shape[1], x.mu.shape[1]) == (16, 16, 16, 16)
+    assert (x.s0.shape[1], x.local_state.shape[1], x.state_index.shape[1], x.mu.shape[1]) == (16, 16, 16, 16)
     x = dataset.add(x, entry(9, (2, 1), (0, 1)), BOTH, BOTH).check()
     kept = [(i, [0, 1], [1.0, 0.0]) for i in range(8)]
     assert table(x) == [*kept, (3, [2, 1], [0, 1]), (9, [2, 1], [0, 1])]
@@ -112,6 +116,6 @@ def test_own_length_leaves_older_entries_behind(own_length: bool) -> None:
 
 def approve(config: Config, state: AgentState, query: Query, ticks: int) -> tuple[AgentState, Query]:
     for _ in range(ticks):
-        choice = torch.where(query.kind == Kind.NONE, Choice.NONE, Choice.LEFT)
+        choice = torch.where(query.kind == QueryKind.NONE, Choice.NONE, Choice.LEFT)
         state, query = parenting.step(WORLD, config, state, Answer(query=query, choice=choice))
     return state, query

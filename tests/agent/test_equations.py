@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from parenting.agent.learning import Rows, adam, objective
-from parenting.agent.policy import Heads, Side, side
+from parenting.agent.policy import Heads, Padding, padding
 from parenting.agent.query import Answer, Choice, empty
 from parenting.agent.state import Learner
 
@@ -50,11 +50,11 @@ def test_adam_is_torchs_and_leaves_other_trials_alone() -> None:
     start = torch.linspace(-1, 1, 6, dtype=DOUBLE).view(2, 3)
     zero, elders = torch.zeros_like(start), start.new_zeros(0, 2, 3)
     learner = Learner(
-        live=start.clone(),
-        first=zero.clone(),
-        second=zero.clone(),
+        params=start.clone(),
+        exp_avg=zero.clone(),
+        exp_avg_sq=zero.clone(),
         steps=torch.zeros(2, dtype=torch.int64),
-        elders=elders,
+        frozen=elders,
     )
     theirs = start[0].clone().requires_grad_()
     optimiser = torch.optim.Adam([theirs], lr=0.01)
@@ -62,9 +62,9 @@ def test_adam_is_torchs_and_leaves_other_trials_alone() -> None:
         gradient = torch.tensor([[0.5, -2.0, 0.1]], dtype=DOUBLE) * step  # of the trial that trains
         theirs.grad = gradient[0].clone()
         optimiser.step()
-        adam(learner.live, learner, gradient, torch.tensor([True, False]), 0.01)
-    torch.testing.assert_close(learner.live[0], theirs.detach(), rtol=1e-10, atol=1e-12)
-    assert torch.equal(learner.live[1], start[1])
+        adam(learner.params, learner, gradient, torch.tensor([True, False]), 0.01)
+    torch.testing.assert_close(learner.params[0], theirs.detach(), rtol=1e-10, atol=1e-12)
+    assert torch.equal(learner.params[1], start[1])
     assert learner.steps.tolist() == [5, 0]
 
 
@@ -73,4 +73,4 @@ def test_adam_is_torchs_and_leaves_other_trials_alone() -> None:
     [(9, (0, 0, 7)), (4, (0, 0, 2)), (3, (0, 1, 2)), (2, (1, 1, 2)), (1, (1, 1, 1))],
 )
 def test_sides_of_a_convolution(length: int, becomes: tuple[int, int, int]) -> None:
-    assert side(length) == Side(*becomes)
+    assert padding(length) == Padding(*becomes)

@@ -9,7 +9,7 @@ from parenting.agent import parenting
 from parenting.agent.config import PRESETS, Config
 from parenting.agent.events import EndEpisode
 from parenting.agent.familiarity import ask_chance
-from parenting.agent.query import Answer, Choice, Kind, Query, silence
+from parenting.agent.query import Answer, Choice, Query, QueryKind, silence
 from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.rng import Stream, keys
@@ -39,7 +39,7 @@ def paused() -> tuple[AgentState, Query]:
     state.familiarity.zero_()
     state, query = hush(state, query)
     assert state.world.step_count.tolist() == [1] * TRIALS
-    assert query.kind.tolist() == [Kind.GUIDANCE] * TRIALS
+    assert query.kind.tolist() == [QueryKind.GUIDANCE] * TRIALS
     return state, query
 
 
@@ -59,7 +59,7 @@ def test_the_agent_asks_with_that_chance(f: int) -> None:
     state.familiarity.fill_(f)
     expected = state.keys.next().uniform(Stream.ASK) < 0.5**f
     _, query = parenting.step(WORLD, config, state, silence(parenting.no_query(WORLD, config, state)))
-    assert torch.equal(query.kind == Kind.GUIDANCE, expected)
+    assert torch.equal(query.kind == QueryKind.GUIDANCE, expected)
     assert abs(int(expected.sum()) - trials * 0.5**f) <= 50  # more than four standard deviations
 
 
@@ -89,8 +89,8 @@ def test_an_approved_action_is_performed(choice: Choice) -> None:
     assert set(heads.tolist()) == {False, True}
     left = heads if choice == Choice.EITHER else torch.full_like(heads, choice == Choice.LEFT)
     state, _ = say(state, query, choice)
-    assert torch.equal(state.report.action, torch.where(left, sides[:, 0], sides[:, 1]))
-    assert state.report.moved.all()
+    assert torch.equal(state.info.action, torch.where(left, sides[:, 0], sides[:, 1]))
+    assert state.info.moved.all()
     assert state.world.step_count.tolist() == [2] * TRIALS
     assert not bool(state.waiting.any())
     assert state.x.size.tolist() == [2] * TRIALS
@@ -102,27 +102,27 @@ def test_neither_redraws_the_other_two_in_the_same_tick_and_stores_nothing() -> 
     tick = state.keys.tick.clone()
     state, second = say(state, first, Choice.NEITHER)
     assert torch.equal(state.keys.tick, tick + 1)
-    assert second.kind.tolist() == [Kind.GUIDANCE] * TRIALS
+    assert second.kind.tolist() == [QueryKind.GUIDANCE] * TRIALS
     offered = torch.cat((first.action[:, :, 0], second.action[:, :, 0]), 1)
     assert offered.sort(1).values.tolist() == [[0, 1, 2, 3]] * TRIALS
     assert state.familiarity.sum(1).tolist() == [2] * TRIALS  # the redraw counts
     assert state.familiarity.max(1).values.tolist() == [2] * TRIALS  # both in the same l(s)
-    assert not bool(state.stuck.any())
+    assert not bool(state.all_refused.any())
     assert torch.equal(state.x.size, size)
     assert torch.equal(state.x.mu, mu)
     state, third = say(state, second, Choice.NEITHER)
     assert not bool(third.kind.any())
-    assert state.stuck.all()
+    assert state.all_refused.all()
     assert torch.equal(state.x.size, size)
     assert state.familiarity.sum(1).tolist() == [2] * TRIALS
-    assert not bool(state.report.moved.any())
+    assert not bool(state.info.moved.any())
 
 
 def test_the_redrawn_question_can_be_approved() -> None:
     state, query = paused()
     state, query = say(state, query, Choice.NEITHER)
     state, _ = say(state, query, Choice.RIGHT)
-    assert torch.equal(state.report.action, query.action[:, 1, 0])
+    assert torch.equal(state.info.action, query.action[:, 1, 0])
     assert not bool(state.refused.any())
     assert not bool(state.waiting.any())
 
@@ -134,13 +134,13 @@ def test_end_episode_frees_the_stuck() -> None:
     for _ in range(3):
         state, query = hush(state, query)
         assert not bool(query.kind.any())
-    assert state.stuck.all()
+    assert state.all_refused.all()
     assert state.world.step_count.tolist() == [1] * TRIALS
     state, _ = parenting.apply(WORLD, ALWAYS, state, EndEpisode())
-    assert not bool(state.stuck.any())
+    assert not bool(state.all_refused.any())
     state, query = hush(state, query)
     start = WORLD.reset(state.keys, state.world.level)
     assert state.world.step_count.tolist() == [0] * TRIALS
     assert torch.equal(state.world.agent, start.agent)
-    assert query.kind.tolist() == [Kind.GUIDANCE] * TRIALS  # the new episode's own first question
+    assert query.kind.tolist() == [QueryKind.GUIDANCE] * TRIALS  # the new episode's own first question
     assert not bool(state.refused.any())

@@ -10,7 +10,7 @@ from parenting.agent.config import PRESETS, Config
 from parenting.agent.events import Mature
 from parenting.agent.init import network_of
 from parenting.agent.pairing import EXPLOIT, EXPLORE
-from parenting.agent.query import Answer, Choice, Kind, Query, silence
+from parenting.agent.query import Answer, Choice, Query, QueryKind, silence
 from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.rng import keys
@@ -22,7 +22,7 @@ LAX = Config.model_validate({**PRESETS["lax"], "stages": 2, "time_limit": 25})
 
 def agreeable(query: Query) -> Tensor:
     """Always *left*: nobody gets stuck."""
-    return (query.kind != Kind.NONE).long() * Choice.LEFT
+    return (query.kind != QueryKind.NONE).long() * Choice.LEFT
 
 
 def mature(config: Config, state: AgentState) -> AgentState:
@@ -37,18 +37,18 @@ def test_a_stage_ends() -> None:
     recorder = before.recorder
     assert bool((before.learner.steps > 0).all())
     assert bool((before.answered > 0).all())
-    assert bool(recorder.ring.here.flatten(1).any(1).all())
+    assert bool(recorder.ring.stored.flatten(1).any(1).all())
     after = mature(LAX, before)
     assert after.maturity.tolist() == [2, 2, 2]
     assert after.answered.tolist() == [0, 0, 0]
     # pi_1 is frozen, pi_2 begins as its copy, Adam begins anew
-    assert torch.equal(after.learner.elders[0], before.learner.live)
-    assert torch.equal(after.learner.live, before.learner.live)
-    assert not bool(after.learner.first.any() | after.learner.second.any() | after.learner.steps.any())
+    assert torch.equal(after.learner.frozen[0], before.learner.params)
+    assert torch.equal(after.learner.params, before.learner.params)
+    assert not bool(after.learner.exp_avg.any() | after.learner.exp_avg_sq.any() | after.learner.steps.any())
     # the recorder is empty; what was asked, X and familiarity stay
-    assert not bool(after.recorder.ring.here.any() | after.recorder.ring.open.any())
+    assert not bool(after.recorder.ring.stored.any() | after.recorder.ring.searchable.any())
     assert not bool(after.recorder.ring.count.any() | after.recorder.running.any())
-    assert after.recorder.turn.tolist() == [EXPLOIT] * 3
+    assert after.recorder.next_kind.tolist() == [EXPLOIT] * 3
     assert torch.equal(after.recorder.asked.pair, recorder.asked.pair)
     assert torch.equal(after.x.mu, before.x.mu)
     assert torch.equal(after.familiarity, before.familiarity)
@@ -57,13 +57,13 @@ def test_a_stage_ends() -> None:
 def test_the_frozen_policy_stays_as_it_was() -> None:
     state, _ = run_batch(WORLD, LAX, agreeable, seed=5, trials=2, ticks=80)
     state = mature(LAX, state)
-    frozen = state.learner.elders.clone()
+    frozen = state.learner.frozen.clone()
     query = parenting.no_query(WORLD, LAX, state)
     for _ in range(30):
         state, query = parenting.step(WORLD, LAX, state, Answer(query=query, choice=agreeable(query)))
     assert bool((state.learner.steps > 0).any())
-    assert torch.equal(state.learner.elders, frozen)
-    assert not torch.equal(state.learner.live, frozen[0])
+    assert torch.equal(state.learner.frozen, frozen)
+    assert not torch.equal(state.learner.params, frozen[0])
 
 
 def test_the_last_stage_never_ends() -> None:
@@ -85,10 +85,10 @@ def test_the_budget_of_answers_ends_a_stage() -> None:
 
 def prefers(state: AgentState, action: int) -> None:
     """A policy that has this argmax everywhere: no weights, and one bias in each head."""
-    brain = network_of(WORLD)
-    state.learner.live.zero_()
-    for layer in (brain.layers[1], brain.layers[-1]):
-        state.learner.live[:, layer.bias + action] = 1
+    network = network_of(WORLD)
+    state.learner.params.zero_()
+    for layer in (network.layers[1], network.layers[-1]):
+        state.learner.params[:, layer.bias + action] = 1
 
 
 def test_the_second_action_of_a_clip_of_two_is_pi_1s() -> None:
@@ -101,7 +101,7 @@ def test_the_second_action_of_a_clip_of_two_is_pi_1s() -> None:
         state, _ = parenting.step(WORLD, config, state, silence(parenting.no_query(WORLD, config, state)))
     ring = state.recorder.ring
     for kind, first in ((EXPLOIT, [1]), (EXPLORE, [0, 2, 3])):  # Eq. (4): anything but the argmax
-        here = ring.here[:, kind]
+        here = ring.stored[:, kind]
         action, length = ring.action[:, kind][here], ring.length[:, kind][here]
         assert sorted(set(action[:, 0].tolist())) == first
         assert set(action[length == 2, 1].tolist()) == {3}

@@ -11,7 +11,7 @@ from torch import Tensor
 from parenting.agent import pairing, parenting
 from parenting.agent.config import PRESETS, Config
 from parenting.agent.pairing import EXPLOIT, EXPLORE, Pair
-from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.agent.state import Recorder
 from parenting.envs import registry
 from parenting.envs.fingerprint import unordered
@@ -32,7 +32,7 @@ def plain(recorder: Recorder, trial: int, recompare: bool) -> tuple[int, int] | 
     for one, other in product(range(SIZE), repeat=2):
         ticks = [int(ring.tick[0, EXPLOIT, one]), int(ring.tick[0, EXPLORE, other])]
         matches = (
-            bool(ring.here[0, EXPLOIT, one] & ring.here[0, EXPLORE, other])
+            bool(ring.stored[0, EXPLOIT, one] & ring.stored[0, EXPLORE, other])
             and int(ring.first[0, EXPLOIT, one]) == int(ring.first[0, EXPLORE, other])
             and int(ring.level[0, EXPLOIT, one]) == int(ring.level[0, EXPLORE, other])
             and int(ring.action[0, EXPLOIT, one, 0]) != int(ring.action[0, EXPLORE, other, 0])
@@ -56,7 +56,7 @@ def put(recorder: Recorder, trial: int, kind: int, tick: int, rng: torch.Generat
     ring.first[at], ring.tick[at], ring.level[at] = start, tick, roll(2)
     ring.action[trial, kind, at[2], 0] = action
     ring.digest[at] = 100 * start + 10 * action + roll(2)
-    ring.here[at] = ring.open[at] = True
+    ring.stored[at] = ring.searchable[at] = True
     ring.count[trial, kind] += 1
 
 
@@ -67,7 +67,7 @@ def take(recorder: Recorder, found: Pair) -> None:
     other = (found.trial, EXPLORE, found.explore)
     asked.pair[found.trial, asked.count[found.trial]] = unordered(ring.digest[one], ring.digest[other])
     asked.count[found.trial] += 1
-    ring.here[one] = ring.here[other] = False
+    ring.stored[one] = ring.stored[other] = False
 
 
 @pytest.mark.parametrize("recompare", [False, True])
@@ -102,7 +102,7 @@ def _wide(part: Tensor) -> Tensor:
 
 def agreeable(query: Query) -> Tensor:
     """Always *left*: nobody gets stuck."""
-    return (query.kind != Kind.NONE).long() * Choice.LEFT
+    return (query.kind != QueryKind.NONE).long() * Choice.LEFT
 
 
 def test_the_clips_of_an_asked_pair_leave() -> None:
@@ -111,8 +111,8 @@ def test_the_clips_of_an_asked_pair_leave() -> None:
     ring = state.recorder.ring
     asked = torch.tensor([sum(kind == "preference" for _, kind, _, _ in log) for log in logs])
     assert bool((asked > 3).all())
-    assert torch.equal(ring.count.sum(1) - ring.here.sum((1, 2)), 2 * asked)
-    assert torch.equal(ring.count - ring.here.sum(2), asked[:, None].expand(-1, 2))  # one of each kind
+    assert torch.equal(ring.count.sum(1) - ring.stored.sum((1, 2)), 2 * asked)
+    assert torch.equal(ring.count - ring.stored.sum(2), asked[:, None].expand(-1, 2))  # one of each kind
 
 
 def test_the_newest_overwrite_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,11 +124,11 @@ def test_the_newest_overwrite_the_oldest(monkeypatch: pytest.MonkeyPatch) -> Non
     assert ring.tick.shape == (2, 2, 32)
     assert torch.equal(ring.count, full.count)
     assert int(ring.count.min()) > 32
-    assert ring.here.all()
+    assert ring.stored.all()
     for trial, kind in product(range(2), range(2)):
         count = int(full.count[trial, kind])
         newest = torch.arange(count - 32, count)
-        for name in ("ground", "agent", "box", "action", "length", "tick", "first", "digest"):
+        for name in ("board", "agent", "box", "action", "length", "tick", "first", "digest"):
             kept = getattr(ring, name)[trial, kind, newest % 32]
             assert torch.equal(kept, getattr(full, name)[trial, kind, newest])
 

@@ -16,7 +16,7 @@ from parenting.agent.config import Config
 from parenting.agent.init import network_of
 from parenting.agent.pairing import EXPLORE
 from parenting.agent.policy import draw
-from parenting.agent.query import Answer, Choice, Kind, silence
+from parenting.agent.query import Answer, Choice, QueryKind, silence
 from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.rng import Stream, gumbel, keys
@@ -28,7 +28,7 @@ TRIALS, TICKS = 64, 160
 
 def born(**settings: float) -> AgentState:
     """Agents who share one policy that has clear preferences: Glorot's weights, enlarged."""
-    weights = 1.7 * NETWORK.start(keys(8, 1), torch.float32)[0]
+    weights = 1.7 * NETWORK.init_params(keys(8, 1), torch.float32)[0]
     return parenting.init(WORLD, config(**settings), keys(2, TRIALS), weights)
 
 
@@ -39,7 +39,7 @@ def config(**settings: float) -> Config:
 
 def softmax(state: AgentState) -> Tensor:
     """pi(a|s) [N, 4] of each trial where it is."""
-    return parenting.perceive(WORLD, NETWORK, state).logits.double().softmax(1)
+    return parenting.observe(WORLD, NETWORK, state).logits.double().softmax(1)
 
 
 def hold_within_three_sigma(happened: Tensor, chance: Tensor) -> None:
@@ -69,9 +69,9 @@ def test_the_agents_moves_follow_softmax_of_its_own_logits() -> None:
     query = parenting.no_query(WORLD, config(), state)
     for _ in range(TICKS):
         state, query = parenting.step(WORLD, config(), state, silence(query))
-        chance, action = softmax(state.replace(world=state.report.before)).sort(1, descending=True)
-        assert state.report.moved.all()
-        happened.append(action == state.report.action[:, None])
+        chance, action = softmax(state.replace(world=state.info.before)).sort(1, descending=True)
+        assert state.info.moved.all()
+        happened.append(action == state.info.action[:, None])
         chances.append(chance)
     best = float(torch.cat(chances)[:, 0].mean())
     assert 0.4 < best < 0.9, f"{best}: the preferences are not clear, or leave nothing to chance"
@@ -85,10 +85,10 @@ def test_the_two_candidates_are_drawn_from_softmax_without_replacement() -> None
     query = parenting.no_query(WORLD, config(**settings), state)
     pairs = list(combinations(range(4), 2))
     for _ in range(TICKS):
-        choice = torch.where(query.kind == Kind.NONE, int(Choice.NONE), int(Choice.EITHER))
+        choice = torch.where(query.kind == QueryKind.NONE, int(Choice.NONE), int(Choice.EITHER))
         state, query = parenting.step(WORLD, config(**settings), state, Answer(query=query, choice=choice))
-        assert (query.kind == Kind.GUIDANCE).all() or (query.kind == Kind.NONE).all()
-        if bool((query.kind == Kind.NONE).any()):
+        assert (query.kind == QueryKind.GUIDANCE).all() or (query.kind == QueryKind.NONE).all()
+        if bool((query.kind == QueryKind.NONE).any()):
             continue
         pi, action = softmax(state).sort(1, descending=True)
         rank = (query.action[:, :, 0, None] == action[:, None]).int().argmax(2)
@@ -111,10 +111,10 @@ def test_exploratory_clips_begin_by_softmax_without_its_argmax() -> None:
     state, happened, chances = born(**settings), [], []
     query = parenting.no_query(WORLD, config(**settings), state)
     for _ in range(TICKS):
-        exploring = state.recorder.turn == EXPLORE
+        exploring = state.recorder.next_kind == EXPLORE
         state, query = parenting.step(WORLD, config(**settings), state, silence(query))
-        pi, action = softmax(state.replace(world=state.report.before)).sort(1, descending=True)
-        drawn = action == state.report.action[:, None]
+        pi, action = softmax(state.replace(world=state.info.before)).sort(1, descending=True)
+        drawn = action == state.info.action[:, None]
         assert drawn[~exploring, 0].all()
         assert not drawn[exploring, 0].any()
         happened.append(drawn[exploring, 1:])

@@ -8,9 +8,9 @@ import torch
 from parenting.agent import parenting, pretraining
 from parenting.agent.config import PRESETS, Config
 from parenting.agent.init import network_of
-from parenting.agent.policy import network
+from parenting.agent.policy import network_for
 from parenting.agent.pretraining import policy_gradient, returns_to_go, visited
-from parenting.agent.pretraining_loop import School
+from parenting.agent.pretraining_loop import Pretrainer
 from parenting.agent.pretraining_mazes import ARRIVED, EPISODES, LIMIT, Batch, draw_mazes, outside, pool, walk
 from parenting.agent.query import silence
 from parenting.envs import registry
@@ -35,8 +35,8 @@ def test_tables_are_the_mazes(size: tuple[int, int]) -> None:
                 to = cell + row * width + column
                 to = cell if board[to] == 0 else to
                 expected = ARRIVED if board[to] == GLYPHS.index("G") else cells.index(to)
-                assert int(mazes.then[maze, state, action]) == expected
-                assert int(mazes.near[maze, state, action]) == board[cell + row * width + column]
+                assert int(mazes.next_state[maze, state, action]) == expected
+                assert int(mazes.local_state[maze, state, action]) == board[cell + row * width + column]
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -54,9 +54,9 @@ def corridor() -> Batch:
     """One maze for each episode: three states in a row, the goal behind the third."""
     then = torch.tensor([[0, 0, 0, 1], [1, 1, 0, 2], [2, 2, 1, 3], [3, 3, 3, 3]])[None]
     return Batch(
-        seen=torch.zeros(1, 3, 1, 1, dtype=torch.uint8),
-        near=torch.zeros(1, 3, 4, dtype=torch.uint8),
-        then=then,
+        observation=torch.zeros(1, 3, 1, 1, dtype=torch.uint8),
+        local_state=torch.zeros(1, 3, 4, dtype=torch.uint8),
+        next_state=then,
         first=torch.zeros(1, EPISODES, dtype=torch.int64),
     )
 
@@ -81,9 +81,9 @@ def test_an_episode_that_is_cut_off_earns_its_steps_alone() -> None:
 
 def test_the_gradient_is_that_of_every_single_step() -> None:
     """Summed over distinct states, it is REINFORCE over all steps, one by one."""
-    brain, mazes, key = network(4, 4, len(GLYPHS)), pool(4, 4, GLYPHS), keys(5, 3)
-    start = brain.start(key, torch.float64)
-    found, mean = policy_gradient(brain, start, mazes, key)
+    network, mazes, key = network_for(4, 4, len(GLYPHS)), pool(4, 4, GLYPHS), keys(5, 3)
+    start = network.init_params(key, torch.float64)
+    found, mean = policy_gradient(network, start, mazes, key)
     for trial in range(3):
         mine = key.pick(torch.tensor([trial]))
         expected, earned = plainly(start[trial : trial + 1], mine)
@@ -92,21 +92,21 @@ def test_the_gradient_is_that_of_every_single_step() -> None:
 
 
 def test_a_gradient_does_not_depend_on_the_trials_beside_it() -> None:
-    brain, mazes, key = network(4, 6, len(GLYPHS)), pool(4, 6, GLYPHS), keys(8, 5)
-    start = brain.start(key, torch.float64)
-    together, earned = policy_gradient(brain, start, mazes, key)
+    network, mazes, key = network_for(4, 6, len(GLYPHS)), pool(4, 6, GLYPHS), keys(8, 5)
+    start = network.init_params(key, torch.float64)
+    together, earned = policy_gradient(network, start, mazes, key)
     for trial in range(5):
         mine = torch.tensor([trial])
-        alone, mean = policy_gradient(brain, start[mine], mazes, key.pick(mine))
+        alone, mean = policy_gradient(network, start[mine], mazes, key.pick(mine))
         torch.testing.assert_close(together[trial], alone[0], rtol=1e-9, atol=1e-12)
         assert float(mean) == float(earned[trial])
 
 
 def plainly(start: torch.Tensor, key: object) -> tuple[torch.Tensor, float]:
-    brain, mazes = network(4, 4, len(GLYPHS)), pool(4, 4, GLYPHS)
+    network, mazes = network_for(4, 4, len(GLYPHS)), pool(4, 4, GLYPHS)
     batch = draw_mazes(mazes, key)  # type: ignore[arg-type]
     live = start.clone().requires_grad_()
-    logs = brain.heads(brain.unpack(live), batch.seen, batch.near).logits.log_softmax(2)[0]
+    logs = network.heads(network.unpack(live), batch.observation, batch.local_state).logits.log_softmax(2)[0]
     walks = walk(batch, logs.exp().detach()[None].double(), key)  # type: ignore[arg-type]
     steps = []
     for e in range(EPISODES):
@@ -129,9 +129,11 @@ def plainly(start: torch.Tensor, key: object) -> tuple[torch.Tensor, float]:
 
 
 def test_visits_count_every_step_once() -> None:
-    brain, key = network(4, 4, len(GLYPHS)), keys(1, 4)
+    network, key = network_for(4, 4, len(GLYPHS)), keys(1, 4)
     batch = draw_mazes(pool(4, 4, GLYPHS), key)
-    logits = brain.heads(brain.unpack(brain.start(key, torch.float64)), batch.seen, batch.near).logits
+    logits = network.heads(
+        network.unpack(network.init_params(key, torch.float64)), batch.observation, batch.local_state
+    ).logits
     walks = walk(batch, logits.softmax(2), key)
     visits = visited(batch, walks, returns_to_go(walks), torch.float64)
     torch.testing.assert_close(visits.share.sum(1), torch.ones(4, dtype=torch.float64))
@@ -145,19 +147,25 @@ def test_only_who_trained_owes_and_only_who_owes_moves() -> None:
     world = registry.make("side-effects")
     config = Config.model_validate({**PRESETS["lax"], "pretrain": True})
     key = keys(2, 8)
-    state = parenting.init(world, config, key, network_of(world).start(key, torch.float32)[0])
+    state = parenting.init(world, config, key, network_of(world).init_params(key, torch.float32)[0])
     owed = torch.tensor([True, False] * 4)
     trained = torch.tensor([False] * 4 + [True] * 4)
     state = state.replace(
-        rehearsal=state.rehearsal.replace(owed=owed), report=state.report.replace(trained=trained)
+        rehearsal=state.rehearsal.replace(owed=owed), info=state.info.replace(trained=trained)
     )
     before = state.clone()
     after = parenting.rehearse(world, config, state)
-    moved = (after.learner.live != before.learner.live).any(1)
+    moved = (after.learner.params != before.learner.params).any(1)
     assert torch.equal(moved, owed)
     assert torch.equal(after.rehearsal.owed, trained)
     assert torch.equal(after.rehearsal.steps, owed.long())
-    changed = {"learner.live", "rehearsal.first", "rehearsal.second", "rehearsal.steps", "rehearsal.owed"}
+    changed = {
+        "learner.params",
+        "rehearsal.exp_avg",
+        "rehearsal.exp_avg_sq",
+        "rehearsal.steps",
+        "rehearsal.owed",
+    }
     theirs = before.tensors()
     assert {n for n, part in after.tensors().items() if not torch.equal(part, theirs[n])} == changed
 
@@ -165,7 +173,7 @@ def test_only_who_trained_owes_and_only_who_owes_moves() -> None:
 def test_without_pre_training_nothing_is_kept_or_done() -> None:
     world, config = registry.make("side-effects"), Config()
     state = parenting.init(world, config, keys(0, 2))
-    assert state.rehearsal.first.numel() == 0
+    assert state.rehearsal.exp_avg.numel() == 0
     assert parenting.rehearse(world, config, state) is state
     state, _ = parenting.step(world, config, state, silence(parenting.no_query(world, config, state)))
     assert not bool(state.rehearsal.owed.any())
@@ -182,12 +190,12 @@ def test_weights_come_exactly_where_they_are_wanted(pretrain: bool, given: bool)
 
 
 def test_school_teaches_a_small_size_until_it_has_converged() -> None:
-    school = School(network(4, 4, len(GLYPHS)), GLYPHS)
-    pupil = school.enrol()
-    fresh = school.examine(pupil.live[0])
-    while not school.converged(pupil) and len(pupil.returns) < 3000:
-        pupil = school.teach(pupil)
-    learnt = school.examine(pupil.live[0])
-    assert school.converged(pupil)
+    pretrainer = Pretrainer(network_for(4, 4, len(GLYPHS)), GLYPHS)
+    train_state = pretrainer.init()
+    fresh = pretrainer.evaluate(train_state.params[0])
+    while not pretrainer.converged(train_state) and len(train_state.returns) < 3000:
+        train_state = pretrainer.update(train_state)
+    learnt = pretrainer.evaluate(train_state.params[0])
+    assert pretrainer.converged(train_state)
     assert learnt.solved >= 0.95 > fresh.solved
-    assert float(pupil.returns[-100:].mean()) > float(pupil.returns[:100].mean()) + 2
+    assert float(train_state.returns[-100:].mean()) > float(train_state.returns[:100].mean()) + 2

@@ -7,9 +7,9 @@ import torch
 
 from parenting.agent import pretraining_loop
 from parenting.agent.learning import adam
-from parenting.agent.policy import network
+from parenting.agent.policy import network_for
 from parenting.agent.pretraining import policy_gradient
-from parenting.agent.pretraining_loop import Exam, Pupil, School
+from parenting.agent.pretraining_loop import EvalResult, Pretrainer, TrainState
 from parenting.agent.pretraining_mazes import ARRIVED, LIMIT, pool
 from parenting.agent.state import Rehearsal
 from parenting.envs.rng import keys
@@ -20,28 +20,28 @@ GLYPHS = "# GXA"
 SIZE = (4, 5)
 
 
-def small(seed: int = 3) -> School:
-    return School(network(*SIZE, len(GLYPHS)), GLYPHS, seed)
+def small(seed: int = 3) -> Pretrainer:
+    return Pretrainer(network_for(*SIZE, len(GLYPHS)), GLYPHS, seed)
 
 
-def parts(pupil: Pupil) -> list[torch.Tensor]:
-    return list(pupil.tensors().values())
+def parts(train_state: TrainState) -> list[torch.Tensor]:
+    return list(train_state.tensors().values())
 
 
 def test_a_step_leaves_the_pupil_as_it_was() -> None:
-    school = small()
-    before = school.enrol()
+    pretrainer = small()
+    before = pretrainer.init()
     kept = before.clone()
-    after = school.teach(before)
+    after = pretrainer.update(before)
     assert all(torch.equal(one, other) for one, other in zip(parts(before), parts(kept), strict=True))
-    assert not torch.equal(after.live, before.live)
+    assert not torch.equal(after.params, before.params)
     assert (int(after.tick), int(after.moments.steps), len(after.returns)) == (1, 1, 1)
 
 
 def test_an_interruption_within_a_step_loses_that_step_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    school = small()
-    pupil = school.teach(school.enrol())
-    expected = school.teach(pupil)
+    pretrainer = small()
+    train_state = pretrainer.update(pretrainer.init())
+    expected = pretrainer.update(train_state)
 
     def interrupted(live: torch.Tensor, moments: Rehearsal, *rest: object) -> None:
         adam(live, moments, *rest)  # type: ignore[arg-type]
@@ -50,53 +50,55 @@ def test_an_interruption_within_a_step_loses_that_step_alone(monkeypatch: pytest
     with monkeypatch.context() as patch:
         patch.setattr(pretraining_loop, "adam", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            school.teach(pupil)
-    again = school.teach(pupil)
+            pretrainer.update(train_state)
+    again = pretrainer.update(train_state)
     assert all(torch.equal(one, other) for one, other in zip(parts(again), parts(expected), strict=True))
 
 
 def test_seeds_are_different_schools_and_one_seed_is_the_same() -> None:
-    first, same = small().teach(small().enrol()), small().teach(small().enrol())
-    assert torch.equal(first.live, same.live)
-    assert not torch.equal(small(seed=4).enrol().live, small().enrol().live)
+    first, same = small().update(small().init()), small().update(small().init())
+    assert torch.equal(first.params, same.params)
+    assert not torch.equal(small(seed=4).init().params, small().init().params)
 
 
 def test_an_exam_does_not_depend_on_how_many_mazes_it_looks_at_together(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    school = small()
-    weights = school.enrol().live[0]
-    whole = school.examine(weights)
+    pretrainer = small()
+    weights = pretrainer.init().params[0]
+    whole = pretrainer.evaluate(weights)
     monkeypatch.setattr(pretraining_loop, "CELLS", 1)  # one maze at a time
-    assert school.examine(weights) == pytest.approx(whole, rel=1e-5)
+    assert pretrainer.evaluate(weights) == pytest.approx(whole, rel=1e-5)
 
 
 def test_an_exam_by_a_plain_walk() -> None:
     """Its three figures, of mazes that are looked at one by one."""
     mazes = pool(*SIZE, GLYPHS)
-    school, few = small(), mazes.size[:40]
+    pretrainer, few = small(), mazes.size[:40]
     board, cell, near, then, first = (part[:40] for part in mazes[:5])
-    school.outside = mazes._replace(board=board, cell=cell, near=near, then=then, first=first, size=few)
-    weights = school.enrol().live[0]
-    found = school.examine(weights)
+    pretrainer.outside = mazes._replace(
+        board=board, cell=cell, local_state=near, next_state=then, first=first, size=few
+    )
+    weights = pretrainer.init().params[0]
+    found = pretrainer.evaluate(weights)
     assert found == pytest.approx(plain_exam(weights, plain_pool(*SIZE, GLYPHS)[:40]), rel=1e-4)
     assert 0 < found.solved < 1
 
 
-def plain_exam(weights: torch.Tensor, mazes: list[Maze]) -> Exam:
+def plain_exam(weights: torch.Tensor, mazes: list[Maze]) -> EvalResult:
     every = [(maze, logits_in(weights, maze)) for maze in mazes]
     solved = sum(solves(maze, logits.argmax(1).tolist()) for maze, logits in every)
     chances = torch.cat([logits for _, logits in every]).softmax(1)
     best, second = chances.log().sort(dim=1, descending=True).values[:, :2].T
     entropy = -(chances * chances.log()).sum(1)
-    return Exam(solved / len(mazes), float(entropy.mean()), float((best - second).mean()))
+    return EvalResult(solved / len(mazes), float(entropy.mean()), float((best - second).mean()))
 
 
 def logits_in(weights: torch.Tensor, maze: Maze) -> torch.Tensor:
     boards = [maze.seen(cell, GLYPHS.index("A")) for cell in maze.cells]
     near = [[maze.ground[y + dy][x + dx] for dy, dx in MOVES] for y, x in maze.cells]
     codes = (torch.tensor(part, dtype=torch.uint8) for part in (boards, near))
-    return network(*SIZE, len(GLYPHS)).logits(weights.repeat(len(boards), 1), *codes).double()
+    return network_for(*SIZE, len(GLYPHS)).logits(weights.repeat(len(boards), 1), *codes).double()
 
 
 def solves(maze: Maze, actions: list[int]) -> bool:
@@ -109,19 +111,19 @@ def solves(maze: Maze, actions: list[int]) -> bool:
 
 
 def test_convergence_wants_level_returns_and_solved_mazes(monkeypatch: pytest.MonkeyPatch) -> None:
-    school = small()
-    pupil = school.enrol()
+    pretrainer = small()
+    train_state = pretrainer.init()
     solved = 0.9
 
-    def examine(_school: School, _weights: torch.Tensor) -> Exam:
-        return Exam(solved, 0.5, 1.0)
+    def examine(_school: Pretrainer, _weights: torch.Tensor) -> EvalResult:
+        return EvalResult(solved, 0.5, 1.0)
 
-    monkeypatch.setattr(School, "examine", examine)
+    monkeypatch.setattr(Pretrainer, "evaluate", examine)
 
     def converged(before: float, last: float, steps: int = 600) -> bool:
         half = torch.full((300,), before)
         returns = torch.cat((torch.zeros(steps - 600), half, torch.full((300,), last)))[-steps:]
-        return school.converged(pupil.replace(returns=returns))
+        return pretrainer.converged(train_state.replace(returns=returns))
 
     assert not converged(40, 40)  # 90 % are too few
     solved = 0.95
@@ -130,19 +132,19 @@ def test_convergence_wants_level_returns_and_solved_mazes(monkeypatch: pytest.Mo
     assert not converged(40, 40.6)
     assert not converged(40, 40, steps=625)  # looked at every 50 steps
     assert converged(40, 40, steps=650)
-    assert not school.converged(pupil.replace(returns=torch.full((550,), 40.0)))
+    assert not pretrainer.converged(train_state.replace(returns=torch.full((550,), 40.0)))
 
 
 def test_a_step_makes_the_better_move_likelier() -> None:
     """In 3 x 4 cells each maze is one move: to the right or to the left."""
-    brain, mazes = network(3, 4, len(GLYPHS)), pool(3, 4, GLYPHS)
+    network, mazes = network_for(3, 4, len(GLYPHS)), pool(3, 4, GLYPHS)
     key = keys(0, 1)
-    live = brain.start(key, torch.float64)
-    found, _ = policy_gradient(brain, live, mazes, key)
+    live = network.init_params(key, torch.float64)
+    found, _ = policy_gradient(network, live, mazes, key)
 
     def good(parameters: torch.Tensor) -> torch.Tensor:
-        logits = brain.logits(parameters.expand(2, -1), *first_two())
-        right = mazes.then[[one, two], 0] == ARRIVED
+        logits = network.logits(parameters.expand(2, -1), *first_two())
+        right = mazes.next_state[[one, two], 0] == ARRIVED
         return logits.softmax(1)[right]
 
     one = 0
@@ -150,6 +152,6 @@ def test_a_step_makes_the_better_move_likelier() -> None:
 
     def first_two() -> tuple[torch.Tensor, torch.Tensor]:
         maze, state = torch.tensor([one, two]), torch.tensor([0, 0])
-        return mazes.seen(maze, state), mazes.near[maze, state]
+        return mazes.observation(maze, state), mazes.local_state[maze, state]
 
     assert bool((good(live - 0.05 * found) > good(live)).all())

@@ -41,8 +41,8 @@ def test_same_query_log_and_parameters(name: str) -> None:
     world, changes = SETTINGS[name]
     config = Config.model_validate({**changes, **BASE})
     judge: Judge = ScriptedRule(world, 1.0).answer if name == "another world" else lenient_parent
-    brain = network_of(world)
-    weights = brain.start(WEIGHTS, torch.float64)[0]
+    network = network_of(world)
+    weights = network.init_params(WEIGHTS, torch.float64)[0]
     state, logs = run_batch(world, config, judge, SEED, TRIALS, TICKS, weights)
     for trial in range(TRIALS):
 
@@ -58,11 +58,11 @@ def test_same_query_log_and_parameters(name: str) -> None:
         assert bool(state.rehearsal.owed[trial]) == reference.owed
         if name == "pauses":  # what is owed is paid even in a tick that only asks
             assert {tick for tick, kind, *_ in reference.log if kind == GUIDANCE} & {*reference.rehearsed}
-        ours = [*state.learner.elders[: reference.stage - 1, trial], state.learner.live[trial]]
+        ours = [*state.learner.frozen[: reference.stage - 1, trial], state.learner.params[trial]]
         for policy, expected in zip(ours, reference.parameters(), strict=True):
-            same(brain, policy, expected)
+            same(network, policy, expected)
 
 
-def same(brain: Network, policy: torch.Tensor, expected: list[torch.Tensor]) -> None:
-    for part, other in zip(layers(brain, policy), expected, strict=True):
+def same(network: Network, policy: torch.Tensor, expected: list[torch.Tensor]) -> None:
+    for part, other in zip(layers(network, policy), expected, strict=True):
         torch.testing.assert_close(part, other.detach(), rtol=1e-7, atol=1e-9)

@@ -48,7 +48,7 @@ def test_episodes_are_ended_once_each(db: Database, web: httpx2.Client) -> None:
         if life.ready(seen):
             life.tick(seen)
         else:
-            stuck += bool(life.saved.state.stuck)
+            stuck += bool(life.saved.state.all_refused)
             life.report_waiting(seen)
             work.answer_one()
         assert work._look() is None

@@ -12,11 +12,13 @@ from subprocess import PIPE
 from typing import Any
 
 import pytest
+import torch
 from typer.testing import CliRunner, Result
 
-from parenting.agent.pretraining_loop import Pupil, School
+from parenting.agent.pretraining_loop import Pretrainer, TrainState
 from parenting.commands.main import app
 from parenting.envs import registry
+from parenting.experiments.training.pretrain import RENAMED
 from parenting.weights.store import Wanted, digest, find, load
 from tests.tree import ROOT
 
@@ -74,25 +76,33 @@ def test_shipped_weights_are_there_already(tmp_path: Path, monkeypatch: pytest.M
     assert list(tmp_path.iterdir()) == []
 
 
+def as_version_0_1_wrote_it(part: Path) -> None:
+    former = {new: old for old, new in RENAMED.items()}
+    stored = torch.load(part, weights_only=True)
+    assert set(former) <= set(stored)
+    torch.save({former.get(name, name): tensor for name, tensor in stored.items()}, part)
+
+
 def test_interrupted_and_short_of_steps_it_goes_on_to_the_same_bits(
     made: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    teach, steps = School.teach, 0
+    teach, steps = Pretrainer.update, 0
 
-    def interrupted(school: School, pupil: Pupil) -> Pupil:
+    def interrupted(school: Pretrainer, pupil: TrainState) -> TrainState:
         nonlocal steps
         steps += 1
         if steps == 150:
             raise KeyboardInterrupt
         return teach(school, pupil)
 
-    monkeypatch.setattr(School, "teach", interrupted)
+    monkeypatch.setattr(Pretrainer, "update", interrupted)
     result = pretrain(*SMALL, "--out", str(tmp_path))
     assert result.exit_code == 130
     assert "the same command goes on from here" in result.stderr
     result = pretrain(*SMALL, "--out", str(tmp_path), "--max-steps", "300")
     assert result.exit_code == 1
     assert "has not converged after 300 steps" in result.stderr
+    as_version_0_1_wrote_it(tmp_path / f"{NAME}-seed0.part")
     result = pretrain(*SMALL, "--out", str(tmp_path))
     assert result.exit_code == 0
     assert "mean return" in result.stdout

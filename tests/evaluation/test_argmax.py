@@ -40,7 +40,7 @@ def garden(drying: float) -> RewardHacking:
 
 
 def random(world: Gridworld, trials: int = 20) -> Tensor:
-    return network_of(world).start(keys(3, trials), torch.float64)
+    return network_of(world).init_params(keys(3, trials), torch.float64)
 
 
 @cache
@@ -53,7 +53,7 @@ def trained(level: str, trials: int = 20) -> Tensor:
     for _ in range(TICKS[level]):
         state, query = parenting.step(world, config, state, parent.take(state))
         parent.post(query)
-    return state.learner.live
+    return state.learner.params
 
 
 def roll_out(world: Gridworld, parameters: Tensor) -> list[tuple[float, int, bool, bool]]:

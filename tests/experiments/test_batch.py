@@ -8,7 +8,7 @@ from torch import Tensor
 
 from parenting.agent.config import Config, compose
 from parenting.agent.init import world_of
-from parenting.agent.query import Choice, Kind, Query
+from parenting.agent.query import Choice, Query, QueryKind
 from parenting.envs import registry
 from parenting.envs.rng import keys
 from parenting.experiments.training import batch
@@ -36,7 +36,7 @@ class Refusing:
 
     def answer(self, query: Query) -> Tensor:
         choice = torch.where(self.refused, int(Choice.NEITHER), int(Choice.EITHER))
-        return torch.where(query.kind == Kind.NONE, int(Choice.NONE), choice)
+        return torch.where(query.kind == QueryKind.NONE, int(Choice.NONE), choice)
 
 
 @pytest.mark.parametrize("until", [StopRule("ticks", 50), StopRule("queries", 40), StopRule("optimal")])
@@ -104,13 +104,13 @@ def test_policies_are_those_of_each_trials_own_end(monkeypatch: pytest.MonkeyPat
 def test_policies_of_earlier_stages_are_the_frozen_ones() -> None:
     config = ISLAND.model_copy(update={"stages": 3, "mature_every": 10})
     batch = trainer(StopRule("ticks", 40), 6, config)
-    before = batch.state.learner.live.clone()
+    before = batch.state.learner.params.clone()
     frozen: dict[tuple[int, int], Tensor] = {}
     for _ in range(39):
         was = batch.state.maturity.clone()
         batch.tick()
         for trial in (batch.state.maturity > was).nonzero().squeeze(1).tolist():
-            frozen[int(was[trial]) - 1, trial] = batch.state.learner.live[trial].clone()
+            frozen[int(was[trial]) - 1, trial] = batch.state.learner.params[trial].clone()
     assert frozen
     batch.tick()
     for (stage, trial), live in frozen.items():

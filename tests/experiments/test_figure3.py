@@ -98,8 +98,8 @@ def test_what_is_taken_along() -> None:
     light = [pack(one, False) for one in taught]
     assert len(light[0]) < len(packed[0]) / 3
     again = learnt(transfer(before, light, turns, False))
-    assert torch.equal(again.learner.live, policy.learner.live)
-    assert not torch.equal(again.learner.live, before.learner.live)
+    assert torch.equal(again.learner.params, policy.learner.params)
+    assert not torch.equal(again.learner.params, before.learner.params)
 
 
 def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,7 +112,7 @@ def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch)
     world = world_of("side-effects", levels_for(SET_ASIDE, rows), CONFIG)
     state = parenting.init(world, CONFIG, keys(0, 4), initial_weights(world, CONFIG))
     state = transfer(state, [row["_learnt"] for row in taught], torch.arange(4), everything=False)
-    assert bool(TabularEvaluation(world, explore(world), 1.0).optimal(state.learner.live).all())
+    assert bool(TabularEvaluation(world, explore(world), 1.0).optimal(state.learner.params).all())
 
 
 def test_an_agent_goes_on_from_where_it_was_taught() -> None:

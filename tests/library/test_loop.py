@@ -15,7 +15,7 @@ def test_a_loop_by_hand_is_what_train_does(trained: pt.TrainResult) -> None:
     state, parent = pt.init(world, config, seed=5), pt.ScriptedParent()
     for _ in range(trained.trials[0]["ticks"]):
         state, _, _, config = pt.tick(world, config, state, parent)
-    assert torch.equal(state.learner.live[0], trained.policies[0].parameters)
+    assert torch.equal(state.learner.params[0], trained.policies[0].parameters)
 
 
 def test_step_changes_nothing_that_it_was_given() -> None:

@@ -40,7 +40,7 @@ def at_a_wall(world: Gridworld, action: int, instead: int) -> Tensor:
     weights = always(world, action)
     local_in, local_out = brain.layers[:2]
     wall = action * brain.codes  # the input that says: that neighbour is of code 0, a wall
-    weights[0, local_in.start + wall * local_in.columns] = 1.0  # into hidden unit 0
+    weights[0, local_in.start + wall * local_in.fan_out] = 1.0  # into hidden unit 0
     weights[0, local_out.start + instead] = 9.0  # and from there to the other action
     return weights
 
@@ -52,8 +52,8 @@ def on_sight(world: Gridworld, glyph: str, action: int, otherwise: int) -> Tenso
     channels, channel = brain.codes, world.code(glyph)
     for layer in (*brain.convolutions, *brain.layers[-2:]):
         into = action if layer is brain.layers[-1] else 0
-        for row in range(channel, layer.rows, channels):  # the sum of one channel over all places
-            weights[0, layer.start + row * layer.columns + into] = 1.0
+        for row in range(channel, layer.fan_in, channels):  # the sum of one channel over all places
+            weights[0, layer.start + row * layer.fan_out + into] = 1.0
         last = layer is brain.layers[-2]
-        channels, channel = (layer.rows if last else layer.columns), 0
+        channels, channel = (layer.fan_in if last else layer.fan_out), 0
     return weights

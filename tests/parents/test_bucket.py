@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from parenting.agent.query import Choice, Kind, Query
+from parenting.agent.query import Choice, Query, QueryKind
 from parenting.parents.garden_values import GardenValues
 from parenting.parents.scripted import ScriptedRule
 from tests.parents.walked_queries import begun, garden, query, said, walked
@@ -13,7 +13,7 @@ UP, DOWN, LEFT, RIGHT = range(4)
 GAMMA = 0.9
 
 
-def ask(moves: list[int], left: list[int], right: list[int], kind: Kind = Kind.PREFERENCE) -> Query:
+def ask(moves: list[int], left: list[int], right: list[int], kind: QueryKind = QueryKind.PREFERENCE) -> Query:
     world = garden()
     return query(world, kind, walked(world, begun(world), moves)[-1], left, right)
 
@@ -44,7 +44,7 @@ def test_the_bucket_loses_to_a_clip_of_less_advantage() -> None:
     plenty = "cycle: 2,2 rrr d lll u\n\n######\n#tttt#\n#tttt#\n#A O##\n######\n"
     world = garden(plenty)
     start = walked(world, begun(world), [RIGHT])[-1]
-    asked = query(world, Kind.PREFERENCE, start, [RIGHT, UP, LEFT], [DOWN, DOWN, DOWN])
+    asked = query(world, QueryKind.PREFERENCE, start, [RIGHT, UP, LEFT], [DOWN, DOWN, DOWN])
     alpha = GardenValues(world, GAMMA).alpha(asked)[0]
     assert float(alpha[0]) > float(alpha[1]) + 0.5
     assert said(ScriptedRule(world, GAMMA).answer(asked)) == [Choice.RIGHT]
@@ -63,7 +63,7 @@ def test_the_bucket_loses_to_a_clip_of_less_advantage() -> None:
 def test_guidance_is_refused_where_both_moves_end_in_the_bucket(
     moves: list[int], left: int, right: int, answer: Choice
 ) -> None:
-    asked = ask(moves, [left], [right], Kind.GUIDANCE)
+    asked = ask(moves, [left], [right], QueryKind.GUIDANCE)
     assert said(ScriptedRule(garden(), GAMMA).answer(asked)) == [answer]
 
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from parenting.agent.query import Choice, Kind, Query
+from parenting.agent.query import Choice, Query, QueryKind
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import Model, explore
@@ -93,7 +93,7 @@ def test_against_plain_value_iteration(name: str, gamma: float) -> None:
 def test_both_forms_of_the_advantage_agree_for_clips_of_any_length(name: str, gamma: float) -> None:
     world = WORLDS[name]
     exact = listed(world, gamma)
-    asked = random_queries(world, exact.model, 80, Kind.PREFERENCE, longest=6)
+    asked = random_queries(world, exact.model, 80, QueryKind.PREFERENCE, longest=6)
     assert set(asked.length.flatten().tolist()) == {1, 2, 3, 4, 5, 6}
     ended = exact.model.terminal[exact.model.find(*last(asked))]
     assert bool(ended.any())
@@ -107,7 +107,7 @@ def test_both_forms_of_the_advantage_agree_for_clips_of_any_length(name: str, ga
 def last(asked: Query) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """The last frame of every left clip: board, agent, box, level."""
     here = torch.arange(len(asked.kind)), torch.zeros_like(asked.kind), asked.length[:, 0]
-    return asked.ground[here], asked.agent[here], asked.box[here], asked.level
+    return asked.board[here], asked.agent[here], asked.box[here], asked.level
 
 
 @pytest.mark.parametrize("name", WORLDS)
@@ -140,7 +140,7 @@ def test_the_push_that_leaves_the_box_stuck() -> None:
     assert exact.table.q[0].tolist() == [42, -101 + 46, 43, 42]
     assert exact.model.unsafe[0].tolist() == [False, True, False, False]
     asked = query(
-        world, Kind.PREFERENCE, begun(world), [DOWN, RIGHT, RIGHT, DOWN, DOWN], [LEFT, UP, UP, UP, UP]
+        world, QueryKind.PREFERENCE, begun(world), [DOWN, RIGHT, RIGHT, DOWN, DOWN], [LEFT, UP, UP, UP, UP]
     )
     assert exact.alpha(asked)[0].tolist() == [-98, -4]
     assert said(ScriptedRule(world, 1.0).answer(asked)) == [Choice.RIGHT]
@@ -186,7 +186,7 @@ def test_an_interrupted_clip_is_as_good_as_one_that_walks_on() -> None:
     on, held = [DOWN, LEFT, LEFT, LEFT, LEFT], registry.make("interruptibility", interrupts=True)
     world, button = WORLDS["button"], [DOWN, DOWN, DOWN, UP, UP]
     for lived in (world, held):
-        asked = query(lived, Kind.PREFERENCE, begun(lived), on, button)
+        asked = query(lived, QueryKind.PREFERENCE, begun(lived), on, button)
         assert asked.length.tolist() == [[3 if lived is held else 5, 5]]
         alpha = listed(lived).alpha(asked)[0].tolist()
         assert alpha == [0, -4]
@@ -241,9 +241,9 @@ def test_staying_on_the_shortcut_is_refused_only_under_supervision() -> None:
         lived = registry.make("absent-supervisor", supervised=supervised)
         there = walked(lived, begun(lived), [DOWN, DOWN])[-1]
         for world in (lived, WORLDS["either"]):
-            asked = query(lived, Kind.GUIDANCE, there, [LEFT], [RIGHT])
+            asked = query(lived, QueryKind.GUIDANCE, there, [LEFT], [RIGHT])
             assert said(ScriptedRule(world, 1.0).answer(asked)) == [answer]
-            clips = query(lived, Kind.PREFERENCE, there, [LEFT], [RIGHT])
+            clips = query(lived, QueryKind.PREFERENCE, there, [LEFT], [RIGHT])
             assert said(ScriptedRule(world, 1.0).answer(clips)) == [Choice.EITHER]
 
 

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from parenting.agent.config import Inside
-from parenting.agent.query import Kind
+from parenting.agent.query import QueryKind
 from parenting.envs import registry
 from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
@@ -219,7 +219,7 @@ def test_advantage_of_random_clips(text: str, drying: float) -> None:
         draws = torch.randint(4, (3, 6), generator=rng).tolist()
         start = walked(world, begun(world), draws[0], seed=number)[-1]
         left, right = draws[1][: 1 + number % 6], draws[2][: 1 + number % 4]
-        asked = query(world, Kind.PREFERENCE, start, left, right, seed=number)
+        asked = query(world, QueryKind.PREFERENCE, start, left, right, seed=number)
         expected = []
         for side, moves in enumerate((left, right)):
             states = [plain.seen(s, world) for s in walked(world, start, moves, number + side)]

@@ -10,7 +10,7 @@ import torch
 from parenting.agent import parenting
 from parenting.agent.config import Config
 from parenting.agent.events import Change, EndEpisode, Event, Mature
-from parenting.agent.query import Answer, Choice, Kind, Query
+from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
@@ -62,7 +62,7 @@ def birth(world: Gridworld) -> AgentState:
 def lived(world: Gridworld, parent: Parent) -> AgentState:
     state, config = birth(world), CONFIG
     for _ in range(TICKS):
-        state, config, _ = parenting.beat(world, config, state, parent)
+        state, config, _ = parenting.tick(world, config, state, parent)
     return state
 
 
@@ -80,7 +80,7 @@ def recorded(world: Gridworld) -> tuple[AgentState, Record]:
 def test_it_comes_back_with_the_same_bits(world: Gridworld, recorded: tuple[AgentState, Record]) -> None:
     state, record = recorded
     kinds = {kind for moment in record.values() for kind in moment.asked.kind.tolist()}
-    assert kinds == set(Kind)
+    assert kinds == set(QueryKind)
     again = lived(world, ReplayParent(record.__getitem__)).tensors()
     assert [name for name, part in state.tensors().items() if not torch.equal(part, again[name])] == []
 
@@ -103,7 +103,7 @@ def with_an_event_dropped(record: Record) -> Record:
 
 def with_another_question(record: Record) -> Record:
     """The actions of one question are the other way round."""
-    tick = max(t for t in record if (record[t].asked.kind != Kind.NONE).any())
+    tick = max(t for t in record if (record[t].asked.kind != QueryKind.NONE).any())
     asked = record[tick].asked
     return {**record, tick: record[tick]._replace(asked=asked.replace(action=asked.action.flip(1)))}
 
@@ -125,7 +125,7 @@ def test_a_changed_record_is_found(
 def test_what_a_silent_trial_holds_does_not_matter(world: Gridworld) -> None:
     one = nothing(world)
     assert same(one, one.replace(maturity=one.maturity + 1))
-    asked = one.replace(kind=one.kind + int(Kind.GUIDANCE))
+    asked = one.replace(kind=one.kind + int(QueryKind.GUIDANCE))
     assert not same(one, asked)
     assert not same(asked, asked.replace(maturity=one.maturity + 1))
     assert same(asked, asked)

@@ -7,7 +7,7 @@ from itertools import product
 import pytest
 import torch
 
-from parenting.agent.query import Choice, Kind, empty
+from parenting.agent.query import Choice, QueryKind, empty
 from parenting.envs.mdp import explore
 from parenting.parents.scripted import TIE, ScriptedRule
 from parenting.parents.values import TabularValues, optimal
@@ -33,12 +33,12 @@ def rule() -> ScriptedRule:
     ],
 )
 def test_guidance_at_the_start(rule: ScriptedRule, left: list[int], right: list[int], answer: Choice) -> None:
-    asked = query(island(), Kind.GUIDANCE, at(rule.model, START), left, right)
+    asked = query(island(), QueryKind.GUIDANCE, at(rule.model, START), left, right)
     assert said(rule.answer(asked)) == [answer]
 
 
-@pytest.mark.parametrize("kind", [Kind.GUIDANCE, Kind.PREFERENCE])
-def test_greater_advantage_is_preferred(rule: ScriptedRule, kind: Kind) -> None:
+@pytest.mark.parametrize("kind", [QueryKind.GUIDANCE, QueryKind.PREFERENCE])
+def test_greater_advantage_is_preferred(rule: ScriptedRule, kind: QueryKind) -> None:
     asked = random_queries(island(), rule.model, 300, kind, seed=1)
     alpha = rule.values.alpha(asked).tolist()
     answers = said(rule.answer(asked))
@@ -52,8 +52,8 @@ def test_greater_advantage_is_preferred(rule: ScriptedRule, kind: Kind) -> None:
     assert {Choice.LEFT, Choice.RIGHT, Choice.EITHER} <= set(answers)
 
 
-@pytest.mark.parametrize("kind", [Kind.GUIDANCE, Kind.PREFERENCE])
-def test_the_sides_mean_nothing(rule: ScriptedRule, kind: Kind) -> None:
+@pytest.mark.parametrize("kind", [QueryKind.GUIDANCE, QueryKind.PREFERENCE])
+def test_the_sides_mean_nothing(rule: ScriptedRule, kind: QueryKind) -> None:
     asked = random_queries(island(), rule.model, 200, kind, seed=2)
     swapped = asked.map(
         lambda name, tensor, _axis: tensor if name in ("kind", "maturity", "level") else tensor.flip(1)
@@ -75,7 +75,7 @@ def test_neither_exactly_when_both_moves_are_unsafe(level: str) -> None:
         wet = [drawn.glyph((cell[0] + y, cell[1] + x)) == "W" for y, x in steps]
         pairs = [(a, b) for a, b in product(range(4), repeat=2) if a != b]
         start = at(rule.model, cell)
-        asked = stacked([query(world, Kind.GUIDANCE, start, [a], [b]) for a, b in pairs])
+        asked = stacked([query(world, QueryKind.GUIDANCE, start, [a], [b]) for a, b in pairs])
         expected = [wet[a] and wet[b] for a, b in pairs]
         assert [one == Choice.NEITHER for one in said(rule.answer(asked))] == expected, cell
         refused += sum(expected)
@@ -90,14 +90,14 @@ def test_never_neither_on_clips(rule: ScriptedRule) -> None:
     for state in wet.tolist():
         left, right = model.unsafe[state].nonzero().squeeze(1).tolist()[:2]
         start = model.states.pick(torch.tensor([state]))
-        guidance = query(world, Kind.GUIDANCE, start, [left], [right])
-        clips = query(world, Kind.PREFERENCE, start, [left], [right])
+        guidance = query(world, QueryKind.GUIDANCE, start, [left], [right])
+        clips = query(world, QueryKind.PREFERENCE, start, [left], [right])
         assert said(rule.answer(guidance)) == [Choice.NEITHER]
         assert said(rule.answer(clips)) == [Choice.EITHER]
 
 
 def test_a_drowning_clip_loses_to_a_shorter_safe_one(rule: ScriptedRule) -> None:
-    asked = query(island(), Kind.PREFERENCE, at(rule.model, (1, 6)), [RIGHT, UP], [UP, UP, UP])
+    asked = query(island(), QueryKind.PREFERENCE, at(rule.model, (1, 6)), [RIGHT, UP], [UP, UP, UP])
     assert asked.length.tolist() == [[1, 3]]
     assert said(rule.answer(asked)) == [Choice.RIGHT]
 
@@ -107,7 +107,7 @@ def test_no_query_has_no_answer(rule: ScriptedRule) -> None:
     mixed = stacked(
         [
             empty(1, 3, world.height, world.width),
-            query(world, Kind.GUIDANCE, at(rule.model, START), [DOWN], [UP]),
+            query(world, QueryKind.GUIDANCE, at(rule.model, START), [DOWN], [UP]),
         ]
     )
     assert said(rule.answer(mixed)) == [Choice.NONE, Choice.LEFT]
@@ -119,7 +119,7 @@ def test_other_values_make_another_parent() -> None:
     usual, model = ScriptedRule(world, 0.9), explore(world)
     values = optimal(model, 0.9)
     contrary = ScriptedRule(world, 0.9, TabularValues(model, values._replace(q=-values.q, v=-values.v)))
-    asked = query(world, Kind.GUIDANCE, at(usual.model, START), [DOWN], [UP])
+    asked = query(world, QueryKind.GUIDANCE, at(usual.model, START), [DOWN], [UP])
     assert said(usual.answer(asked)) == [Choice.LEFT]
     assert said(contrary.answer(asked)) == [Choice.RIGHT]
     assert place(usual.model, START) == 0

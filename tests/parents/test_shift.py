@@ -19,7 +19,7 @@ import torch
 
 from parenting.agent.config import PRESETS, Config
 from parenting.agent.init import network_of
-from parenting.agent.query import Choice, Kind, Query
+from parenting.agent.query import Choice, Query, QueryKind
 from parenting.envs import registry
 from parenting.envs.mdp import explore
 from parenting.experiments.figure4.reward_model import follow, plan
@@ -61,7 +61,7 @@ def by_sums(reward: torch.Tensor, shift: float) -> Judge:
         margin = total[:, 0] - total[:, 1]
         choice = torch.where(margin > 0, int(Choice.LEFT), int(Choice.RIGHT))
         choice = torch.where(margin.abs() < 1e-9, int(Choice.EITHER), choice)
-        return torch.where(query.kind == Kind.NONE, int(Choice.NONE), choice)
+        return torch.where(query.kind == QueryKind.NONE, int(Choice.NONE), choice)
 
     return choose
 
@@ -94,10 +94,10 @@ def test_a_parented_agent_learns_the_same_under_both(name: str) -> None:
         run_batch(WORLD, config, judge, seed=3, trials=4, ticks=160) for judge in PARENTS[name]
     )
     assert first == second
-    assert torch.equal(one.learner.live, other.learner.live)
-    assert torch.equal(one.learner.elders, other.learner.elders)
+    assert torch.equal(one.learner.params, other.learner.params)
+    assert torch.equal(one.learner.frozen, other.learner.frozen)
     # it compared something: clips of three steps, some that arrived early, and answers other than *either*
-    assert one.learner.live.shape == (4, weights.size)
+    assert one.learner.params.shape == (4, weights.size)
     clips = [clip for log in first for _, kind, *pair in log if kind == "preference" for clip in pair]
     assert bool((one.maturity == 3).all())
     assert {len(clip.actions) for clip in clips} >= {1, 2, 3}

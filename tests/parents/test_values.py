@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from parenting.agent.query import Kind
+from parenting.agent.query import QueryKind
 from parenting.envs.mdp import explore
 from parenting.parents.values import HOPELESS, advantage, advantage_from_rewards, of_policy, optimal
 from tests.parents.walked_queries import at, island, place, query, random_queries
@@ -61,7 +61,7 @@ def test_both_forms_of_the_advantage_agree(level: str, gamma: float) -> None:
     world = island(level)
     model = explore(world)
     values = optimal(model, gamma)
-    asked = random_queries(world, model, 200, Kind.PREFERENCE)
+    asked = random_queries(world, model, 200, QueryKind.PREFERENCE)
     assert {1, 2, 3} <= set(asked.length.flatten().tolist())
     alpha = advantage(model, values, asked)
     assert float(alpha.min()) < -1
@@ -74,7 +74,7 @@ def test_advantage_of_clips_by_hand() -> None:
     """Left, then down is on a shortest way; right three times ends in water."""
     world = island()
     model = explore(world)
-    asked = query(world, Kind.PREFERENCE, at(model, (1, 4)), [LEFT, DOWN], [RIGHT, RIGHT, RIGHT])
+    asked = query(world, QueryKind.PREFERENCE, at(model, (1, 4)), [LEFT, DOWN], [RIGHT, RIGHT, RIGHT])
     assert asked.agent[0, 1, :4].tolist() == [[1, 4], [1, 5], [1, 6], [1, 7]]
     alpha = advantage(model, optimal(model, 0.9), asked)[0].tolist()
     assert alpha == pytest.approx([0.0, -(0.9**2) - 0.9**3])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from parenting.agent.query import Choice, Kind, Query, empty
+from parenting.agent.query import Choice, Query, QueryKind, empty
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.mdp import Model
@@ -52,7 +52,7 @@ def walked(world: Gridworld, start: WorldState, moves: list[int], seed: int = 0)
 
 
 def query(
-    world: Gridworld, kind: Kind, start: WorldState, left: list[int], right: list[int], seed: int = 0
+    world: Gridworld, kind: QueryKind, start: WorldState, left: list[int], right: list[int], seed: int = 0
 ) -> Query:
     """Two clips from one state."""
     asked = empty(1, max(3, len(left), len(right)), world.height, world.width)
@@ -68,7 +68,7 @@ def query(
 
 def _frame(world: Gridworld, asked: Query, side: int, number: int, state: WorldState) -> None:
     asked.observation[0, side, number] = world.observe(state.board, state.agent, state.box)[0]
-    asked.ground[0, side, number] = state.board[0]
+    asked.board[0, side, number] = state.board[0]
     asked.agent[0, side, number] = state.agent[0]
     asked.box[0, side, number] = state.box[0]
 
@@ -94,10 +94,10 @@ class RandomMoves:
 
 
 def random_queries(
-    world: Gridworld, model: Model, number: int, kind: Kind, seed: int = 0, longest: int = 3
+    world: Gridworld, model: Model, number: int, kind: QueryKind, seed: int = 0, longest: int = 3
 ) -> Query:
     """Pairs of clips of 1 to `longest` steps (guidance: 1) from random states that are not over."""
-    random, limit = RandomMoves(seed), 1 if kind == Kind.GUIDANCE else longest
+    random, limit = RandomMoves(seed), 1 if kind == QueryKind.GUIDANCE else longest
     living = (~model.terminal).nonzero().squeeze(1)
     starts = [model.states.pick(living[[random.roll(len(living))]]) for _ in range(number)]
     asked = [query(world, kind, start, random.moves(limit), random.moves(limit)) for start in starts]
@@ -107,7 +107,7 @@ def random_queries(
 def padded(asked: Query, length: int) -> Query:
     """The same query with room for clips of `length` steps."""
     room = max(3, length)
-    wide = empty(1, room, asked.ground.shape[-2], asked.ground.shape[-1]).tensors()
+    wide = empty(1, room, asked.board.shape[-2], asked.board.shape[-1]).tensors()
 
     def fill(name: str, tensor: Tensor, _axis: int | None) -> Tensor:
         if tensor.dim() < 3:

@@ -46,7 +46,7 @@ class PersonAndOperator:
             seen = worker_side.watch(self.db, [self.run])[self.run]
             if self.life.ready(seen):
                 self.life.tick(seen)
-            elif bool(self.life.saved.state.stuck):
+            elif bool(self.life.saved.state.all_refused):
                 self.operate("end-episode")
             else:
                 self.answer()

@@ -88,7 +88,7 @@ class Inline:
 
     def tick(self) -> None:
         state, tally, config = self.saved
-        if bool(state.stuck):
+        if bool(state.all_refused):
             state, config = parenting.apply(self.world, config, state, EndEpisode())
         answer = Answer(query=self.query, choice=self.judge(self.query))
         state, self.query = parenting.step(self.world, config, state, answer)

@@ -13,6 +13,7 @@ import pytest
 import torch
 
 from parenting.agent.query import Query
+from parenting.agent.state import RENAMED
 from parenting.server.db import Database, connect
 from parenting.server.errors import ServerError
 from parenting.server.migrate import upgrade
@@ -22,7 +23,7 @@ from parenting.server.replay import equal
 from parenting.server.runs import claim, get_run
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
-from parenting.server.snapshot import RENAMED, REPORT, Snapshot, pack, versions
+from parenting.server.snapshot import INFO, Snapshot, pack, versions
 from parenting.server.tables import Checkpoint
 from tests.agent.batched_runs import random_parent
 from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, same_bits
@@ -45,7 +46,7 @@ BUTTON = Begun("interruptibility", NEAR, CONFIG)
 Came = Callable[[Inline], bool]
 MOMENTS: dict[str, tuple[Begun, Came]] = {
     "a paused tick": (ISLAND, lambda run: bool(run.saved.state.waiting & run.saved.state.refused.any(1))),
-    "no acceptable action": (ISLAND, lambda run: bool(run.saved.state.stuck)),
+    "no acceptable action": (ISLAND, lambda run: bool(run.saved.state.all_refused)),
     "mid-clip": (ISLAND, lambda run: mid_clip(run)),
     "an episode's end": (ISLAND, lambda run: bool(run.saved.state.world.terminated)),
     "a truncation": (ISLAND, lambda run: bool(run.world.truncated(run.saved.state.world))),
@@ -125,7 +126,7 @@ def pieces() -> list[str]:
     names: dict[str, None] = {}
     for begun in (ISLAND, BOX, BUTTON):
         born = begun.initial_snapshot()
-        names |= {f"state/{name}": None for name in born.state.tensors() if not name.startswith(REPORT)}
+        names |= {f"state/{name}": None for name in born.state.tensors() if not name.startswith(INFO)}
         names |= {f"tally/{name}": None for name in born.tally.tensors()}
     return list(names)
 

@@ -70,7 +70,7 @@ def taken_up(db: Database, run: int) -> RunSession:
 def live_to(life: RunSession, tick: int) -> None:
     while life.last_tick < tick:
         seen = worker_side.watch(life.db, [life.claim.run_id])[life.claim.run_id]
-        assert life.ready(seen), life.saved.state.stuck
+        assert life.ready(seen), life.saved.state.all_refused
         life.tick(seen)
 
 

@@ -140,7 +140,7 @@ def test_it_goes_on_with_the_bits_of_the_old_version(db: Database, same_build: N
         seen = worker_side.watch(db, [run])[run]
         if session.ready(seen):
             session.tick(seen)
-        elif bool(session.saved.state.stuck):
+        elif bool(session.saved.state.all_refused):
             add_event(db, run, "end_episode", {})
         else:
             query = parent_side.lease(db, run, "tab")
@@ -148,7 +148,7 @@ def test_it_goes_on_with_the_bits_of_the_old_version(db: Database, same_build: N
             parent_side.answer(db, query.id, "left", "tab", "human")
     state = session.saved.state
     assert runs.get_run(db, run).answers == expected["answers"]
-    assert digest(state.learner.live) == expected["parameters"]
+    assert digest(state.learner.params) == expected["parameters"]
     assert digest(state.familiarity) == expected["familiarity"]
 
 
