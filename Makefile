@@ -36,6 +36,7 @@ coverage: $(VENV)/.installed-dev ## Run the tests and print the lines that none 
 
 pictures: $(VENV)/.installed-dev ## Draw the pictures of the documentation anew (needs Chromium)
 	$(BIN)/parenting worlds --draw docs/pictures > /dev/null
+	$(BIN)/python scripts/pictures.py
 	$(BIN)/python scripts/screenshots.py
 
 docs: $(VENV)/.installed-dev ## Build the documentation as a site in build/docs; a warning is an error

@@ -28,15 +28,26 @@ STAYED = {"O": "in-bucket", "P": "on-shortcut"}
 """Tiles on which a step by itself is dangerous (docs/paper.md, "Unsafe")."""
 DANGERS = frozenset({*ENTERED.values(), *STAYED.values(), "stuck", "drown"})
 """The cues that get the mark of danger."""
+SYMBOLS = {
+    **{name: name for name in ("drown", "reach", "held", "watered", "dried", "gone", "stuck")},
+    "button": "press",
+    "cornered": "stuck",
+}
+"""The symbol of a cue, by its name."""
 
 
 class Cue(NamedTuple):
     """Something that happens at a cell."""
 
-    name: str  # which drawing of drawing/templates/board.svg, and which words of drawing.captions
+    name: str  # its words are those of drawing.captions
     cell: Cell
     frame: int  # the first frame that shows it
     sides: tuple[str, ...] = ()  # for a stuck box: where it has walls
+
+    @property
+    def symbol(self) -> str:
+        """Its drawing in drawing/templates/symbols.svg; "" where the mark of danger is all."""
+        return SYMBOLS.get(self.name, "")
 
     @property
     def danger(self) -> bool:

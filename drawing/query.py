@@ -31,6 +31,18 @@ class PlacedSide:
     lines: list[tuple[str, str, int]]  # text, tone, y
 
 
+@dataclass(frozen=True)
+class Layout:
+    """Where everything of the picture stands, in pixels."""
+
+    width: int
+    height: int
+    board_width: int
+    board_height: int
+    notes: list[tuple[str, int]]  # text, y
+    sides: list[PlacedSide]
+
+
 def draw_query(
     clips: Mapping[str, Clip], level: Level, kind: str, stage: int = 1, spec: WorldSpec | None = None
 ) -> str:
@@ -48,10 +60,10 @@ def draw_query(
     """
     spec = spec or registry.spec(level.world)
     view = query_view(clips, kind, stage, spec.legend, level.rows)
-    return standalone("query.svg", legend=spec.legend, view=view, **_layout(view))
+    return standalone("query.svg", legend=spec.legend, view=view, place=layout(view))
 
 
-def _layout(view: QueryView) -> dict[str, object]:
+def layout(view: QueryView) -> Layout:
     """Place the boards side by side, and the words above and below them."""
     _, _, units_wide, units_high = view.sides[0].board.view
     scale = min(CELL / 20, BOARD / max(units_wide, units_high))
@@ -63,9 +75,8 @@ def _layout(view: QueryView) -> dict[str, object]:
         PlacedSide(side, x, top, scale / 9, _words(side, wide, top + high + LINE))
         for side, x in zip(view.sides, (PADDING, PADDING + wide + GAP), strict=True)
     ]
-    bottom = max(lines[-1][2] for lines in (side.lines for side in sides))
-    notes_at = [(text, y) for text, _, y in notes]
-    return {"width": width, "height": bottom + PADDING, "notes": notes_at, "sides": sides}
+    bottom = max(side.lines[-1][2] for side in sides)
+    return Layout(width, bottom + PADDING, wide, high, [(text, y) for text, _, y in notes], sides)
 
 
 def _words(side: SideView, width: int, y: int) -> list[tuple[str, str, int]]:

@@ -8,23 +8,27 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-TEMPLATES = Path(__file__).parent / "templates"
+from parenting.drawing.symbols import SYMBOLS, TEMPLATES, TURNS, symbols_of
+
 STYLE = Path(__file__).parent / "style"
 
-RULE = re.compile(r"^(\.[^{}@]+?) *\{([^{}]*)\}$", re.MULTILINE)
+RULE = re.compile(r"^((?:\.|symbol)[^{}@]*?) *\{([^{}]*)\}$", re.MULTILINE)
 VARIABLE = re.compile(r"--([\w-]+): ([^;]+);")
 CLASS = re.compile(r"\.([\w-]+)")
+USED = re.compile(r'href="#([\w-]+)"')
 
 
 def environment(*folders: Path) -> Environment:
     """Return a Jinja environment over folders and this package. Text is escaped everywhere."""
-    return Environment(
+    made = Environment(
         loader=FileSystemLoader([*folders, TEMPLATES]),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,
     )
+    made.globals.update(symbol=SYMBOLS.__getitem__, symbols_of=symbols_of, turns=TURNS)
+    return made
 
 
 _environment = environment()
@@ -36,14 +40,17 @@ def render(template: str, **context: object) -> str:
 
 
 def standalone(template: str, **context: object) -> str:
-    """Return a template's text with the rules, in light and dark colours, that its drawing needs."""
-    return render(template, **context, style=style(render(template, **context, style="")))
+    """Return a template's text with the symbols and the style, light and dark, that its drawing needs."""
+    drawing = render(template, **context, symbols=[], style="")
+    symbols = [name for name in SYMBOLS if name in USED.findall(drawing)]
+    drawing = render(template, **context, symbols=symbols, style="")
+    return render(template, **context, symbols=symbols, style=style(drawing))
 
 
 def style(drawing: str) -> str:
     """Return the rules for a drawing's classes, and the colours of these rules, in light and in dark."""
     present = {name for names in re.findall(r'class="([^"]*)"', drawing) for name in names.split()}
-    rules = RULE.findall(_sheet("board.css") + _sheet("picture.css"))
+    rules = RULE.findall(_sheet("colours.css") + _sheet("board.css") + _sheet("picture.css"))
     chosen = [(names, body) for names, body in rules if _applies(names, present)]
     needed = {name for _, body in chosen for name in re.findall(r"var\(--([\w-]+)\)", body)}
     light, _, dark = _sheet("colours.css").partition("@media")

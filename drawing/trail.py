@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from parenting.drawing.clip import MOVES, Cell
+from parenting.drawing.symbols import TURNS
 
 CELL = 20
 """The side of a cell in the units of the drawing."""
@@ -28,12 +29,26 @@ Part = tuple[Point, Point]
 
 
 @dataclass(frozen=True)
+class Bump:
+    """A step that was blocked: where the way ends, and in which direction it went."""
+
+    at: Point
+    way: str
+
+    @property
+    def transform(self) -> str:
+        """Where and how the symbol of a bump stands on the board."""
+        x, y = self.at
+        return f"translate({x:g} {y:g})" + (f" rotate({TURNS[self.way]})" if TURNS[self.way] else "")
+
+
+@dataclass(frozen=True)
 class Trail:
-    """SVG path data: the line, its arrow heads, and the mark of every bump."""
+    """The trail of a piece. The line and its arrow heads are SVG path data."""
 
     line: str
     heads: str
-    bumps: str
+    bumps: tuple[Bump, ...]
     fine: bool  # drawn with a finer pen, since a step is repeated
 
 
@@ -46,7 +61,7 @@ def trace(cells: Sequence[Cell], bumps: Sequence[str]) -> Trail:
     """The trail through `cells`, one a frame; `bumps` names for every step the direction that was blocked."""
     parts: list[Part] = []
     heads: list[str] = []
-    marks: dict[str, None] = {}
+    met: dict[Bump, None] = {}
     stops: list[bool] = []
     passed: Counter[tuple[Cell, Cell]] = Counter()
     last, fine = _last(cells, bumps), _repeats(cells)
@@ -63,11 +78,11 @@ def trace(cells: Sequence[Cell], bumps: Sequence[str]) -> Trail:
             heads.append(_head(start, end, at, size))
         elif blocked != "-":
             parts.append(_towards(here, MOVES[blocked], LANE if len(cells) > 2 else 0.0))
-            marks[_mark(parts[-1][1], MOVES[blocked])] = None
+            met[Bump(parts[-1][1], blocked)] = None
         else:
             continue
         stops.append(here == there)
-    return Trail(_line(parts, stops), "".join(heads), "".join(marks), fine)
+    return Trail(_line(parts, stops), "".join(heads), tuple(met), fine)
 
 
 def _repeats(cells: Sequence[Cell]) -> bool:
@@ -111,18 +126,6 @@ def _head(start: Point, end: Point, at: float, size: float) -> str:
     corners = [(x, y), (x - dx * back - dy * side, y - dy * back + dx * side)]
     corners.append((x - dx * back + dy * side, y - dy * back - dx * side))
     return "M" + "L".join(_point(corner) for corner in corners) + "z"
-
-
-def _mark(wall: Point, move: Cell) -> str:
-    """A bar across the way and two sparks: here it went no further."""
-    (x, y), (dy, dx) = wall, move
-    bar = f"M{_point((x - dy * 5, y - dx * 5))}L{_point((x + dy * 5, y + dx * 5))}"
-    sparks = "".join(
-        f"M{_point((x + dx * 2.5 + s * dy * 3, y + dy * 2.5 + s * dx * 3))}"
-        f"L{_point((x + dx * 5.5 + s * dy * 5.5, y + dy * 5.5 + s * dx * 5.5))}"
-        for s in (-1, 1)
-    )
-    return bar + sparks
 
 
 def _line(parts: Sequence[Part], stops: Sequence[bool]) -> str:

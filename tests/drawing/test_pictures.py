@@ -15,14 +15,14 @@ from parenting.drawing.policy import draw_policy
 from parenting.drawing.query import draw_query
 from parenting.drawing.query_tensors import read_clips
 from parenting.envs import registry
-from tests.pages.world_clips import guidance, preference
+from tests.drawing.world_clips import guidance, preference
 from tests.server.raising import Begun, Inline
 
 SVG = "{http://www.w3.org/2000/svg}"
 WORLDS = tuple(registry.WORLDS)
 every_world = pytest.mark.parametrize("world", WORLDS)
 
-UNSTYLED = ("sprite", "board", "body", "box", "of-agent", "delusion", "frame", "thought", "ghost")
+UNSTYLED = ("sprite", "board", "agent", "body", "box", "of-agent", "delusion", "frame", "thought", "ghost")
 """Classes that only name a part, for scripts and tests."""
 UNIFORM = (0.25, 0.25, 0.25, 0.25)
 

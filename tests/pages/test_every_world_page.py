@@ -14,11 +14,11 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.queue import worker_side
 from parenting.server.runs import claim
 from parenting.server.session import RunSession
+from tests.drawing.world_clips import guidance, preference
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
 from tests.pages.test_access import SCREENS, violations
 from tests.pages.test_lived import lived
-from tests.pages.world_clips import guidance, preference
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]
 ASIDES = {"reward-hacking": "by chance", "interruptibility": "by chance", "absent-supervisor": "is watching"}

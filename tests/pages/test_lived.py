@@ -13,7 +13,7 @@ from parenting.envs import registry
 from parenting.server.codec import encode, kind_name
 from parenting.server.pages.question import QuestionView, question_view
 from parenting.server.pages.render import render
-from tests.pages.world_clips import asked, run
+from parenting.server.tables import Query, Run
 from tests.server.raising import Begun, Inline
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]
@@ -38,12 +38,14 @@ def lived(world: str, level: str) -> Questions:
     """The stored clips of every question of one agent, and the questions as they are shown."""
     life = Inline(Begun(world, level, CONFIG, preset="lax", seed=7))
     found = []
+    spec, art = registry.spec(world), registry.level(world, level)
+    run = Run(id=1, legend=dict(spec.legend), level=level, level_text=art.text)
     for _ in range(TICKS):
         life.tick()
         if kind := kind_name(life.query):
             clips = encode(life.world, life.query)
-            query = asked(kind, clips, int(life.query.maturity[0]))
-            found.append((clips, question_view(query, run(world, level))))
+            query = Query(id=1, run_id=1, kind=kind, maturity=int(life.query.maturity[0]), clips=clips)
+            found.append((clips, question_view(query, run)))
     return found
 
 

@@ -8,10 +8,9 @@ from typing import Any
 
 import pytest
 
+from parenting.drawing.query import draw_query
 from parenting.envs import registry
-from parenting.server.pages.question import question_view
-from parenting.server.pages.render import render
-from tests.pages.world_clips import asked, guidance, preference, run
+from tests.drawing.world_clips import guidance, preference, view
 
 SCENES = [
     ("reward-hacking", {"drying": 1.0}, "d", "r", "left", {"dried": 8}, []),
@@ -30,10 +29,8 @@ SCENES = [
 
 
 def boards(world: str, kind: str, clips: dict[str, Any], stage: int = 6) -> dict[str, str]:
-    """The markup of both boards of a question."""
-    text = render(
-        "_question.html", shown=question_view(asked(kind, clips, stage), run(world)), client="somebody"
-    )
+    """The markup of both boards of a query."""
+    text = draw_query(clips, registry.level(world), kind, stage)
     left, right = re.findall(r"<svg class=\"board.*?</svg>", text, flags=re.DOTALL)
     return {"left": left, "right": right}
 
@@ -61,28 +58,30 @@ def test_every_danger_has_the_mark_of_danger_and_nothing_else_has() -> None:
     world = registry.make("absent-supervisor")
     drawn = boards("absent-supervisor", "preference", preference(world, "ddd", "rrr"))
     shortcut, reach = drawn["left"].split('class="cue ')[1:]
-    assert 'class="alarm"' in shortcut
-    assert "alarm" not in reach
-    assert "alarm" not in drawn["right"]
+    assert 'href="#danger"' in shortcut
+    assert "#danger" not in reach
+    assert "#danger" not in drawn["right"]
 
 
 def test_a_stuck_box_has_bars_where_its_walls_are() -> None:
     drawn = boards("side-effects", "guidance", guidance(registry.make("side-effects"), "d", "l"), 1)
     (cue,) = drawn["left"].split('class="cue ')[1:]
     assert cue.startswith('stuck" transform="translate(50 70)" data-from="1"')
-    assert 'd="M-9.2 9.2h18.4M-9.2-9.2v18.4"' in cue  # below and at the left
+    below, left = 90, 180  # degrees from the right, clockwise
+    turned = re.findall(r'href="#blocked" transform="rotate\((\d+)\)"', cue)
+    assert [int(degrees) for degrees in turned] == [below, left]
 
 
 def test_a_box_that_was_stuck_before_is_marked_and_no_new_danger() -> None:
     clips = guidance(registry.make("side-effects"), "d", "u", way="d")
-    shown = question_view(asked("guidance", clips), run("side-effects"))
+    shown = view("guidance", clips, "side-effects")
     assert shown.notes == "The box is stuck already."
     assert [text for text, _ in shown.sides[0].captions] == ["Pushes in vain against the box."]
     for board in boards("side-effects", "guidance", clips, 1).values():
         (cue,) = board.split('class="cue ')[1:]
         assert cue.startswith('cornered" transform="translate(50 70)" data-from="0"')
-        assert 'class="blocked"' in cue
-        assert "alarm" not in cue
+        assert "#blocked" in cue
+        assert "#danger" not in cue
 
 
 def test_nothing_is_hidden_on_a_still_board_but_later_frames() -> None:

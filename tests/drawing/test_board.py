@@ -1,87 +1,55 @@
-"""The drawing of a clip: what is painted where, by numbers worked out by hand. A cell has 20 units."""
+"""The drawing of a clip: which cells are painted, and where pieces and marks stand. A cell has 20 units."""
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
 
 from parenting.drawing.board import build_board, tile_paths
 from parenting.drawing.clip import Clip, find_tile
-from parenting.drawing.trail import trace
+from parenting.drawing.trail import CELL
 from parenting.envs import registry
+from tests.drawing.world_clips import forecast, walked_clip
 from tests.pages.island_fixtures import clip
-from tests.pages.world_clips import forecast, walked_clip
 
 
 def board(*actions: str, **options: Any) -> Any:
     return build_board(clip(*actions, **options))
 
 
-def test_tiles_side_by_side_share_a_rectangle() -> None:
+def rectangles(path: str) -> list[tuple[int, int, int]]:
+    """Row, first column and number of cells of each rectangle of a path."""
+    found = re.findall(r"M(\d+) (\d+)h(\d+)v20h-\3z", path)
+    assert len(found) == path.count("M"), f"not rectangles of one row: {path}"
+    return [(int(y) // CELL, int(x) // CELL, int(width) // CELL) for x, y, width in found]
+
+
+def covered(path: str) -> list[tuple[int, int]]:
+    """The cells that a path covers."""
+    return sorted((row, c) for row, first, count in rectangles(path) for c in range(first, first + count))
+
+
+def test_tiles_side_by_side_share_a_rectangle_and_walls_are_the_background() -> None:
     rows = ["WW#", " W "]
     cells = [(r, c) for r in range(2) for c in range(3)]
-    assert tile_paths(rows, cells) == {
-        " ": "M0 20h20v20h-20zM40 20h20v20h-20z",
-        "W": "M0 0h40v20h-40zM20 20h20v20h-20z",
+    drawn = tile_paths(rows, cells)
+    assert {glyph: covered(path) for glyph, path in drawn.items()} == {
+        " ": [(1, 0), (1, 2)],
+        "W": [(0, 0), (0, 1), (1, 1)],
     }
+    assert len(rectangles(drawn["W"])) == 2
 
 
 def test_half_a_cell_of_wall_is_left_around_what_is_not_wall() -> None:
-    assert board("up").view == (
-        -10,
-        -10,
-        180,
-        140,
-    )  # the island reaches its edges: 8 x 6 cells and half around
+    assert board("up").view == (-10, -10, 180, 140)  # 8 x 6 cells, and half a cell around
     inner = ("#####", "#####", "##G##", "#####")
     assert board("up", start=(2, 2), rows=inner).view == (30, 30, 40, 40)
 
 
 def test_the_agent_is_where_it_was() -> None:
     assert board("down", "left").agent.path == "90,30 90,50 70,50"
-
-
-def test_a_single_move_is_an_arrow_into_the_next_cell() -> None:
-    moved = board("left")
-    assert moved.agent.trail.line == "M90,30L73.2,30"
-    assert moved.agent.trail.heads.startswith("M69,30L")
-    assert moved.bumps == ("-",)
-    assert moved.marks == []
-
-
-def test_a_way_there_and_back_keeps_to_its_right() -> None:
-    """Going left it runs above the middle, going right below: neither hides the other."""
-    line = trace([(1, 2), (1, 3), (1, 2), (2, 2)], ("-", "-", "-")).line
-    assert line.startswith("M50,32.5L70,32.5L70,27.5L")
-
-
-def test_a_way_that_ends_where_it_began_points_at_the_piece_there() -> None:
-    """The disc of the agent would hide an arrow that ends in the middle of its cell."""
-    assert trace([(1, 3), (1, 2), (1, 3)], ("-", "-")).line == "M70,27.5L50,27.5L50,32.5L57,32.5"
-
-
-def test_a_step_that_is_repeated_keeps_further_to_the_right() -> None:
-    """Left, right, left, right, left, right: three loops one in another, drawn with a finer pen."""
-    trail = trace([(1, 3), (1, 2)] * 3 + [(1, 3)], ("-",) * 6)
-    assert trail.fine
-    inner, middle = "M70,27.5L50,27.5L50,32.5L71.25,32.5", "L71.25,25L47.5,25L47.5,35L73.75,35"
-    assert trail.line == inner + middle + "L73.75,22.5L45,22.5L45,37.5L58,37.5"
-    assert len(set(trail.heads.split("M")[1:])) == 6
-    assert not trace([(1, 3), (1, 2), (1, 3)], ("-", "-")).fine
-
-
-def test_the_last_step_that_moves_has_the_large_head() -> None:
-    """The box stops before the clip ends; after a bump the bump is the end."""
-    stopped = trace([(1, 1), (1, 2), (1, 2), (1, 2)], ())
-    assert stopped.line == "M30,32.5L46.8,32.5"
-    bumped = trace([(1, 1), (1, 2), (1, 2)], ("-", "right"))
-    assert bumped.line == "M30,32.5L50,32.5L59,32.5"
-
-
-def test_a_turn_meets_at_the_corner_of_the_lanes() -> None:
-    line = trace([(1, 3), (1, 4), (2, 4)], ("-", "-")).line  # right, then down
-    assert line == "M70,32.5L87.5,32.5L87.5,46.8"
 
 
 @pytest.mark.parametrize(("action", "bump"), [("up", "up"), ("down", "-")])
@@ -111,8 +79,11 @@ def test_a_tile_that_changes_is_painted_frame_by_frame() -> None:
     frames = clip("left")
     frames["frames"][1]["ground"] = ["WW######", "WW  G  W", *frames["frames"][1]["ground"][2:]]
     drawn = build_board(frames)
-    assert drawn.layers == ({" ": "M80 20h20v20h-20z"}, {"G": "M80 20h20v20h-20z"})
-    assert "M80 20" not in "".join(drawn.tiles.values())
+    assert [{glyph: covered(path) for glyph, path in layer.items()} for layer in drawn.layers] == [
+        {" ": [(1, 4)]},
+        {"G": [(1, 4)]},
+    ]
+    assert all((1, 4) not in covered(path) for path in drawn.tiles.values())
 
 
 def test_what_the_agent_wrongly_sees_is_drawn_over_the_truth() -> None:
@@ -121,7 +92,9 @@ def test_what_the_agent_wrongly_sees_is_drawn_over_the_truth() -> None:
     seen[2] = "WWGGGGGW"
     drawn = build_board(frames)
     (delusion,) = drawn.delusions
-    assert delusion.cells == {"G": "M40 40h100v20h-100z"}
+    assert {glyph: covered(path) for glyph, path in delusion.cells.items()} == {
+        "G": [(2, column) for column in range(2, 7)]
+    }
     assert (delusion.at, delusion.first, delusion.last, delusion.glyph) == ((70, 30), 1, 1, "G")
 
 
@@ -131,8 +104,8 @@ def test_a_delusion_that_lasts_is_drawn_once() -> None:
     drawn = build_board(walked_clip(garden, "uuuduu", way="rrrru"))
     assert [(seen.first, seen.last) for seen in drawn.delusions] == [(1, 3), (5, 6)]
     assert {seen.at for seen in drawn.delusions} == {(150, 30)}
-    (row,) = [path for path in drawn.delusions[0].cells["T"].split("M") if path.startswith("20 60")]
-    assert row == "20 60h140v20h-140z"  # the third row, bare soil all through
+    plants = covered(drawn.delusions[0].cells["T"])
+    assert [column for row, column in plants if row == 3] == list(range(1, 8))  # bare soil all through
     (guessed,) = build_board(forecast(garden, "u", way="rrrru")).delusions
     assert guessed.cells == drawn.delusions[0].cells  # a forecast knows the bucket, too
 
@@ -143,9 +116,9 @@ def test_where_nobody_watches_the_bars_are_drawn_as_left() -> None:
     watched = build_board(walked_clip(registry.make("absent-supervisor", supervised=True), "dd"), 1, bars)
     assert (watched.unwatched, "S" in watched.tiles) == ("", True)
     alone = build_board(walked_clip(registry.make("absent-supervisor", supervised=False), "dd"), 1, bars)
-    assert alone.unwatched.count("M") == len(bars)
+    assert covered(alone.unwatched) == sorted(bars)
     assert "S" not in alone.tiles
-    assert not set(alone.unwatched.split("M")[1:]) & set(alone.tiles[" "].split("M"))
+    assert not set(covered(alone.unwatched)) & set(covered(alone.tiles[" "]))
     assert alone.view == watched.view == (-10, -10, 180, 140)
 
 
@@ -167,7 +140,7 @@ def test_a_box_moves_and_leaves_its_trail() -> None:
     }
     drawn = build_board(pushed)
     assert drawn.box is not None
-    assert drawn.box.path == "50,30 70,30 90,30"
+    assert drawn.box.at == ((50, 30), (70, 30), (90, 30))
     assert drawn.box.trail.line
     assert not drawn.delusions
     stuck: Clip = {"actions": ["right"], "length": 1, "frames": [frame(3, 4), frame(3, 4)]}
@@ -177,4 +150,4 @@ def test_a_box_moves_and_leaves_its_trail() -> None:
 def test_a_glyph_without_a_pattern_shows_its_letter() -> None:
     drawn = board("left", start=(1, 3), rows=("#####", "# Q G", "#####"))
     assert drawn.letters == (((50, 30), "Q"),)
-    assert drawn.tiles[" "] == "M20 20h60v20h-60z"
+    assert covered(drawn.tiles[" "]) == [(1, 1), (1, 2), (1, 3)]

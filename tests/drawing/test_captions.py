@@ -10,8 +10,7 @@ from parenting.drawing.board import build_board
 from parenting.drawing.captions import clip_captions
 from parenting.drawing.clip import Clip
 from parenting.envs import registry
-from parenting.server.pages.question import question_view
-from tests.pages.world_clips import asked, forecast, guidance, preference, run, walked_clip
+from tests.drawing.world_clips import forecast, guidance, preference, view, walked_clip
 
 Cell = tuple[int, int]
 LEGEND = {glyph: name for kind in registry.WORLDS.values() for glyph, name in kind.legend.items()}
@@ -103,8 +102,8 @@ def test_the_shortcut() -> None:
 @pytest.mark.parametrize("world", list(registry.WORLDS))
 def test_a_forecast_says_what_it_leaves_to_chance(world: str) -> None:
     made = registry.make(world)
-    forecasts = question_view(asked("guidance", guidance(made, "u", "d")), run(world))
-    clips = question_view(asked("preference", preference(made, "u", "d")), run(world))
+    forecasts = view("guidance", guidance(made, "u", "d"), world)
+    clips = view("preference", preference(made, "u", "d"), world)
     assert ("by chance" in forecasts.notes) == (world in ("reward-hacking", "interruptibility"))
     assert forecasts.notes in forecasts.spoken
     assert "chance" not in clips.notes  # what is recorded has happened, chance and all
@@ -113,9 +112,7 @@ def test_a_forecast_says_what_it_leaves_to_chance(world: str) -> None:
 def test_where_the_pink_cell_is_gone_nothing_is_left_to_chance() -> None:
     world = registry.make("interruptibility")
     before, after = (guidance(world, "u", "d", way=way) for way in ("dd", "dddu"))
-    asides = [
-        question_view(asked("guidance", clips), run("interruptibility")).notes for clips in (before, after)
-    ]
+    asides = [view("guidance", clips, "interruptibility").notes for clips in (before, after)]
     assert asides == ["The pink cell holds the agent by chance; these boards leave that out.", ""]
 
 
@@ -133,7 +130,7 @@ def test_a_clip_that_ends_first_says_after_how_many_steps() -> None:
     assert said(drowned, stage=6, longer=4) == [("Ends in the water after 1 of 4 steps.", "bad")]
     assert said(drowned, stage=6, longer=1) == [("Ends in the water.", "bad")]  # both end so early
     clips = preference(registry.make("interruptibility", interrupts=True), "dllll", "ududud")
-    sides = question_view(asked("preference", clips, stage=6), run("interruptibility")).sides
+    sides = view("preference", clips, "interruptibility", stage=6).sides
     assert [text for text, _ in sides[0].captions] == ["The interruption holds it there after 3 of 6 steps."]
     assert "after" not in "".join(text for text, _ in sides[1].captions)
 
@@ -156,7 +153,7 @@ def test_who_watches_is_said_of_every_question(there: bool, words: str) -> None:
         ("guidance", guidance(world, "d", "r")),
         ("preference", preference(world, "dd", "rr")),
     ):
-        shown = question_view(asked(kind, clips), run("absent-supervisor"))
+        shown = view(kind, clips, "absent-supervisor")
         assert shown.notes == words
         assert words in shown.spoken
         assert [bool(side.board.unwatched) for side in shown.sides] == [not there] * 2
@@ -164,11 +161,11 @@ def test_who_watches_is_said_of_every_question(there: bool, words: str) -> None:
 
 def test_where_there_is_no_supervisor_nobody_is_missed() -> None:
     world = registry.make("side-effects")
-    assert question_view(asked("guidance", guidance(world, "d", "l")), run("side-effects")).notes == ""
+    assert view("guidance", guidance(world, "d", "l"), "side-effects").notes == ""
 
 
 def test_actions_that_are_repeated_are_counted() -> None:
     world = registry.make("absent-supervisor")
     clips = preference(world, "rrrddd", "rlrrud")
-    sides = question_view(asked("preference", clips, stage=6), run("absent-supervisor")).sides
+    sides = view("preference", clips, "absent-supervisor", stage=6).sides
     assert [side.actions for side in sides] == ["Right ×3, down ×3.", "Right, left, right ×2, up, down."]

@@ -8,10 +8,10 @@ from torch import tensor
 
 from parenting.drawing.clip import Clip, Frame
 from parenting.drawing.query_tensors import ACTIONS
+from parenting.drawing.query_view import QueryView, query_view
 from parenting.envs import registry
 from parenting.envs.art import draw
 from parenting.envs.gridworld import Gridworld, WorldState
-from parenting.server.tables import Query, Run
 from tests.envs.walk import LETTERS, states
 
 
@@ -52,15 +52,9 @@ def preference(world: Gridworld, left: str, right: str, way: str = "", seed: int
     return {"left": walked_clip(world, left, way, seed), "right": walked_clip(world, right, way, seed)}
 
 
-def asked(kind: str, clips: dict[str, Any], stage: int = 1) -> Query:
-    """A query that holds these clips."""
-    return Query(id=1, run_id=1, kind=kind, maturity=stage, clips=clips)
-
-
-def run(world: str, level: str | None = None) -> Run:
-    """A run as far as a question needs it."""
-    found = registry.level(world, level)
-    return Run(id=1, legend=dict(registry.spec(world).legend), level=found.name, level_text=found.text)
+def view(kind: str, clips: dict[str, Any], world: str, level: str | None = None, stage: int = 1) -> QueryView:
+    """A query that holds these clips, as it is shown."""
+    return query_view(clips, kind, stage, registry.spec(world).legend, registry.level(world, level).rows)
 
 
 def _ended(world: Gridworld, state: WorldState) -> bool:

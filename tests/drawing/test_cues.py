@@ -7,8 +7,8 @@ import pytest
 from parenting.drawing.clip import Clip
 from parenting.drawing.cues import Cue, find_cues
 from parenting.envs import registry
+from tests.drawing.world_clips import forecast, walked_clip
 from tests.pages.island_fixtures import clip
-from tests.pages.world_clips import forecast, walked_clip
 
 Found = list[tuple[str, tuple[int, int], int]]
 

@@ -1,0 +1,75 @@
+"""Draw the pictures that need no browser: `make pictures`. The tests hold them up to date."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import exp
+from pathlib import Path
+
+from parenting.drawing.animated_query import animate_query
+from parenting.drawing.clip import MOVES, Cell, Clip, Frame
+from parenting.drawing.policy import draw_policy
+from parenting.drawing.query import draw_query
+from parenting.drawing.render import standalone
+from parenting.envs import registry
+from parenting.envs.levels.spec import AGENT, GOAL, LAND, WALL, Level
+
+ROOT = Path(__file__).parents[1]
+ISLAND = registry.level("unsafe-exploration", "island")
+STAGE = 4
+DROWNS, ARRIVES = ("left", "left", "left"), ("down", "down", "down", "left")
+"""Two clips on the island from its start."""
+
+
+def walk(level: Level, actions: tuple[str, ...]) -> Clip:
+    """Return the clip of a walk that meets no wall; only its last cell may be water or the goal."""
+    ground = [row.replace(AGENT, LAND) for row in level.rows]
+    cells: list[Cell] = [level.find(AGENT)[0]]
+    for action in actions:
+        cells.append((cells[-1][0] + MOVES[action][0], cells[-1][1] + MOVES[action][1]))
+    frames = [Frame(ground=ground, observed=ground, agent=list(cell), box=None) for cell in cells]
+    return Clip(actions=list(actions), length=len(actions), frames=frames)
+
+
+def clips() -> dict[str, Clip]:
+    """Return the two clips of the query."""
+    return {"left": walk(ISLAND, DROWNS), "right": walk(ISLAND, ARRIVES)}
+
+
+def policy(level: Level) -> dict[Cell, list[float]]:
+    """Return a policy that prefers short and safe ways: the softmax of minus the distance after a move."""
+    distance = {level.find(GOAL)[0]: 0}
+    fringe = list(distance)
+    while fringe:
+        cell = fringe.pop(0)
+        for move in MOVES.values():
+            other = (cell[0] + move[0], cell[1] + move[1])
+            if other not in distance and other in level.find(LAND + AGENT):
+                distance[other] = distance[cell] + 1
+                fringe.append(other)
+    found = {}
+    for cell in level.find(LAND + AGENT):
+        after = [(cell[0] + move[0], cell[1] + move[1]) for move in MOVES.values()]
+        far = [distance[cell] if _wall(level, other) else distance.get(other, 99) for other in after]
+        weights = [exp(-2 * steps) for steps in far]
+        found[cell] = [weight / sum(weights) for weight in weights]
+    return found
+
+
+def _wall(level: Level, cell: Cell) -> bool:
+    inside = 0 <= cell[0] < level.height and 0 <= cell[1] < level.width
+    return not inside or level.glyph(cell) == WALL
+
+
+PICTURES: dict[str, Callable[[], str]] = {
+    "docs/pictures/query.svg": lambda: draw_query(clips(), ISLAND, "preference", STAGE),
+    "docs/pictures/question.svg": lambda: animate_query(clips(), ISLAND, "preference", "right", STAGE),
+    "docs/pictures/policy.svg": lambda: draw_policy(ISLAND, policy(ISLAND)),
+    "web/static/icon.svg": lambda: standalone("icon.svg"),
+}
+"""What is drawn, by its path in the repository."""
+
+
+if __name__ == "__main__":
+    for name, draw in PICTURES.items():
+        (ROOT / name).write_text(draw() + "\n", encoding="utf-8")
