@@ -33,8 +33,8 @@ def answer(
             show_default="optimal; over with --limit, and in reward-hacking",
         ),
     ] = None,
-    patience: Annotated[
-        float, typer.Option(min=0.1, help="Give up after so many seconds without a question.")
+    timeout: Annotated[
+        float, typer.Option(min=0.1, metavar="SECONDS", help="Give up after this long without a question.")
     ] = 60,
     end_episodes: Annotated[
         bool, typer.Option("--end-episodes", help="Where no action is acceptable, end the episode.")
@@ -42,10 +42,10 @@ def answer(
     client_id: Annotated[
         str, typer.Option(help="The name to answer under; two scripts at one run need two.")
     ] = "scripted",
-    ledger: Annotated[
+    receipts: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Append the server's receipt of each stored answer, a line of JSON."
+            metavar="FILE", help="Append the server's receipt of each stored answer, as a line of JSON."
         ),
     ] = None,
     as_json: Annotated[
@@ -58,7 +58,7 @@ def answer(
     come back meanwhile: an answer is sent until the server has said that it is stored. It ends after --limit
     answers, or when the run is over or rests at its goal, or as --until says, whichever comes first.
 
-    Exit codes: 0 it came to one of these; 1 the run failed, or asked nothing for --patience seconds, or no
+    Exit codes: 0 it came to one of these; 1 the run failed, or asked nothing for --timeout seconds, or no
     action was acceptable; 2 there is no such run or server, or an option is wrong; 130 stopped by Ctrl-C.
 
     Example: parenting answer --url http://localhost:8765 --run 3 --limit 50
@@ -68,8 +68,8 @@ def answer(
         stack.callback(client.close)
         found = _first_look(client, run)
         optimal = _until(found["world"], until, limit) == "optimal"
-        order = Order(run, client_id, limit, optimal, patience, end_episodes)
-        keep = _ledger(ledger, stack)
+        order = Order(run, client_id, limit, optimal, timeout, end_episodes)
+        keep = _receipts(receipts, stack)
         show = stack.enter_context(bar("answers"))
         from parenting.agent.process import (
             settle,  # loads torch, which takes a second: what is wrong is said before
@@ -128,7 +128,7 @@ def _until(world: str, until: Until | None, limit: int | None) -> Until:
     return until or ("over" if endless or limit is not None else "optimal")
 
 
-def _ledger(file: Path | None, stack: ExitStack) -> Callable[[dict[str, Any]], None]:
+def _receipts(file: Path | None, stack: ExitStack) -> Callable[[dict[str, Any]], None]:
     """What writes a receipt down, at once.
 
     Raises:
@@ -139,7 +139,7 @@ def _ledger(file: Path | None, stack: ExitStack) -> Callable[[dict[str, Any]], N
     try:
         lines = stack.enter_context(file.open("a", encoding="utf-8", buffering=1))
     except OSError as error:
-        raise UsageError(f"--ledger: {file} cannot be written: {error.strerror}.") from None
+        raise UsageError(f"--receipts: {file} cannot be written: {error.strerror}.") from None
     return lambda receipt: print(json.dumps(receipt), file=lines)
 
 

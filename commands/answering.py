@@ -42,7 +42,7 @@ class Order:
     client_id: str = "scripted"
     limit: int | None = None
     until_optimal: bool = True
-    patience: float = 60.0
+    timeout: float = 60.0
     end_episodes: bool = False
 
 
@@ -119,7 +119,7 @@ class Answering:
         choice = self.judge.choice(question)
         body = {"choice": choice, "client_id": self.order.client_id, "parent": "scripted"}
         self._asked_at = time.monotonic()
-        while time.monotonic() - self._asked_at < self.order.patience:
+        while time.monotonic() - self._asked_at < self.order.timeout:
             try:
                 receipt = self.client.post(f"queries/{question['id']}/answer", **body)
             except UnavailableError as error:
@@ -146,8 +146,8 @@ class Answering:
         if now - self._looked_at >= (LOOK_SECONDS if asked else LOOK_SECONDS / 4):
             self._looked_at = now
             ending = self._look()
-        if ending is None and waited >= self.order.patience:
-            ending = Ending("silent", f"{self._why} Nothing was asked for {self.order.patience:g} s.")
+        if ending is None and waited >= self.order.timeout:
+            ending = Ending("silent", f"{self._why} Nothing was asked for {self.order.timeout:g} s.")
         if ending is None and not asked:
             time.sleep(min(max(SHORTEST, waited / 2), LONGEST))
         return ending

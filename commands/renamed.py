@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import typer
 
 RENAMED: Mapping[str, Mapping[str, str]] = {
+    "answer": {"--ledger": "--receipts", "--patience": "--timeout"},
     "pretrain": {"--again": "--force"},
 }
 """Command -> old option -> new option. An entry goes with the version after the one that renamed it."""

@@ -46,12 +46,12 @@ def answer(*arguments: str, run: int = 1) -> Result:
 
 def test_a_limit(db: Database, raising: None, tmp_path: Path) -> None:
     run = begin(db)
-    said = answer("--limit", "6", "--ledger", str(tmp_path / "ledger"))
+    said = answer("--limit", "6", "--receipts", str(tmp_path / "receipts"))
     assert said.exit_code == 0, said.output
     assert said.stdout.startswith("Run 1: answered 6 (")
     assert said.stdout.endswith("). These are the 6 that were wanted.\n")
     rows = [row.answer for row in every(db, run)]
-    receipts = [json.loads(line) for line in (tmp_path / "ledger").read_text().splitlines()]
+    receipts = [json.loads(line) for line in (tmp_path / "receipts").read_text().splitlines()]
     assert [(row["number"], row["query"], row["choice"]) for row in receipts] == [
         (row.number, row.query_id, row.choice) for row in rows
     ]
@@ -93,21 +93,21 @@ def test_a_run_that_is_over(db: Database, web: httpx2.Client) -> None:
     assert (said.exit_code, said.stdout) == (1, "Run 3: answered 0. The run failed: The disk is full.\n")
 
 
-def test_patience_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.Client) -> None:
+def test_the_timeout_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.Client) -> None:
     begin(db)
-    said = answer("--patience", "0.3")
+    said = answer("--timeout", "0.3")
     assert said.exit_code == 1
     assert (
         "No worker raises run 1. Start one: parenting worker. Nothing was asked for 0.3 s.\n" in said.stdout
     )
     runs.set_status(db, 1, RunStatus.PAUSED)
-    assert "Run 1 is paused: resume it on its page." in answer("--patience", "0.3").stdout
+    assert "Run 1 is paused: resume it on its page." in answer("--timeout", "0.3").stdout
     runs.set_status(db, 1, RunStatus.ACTIVE)
     (query,) = asked(db, 1, 1)
     parent_side.lease(db, 1, "somebody")
-    assert "Somebody else holds the questions of run 1." in answer("--patience", "0.3").stdout
+    assert "Somebody else holds the questions of run 1." in answer("--timeout", "0.3").stdout
     parent_side.answer(db, query, "left", "somebody", "human")
-    assert "The agent of run 1 explores, at tick 0." in answer("--patience", "0.3").stdout
+    assert "The agent of run 1 explores, at tick 0." in answer("--timeout", "0.3").stdout
 
 
 def test_ctrl_c(db: Database, web: httpx2.Client, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,7 +130,7 @@ def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Clie
     assert said.exit_code == 1
     assert "No action was acceptable at tick 7, so the agent stands still. End the episode on " in said.stdout
     assert not record.list_events(db, 1)
-    found = json.loads(answer("--end-episodes", "--patience", "0.3", "--json").stdout)
+    found = json.loads(answer("--end-episodes", "--timeout", "0.3", "--json").stdout)
     assert (found["episodes_ended"], found["ended"]) == (1, "silent")
     assert [event.kind for event in record.list_events(db, 1)] == ["end_episode"]
 
@@ -163,7 +163,7 @@ def test_wrong_names_and_files(db: Database, web: httpx2.Client, tmp_path: Path)
     begin(db)
     said = answer("--client-id", "a b")
     assert (said.exit_code, said.stderr.partition(":")[0]) == (2, "client_id")
-    said = answer("--ledger", str(tmp_path / "no" / "folder"))
+    said = answer("--receipts", str(tmp_path / "no" / "folder"))
     assert said.exit_code == 2
     assert said.stderr.endswith("folder cannot be written: No such file or directory.\n")
 

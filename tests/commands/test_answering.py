@@ -104,7 +104,7 @@ def test_what_somebody_else_has_answered_is_let_go(db: Database, web: httpx2.Cli
 def test_a_server_that_stays_away_is_given_up() -> None:
     with httpx2.Client() as nobody:
         work = Answering(
-            Client(f"http://127.0.0.1:{free_port()}", nobody), Order(1, patience=0.2), Never(), print
+            Client(f"http://127.0.0.1:{free_port()}", nobody), Order(1, timeout=0.2), Never(), print
         )
         ending = work.work()
     assert ending.kind == "silent"

@@ -40,7 +40,7 @@ class House:
 
     def __init__(self, data: Path, runs: dict[int, Begun]) -> None:
         self.data, self.url = data, f"http://127.0.0.1:{free_port()}"
-        self.ledgers = {run: data / f"ledger-{run}.jsonl" for run in runs}
+        self.receipts = {run: data / f"receipts-{run}.jsonl" for run in runs}
         self.orders: dict[str, tuple[str, ...]] = {
             "web": ("web", "--port", self.url.rpartition(":")[2]),
             "worker": ("worker",),
@@ -50,7 +50,7 @@ class House:
         self.killed: Counter[str] = Counter()
 
     def script(self, run: int) -> tuple[str, ...]:
-        return answering(self.url, run, "--ledger", str(self.ledgers[run]))
+        return answering(self.url, run, "--receipts", str(self.receipts[run]))
 
     def __enter__(self) -> House:
         return self
@@ -83,7 +83,7 @@ class House:
 
     def receipts(self) -> Iterator[dict[str, Any]]:
         """What the server has told: a line was written after its reply was read to the end."""
-        for file in self.ledgers.values():
+        for file in self.receipts.values():
             if file.exists():
                 yield from map(json.loads, file.read_text(encoding="utf-8").splitlines())
 
@@ -119,12 +119,12 @@ def test_killed_at_random_moments(tmp_path: Path, db: Database, seed: int) -> No
         house.keep()
         assert house.commands["worker"].stop() == 0
         told = list(house.receipts())
-    hold_to_the_ledger(db, told, runs)
+    hold_to_the_receipts(db, told, runs)
     for run, begun in runs.items():
         check(db, run, begun)
 
 
-def hold_to_the_ledger(db: Database, told: list[dict[str, Any]], runs: dict[int, Begun]) -> None:
+def hold_to_the_receipts(db: Database, told: list[dict[str, Any]], runs: dict[int, Begun]) -> None:
     """Every receipt is in the database; every question has one answer, and every answer its own number."""
     with db.read() as session:
         rows = session.scalars(select(Answer)).all()

@@ -39,7 +39,7 @@ def begin(db: Database) -> dict[int, Begun]:
 
 def answering(url: str, run: int, *more: str) -> tuple[str, ...]:
     """The command line of a script for one run."""
-    patient = ("--until", "over", "--patience", "150")
+    patient = ("--until", "over", "--timeout", "150")
     return ("answer", "--url", url, "--run", str(run), *patient, "--json", *more)
 
 
