@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import bindparam, func, or_, select, update
+from sqlalchemy import bindparam, or_, select, update
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
-from parenting.server.statuses import LIVING, OVER, QueryStatus, RunStatus
-from parenting.server.tables import Query, Run
+from parenting.server.queue.queries import withdraw_in
+from parenting.server.statuses import LIVING, OVER, RunStatus
+from parenting.server.tables import Run
 
 CLAIM_SECONDS = 5.0
 PROGRESS_FIELDS = frozenset({"tick", "waiting", "optimal", "versions", "maturity", "speed"})
@@ -41,14 +42,6 @@ _MINE = (
     .where(Run.fencing_token == bindparam("fencing_token"))
     .with_for_update()
 )
-
-
-@dataclass(frozen=True)
-class Open:
-    """How many queries of a run wait for an answer, by kind."""
-
-    guidance: int
-    preference: int
 
 
 def create_run(db: Database, **fields: Any) -> Run:
@@ -77,12 +70,6 @@ def get_run(db: Database, run_id: int) -> Run:
     """
     with db.read() as session:
         return find(session, run_id)
-
-
-def open_counts(db: Database, run_id: int) -> Open:
-    """How many queries are open (not yet answered), by kind."""
-    with db.read() as session:
-        return open_in(session, run_id)
 
 
 def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None = None) -> Run:
@@ -247,28 +234,6 @@ def held_status(session: Session, mine: Claim) -> RunStatus:
     """`held`, for those who need no more of the run than its status: what a tick writes."""
     status: RunStatus | None = session.execute(_MINE, vars(mine)).scalar()
     return held(session, mine).status if status is None else status
-
-
-def open_in(session: Session, run_id: int) -> Open:
-    """`open_counts`, in a transaction that is already open."""
-    return open_by_run(session, [run_id])[run_id]
-
-
-def open_by_run(session: Session, run_ids: Sequence[int]) -> dict[int, Open]:
-    """`open_in` for many runs at once."""
-    rows = select(Query.run_id, Query.kind, func.count()).where(
-        Query.status == QueryStatus.OPEN, Query.run_id.in_(run_ids)
-    )
-    counts = {(row[0], row[1]): row[2] for row in session.execute(rows.group_by(Query.run_id, Query.kind))}
-    return {i: Open(counts.get((i, "guidance"), 0), counts.get((i, "preference"), 0)) for i in run_ids}
-
-
-def withdraw_in(session: Session, run_id: int, kind: str | None = None) -> None:
-    """Withdraw the open queries of a run (of one kind), in a transaction that is already open."""
-    rows = update(Query).where(Query.run_id == run_id, Query.status == QueryStatus.OPEN)
-    if kind is not None:
-        rows = rows.where(Query.kind == kind)
-    session.execute(rows.values(status=QueryStatus.WITHDRAWN))
 
 
 def _become(session: Session, run: Run, status: RunStatus, reason: str | None) -> None:

@@ -10,7 +10,8 @@ from pydantic import BaseModel, ConfigDict
 
 from parenting.agent.config import Config, Inside
 from parenting.server.db import Database
-from parenting.server.runs import Open, find, open_by_run, open_in
+from parenting.server.queue.queries import Open, open_by_run, open_in
+from parenting.server.runs import find
 from parenting.server.statuses import OVER, QueryStatus, RunState, RunStatus, Waiting
 from parenting.server.tables import Answer, Metric, Query, Run
 

@@ -13,7 +13,7 @@ from parenting.agent.init import world_of
 from parenting.agent.query import Query, QueryKind
 from parenting.evaluation.argmax import evaluation
 from parenting.parents.scripted import ScriptedRule
-from parenting.server import record, runs
+from parenting.server import checkpoints, metrics, runs
 from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
 from parenting.server.db import Database
@@ -74,7 +74,7 @@ class RunSession:
         return QueueParent(self.db, self.claim, self.world, config, asked)
 
     def _recall(self, config: Config) -> Snapshot:
-        for checkpoint in record.load_checkpoints(self.db, self.claim.run_id):
+        for checkpoint in checkpoints.load_checkpoints(self.db, self.claim.run_id):
             if checkpoint.intact:
                 return unpack(self.world, config, checkpoint.blob, self._weights)
             log.warning("damaged checkpoint passed over", run=self.claim.run_id, tick=checkpoint.tick)
@@ -181,7 +181,7 @@ class RunSession:
         self._measured_at, self._measured_tick, self._news = time.monotonic(), self.last_tick, False
         row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed}
         self.optimal, self.waiting, self.stage = bool(row["optimal"]), None, stage
-        record.write_metrics(self.db, self.claim, {self.last_tick: row})
+        metrics.write_metrics(self.db, self.claim, {self.last_tick: row})
         shown = {"maturity": row["maturity"], "speed": speed, "optimal": self.optimal}
         runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None, **shown)
 
@@ -198,7 +198,7 @@ class RunSession:
 
     def save(self) -> None:
         """Write a checkpoint."""
-        record.save_checkpoint(self.db, self.claim, self.last_tick, pack(self.saved))
+        checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, pack(self.saved))
         self._saved_tick, self._saved_at = self.last_tick, time.monotonic()
 
 

@@ -21,8 +21,8 @@ from starlette.concurrency import run_in_threadpool
 from parenting.server.db import Database
 from parenting.server.errors import ServerError, TooManyStreamsError
 from parenting.server.notify import Notifier
-from parenting.server.queue.parent_side import waiting
-from parenting.server.record import metrics
+from parenting.server.queue.leases import waiting
+from parenting.server.reads.metrics import list_metrics
 from parenting.server.schemas import metric_schemas, run_schema
 
 POLL_SECONDS = 0.25
@@ -101,7 +101,7 @@ class Streams:
 
     async def _metrics(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
         while after is not None:
-            rows = await run_in_threadpool(metrics, self.db, run_id, after, ROWS)
+            rows = await run_in_threadpool(list_metrics, self.db, run_id, after, ROWS)
             if rows:
                 shown = [row.model_dump(mode="json") for row in metric_schemas(rows)]
                 yield ServerSentEvent(event="metrics", data={"rows": shown}, id=str(rows[-1].tick))

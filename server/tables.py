@@ -224,7 +224,7 @@ class Answer(Table):
     applied_tick: Mapped[int | None]
 
 
-class Event(Table):
+class OperatorEvent(Table):
     """What the operator did to a living agent (agent.events), and the tick before which it was applied."""
 
     __tablename__ = "event"

@@ -38,7 +38,7 @@ class MetricRows(Rows[MetricSchema]):
     """What was measured, in the order of the ticks."""
 
 
-class OperatorEvent(Schema):
+class OperatorEventSchema(Schema):
     """What the operator did to an agent, and when it took effect."""
 
     id: int
@@ -49,7 +49,7 @@ class OperatorEvent(Schema):
     """The tick before which it applied; null: not yet."""
 
 
-class OperatorEventRows(Rows[OperatorEvent]):
+class OperatorEventRows(Rows[OperatorEventSchema]):
     """The operator's events, in their order."""
 
 
@@ -92,10 +92,10 @@ class EventPart(Part):
     limit: int = Field(200, ge=1, le=1000, description="At most so many rows.")
 
 
-def operator_event(row: tables.Event) -> OperatorEvent:
+def operator_event(row: tables.OperatorEvent) -> OperatorEventSchema:
     """An event as it is stored."""
     event = {"kind": row.kind, **row.payload}
-    return OperatorEvent.model_validate(
+    return OperatorEventSchema.model_validate(
         {
             "id": row.id,
             "run": row.run_id,

@@ -9,7 +9,7 @@ from parenting.server import runs
 from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody, RunId
 from parenting.server.api.responses import write_responses
 from parenting.server.deps import Db, notify_worker
-from parenting.server.record import add_event
+from parenting.server.operator_events import add_operator_event
 from parenting.server.schemas import RunSchema, run_schema
 from parenting.server.statuses import RunStatus
 
@@ -80,6 +80,6 @@ def _become(request: Request, db: Db, run_id: int, status: RunStatus, reason: st
 
 
 def _happen(request: Request, db: Db, run_id: int, event: Event) -> RunSchema:
-    add_event(db, run_id, event.kind, event.model_dump(mode="json"))
+    add_operator_event(db, run_id, event.kind, event.model_dump(mode="json"))
     notify_worker(request)
     return run_schema(db, run_id)

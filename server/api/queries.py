@@ -12,7 +12,8 @@ from parenting.server.api.bodies import AnswerBody, LeaseBody, QueryId, RunId
 from parenting.server.api.lists import AskedPart, AskedRows
 from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.deps import Db, SettingsOf, notify_worker
-from parenting.server.queue.parent_side import answer, lease, release
+from parenting.server.queue.answers import answer
+from parenting.server.queue.leases import lease, release
 from parenting.server.reads import pagination
 from parenting.server.runs import get_run
 from parenting.server.schemas import AskedSchema, LeasedSchema, StoredSchema, asked_schema, leased_schema

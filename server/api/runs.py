@@ -68,5 +68,5 @@ def list_operator_events(run_id: RunId, db: Db, part: Annotated[EventPart, Query
     With seed, config and answers they make the run: replayed at these ticks, it comes out with the same bits.
     The `next` of a page goes back as `after`.
     """
-    page = pagination.events_after(db, run_id, part.after, part.limit)
+    page = pagination.operator_events_after(db, run_id, part.after, part.limit)
     return OperatorEventRows(rows=[operator_event(row) for row in page.rows], next=page.next)

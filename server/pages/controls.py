@@ -11,7 +11,7 @@ from fastapi import APIRouter, Form, Request, Response
 from pydantic import TypeAdapter, ValidationError
 
 from parenting.agent.events import Change, EndEpisode, Mature, Probability
-from parenting.server import record, runs
+from parenting.server import operator_events, runs
 from parenting.server.api.bodies import RunId
 from parenting.server.deps import Db, notify_worker
 from parenting.server.new_run import Goal, Pace
@@ -59,7 +59,7 @@ def event(
 ) -> Response:
     """End the stage, or an episode in which no action was acceptable."""
     happens = Mature() if kind == "mature" else EndEpisode()
-    record.add_event(db, run_id, kind, happens.model_dump(mode="json"))
+    operator_events.add_operator_event(db, run_id, kind, happens.model_dump(mode="json"))
     return _back(request, run_id, back)
 
 
@@ -70,10 +70,10 @@ def set_probabilities(request: Request, run_id: RunId, db: Db, form: FormFields)
     given, wrong = _numbers(form, PROBABILITIES, Probability)
     if wrong:
         return dashboard_page(db, run_id, form, wrong)
-    known = probabilities(run, record.list_events(db, run_id))
+    known = probabilities(run, operator_events.list_operator_events(db, run_id))
     for name in [name for name in PROBABILITIES if given[name] != known[name]]:
         change = Change.model_validate({"name": name, "value": given[name]})
-        record.add_event(db, run_id, change.kind, change.model_dump(mode="json"))
+        operator_events.add_operator_event(db, run_id, change.kind, change.model_dump(mode="json"))
     return _back(request, run_id, "operator")
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from fastapi import APIRouter, Response
 
-from parenting.server import record, runs
+from parenting.server import operator_events, runs
 from parenting.server.api.bodies import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
@@ -17,7 +17,7 @@ from parenting.server.pages.operator_log import PROBABILITIES, log_entries, prob
 from parenting.server.pages.render import format_number, page
 from parenting.server.pages.stages import stage_rows
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, page_state, run_title
-from parenting.server.reads.pages import first_metrics, sampled_metrics
+from parenting.server.reads.metrics import first_metrics, sampled_metrics
 from parenting.server.schemas import run_schema
 from parenting.server.security import policy
 from parenting.server.tables import Run
@@ -115,7 +115,7 @@ def _numbers(db: Database, run: Run) -> dict[str, object]:
 
 def _operator(db: Database, run: Run, typed: Mapping[str, str]) -> dict[str, object]:
     """What the operator did, and the fields to do more."""
-    events = record.list_events(db, run.id)
+    events = operator_events.list_operator_events(db, run.id)
     known = {
         **{name: format_number(value) for name, value in probabilities(run, events).items()},
         "goal": format_number(run.goal),

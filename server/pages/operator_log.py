@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from parenting.server.tables import Event, Run
+from parenting.server.tables import OperatorEvent, Run
 
 PROBABILITIES = {
     "p_guid": "ask before a new move",
@@ -23,22 +23,22 @@ class LogEntry(NamedTuple):
     when: str
 
 
-def log_entries(events: Sequence[Event]) -> list[LogEntry]:
+def log_entries(events: Sequence[OperatorEvent]) -> list[LogEntry]:
     """Everything that the operator did, the last first."""
     return [LogEntry(_what(event), _when(event)) for event in reversed(events)]
 
 
-def probabilities(run: Run, events: Sequence[Event]) -> dict[str, float]:
+def probabilities(run: Run, events: Sequence[OperatorEvent]) -> dict[str, float]:
     """The chances by name as they hold once every event has applied."""
     changed = {event.payload["name"]: event.payload["value"] for event in events if event.kind == "change"}
     return {name: changed.get(name, run.config[name]) for name in PROBABILITIES}
 
 
-def _what(event: Event) -> str:
+def _what(event: OperatorEvent) -> str:
     if event.kind == "change":
         return f"Set {event.payload['name']} to {event.payload['value']:g}"
     return {"mature": "Ended the stage", "end_episode": "Ended the episode"}[event.kind]
 
 
-def _when(event: Event) -> str:
+def _when(event: OperatorEvent) -> str:
     return "before the next tick" if event.applied_tick is None else f"at tick {event.applied_tick}"

@@ -26,8 +26,8 @@ from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.question import QuestionView, question_view
 from parenting.server.pages.render import page, redirect
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, page_state, run_title
-from parenting.server.queue import parent_side
-from parenting.server.reads.pages import lease_ahead, may_lease
+from parenting.server.queue import answers, leases
+from parenting.server.queue.leases import lease_ahead, may_lease
 from parenting.server.schemas import run_schema
 from parenting.server.streams import Streams
 from parenting.server.tables import Run
@@ -110,9 +110,9 @@ def answer(
     client_id: ClientField,
 ) -> Response:
     """For the form: store the answer, then go to the next question. A closed question says so (409)."""
-    if parent_side.get_query(db, query_id).run_id != run_id:
+    if answers.get_query(db, query_id).run_id != run_id:
         raise NotFound(f"Question {query_id} is not one of run {run_id}.")
-    parent_side.answer(db, query_id, choice, client_id, parent="human")
+    answers.answer(db, query_id, choice, client_id, parent="human")
     notify_worker(request)
     return _go_on(db, run_id, client_id, settings.lease_seconds, patience=PATIENCE)
 
@@ -123,7 +123,7 @@ def _markup(
     if shown:
         query = lease_ahead(db, run.id, client_id, shown, seconds)
     else:
-        query = parent_side.lease(db, run.id, client_id, seconds)
+        query = leases.lease(db, run.id, client_id, seconds)
     return (
         None if query is None else page("_question.html", shown=question_view(query, run), client=client_id)
     )
@@ -132,13 +132,13 @@ def _markup(
 def _go_on(db: Database, run_id: int, client_id: str, seconds: float, patience: float = 0.0) -> Response:
     """To the next question, which may come within `patience` seconds, or to the page that waits for it."""
     until = time.monotonic() + patience
-    while (query := parent_side.lease(db, run_id, client_id, seconds)) is None and time.monotonic() < until:
+    while (query := leases.lease(db, run_id, client_id, seconds)) is None and time.monotonic() < until:
         time.sleep(0.02)
     return redirect(f"/runs/{run_id}/parent" + (f"?query={query.id}" if query else ""))
 
 
 def _open_question(db: Database, run: Run, query_id: int) -> QuestionView | None:
-    query = parent_side.get_query(db, query_id)
+    query = answers.get_query(db, query_id)
     if query.run_id != run.id:
         raise NotFound(f"Question {query_id} is not one of run {run.id}.")
     return question_view(query, run) if query.status == "open" else None

@@ -17,7 +17,7 @@ from parenting.server.new_run import LARGEST_INT, plan, read_form, start
 from parenting.server.pages.labels import metric_labels
 from parenting.server.pages.render import page, redirect
 from parenting.server.pages.texts import STATE_WORDS, page_state, run_title
-from parenting.server.reads.pages import latest_metrics
+from parenting.server.reads.metrics import latest_metrics
 from parenting.server.reads.pagination import runs_before
 from parenting.server.schemas import RunSchema, run_schemas
 from parenting.server.tables import Metric, Run

@@ -18,7 +18,7 @@ from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_name
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
-from parenting.server.queue import parent_side, worker_side
+from parenting.server.queue import answers, worker_side
 from parenting.server.runs import Claim
 
 SCRIPT = "scripted"
@@ -46,7 +46,7 @@ class QueueParent:
     def events(self, state: AgentState) -> Sequence[Event]:
         """The operator's events that apply before the tick that comes."""
         self.tick = int(state.keys.tick[0]) + 1
-        rows = worker_side.take_events(self.db, self.mine, self.tick) if self.events_wait else ()
+        rows = worker_side.take_operator_events(self.db, self.mine, self.tick) if self.events_wait else ()
         return [_EVENTS.validate_python({"kind": row.kind, **row.payload}) for row in rows]
 
     def take(self, state: AgentState) -> Answer:
@@ -96,4 +96,4 @@ class ScriptedQueueParent(QueueParent):
         """Store the script's answer. A replayed tick stores the same again, which changes nothing."""
         choice = CHOICE_NAMES[int(self.rule.answer(query)[0])]
         with suppress(Conflict):  # the operator has stopped the run meanwhile: the question was withdrawn
-            parent_side.answer(self.db, number, choice, SCRIPT, SCRIPT)
+            answers.answer(self.db, number, choice, SCRIPT, SCRIPT)

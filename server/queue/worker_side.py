@@ -1,14 +1,14 @@
-"""The worker's verbs on queries, answers and events: watch, post, take.
+"""The worker's side of the queue: watch a run, post a query, take an answer, take the operator's events.
 
-One transaction each; all their SQL is here.
+Each verb is one transaction.
 
-**Crash and replay.** A worker that lost its memory goes on from a checkpoint and lives some ticks a second
-time. At or below the *high-water tick*, the largest on any posted query, applied answer or applied event,
-`take_answer` and `take_events` give back exactly what was recorded for that tick, and `post_query` of a known
-tick inserts nothing. So ticks replay exactly and nothing is asked twice.
+**Crash and replay.** A worker that lost its memory resumes from a checkpoint and lives some ticks a second
+time. Let the *high-water tick* be the largest tick of any posted query, applied answer or applied event. At
+or below it, `take_answer` and `take_operator_events` return exactly what was recorded for that tick, and
+`post_query` inserts nothing. So ticks replay exactly and nothing is asked twice.
 
-Within a tick the order is: events, answer, step, query. So an event applied at a tick does not close that
-tick to an answer, but an answer or a query closes it to both.
+Within a tick the order is: events, answer, step, query. An event applied at a tick therefore leaves that tick
+open to an answer, whereas an answer or a query closes it to both.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import BindParameter, ColumnElement, ScalarSelect, bindparam, func, select, update
+from sqlalchemy import BindParameter, ColumnElement, ScalarSelect, bindparam, func, select
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
-from parenting.server.queue.parent_side import guidance_first
-from parenting.server.runs import Claim, held, held_status, withdraw_in
+from parenting.server.queue.queries import guidance_first, withdraw_in
+from parenting.server.runs import Claim, held, held_status
 from parenting.server.statuses import LIVING, QueryStatus, RunStatus
-from parenting.server.tables import Answer, Event, Query, Run
+from parenting.server.tables import Answer, OperatorEvent, Query, Run
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ _RUN: BindParameter[int] = bindparam("run_id")
 _HIGH = select(
     select(func.max(Query.tick)).where(Query.run_id == _RUN).scalar_subquery(),
     select(func.max(Answer.applied_tick)).where(Answer.run_id == _RUN).scalar_subquery(),
-    select(func.max(Event.applied_tick)).where(Event.run_id == _RUN).scalar_subquery(),
+    select(func.max(OperatorEvent.applied_tick)).where(OperatorEvent.run_id == _RUN).scalar_subquery(),
 )
 _PENDING = (
     select(Answer, Query)
@@ -88,7 +88,7 @@ _WATCH = select(
     Run.answers.label("answered"),
     Run.goal,
     Run.pace,
-    _number(Event.run_id == Run.id, Event.applied_tick.is_(None)).label("events"),
+    _number(OperatorEvent.run_id == Run.id, OperatorEvent.applied_tick.is_(None)).label("events"),
 ).where(Run.id.in_(bindparam("run_ids", expanding=True)))
 
 
@@ -168,7 +168,7 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
         return found
 
 
-def take_events(db: Database, mine: Claim, tick: int) -> Sequence[Event]:
+def take_operator_events(db: Database, mine: Claim, tick: int) -> Sequence[OperatorEvent]:
     """The operator's events that apply before this tick, in their order. New ones are marked with it.
 
     An *end the episode* also withdraws the open guidance question: nobody waits for that move any more. And
@@ -177,8 +177,9 @@ def take_events(db: Database, mine: Claim, tick: int) -> Sequence[Event]:
     Raises:
         LostClaimError: another worker raises this run now.
     """
-    recorded = select(Event).where(Event.run_id == mine.run_id, Event.applied_tick == tick).order_by(Event.id)
-    fresh = select(Event).where(Event.run_id == mine.run_id, Event.applied_tick.is_(None)).order_by(Event.id)
+    mine_only = select(OperatorEvent).where(OperatorEvent.run_id == mine.run_id).order_by(OperatorEvent.id)
+    recorded = mine_only.where(OperatorEvent.applied_tick == tick)
+    fresh = mine_only.where(OperatorEvent.applied_tick.is_(None))
     with db.read() as session:
         if max(_high(session, mine.run_id)) >= tick:
             return session.scalars(recorded).all()
@@ -193,31 +194,6 @@ def take_events(db: Database, mine: Claim, tick: int) -> Sequence[Event]:
             withdraw_in(session, mine.run_id, "guidance")
             run.waiting = None
         return events
-
-
-def withdraw(db: Database, mine: Claim, query_id: int) -> None:
-    """Withdraw one open query; one that was answered meanwhile stays answered.
-
-    Raises:
-        LostClaimError: another worker raises this run now.
-    """
-    with db.write() as session:
-        run = held(session, mine)
-        session.execute(
-            update(Query)
-            .where(Query.id == query_id, Query.run_id == run.id, Query.status == QueryStatus.OPEN)
-            .values(status=QueryStatus.WITHDRAWN)
-        )
-
-
-def record(db: Database, run_id: int) -> Sequence[Taken]:
-    """Every answer that the agent heard, in that order: from this X is rebuilt at any time."""
-    with db.read() as session:
-        rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
-        rows = rows.where(Answer.run_id == run_id, Answer.applied_tick.is_not(None)).order_by(
-            Answer.applied_tick
-        )
-        return [Taken(answer, query) for answer, query in session.execute(rows)]
 
 
 def _high(session: Session, run_id: int) -> tuple[int, int, int]:

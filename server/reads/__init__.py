@@ -1,1 +1,1 @@
-"""What pages and API read. Nothing here writes."""
+"""What pages, API and replay read from the database. Nothing here writes."""

@@ -1,4 +1,4 @@
-"""Long lists, page by page, for the API: runs, questions, operator's events, metrics.
+"""Lists for the API, page by page: runs, questions, operator events, metrics.
 
 The cursor of a page is the place of its last row; the next page begins behind it. So no page is counted
 through, and what is added meanwhile shifts nothing.
@@ -15,10 +15,10 @@ from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
-from parenting.server.record import metrics
+from parenting.server.reads.metrics import list_metrics
 from parenting.server.runs import find
 from parenting.server.statuses import QueryStatus
-from parenting.server.tables import Answer, Event, Metric, Query, Run
+from parenting.server.tables import Answer, Metric, OperatorEvent, Query, Run
 
 Row = TypeVar("Row")
 
@@ -79,13 +79,14 @@ def asked(db: Database, query_id: int) -> Asked:
         return Asked(query, _standing(session, [query_id]).get(query_id))
 
 
-def events_after(db: Database, run_id: int, event_id: int, limit: int) -> Page[Event]:
+def operator_events_after(db: Database, run_id: int, event_id: int, limit: int) -> Page[OperatorEvent]:
     """The operator's events of a run behind the one of this id, in their order.
 
     Raises:
         NotFound: there is no such run.
     """
-    rows = select(Event).where(Event.run_id == run_id, Event.id > event_id).order_by(Event.id)
+    event = OperatorEvent
+    rows = select(event).where(event.run_id == run_id, event.id > event_id).order_by(event.id)
     with db.read() as session:
         find(session, run_id)
         return _cut(session.scalars(rows.limit(limit + 1)).all(), limit, lambda event: event.id)
@@ -97,7 +98,7 @@ def metrics_after(db: Database, run_id: int, tick: int, limit: int) -> Page[Metr
     Raises:
         NotFound: there is no such run.
     """
-    return _cut(metrics(db, run_id, tick, limit + 1), limit, lambda metric: metric.tick)
+    return _cut(list_metrics(db, run_id, tick, limit + 1), limit, lambda metric: metric.tick)
 
 
 def _cut(rows: Sequence[Row], limit: int, place: Callable[[Row], int]) -> Page[Row]:

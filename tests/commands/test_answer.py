@@ -14,9 +14,9 @@ from structlog.testing import capture_logs
 from typer.testing import CliRunner, Result
 
 from parenting.commands.main import app
-from parenting.server import record, runs
+from parenting.server import operator_events, runs
 from parenting.server.db import Database
-from parenting.server.queue import parent_side
+from parenting.server.queue import answers, leases
 from parenting.server.reads.answers import every
 from parenting.server.settings import Settings
 from parenting.server.statuses import OVER, RunStatus
@@ -104,9 +104,9 @@ def test_the_timeout_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.
     assert "Run 1 is paused: resume it on its page." in answer("--timeout", "0.3").stdout
     runs.set_status(db, 1, RunStatus.ACTIVE)
     (query,) = asked(db, 1, 1)
-    parent_side.lease(db, 1, "somebody")
+    leases.lease(db, 1, "somebody")
     assert "Somebody else holds the questions of run 1." in answer("--timeout", "0.3").stdout
-    parent_side.answer(db, query, "left", "somebody", "human")
+    answers.answer(db, query, "left", "somebody", "human")
     assert "The agent of run 1 explores, at tick 0." in answer("--timeout", "0.3").stdout
 
 
@@ -129,10 +129,10 @@ def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Clie
     said = answer()
     assert said.exit_code == 1
     assert "No action was acceptable at tick 7, so the agent stands still. End the episode on " in said.stdout
-    assert not record.list_events(db, 1)
+    assert not operator_events.list_operator_events(db, 1)
     found = json.loads(answer("--end-episodes", "--timeout", "0.3", "--json").stdout)
     assert (found["episodes_ended"], found["ended"]) == (1, "silent")
-    assert [event.kind for event in record.list_events(db, 1)] == ["end_episode"]
+    assert [event.kind for event in operator_events.list_operator_events(db, 1)] == ["end_episode"]
 
 
 # What is wrong

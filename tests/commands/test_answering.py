@@ -11,9 +11,9 @@ import httpx2
 from parenting.commands.answering import Answering, Order
 from parenting.commands.client import Client
 from parenting.commands.judge import Judge
-from parenting.server import record, runs
+from parenting.server import operator_events, runs
 from parenting.server.db import Database
-from parenting.server.queue import parent_side
+from parenting.server.queue import answers
 from parenting.server.queue.worker_side import watch
 from parenting.server.reads.answers import every
 from parenting.server.session import RunSession
@@ -53,7 +53,7 @@ def test_episodes_are_ended_once_each(db: Database, web: httpx2.Client) -> None:
             work.answer_one()
         assert work._look() is None
         assert work._look() is None
-    assert work.told.episodes == len(record.list_events(db, run)) == 3
+    assert work.told.episodes == len(operator_events.list_operator_events(db, run)) == 3
     assert work.told.choices["neither"] == work.told.answered
 
 
@@ -89,7 +89,7 @@ def test_what_somebody_else_has_answered_is_let_go(db: Database, web: httpx2.Cli
     class Slow(Never):
         def choice(self, question: dict[str, Any]) -> str:
             if question["id"] == first:
-                parent_side.answer(db, first, "left", "somebody", "human")
+                answers.answer(db, first, "left", "somebody", "human")
             return super().choice(question)
 
     work = script(web, Slow(), limit=1)

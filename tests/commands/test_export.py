@@ -15,7 +15,7 @@ from parenting.commands.main import app
 from parenting.server.db import Database
 from parenting.server.export import lines
 from parenting.server.new_run import NewRun, start
-from parenting.server.queue.parent_side import answer, correct
+from parenting.server.queue.answers import answer, supersede
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import claim
 from tests.server.conftest import CLIPS
@@ -31,7 +31,7 @@ def answered(db: Database) -> None:
     for tick in (1, 2, 3):
         query = post_query(db, mine, tick, "guidance", 1, CLIPS)
         answer(db, query, "left", "me", "human")
-    correct(db, query, "right", "me", "human")
+    supersede(db, query, "right", "me", "human")
 
 
 def export(*arguments: str) -> Result:

@@ -19,13 +19,13 @@ from sqlalchemy import text
 from typer.testing import CliRunner, Result
 
 from parenting.commands.main import app
-from parenting.server import record
+from parenting.server import operator_events
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
 from parenting.server.migrate import upgrade
-from parenting.server.queue import worker_side
 from parenting.server.settings import Settings
 from tests.server.eventful_run import TICKS, raise_eventful_run
+from tests.server.heard import heard_answers
 from tests.tree import ROOT
 
 
@@ -75,11 +75,11 @@ def sql(db: Database, statement: str, **values: object) -> int:
 def test_equal_bit_for_bit(db: Database) -> None:
     said = replay()
     assert said.exit_code == 0, said.output
-    heard, events = len(worker_side.record(db, 1)), record.list_events(db, 1)
+    heard, events = len(heard_answers(db, 1)), operator_events.list_operator_events(db, 1)
     assert {event.kind for event in events} == {"end_episode", "change", "mature"}
     counts = f"{TICKS} ticks, {heard} answers, {len(events)} events re-lived."
     assert said.output == f"Run 1: {counts} Equal bit for bit.\n"
-    asked = [row.query for row in worker_side.record(db, 1)]
+    asked = [row.query for row in heard_answers(db, 1)]
     assert {query.kind for query in asked} == {"guidance", "preference"}
 
 
@@ -101,13 +101,13 @@ def test_as_json(data: Path) -> None:
 
 
 def another_choice(db: Database) -> None:
-    taken = next(row for row in worker_side.record(db, 1) if row.answer.choice == "left")
+    taken = next(row for row in heard_answers(db, 1) if row.answer.choice == "left")
     assert sql(db, "UPDATE answer SET choice = 'right' WHERE id = :id", id=taken.answer.id)
 
 
 def a_late_choice(db: Database) -> None:
     """The last answer that training took in: only bits can tell."""
-    taken = [row for row in worker_side.record(db, 1) if row.answer.choice in ("left", "right")][-1]
+    taken = [row for row in heard_answers(db, 1) if row.answer.choice in ("left", "right")][-1]
     other = {"left": "right", "right": "left"}[taken.answer.choice]
     assert sql(db, "UPDATE answer SET choice = :other WHERE id = :id", other=other, id=taken.answer.id)
 
@@ -134,7 +134,7 @@ def an_unreadable_question(db: Database) -> None:
 
 
 def an_answer_moved(db: Database) -> None:
-    heard = [row.answer for row in worker_side.record(db, 1) if row.query.kind == "guidance"]
+    heard = [row.answer for row in heard_answers(db, 1) if row.query.kind == "guidance"]
     tick = heard[-1].applied_tick
     assert sql(db, "UPDATE answer SET applied_tick = :tick - 1 WHERE applied_tick = :tick", tick=tick)
 

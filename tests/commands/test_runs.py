@@ -12,7 +12,7 @@ from parenting.commands.runs import COLUMNS
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
-from parenting.server.queue.parent_side import answer
+from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim
 from parenting.server.schemas import run_schema

@@ -6,9 +6,9 @@ from typing import Any
 
 from parenting.drawing.clip import Clip, Frame
 from parenting.server.db import Database
+from parenting.server.metrics import write_metrics
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import post_query
-from parenting.server.record import write_metrics
 from parenting.server.runs import Claim, claim, report_progress
 from parenting.server.tables import Run
 

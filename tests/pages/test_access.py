@@ -10,9 +10,9 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
-from parenting.server import record, runs
+from parenting.server import operator_events, runs
 from parenting.server.db import Database
-from parenting.server.queue import parent_side
+from parenting.server.queue import answers
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
@@ -46,14 +46,14 @@ def lives(db: Database) -> None:
     fixtures.ask(db, mine, 41, "guidance", fixtures.guidance("left", "up", start=(1, 2)))
     fixtures.ask(db, mine, 42, "preference", fixtures.preference("down left left left", "right down down"))
     told = fixtures.ask(db, mine, 43, "preference", fixtures.preference("left left", "down"))
-    parent_side.answer(db, told, "left", "me", "human")
+    answers.answer(db, told, "left", "me", "human")
     _, other = fixtures.start_run(db, level="island-bottleneck")
     runs.report_progress(db, other, waiting="stuck", optimal=True)
     _, third = fixtures.start_run(db, goal=1, pace=2.5, config={"stages": 2})
     fixtures.measure(db, third, 40)
     runs.report_progress(db, third, maturity=2)
-    record.add_event(db, 3, "end_episode", {})
-    parent_side.answer(
+    operator_events.add_operator_event(db, 3, "end_episode", {})
+    answers.answer(
         db, fixtures.ask(db, third, 41, "guidance", fixtures.guidance("up", "left")), "left", "me", "human"
     )
     _, fourth = fixtures.start_run(db)

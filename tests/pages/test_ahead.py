@@ -8,7 +8,7 @@ from collections.abc import Callable
 from playwright.sync_api import APIResponse, Route, expect
 
 from parenting.server.db import Database
-from parenting.server.queue import parent_side
+from parenting.server.queue import answers
 from tests.pages.browser_tabs import BrowserTabs, given, shown, until
 
 
@@ -62,7 +62,7 @@ def test_a_page_that_is_gone_is_promised_nothing(
     page.context.close()
     second = ask()
     time.sleep(0.5)  # longer than a look takes to come
-    assert parent_side.get_query(db, second).leased_by is None
+    assert answers.get_query(db, second).leased_by is None
 
 
 def test_what_two_requests_bring_is_shown_once(

@@ -8,7 +8,7 @@ from playwright.sync_api import Route, expect
 
 from parenting.server import runs
 from parenting.server.db import Database
-from parenting.server.queue import parent_side
+from parenting.server.queue import answers
 from parenting.server.runs import Claim
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Query
@@ -137,7 +137,7 @@ def test_a_question_closed_by_another_is_told(
     number, following = ask(), ask()
     page = tabs.open("/runs/1/parent")
     shown(page, number)
-    parent_side.answer(db, number, "left", "somebody", "human")
+    answers.answer(db, number, "left", "somebody", "human")
     page.keyboard.press("ArrowRight")
     expect(page.get_by_role("alert")).to_contain_text("already answered by someone else")
     expect(page.locator("#saved")).to_have_text("")

@@ -10,8 +10,8 @@ import pytest
 
 from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.operator_events import list_operator_events
 from parenting.server.queue import worker_side
-from parenting.server.record import list_events
 from parenting.server.runs import Claim, get_run, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
@@ -27,7 +27,11 @@ def mine(db: Database) -> Claim:
 
 def changes(db: Database) -> list[tuple[str, float]]:
     """What was changed, in its order."""
-    return [(row.payload["name"], row.payload["value"]) for row in list_events(db, 1) if row.kind == "change"]
+    return [
+        (row.payload["name"], row.payload["value"])
+        for row in list_operator_events(db, 1)
+        if row.kind == "change"
+    ]
 
 
 def field(page: str, name: str) -> str:
@@ -76,7 +80,7 @@ def test_only_what_differs_becomes_an_event(client: httpx2.Client, db: Database,
         "p_guid": "0.25",
         "p_train": "0.5",
     }
-    worker_side.take_events(db, mine, 7)
+    worker_side.take_operator_events(db, mine, 7)
     client.post("/runs/1/probabilities", data={**PROBABILITIES, "p_train": "0.5"})
     assert changes(db)[2:] == [("p_guid", 0.95)]
 
@@ -92,7 +96,7 @@ def test_a_chance_that_is_none_stands_beside_its_field(
     assert field(page.text, "p_rec") == "0.1"  # what was typed stays
     assert page.text.count(" autofocus") == 1
     assert "'unsafe-inline'" in page.headers["content-security-policy"]
-    assert list_events(db, 1) == []
+    assert list_operator_events(db, 1) == []
 
 
 @pytest.mark.parametrize(
@@ -144,7 +148,7 @@ def test_what_was_done_is_listed_with_its_tick(client: httpx2.Client, db: Databa
     assert "What the operator did" not in client.get("/runs/1").text
     client.post("/runs/1/event", data={"kind": "mature"})
     client.post("/runs/1/event", data={"kind": "end_episode"})
-    worker_side.take_events(db, mine, 7)
+    worker_side.take_operator_events(db, mine, 7)
     client.post("/runs/1/probabilities", data={**PROBABILITIES, "p_guid": "1"})
     listed = client.get("/runs/1").text.partition("What the operator did")[2].partition("</ol>")[0]
     assert [re.sub("<.*?>", "", line) for line in re.findall(r"<li.*?</li>", listed)] == [
@@ -182,7 +186,7 @@ def test_a_run_that_is_over_takes_nothing(
     assert "Ended the stage" in page
     reply = client.post(f"/runs/1/{path}", data=data)
     assert reply.status_code == 409
-    assert len(list_events(db, 1)) == 1
+    assert len(list_operator_events(db, 1)) == 1
 
 
 @pytest.mark.parametrize("path", ["status", "event", "probabilities", "goal", "pace"])

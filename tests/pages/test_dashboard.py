@@ -11,7 +11,7 @@ from parenting.envs import registry
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import watch
-from parenting.server.reads.pages import latest_metrics, sampled_metrics
+from parenting.server.reads.metrics import latest_metrics, sampled_metrics
 from parenting.server.runs import claim, get_run, report_progress, set_status
 from parenting.server.session import RunSession
 from parenting.server.statuses import RunStatus

@@ -8,7 +8,7 @@ from parenting.server.db import Database
 from parenting.server.export import rows
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import watch
-from parenting.server.record import metrics
+from parenting.server.reads.metrics import list_metrics
 from parenting.server.runs import claim
 from parenting.server.session import RunSession
 from tests.tree import ROOT
@@ -27,5 +27,5 @@ def test_numbers_and_keys_have_their_lines(db: Database) -> None:
     life = RunSession(db, claim(db, "test")[0], run, lambda: None)
     for _ in range(20):
         life.tick(watch(db, [run.id])[run.id])
-    assert sorted(names("The numbers")) == sorted(metrics(db, run.id)[-1].values)
+    assert sorted(names("The numbers")) == sorted(list_metrics(db, run.id)[-1].values)
     assert names("The record, exported") == list(next(iter(rows(db, run.id))))

@@ -9,7 +9,7 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.pages.history import PAGE
-from parenting.server.queue import parent_side, worker_side
+from parenting.server.queue import answers, worker_side
 from parenting.server.runs import Claim
 from tests.pages import island_fixtures as fixtures
 
@@ -25,7 +25,7 @@ def answered(db: Database, mine: Claim, tick: int, choice: str, kind: str = "gui
     """A question of this tick with its answer."""
     clips = {"guidance": fixtures.guidance, "preference": fixtures.preference}[kind]("left", "down")
     query = fixtures.ask(db, mine, tick, kind, clips)
-    parent_side.answer(db, query, choice, by, "scripted" if by == "scripted" else "human")
+    answers.answer(db, query, choice, by, "scripted" if by == "scripted" else "human")
     return query
 
 
@@ -103,7 +103,7 @@ def test_some_of_them(client: httpx2.Client, db: Database, mine: Claim) -> None:
 
 def test_a_corrected_answer_says_so(client: httpx2.Client, db: Database, mine: Claim) -> None:
     query = answered(db, mine, 1, "left")
-    parent_side.correct(db, query, "right", ME, "human")
+    answers.supersede(db, query, "right", ME, "human")
     page = client.get("/runs/1/history").text
     assert "corrected later" in entry(page, 1)
     assert "corrected later" not in entry(page, 2)

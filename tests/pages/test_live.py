@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
-from parenting.server.queue import parent_side, worker_side
+from parenting.server.queue import answers, worker_side
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
@@ -50,7 +50,7 @@ def test_an_event_gets_its_tick_on_the_page(tabs: BrowserTabs, db: Database) -> 
     page.get_by_label("p_guid").fill("0.5")
     page.get_by_role("button", name="Change").click()
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 before the next tick")
-    worker_side.take_events(db, mine, 8)
+    worker_side.take_operator_events(db, mine, 8)
     runs.report_progress(db, mine, tick=8)
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 at tick 8")
 
@@ -77,7 +77,7 @@ def test_the_clips_of_an_answer_play_while_it_is_pointed_at(tabs: BrowserTabs, d
     _, mine = fixtures.start_run(db)
     for tick in (1, 2):
         query = fixtures.ask(db, mine, tick, "preference", fixtures.preference("left left", "down down"))
-        parent_side.answer(db, query, "left", "me", "human")
+        answers.answer(db, query, "left", "me", "human")
     page = tabs.open("/runs/1/history")
     entries = page.locator(".entry")
 

@@ -7,9 +7,9 @@ from typing import Any
 import httpx2
 from sqlalchemy import select
 
-from parenting.server import record, runs
+from parenting.server import operator_events, runs
 from parenting.server.db import Database
-from parenting.server.queue import parent_side
+from parenting.server.queue import answers
 from parenting.server.tables import Table
 from tests.pages import island_fixtures as fixtures
 from tests.test_docs import page_routes
@@ -35,8 +35,8 @@ def test_no_get_changes_anything(client: httpx2.Client, db: Database) -> None:
     fixtures.measure(db, mine, 30)
     for tick, kind in ((31, "preference"), (32, "guidance")):
         query = fixtures.ask(db, mine, tick, kind, fixtures.guidance("left", "down"))
-    parent_side.answer(db, query, "left", "me", "human")
-    record.add_event(db, 1, "end_episode", {"kind": "end_episode"})
+    answers.answer(db, query, "left", "me", "human")
+    operator_events.add_operator_event(db, 1, "end_episode", {"kind": "end_episode"})
     _, other = fixtures.start_run(db)
     runs.report_progress(db, other, waiting="stuck")
     fixtures.ask(db, other, 1, "guidance", fixtures.guidance("left", "down"))

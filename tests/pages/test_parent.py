@@ -15,11 +15,11 @@ from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
 from parenting.server.pages.texts import STATE_TEXTS, page_state
-from parenting.server.queue import parent_side
+from parenting.server.queue import answers
 from parenting.server.runs import Claim
 from parenting.server.schemas import OpenSchema, RunSchema, run_schema
 from parenting.server.settings import Settings
-from parenting.server.tables import Answer, Event, Query, Run
+from parenting.server.tables import Answer, OperatorEvent, Query, Run
 from tests.pages import island_fixtures as fixtures
 
 ME, OTHER = "client-of-mine", "client-of-another"
@@ -100,7 +100,7 @@ def test_the_same_form_sent_twice_is_one_answer(
 def test_a_closed_question_says_so_and_leads_on(
     client: httpx2.Client, db: Database, asked: list[int]
 ) -> None:
-    parent_side.answer(db, asked[1], "left", OTHER, "human")
+    answers.answer(db, asked[1], "left", OTHER, "human")
     reply = client.post(
         "/runs/1/parent/answer", data={"client_id": ME, "query_id": asked[1], "choice": "right"}
     )
@@ -171,7 +171,7 @@ def test_nothing_is_leased_ahead_of_the_goal(client: httpx2.Client, db: Database
     assert not offered(), "the one that is shown is the last"
     runs.set_goal(db, 1, 2)
     assert offered()
-    parent_side.answer(db, asked[1], "left", ME, "human")
+    answers.answer(db, asked[1], "left", ME, "human")
     assert offered(), "the one that was shown counts once"
     runs.set_goal(db, 1, 1)
     assert not offered()
@@ -205,7 +205,7 @@ def test_the_operator_ends_an_episode(client: httpx2.Client, db: Database, life:
     assert 'data-state="stuck"' in page.partition("<main")[2].partition(">")[0]
     reply = client.post("/runs/1/event", data={"kind": "end_episode", "back": "parent"})
     assert reply.headers["location"] == "/runs/1/parent"
-    assert [event.kind for event in rows(db, Event)] == ["end_episode"]
+    assert [event.kind for event in rows(db, OperatorEvent)] == ["end_episode"]
 
 
 def test_an_optimal_agent_is_announced(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:

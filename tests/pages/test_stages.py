@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from parenting.server.db import Database
+from parenting.server.metrics import write_metrics
 from parenting.server.new_run import NewRun, start
 from parenting.server.pages.stages import StageRow, stage_rows
-from parenting.server.reads.pages import first_metrics, latest_metrics
-from parenting.server.record import metrics, write_metrics
+from parenting.server.reads.metrics import first_metrics, latest_metrics, list_metrics
 from parenting.server.runs import Claim, get_run
 from parenting.server.settings import Settings
 from parenting.server.worker import Worker
@@ -52,7 +52,7 @@ def test_counts_are_those_of_the_stage_alone(db: Database, mine: Claim) -> None:
 
     rows = {3: row(1, 1, 0, 1.0), 9: row(1, 5, 1, 2.0), 12: row(2, 6, 1, 2.5), 20: row(2, 9, 4, None)}
     write_metrics(db, mine, rows)
-    shown = stage_rows(3, 2, first_metrics(db, mine.run_id), metrics(db, mine.run_id)[-1])
+    shown = stage_rows(3, 2, first_metrics(db, mine.run_id), list_metrics(db, mine.run_id)[-1])
     assert shown == [
         StageRow(1, "past", 0, 12, 6, 12, 1, 2.5, 4.5),
         StageRow(2, "now", 12, 20, 3, 6, 3, None, 4.5),

@@ -11,7 +11,7 @@ from parenting.envs.registry import WORLDS
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.pages.start import PAGE
-from parenting.server.queue.parent_side import answer
+from parenting.server.queue.answers import answer
 from parenting.server.runs import get_run, let_go, list_runs, report_progress, set_goal, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from parenting.server.db import Database, connect
-from parenting.server.record import list_events
+from parenting.server.operator_events import list_operator_events
 from parenting.server.runs import get_run
 from parenting.server.settings import Settings
 from parenting.server.worker import Worker
@@ -81,8 +81,10 @@ def test_from_start_to_stop(tabs: BrowserTabs, db: Database, worker: Worker) -> 
     expect(page.get_by_role("heading", name="That was the last question of this goal.")).to_be_visible()
     press(page, "50 more")
     expect(page.locator("#goal")).to_have_text("of 55")
-    until(lambda: all(row.applied_tick for row in list_events(db, 1)), 10, "an event was not applied")
-    assert [row.kind for row in list_events(db, 1)] == ["mature", "change"]
+    until(
+        lambda: all(row.applied_tick for row in list_operator_events(db, 1)), 10, "an event was not applied"
+    )
+    assert [row.kind for row in list_operator_events(db, 1)] == ["mature", "change"]
     assert get_run(db, 1).tick >= tick
 
     page.get_by_role("link", name="Dashboard").click()

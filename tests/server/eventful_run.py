@@ -9,7 +9,8 @@ import httpx2
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.new_run import start
-from parenting.server.queue import parent_side, worker_side
+from parenting.server.queue import answers, worker_side
+from parenting.server.queue.queries import open_counts
 from parenting.server.session import RunSession
 from tests.server.raising import Begun
 
@@ -52,7 +53,7 @@ class PersonAndOperator:
                 self.answer()
 
     def until_guidance_is_open(self) -> None:
-        while not runs.open_counts(self.db, self.run).guidance:
+        while not open_counts(self.db, self.run).guidance:
             self.live_to(self.life.last_tick + 1)
 
     def answer(self) -> int:
@@ -88,8 +89,8 @@ def raise_eventful_run(db: Database, web: httpx2.Client) -> int:
     people.until_guidance_is_open()
     query = people.answer()
     people.live_to(people.life.last_tick + 3)
-    parent_side.correct(db, query, "either", "tab", "human")  # too late: the agent has heard the other answer
-    assert parent_side.get_query(db, query).status == "applied"
+    answers.supersede(db, query, "either", "tab", "human")  # too late: the agent has heard the other answer
+    assert answers.get_query(db, query).status == "applied"
     people.operate("change", name="p_train", value=0.5)
     people.live_to(50)
     people.operate("mature")

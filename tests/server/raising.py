@@ -19,11 +19,11 @@ from parenting.commands.judge import Judge as Script
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import ScriptedRule
+from parenting.server.checkpoints import load_checkpoints
 from parenting.server.codec import CHOICE_NAMES
 from parenting.server.counters import count
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun
-from parenting.server.record import load_checkpoints
 from parenting.server.replay import differences
 from parenting.server.snapshot import Snapshot, initial_snapshot, unpack
 from parenting.weights.store import Wanted, find, load

@@ -9,8 +9,8 @@ from parenting.agent.config import Config
 from parenting.envs import registry
 from parenting.server.db import Database
 from parenting.server.log import set_up_log
-from parenting.server.queue.worker_side import take_events
-from parenting.server.record import write_metrics
+from parenting.server.metrics import write_metrics
+from parenting.server.queue.worker_side import take_operator_events
 from parenting.server.runs import Claim, get_run, report_progress
 from parenting.server.tables import Run
 from tests.server.conftest import Clock
@@ -148,7 +148,7 @@ def test_pause_resume_stop(client: httpx2.Client, run: Run) -> None:
 def test_events_reach_the_agent(client: httpx2.Client, db: Database, mine: Claim) -> None:
     for verb in ("mature", "end-episode"):
         assert client.post(f"/api/v1/runs/{mine.run_id}/{verb}").status_code == 202
-    assert [event.payload for event in take_events(db, mine, 3)] == [
+    assert [event.payload for event in take_operator_events(db, mine, 3)] == [
         {"kind": "mature"},
         {"kind": "end_episode"},
     ]

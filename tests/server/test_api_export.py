@@ -7,12 +7,13 @@ import pytest
 
 from parenting.server.codec import CHOICES
 from parenting.server.db import Database
-from parenting.server.queue.parent_side import answer
-from parenting.server.queue.worker_side import post_query, record, take_answer
+from parenting.server.queue.answers import answer
+from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.reads import answers
 from parenting.server.runs import Claim
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS
+from tests.server.heard import heard_answers
 
 
 @pytest.fixture
@@ -33,7 +34,7 @@ def test_it_is_what_the_agent_heard(client: httpx2.Client, db: Database, heard: 
     ]
     assert told == [
         (taken.answer.applied_tick, taken.query.clips, taken.answer.choice)
-        for taken in record(db, heard.run_id)
+        for taken in heard_answers(db, heard.run_id)
     ]
     assert [row["mu"] for row in rows] == [[1, 0], [0, 1], [0.5, 0.5], None]
 

@@ -6,10 +6,11 @@ import httpx2
 import pytest
 
 from parenting.server.db import Database
+from parenting.server.metrics import write_metrics
 from parenting.server.new_run import NewRun, start
-from parenting.server.queue.parent_side import answer, correct
+from parenting.server.operator_events import add_operator_event
+from parenting.server.queue.answers import answer, supersede
 from parenting.server.queue.worker_side import post_query, take_answer
-from parenting.server.record import add_event, write_metrics
 from parenting.server.runs import Claim
 from tests.server.conftest import CLIPS
 from tests.server.test_api import wrong
@@ -79,7 +80,7 @@ def test_question_shows_the_answer_that_stands(client: httpx2.Client, db: Databa
         return client.get(f"/api/v1/queries/{query}").json()
 
     assert (shown(asked[0])["answer"]["choice"], shown(asked[0])["answer"]["applied_tick"]) == ("left", 5)
-    correct(db, asked[0], "either", "tab", "human")
+    supersede(db, asked[0], "either", "tab", "human")
     assert (shown(asked[0])["answer"]["choice"], shown(asked[0])["answer"]["applied_tick"]) == (
         "either",
         None,
@@ -100,7 +101,7 @@ def test_metrics_in_pages(client: httpx2.Client, db: Database, mine: Claim) -> N
 
 
 def test_operators_events_in_pages(client: httpx2.Client, db: Database, mine: Claim) -> None:
-    made = [add_event(db, mine.run_id, "end_episode", {"kind": "end_episode"}).id for _ in range(4)]
+    made = [add_operator_event(db, mine.run_id, "end_episode", {"kind": "end_episode"}).id for _ in range(4)]
     assert ids(walk(client, f"/api/v1/runs/{mine.run_id}/operator-events")) == [made[:2], made[2:]]
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.errors import BusyError
-from parenting.server.queue.parent_side import get_query
+from parenting.server.queue.answers import get_query
 from parenting.server.queue.worker_side import take_answer
 from parenting.server.runs import Claim, set_status
 from parenting.server.statuses import RunStatus

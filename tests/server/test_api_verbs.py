@@ -6,7 +6,7 @@ import httpx2
 import pytest
 
 from parenting.server.db import Database
-from parenting.server.queue.worker_side import take_events, watch
+from parenting.server.queue.worker_side import take_operator_events, watch
 from parenting.server.runs import Claim, get_run, set_status
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
@@ -25,7 +25,7 @@ def test_change_reaches_the_agent(
 ) -> None:
     changed = post(client, mine.run_id, "change", name=name, value=value)
     assert changed.status_code == 202
-    (event,) = take_events(db, mine, 3)
+    (event,) = take_operator_events(db, mine, 3)
     assert event.payload == {"kind": "change", "name": name, "value": value}
     assert changed.json()["config"] == get_run(db, mine.run_id).config, "what it was started with stays"
 
@@ -121,7 +121,7 @@ def test_last_stage_never_ends(client: httpx2.Client) -> None:
 
 def test_operators_events_with_their_ticks(client: httpx2.Client, db: Database, mine: Claim) -> None:
     post(client, mine.run_id, "mature")
-    take_events(db, mine, 3)
+    take_operator_events(db, mine, 3)
     post(client, mine.run_id, "change", name="p_guid", value=0.5)
     shown = client.get(f"/api/v1/runs/{mine.run_id}/operator-events").json()
     at = {"run": mine.run_id, "created": "2026-11-22T12:00:00Z"}

@@ -15,12 +15,12 @@ from fastapi.testclient import TestClient
 from structlog.testing import capture_logs
 
 from parenting.envs import registry
-from parenting.server import record
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
 from parenting.server.migrate import upgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue import worker_side
+from parenting.server.reads.metrics import list_metrics
 from parenting.server.runs import claim, get_run, set_status
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
@@ -87,7 +87,7 @@ def test_a_script_raises_it(db: Database, begun: Begun) -> None:
     saved = last(db, run, begun)
     assert int(saved.state.maturity) == begun.config.stages  # so it has heard answers, if it has two
     assert same_bits(saved, inline(TICKS, begun)) == []
-    assert record.metrics(db, run)
+    assert list_metrics(db, run)
 
 
 @pytest.mark.parametrize("begun", ELSEWHERE, ids=name)
@@ -155,9 +155,9 @@ def test_a_garden_goes_on_until_it_is_stopped(settings: Settings, db: Database) 
     run = start(db, NewRun(world="reward-hacking", parent="scripted")).id
     worker = Worker(db, settings)
     worker._claim()
-    while not record.metrics(db, run):
+    while not list_metrics(db, run):
         worker._round()
-    row = record.metrics(db, run)[0].values
+    row = list_metrics(db, run)[0].values
     assert 0 <= row["return"] < 100
     assert row["optimal_return"] > 40  # what the parent's own way waters in a hundred steps
     assert row["optimal"] == 0
@@ -182,12 +182,12 @@ def test_a_dear_look_is_not_taken_at_each_answer(db: Database) -> None:
             else:
                 life.report_waiting(seen)
                 assert parent.answer_one()
-    assert not record.metrics(db, run)
+    assert not list_metrics(db, run)
     life.evaluation.refresh_seconds = 0.0
     while life.ready(seen := worker_side.watch(db, [run])[run]):
         life.tick(seen)
     life.report_waiting(seen)
-    newest = record.metrics(db, run)[-1]
+    newest = list_metrics(db, run)[-1]
     assert (newest.tick, newest.values["guidance"]) == (life.last_tick, int(life.saved.tally.kinds[0, 1]))
     assert get_run(db, run).waiting == "guidance"
 

@@ -10,10 +10,11 @@ from parenting.server.codec import CHOICES
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.export import MU, lines, rows
-from parenting.server.queue.parent_side import answer, correct
-from parenting.server.queue.worker_side import post_query, record, take_answer
+from parenting.server.queue.answers import answer, supersede
+from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.runs import Claim
 from tests.server.conftest import CLIPS, Clock
+from tests.server.heard import heard_answers
 
 
 @pytest.fixture
@@ -24,7 +25,7 @@ def run_id(db: Database, mine: Claim, clock: Clock) -> int:
         clock.pass_seconds(0.5)
         answer(db, query, choice, "tab", "human")
         take_answer(db, mine, 2 * tick + 1)
-    correct(db, query, "left", "tab", "human")
+    supersede(db, query, "left", "tab", "human")
     return mine.run_id
 
 
@@ -54,7 +55,8 @@ def test_a_row_tells_all_about_an_answer(db: Database, run_id: int) -> None:
 
 def test_it_is_what_the_agent_heard(db: Database, run_id: int) -> None:
     heard = [
-        (taken.answer.applied_tick, taken.query.clips, taken.answer.choice) for taken in record(db, run_id)
+        (taken.answer.applied_tick, taken.query.clips, taken.answer.choice)
+        for taken in heard_answers(db, run_id)
     ]
     told = [row for row in rows(db, run_id) if row["applied_tick"] is not None]
     assert [

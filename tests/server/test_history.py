@@ -6,7 +6,7 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
-from parenting.server.queue.parent_side import answer, correct
+from parenting.server.queue.answers import answer, supersede
 from parenting.server.queue.worker_side import post_query
 from parenting.server.reads import answers
 from parenting.server.runs import Claim
@@ -21,7 +21,7 @@ def five(db: Database, mine: Claim) -> int:
     for tick, choice in enumerate(CHOICES):
         last = post_query(db, mine, tick, "guidance", 1, CLIPS)
         answer(db, last, choice, "me", "human")
-    correct(db, last, "right", "me", "human")
+    supersede(db, last, "right", "me", "human")
     return mine.run_id
 
 

@@ -40,7 +40,7 @@ class House:
 
     def __init__(self, data: Path, runs: dict[int, Begun]) -> None:
         self.data, self.url = data, f"http://127.0.0.1:{free_port()}"
-        self.receipts = {run: data / f"receipts-{run}.jsonl" for run in runs}
+        self.receipt_files = {run: data / f"receipts-{run}.jsonl" for run in runs}
         self.orders: dict[str, tuple[str, ...]] = {
             "web": ("web", "--port", self.url.rpartition(":")[2]),
             "worker": ("worker",),
@@ -50,7 +50,7 @@ class House:
         self.killed: Counter[str] = Counter()
 
     def script(self, run: int) -> tuple[str, ...]:
-        return answering(self.url, run, "--receipts", str(self.receipts[run]))
+        return answering(self.url, run, "--receipts", str(self.receipt_files[run]))
 
     def __enter__(self) -> House:
         return self
@@ -83,7 +83,7 @@ class House:
 
     def receipts(self) -> Iterator[dict[str, Any]]:
         """What the server has told: a line was written after its reply was read to the end."""
-        for file in self.receipts.values():
+        for file in self.receipt_files.values():
             if file.exists():
                 yield from map(json.loads, file.read_text(encoding="utf-8").splitlines())
 

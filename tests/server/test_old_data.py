@@ -21,8 +21,8 @@ from parenting.server.db import Database, connect
 from parenting.server.errors import NotFound, SetupError
 from parenting.server.export import lines
 from parenting.server.migrate import downgrade, require_current, upgrade
-from parenting.server.queue import parent_side, worker_side
-from parenting.server.record import add_event
+from parenting.server.operator_events import add_operator_event
+from parenting.server.queue import answers, leases, worker_side
 from parenting.server.replay import relive
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
@@ -141,11 +141,11 @@ def test_it_goes_on_with_the_bits_of_the_old_version(db: Database, same_build: N
         if session.ready(seen):
             session.tick(seen)
         elif bool(session.saved.state.all_refused):
-            add_event(db, run, "end_episode", {})
+            add_operator_event(db, run, "end_episode", {})
         else:
-            query = parent_side.lease(db, run, "tab")
+            query = leases.lease(db, run, "tab")
             assert query is not None
-            parent_side.answer(db, query.id, "left", "tab", "human")
+            answers.answer(db, query.id, "left", "tab", "human")
     state = session.saved.state
     assert runs.get_run(db, run).answers == expected["answers"]
     assert digest(state.learner.params) == expected["parameters"]

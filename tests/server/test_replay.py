@@ -61,7 +61,7 @@ def test_every_piece_is_held_against_its_own() -> None:
 
 @pytest.mark.parametrize("window", [1, 7, 1000])
 def test_it_is_the_same_in_small_portions(db: Database, monkeypatch: pytest.MonkeyPatch, window: int) -> None:
-    monkeypatch.setattr("parenting.server.replay.WINDOW", window)
+    monkeypatch.setattr("parenting.server.reads.record.WINDOW", window)
     run = start(db, ISLAND.new("scripted")).id
     (mine,) = claim(db, "test")
     life = RunSession(db, mine, get_run(db, run), lambda: None)

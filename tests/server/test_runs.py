@@ -5,7 +5,7 @@ import pytest
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.new_run import NewRun, start
-from parenting.server.queue.parent_side import get_query
+from parenting.server.queue.answers import get_query
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim as ClaimOf
 from parenting.server.runs import (

@@ -14,8 +14,8 @@ import pytest
 from parenting.envs import registry
 from parenting.server.db import Database
 from parenting.server.new_run import start
-from parenting.server.queue.worker_side import record
 from parenting.server.replay import relive
+from tests.server.heard import heard_answers
 from tests.server.processes import Command, command
 from tests.server.raising import Begun, Inline, last, same_bits
 from tests.server.serving import free_port, until_up
@@ -46,7 +46,7 @@ def answering(url: str, run: int, *more: str) -> tuple[str, ...]:
 def until_heard(db: Database, runs: dict[int, Begun], seconds: float = 60) -> None:
     """Wait until every answer was heard: the last ones are stored before."""
     end = time.monotonic() + seconds
-    while any(len(record(db, run)) < GOAL for run in runs):
+    while any(len(heard_answers(db, run)) < GOAL for run in runs):
         assert time.monotonic() < end, "an answer was not heard"
         time.sleep(0.05)
 
@@ -56,10 +56,10 @@ def check(db: Database, run: int, begun: Begun) -> None:
     saved, expected = last(db, run, begun), Inline(begun)
     while int(expected.saved.state.keys.tick) < int(saved.state.keys.tick):
         expected.tick()
-    heard = [(taken.answer.applied_tick, taken.answer.choice) for taken in record(db, run)]
+    heard = [(taken.answer.applied_tick, taken.answer.choice) for taken in heard_answers(db, run)]
     assert heard == expected.heard
     assert len(heard) == GOAL
-    assert {taken.answer.parent for taken in record(db, run)} == {"scripted"}
+    assert {taken.answer.parent for taken in heard_answers(db, run)} == {"scripted"}
     assert same_bits(saved, expected.saved) == []
     assert (saved.tally.kinds[0, 1:] > 0).all(), "it asked one kind of questions only: that shows too little"
     assert int(saved.state.maturity) == begun.config.stages

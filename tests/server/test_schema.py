@@ -22,10 +22,11 @@ from structlog.testing import capture_logs
 
 from parenting.server.app import bare_app, create_app
 from parenting.server.db import Database
+from parenting.server.metrics import write_metrics
 from parenting.server.new_run import LARGEST_INT, NewRun, start
-from parenting.server.queue.parent_side import answer
-from parenting.server.queue.worker_side import post_query, take_answer, take_events
-from parenting.server.record import add_event, write_metrics
+from parenting.server.operator_events import add_operator_event
+from parenting.server.queue.answers import answer
+from parenting.server.queue.worker_side import post_query, take_answer, take_operator_events
 from parenting.server.runs import Claim, claim, finish, set_status
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
@@ -57,9 +58,9 @@ def _live(db: Database, mine: Claim) -> None:
     answer(db, queries[0], "left", "a", "human")
     take_answer(db, mine, QUESTIONS)
     answer(db, queries[1], "neither", "a", "human")
-    add_event(db, mine.run_id, "change", {"kind": "change", "name": "p_rec", "value": 0.5})
-    take_events(db, mine, QUESTIONS + 1)
-    add_event(db, mine.run_id, "mature", {"kind": "mature"})
+    add_operator_event(db, mine.run_id, "change", {"kind": "change", "name": "p_rec", "value": 0.5})
+    take_operator_events(db, mine, QUESTIONS + 1)
+    add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
     write_metrics(db, mine, {tick: {"deaths": 0, "loss": None} for tick in range(5)})
 
 

@@ -14,11 +14,13 @@ from sqlalchemy import Connection, event, select, text
 from sqlalchemy.exc import IntegrityError, OperationalError
 
 from parenting.server import db as database
+from parenting.server.checkpoints import save_checkpoint
 from parenting.server.db import Database, connect, sqlite_module
 from parenting.server.errors import BusyError, DiskFullError, SetupError
-from parenting.server.queue.parent_side import answer, lease
+from parenting.server.operator_events import add_operator_event
+from parenting.server.queue.answers import answer
+from parenting.server.queue.leases import lease
 from parenting.server.queue.worker_side import post_query, take_answer
-from parenting.server.record import add_event, save_checkpoint
 from parenting.server.runs import Claim, report_progress
 from parenting.server.settings import Settings
 from parenting.server.tables import Answer, Query, Run
@@ -47,7 +49,7 @@ def test_every_connection_is_set_up(db: Database, name: str, value: object) -> N
     [
         (lambda db, mine, query: answer(db, query, "left", "a", "human"), FULL),
         (lambda db, mine, query: post_query(db, mine, 9, "guidance", 1, {}), FULL),
-        (lambda db, mine, query: add_event(db, mine.run_id, "end_episode", {}), FULL),
+        (lambda db, mine, query: add_operator_event(db, mine.run_id, "end_episode", {}), FULL),
         (lambda db, mine, query: lease(db, mine.run_id, "a"), NORMAL),
         (lambda db, mine, query: take_answer(db, mine, 9), NORMAL),
         (lambda db, mine, query: report_progress(db, mine, tick=9), NORMAL),
@@ -164,7 +166,7 @@ import sys
 from pathlib import Path
 from parenting.server.db import connect
 from parenting.server.queue.worker_side import post_query
-from parenting.server.queue.parent_side import answer
+from parenting.server.queue.answers import answer
 from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 db = connect(Settings(data=Path(sys.argv[1]), database_url=None))

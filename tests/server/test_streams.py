@@ -11,11 +11,11 @@ import uvicorn
 
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
+from parenting.server.metrics import write_metrics
 from parenting.server.migrate import upgrade
 from parenting.server.notify import Notifier
-from parenting.server.queue.parent_side import answer
+from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
-from parenting.server.record import write_metrics
 from parenting.server.runs import Claim, report_progress
 from parenting.server.settings import Settings
 from parenting.server.streams import POLL_SECONDS

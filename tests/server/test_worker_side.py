@@ -4,21 +4,21 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.errors import LostClaimError
-from parenting.server.queue.parent_side import answer, correct, get_query
+from parenting.server.operator_events import add_operator_event
+from parenting.server.queue.answers import answer, get_query, supersede
+from parenting.server.queue.queries import open_counts
 from parenting.server.queue.worker_side import (
     high_water,
     post_query,
-    record,
     take_answer,
-    take_events,
+    take_operator_events,
     watch,
-    withdraw,
 )
-from parenting.server.record import add_event
-from parenting.server.runs import Claim, claim, get_run, open_counts, report_progress, set_status
+from parenting.server.runs import Claim, claim, get_run, report_progress, set_status
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock
+from tests.server.heard import heard_answers
 
 
 def answered(db: Database, mine: Claim, tick: int, kind: str = "preference") -> int:
@@ -60,7 +60,7 @@ def test_heard_answer_is_marked_with_its_tick(db: Database, mine: Claim) -> None
     assert taken is not None
     assert (taken.answer.applied_tick, taken.query.status, taken.query.clips) == (3, "applied", CLIPS)
     assert get_query(db, query).status == "applied"
-    assert [row.answer.applied_tick for row in record(db, mine.run_id)] == [3]
+    assert [row.answer.applied_tick for row in heard_answers(db, mine.run_id)] == [3]
 
 
 def test_replay_gives_back_what_was_recorded(db: Database, mine: Claim) -> None:
@@ -74,7 +74,7 @@ def test_replay_gives_back_what_was_recorded(db: Database, mine: Claim) -> None:
 def test_replay_gives_back_an_answer_that_was_superseded_later(db: Database, mine: Claim) -> None:
     query = answered(db, mine, 2)
     assert heard(db, mine, 3) == query
-    correct(db, query, "neither", "a", "human")
+    supersede(db, query, "neither", "a", "human")
     taken = take_answer(db, mine, 3)
     assert taken is not None
     assert (taken.answer.choice, taken.answer.standing) == ("left", False)
@@ -82,7 +82,7 @@ def test_replay_gives_back_an_answer_that_was_superseded_later(db: Database, min
 
 
 def test_correction_before_it_was_heard_is_what_is_heard(db: Database, mine: Claim) -> None:
-    correct(db, answered(db, mine, 2), "neither", "a", "human")
+    supersede(db, answered(db, mine, 2), "neither", "a", "human")
     taken = take_answer(db, mine, 3)
     assert taken is not None
     assert taken.answer.choice == "neither"
@@ -105,45 +105,44 @@ def test_high_water_counts_answers_and_events(db: Database, mine: Claim) -> None
     answered(db, mine, 1)
     heard(db, mine, 8)
     assert high_water(db, mine.run_id) == 8
-    add_event(db, mine.run_id, "mature", {})
-    take_events(db, mine, 11)
+    add_operator_event(db, mine.run_id, "mature", {})
+    take_operator_events(db, mine, 11)
     assert high_water(db, mine.run_id) == 11
 
 
 def test_events_apply_once_and_replay(db: Database, mine: Claim) -> None:
-    add_event(db, mine.run_id, "mature", {"kind": "mature"})
+    add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
     change = {"kind": "change", "name": "p_rec", "value": 0.25}
-    add_event(db, mine.run_id, "change", change)
-    assert [event.kind for event in take_events(db, mine, 3)] == ["mature", "change"]
-    assert take_events(db, mine, 4) == []
-    add_event(db, mine.run_id, "mature", {})
-    replayed = take_events(db, mine, 3)
+    add_operator_event(db, mine.run_id, "change", change)
+    assert [event.kind for event in take_operator_events(db, mine, 3)] == ["mature", "change"]
+    assert take_operator_events(db, mine, 4) == []
+    add_operator_event(db, mine.run_id, "mature", {})
+    replayed = take_operator_events(db, mine, 3)
     assert [(event.applied_tick, event.payload) for event in replayed][1] == (3, change)
     assert len(replayed) == 2
-    assert len(take_events(db, mine, 5)) == 1
+    assert len(take_operator_events(db, mine, 5)) == 1
 
 
 def test_events_and_answer_share_a_tick(db: Database, mine: Claim) -> None:
     query = answered(db, mine, 2)
-    add_event(db, mine.run_id, "mature", {})
-    assert len(take_events(db, mine, 3)) == 1
+    add_operator_event(db, mine.run_id, "mature", {})
+    assert len(take_operator_events(db, mine, 3)) == 1
     assert heard(db, mine, 3) == query
-    assert len(take_events(db, mine, 3)) == 1
+    assert len(take_operator_events(db, mine, 3)) == 1
     assert heard(db, mine, 3) == query
 
 
 def test_ended_episode_withdraws_guidance_and_nothing_else(db: Database, mine: Claim, guidance: int) -> None:
     preference = post_query(db, mine, 4, "preference", 1, CLIPS)
-    add_event(db, mine.run_id, "end_episode", {})
-    take_events(db, mine, 6)
+    add_operator_event(db, mine.run_id, "end_episode", {})
+    take_operator_events(db, mine, 6)
     assert get_query(db, guidance).status == "withdrawn"
     assert get_query(db, preference).status == "open"
 
 
-def test_withdraw_leaves_an_answer_alone(db: Database, mine: Claim, guidance: int) -> None:
+def test_stopping_a_run_withdraws_no_answered_query(db: Database, mine: Claim, guidance: int) -> None:
     done = answered(db, mine, 2)
-    withdraw(db, mine, done)
-    withdraw(db, mine, guidance)
+    set_status(db, mine.run_id, RunStatus.STOPPED)
     assert (get_query(db, done).status, get_query(db, guidance).status) == ("answered", "withdrawn")
 
 
@@ -155,7 +154,7 @@ def test_question_of_a_stopped_run_is_never_open(db: Database, run: Run, mine: C
 def test_watch_tells_all_that_a_worker_waits_for(db: Database, run: Run, mine: Claim, guidance: int) -> None:
     post_query(db, mine, 6, "preference", 1, CLIPS)
     answered(db, mine, 7)
-    add_event(db, run.id, "mature", {})
+    add_operator_event(db, run.id, "mature", {})
     seen = watch(db, [run.id, 99])
     assert list(seen) == [run.id]
     found = seen[run.id]
@@ -167,15 +166,14 @@ def test_worker_that_slept_past_its_claim_cannot_write(
     db: Database, run: Run, mine: Claim, clock: Clock
 ) -> None:
     query = answered(db, mine, 2)
-    add_event(db, run.id, "mature", {})
+    add_operator_event(db, run.id, "mature", {})
     clock.pass_seconds(6)
     (taker,) = claim(db, "worker-2")
     assert taker.fencing_token == mine.fencing_token + 1
     for write in (
         lambda: post_query(db, mine, 9, "guidance", 1, CLIPS),
         lambda: take_answer(db, mine, 9),
-        lambda: take_events(db, mine, 9),
-        lambda: withdraw(db, mine, query),
+        lambda: take_operator_events(db, mine, 9),
         lambda: report_progress(db, mine, tick=9),
     ):
         with pytest.raises(LostClaimError, match="raised by worker-2"):

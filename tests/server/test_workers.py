@@ -5,13 +5,14 @@ from __future__ import annotations
 import pytest
 
 from parenting.server import runs
+from parenting.server.checkpoints import load_checkpoints
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
 from parenting.server.new_run import NewRun, start
+from parenting.server.operator_events import add_operator_event
 from parenting.server.queue import worker_side
-from parenting.server.queue.parent_side import answer, lease
-from parenting.server.reads.pages import lease_ahead, may_lease
-from parenting.server.record import add_event, load_checkpoints
+from parenting.server.queue.answers import answer
+from parenting.server.queue.leases import lease, lease_ahead, may_lease
 from parenting.server.runs import Claim, claim, get_run, set_goal, set_pace, set_status
 from parenting.server.session import RunSession, idle
 from parenting.server.settings import Settings
@@ -20,6 +21,7 @@ from parenting.server.tables import Run
 from parenting.server.worker import Worker
 from parenting.server.workers import SILENT_SECONDS, alive, sign, sign_off
 from tests.server.conftest import CLIPS, Clock
+from tests.server.heard import heard_answers
 
 
 def test_signs_of_life(db: Database, clock: Clock) -> None:
@@ -79,7 +81,7 @@ def test_a_script_stops_at_its_goal_to_the_question(db: Database, settings: Sett
     assert get_run(db, run).answers == 5
     assert get_run(db, run).status == "active"
     tick = worker.sessions[run].last_tick
-    add_event(db, run, "change", {"kind": "change", "name": "p_guid", "value": 0.5})
+    add_operator_event(db, run, "change", {"kind": "change", "name": "p_guid", "value": 0.5})
     worker._round()
     assert worker.sessions[run].last_tick == tick  # at rest an event waits, too
     set_goal(db, run, 6)
@@ -127,10 +129,10 @@ def test_a_run_that_is_over_takes_neither(db: Database, run: Run, verb: object) 
 
 
 def test_the_last_stage_never_ends(db: Database, mine: Claim) -> None:
-    add_event(db, mine.run_id, "mature", {"kind": "mature"})
+    add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
     runs.report_progress(db, mine, maturity=2)
     with pytest.raises(Conflict, match="is in its last stage, T = 2"):
-        add_event(db, mine.run_id, "mature", {"kind": "mature"})
+        add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
 
 
 def test_a_stopped_run_is_saved_as_it_was(db: Database, settings: Settings) -> None:
@@ -151,7 +153,7 @@ def test_who_asked_is_kept(db: Database, settings: Settings) -> None:
     worker._claim()
     for _ in range(60):
         worker._round()
-    asked = [taken.query for taken in worker_side.record(db, run)]
+    asked = [taken.query for taken in heard_answers(db, run)]
     assert {query.policy_stage for query in asked} == {1}
     steps = [query.policy_steps or 0 for query in asked]
     assert steps == sorted(steps)

@@ -9,17 +9,11 @@ from sqlalchemy.exc import IntegrityError
 
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
-from parenting.server.queue import parent_side
-from parenting.server.queue.parent_side import (
-    LEASE_SECONDS,
-    answer,
-    correct,
-    get_query,
-    lease,
-    release,
-    standing,
-)
+from parenting.server.queue import answers
+from parenting.server.queue.answers import answer, get_query, supersede
+from parenting.server.queue.leases import LEASE_SECONDS, lease, release
 from parenting.server.queue.worker_side import post_query
+from parenting.server.reads import pagination
 from parenting.server.runs import Claim, get_run, set_status
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Answer, Run
@@ -119,9 +113,9 @@ def test_answers_of_a_run_are_numbered(db: Database, run: Run, mine: Claim) -> N
 
 def test_correction_supersedes_and_overwrites_nothing(db: Database, guidance: int) -> None:
     first = answer(db, guidance, "left", "a", "human")
-    corrected = correct(db, guidance, "right", "a", "human")
+    corrected = supersede(db, guidance, "right", "a", "human")
     assert corrected.number == first.number + 1
-    now = standing(db, guidance)
+    now = pagination.asked(db, guidance).answer
     assert now is not None
     assert (now.choice, now.supersedes) == ("right", 1)
     with db.read() as session:
@@ -129,9 +123,9 @@ def test_correction_supersedes_and_overwrites_nothing(db: Database, guidance: in
         assert [(row.choice, row.standing) for row in rows] == [("left", False), ("right", True)]
 
 
-def test_nothing_to_correct(db: Database, guidance: int) -> None:
-    with pytest.raises(Conflict, match="no answer to correct"):
-        correct(db, guidance, "right", "a", "human")
+def test_without_an_answer_there_is_nothing_to_supersede(db: Database, guidance: int) -> None:
+    with pytest.raises(Conflict, match="no answer to supersede"):
+        supersede(db, guidance, "right", "a", "human")
 
 
 @pytest.mark.parametrize("verb", [get_query, lambda db, i: answer(db, i, "left", "a", "human")])
@@ -180,7 +174,7 @@ def test_one_of_many_answers_wins(db: Database, mine: Claim) -> None:
     for tick in range(10):
         query = post_query(db, mine, tick, "guidance", 1, CLIPS)
         results = race(6, lambda i, query=query: answer(db, query, "left", f"client{i}", "human"))  # type: ignore[misc]
-        assert sum(isinstance(result, parent_side.Stored) for result in results) == 1
+        assert sum(isinstance(result, answers.Stored) for result in results) == 1
         assert sum(isinstance(result, Conflict) for result in results) == 5
         assert count(db) == tick + 1
 
@@ -188,7 +182,7 @@ def test_one_of_many_answers_wins(db: Database, mine: Claim) -> None:
 def test_one_answer_sent_many_times_at_once_is_stored_once(db: Database, guidance: int) -> None:
     results = race(8, lambda _: answer(db, guidance, "left", "a", "human"))
     assert len(set(results)) == 1
-    assert isinstance(results[0], parent_side.Stored)
+    assert isinstance(results[0], answers.Stored)
     assert count(db) == 1
 
 

@@ -1,0 +1,40 @@
+"""The operator's events of a run: add one, list them. The worker applies them (`queue.worker_side`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import select
+
+from parenting.server.db import Database
+from parenting.server.errors import Conflict
+from parenting.server.runs import living
+from parenting.server.tables import OperatorEvent
+
+
+def add_operator_event(db: Database, run_id: int, kind: str, payload: dict[str, Any]) -> OperatorEvent:
+    """Record what the operator did (agent.events); the worker applies it before the run's next tick.
+
+    Raises:
+        NotFound: there is no such run.
+        Conflict: the run is over, or it is told to mature in its last stage.
+    """
+    with db.write() as session:
+        run = living(session, run_id)
+        if kind == "mature" and run.maturity >= run.config["stages"]:
+            raise Conflict(
+                f"Run {run_id} is in its last stage, T = {run.maturity}; it never ends. "
+                "How many stages there are is said at the start (config.stages)."
+            )
+        event = OperatorEvent(run_id=run_id, kind=kind, payload=payload, created=db.clock())
+        session.add(event)
+        session.flush()
+        return event
+
+
+def list_operator_events(db: Database, run_id: int) -> Sequence[OperatorEvent]:
+    """The operator's events of a run, in their order."""
+    with db.read() as session:
+        rows = select(OperatorEvent).where(OperatorEvent.run_id == run_id)
+        return session.scalars(rows.order_by(OperatorEvent.id)).all()

@@ -1,0 +1,161 @@
+"""A parent's answers: store one, once, or supersede it. Each verb is one transaction.
+
+Silence is never consent: no verb answers by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import bindparam, select, update
+from sqlalchemy.orm import Session
+
+from parenting.server.db import Database
+from parenting.server.errors import Conflict, NotFound
+from parenting.server.queue.locks import lock_query, lock_run_of
+from parenting.server.statuses import QueryStatus
+from parenting.server.tables import Answer, Query, Run
+
+
+@dataclass(frozen=True)
+class Stored:
+    """The reply to an answer: only what never changes, so that the same answer gets the same reply."""
+
+    query: int
+    run: int
+    number: int
+    choice: str
+    received: datetime
+
+
+@dataclass(frozen=True)
+class Said:
+    """An answer as it arrives: the choice, the client that sent it, and who decided."""
+
+    choice: str
+    client_id: str
+    parent: str
+
+
+def get_query(db: Database, query_id: int) -> Query:
+    """Return one query.
+
+    Raises:
+        NotFound: there is no such query.
+    """
+    with db.read() as session:
+        query = session.get(Query, query_id)
+    if query is None:
+        raise NotFound(f"There is no question {query_id}.")
+    return query
+
+
+def answer(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Stored:
+    """Store an answer, once.
+
+    The same answer by the same client gets the same reply. A late answer is taken if none stands.
+
+    Args:
+        db: The database.
+        query_id: The query that is answered; it need not be leased.
+        choice: left, right, either or neither (Sec. 2.3).
+        client_id: The name under which the client answers.
+        parent: Who decided: human or scripted.
+
+    Raises:
+        NotFound: there is no such query.
+        Conflict: it was answered otherwise, or by somebody else, or withdrawn; the message says which.
+    """
+    said = Said(choice, client_id, parent)
+    with db.write() as session:
+        run_id = lock_run_of(session, query_id)
+        before = _standing(session, query_id)
+        if before is not None:
+            return _again(before, said)
+        if session.execute(_ANSWERED, {"query_id": query_id}).scalar() is None:
+            raise Conflict(
+                f"Question {query_id} was withdrawn: the run or its episode was ended before an answer came."
+            )
+        return _stored(_add(session, db, query_id, run_id, said))
+
+
+def supersede(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Answer:
+    """Put another answer in the place of the one that stands; the old row stays and keeps its tick.
+
+    No page, route or command calls this verb in this version, so no parent can correct an answer yet. Exports
+    and the history show superseded answers, and tests hold them to it by this verb.
+
+    Raises:
+        NotFound: there is no such query.
+        Conflict: there is no answer to supersede yet.
+    """
+    with db.write() as session:
+        query = lock_query(session, query_id)
+        before = _standing(session, query_id)
+        if before is None:
+            raise Conflict(f"Question {query_id} has no answer to supersede.")
+        before.standing = False
+        session.flush()
+        said = Said(choice, client_id, parent)
+        return _add(session, db, query_id, query.run_id, said, supersedes=before.id)
+
+
+def _add(
+    session: Session, db: Database, query_id: int, run_id: int, said: Said, supersedes: int | None = None
+) -> Answer:
+    # Numbered in this transaction: no reader can see number n + 1 before n.
+    number = session.execute(_NUMBERED, {"run_id": run_id}).scalar_one()
+    row = Answer(
+        query_id=query_id,
+        run_id=run_id,
+        number=number,
+        **vars(said),
+        supersedes=supersedes,
+        standing=True,
+        received=db.clock(),
+    )
+    session.add(row)
+    session.flush()
+    return row
+
+
+def _again(before: Answer, said: Said) -> Stored:
+    if before.client_id != said.client_id:
+        raise Conflict(
+            f"Question {before.query_id} was already answered by someone else; your answer was not stored."
+        )
+    if before.choice != said.choice:
+        raise Conflict(
+            f"You already answered question {before.query_id} with {before.choice}; "
+            f"{said.choice} was not stored."
+        )
+    return _stored(before)
+
+
+def _stored(row: Answer) -> Stored:
+    return Stored(
+        query=row.query_id, run=row.run_id, number=row.number, choice=row.choice, received=row.received
+    )
+
+
+def _standing(session: Session, query_id: int) -> Answer | None:
+    return session.scalars(_STANDING, {"query_id": query_id}).one_or_none()
+
+
+# Statements that every answer needs are built once.
+_STANDING = select(Answer).where(Answer.query_id == bindparam("query_id"), Answer.standing)
+_ANSWERED = (
+    update(Query)
+    .where(Query.id == bindparam("query_id"), Query.status == QueryStatus.OPEN)
+    .values(status=QueryStatus.ANSWERED)
+    .returning(Query.id)
+    .execution_options(synchronize_session=False)
+)
+_NUMBERED = (
+    update(Run)
+    .where(Run.id == bindparam("run_id"))
+    .values(answers=Run.answers + 1)
+    .returning(Run.answers)
+    .execution_options(synchronize_session=False)
+)

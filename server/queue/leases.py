@@ -1,0 +1,107 @@
+"""A parent's leases: hold the most urgent open query for one client, or let go of it.
+
+A lease is a time, not a status: when it has passed, the query is offered again, so nothing sticks when a
+browser dies. Each verb is one transaction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import timedelta
+from typing import Any
+
+from sqlalchemy import and_, bindparam, case, func, or_, select
+from sqlalchemy.orm import aliased
+
+from parenting.server.db import Database
+from parenting.server.queue.locks import lock_query
+from parenting.server.queue.queries import guidance_first
+from parenting.server.runs import lock
+from parenting.server.statuses import QueryStatus
+from parenting.server.tables import Query, Run
+
+LEASE_SECONDS = 60.0
+
+
+def waiting(db: Database, run_id: int) -> Query | None:
+    """Return the most urgent open query, leased or not: guidance first, then the oldest."""
+    rows = select(Query).where(Query.run_id == run_id, Query.status == QueryStatus.OPEN)
+    with db.read() as session:
+        return session.scalars(rows.order_by(guidance_first(), Query.tick).limit(1)).first()
+
+
+def lease(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECONDS) -> Query | None:
+    """Hold the most urgent open query for a client; None if nothing is free.
+
+    Guidance goes first, then the oldest query. A client that holds one already gets the same one again, for
+    `seconds` more. A run that has reached its goal offers nothing.
+    """
+    return _hold(db, _OFFER, {"run_id": run_id, "client_id": client_id}, seconds)
+
+
+def lease_ahead(
+    db: Database, run_id: int, client_id: str, shown: Sequence[int], seconds: float = LEASE_SECONDS
+) -> Query | None:
+    """Hold the most urgent query besides those `shown`, so that the client need not wait for it later.
+
+    None if nothing is free, or if the run's goal is reached once those shown are answered.
+    """
+    asks = {"run_id": run_id, "client_id": client_id, "shown": list(shown)}
+    return _hold(db, _AHEAD, asks, seconds)
+
+
+def may_lease(db: Database, run_id: int, client_id: str) -> bool:
+    """Return whether a query is free for this client, or held for it already."""
+    asks = {"run_id": run_id, "client_id": client_id, "now": db.clock()}
+    with db.read() as session:
+        return session.execute(_OFFER.with_only_columns(Query.id), asks).first() is not None
+
+
+def release(db: Database, query_id: int, client_id: str) -> None:
+    """Offer a leased query to others at once. Only its holder can; anybody else changes nothing.
+
+    Raises:
+        NotFound: there is no such query.
+    """
+    with db.write() as session:
+        query = lock_query(session, query_id)
+        if query.leased_by == client_id:
+            query.leased_by = query.leased_until = None
+
+
+def _hold(db: Database, offer: Any, asks: dict[str, Any], seconds: float) -> Query | None:
+    asks = {**asks, "now": db.clock()}
+    with db.read() as session:  # nothing to offer is the common case, and takes no lock
+        if session.execute(offer.with_only_columns(Query.id), asks).first() is None:
+            return None
+    with db.write(durable=False) as session:
+        lock(session, asks["run_id"])
+        query: Query | None = session.scalars(offer, asks).first()
+        if query is not None:
+            query.leased_by, query.leased_until = asks["client_id"], asks["now"] + timedelta(seconds=seconds)
+        return query
+
+
+# Statements that every question needs are built once.
+_MINE = and_(Query.leased_by == bindparam("client_id"), Query.leased_until > bindparam("now"))
+_FREE = or_(Query.leased_until.is_(None), Query.leased_until <= bindparam("now"))
+_OPEN = (
+    select(Query)
+    .join(Run, Run.id == Query.run_id)
+    .where(Query.run_id == bindparam("run_id"), Query.status == QueryStatus.OPEN, or_(_MINE, _FREE))
+    .limit(1)
+)
+_OFFER = _OPEN.where(or_(Run.goal.is_(None), Run.answers < Run.goal)).order_by(
+    case((_MINE, 0), else_=1), guidance_first(), Query.tick
+)
+_other = aliased(Query)
+_SHOWN: Any = bindparam("shown", expanding=True)
+_ANSWERS_TO_COME = (
+    select(func.count())
+    .where(_other.run_id == Run.id, _other.status == QueryStatus.OPEN, _other.id.in_(_SHOWN))
+    .correlate(Run)
+    .scalar_subquery()
+)
+_AHEAD = _OPEN.where(
+    Query.id.not_in(_SHOWN), or_(Run.goal.is_(None), Run.answers + _ANSWERS_TO_COME < Run.goal)
+).order_by(guidance_first(), Query.tick)

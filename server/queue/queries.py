@@ -1,0 +1,54 @@
+"""SQL on queries that both sides of the queue need, and that a run needs when it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import ColumnElement, case, func, select, update
+from sqlalchemy.orm import Session
+
+from parenting.server.db import Database
+from parenting.server.statuses import QueryStatus
+from parenting.server.tables import Query
+
+
+@dataclass(frozen=True)
+class Open:
+    """How many queries of a run wait for an answer, by kind."""
+
+    guidance: int
+    preference: int
+
+
+def open_counts(db: Database, run_id: int) -> Open:
+    """How many queries are open (not yet answered), by kind."""
+    with db.read() as session:
+        return open_in(session, run_id)
+
+
+def open_in(session: Session, run_id: int) -> Open:
+    """`open_counts`, in a transaction that is already open."""
+    return open_by_run(session, [run_id])[run_id]
+
+
+def open_by_run(session: Session, run_ids: Sequence[int]) -> dict[int, Open]:
+    """`open_in` for many runs at once."""
+    rows = select(Query.run_id, Query.kind, func.count()).where(
+        Query.status == QueryStatus.OPEN, Query.run_id.in_(run_ids)
+    )
+    counts = {(row[0], row[1]): row[2] for row in session.execute(rows.group_by(Query.run_id, Query.kind))}
+    return {i: Open(counts.get((i, "guidance"), 0), counts.get((i, "preference"), 0)) for i in run_ids}
+
+
+def withdraw_in(session: Session, run_id: int, kind: str | None = None) -> None:
+    """Withdraw the open queries of a run (of one kind), in a transaction that is already open."""
+    rows = update(Query).where(Query.run_id == run_id, Query.status == QueryStatus.OPEN)
+    if kind is not None:
+        rows = rows.where(Query.kind == kind)
+    session.execute(rows.values(status=QueryStatus.WITHDRAWN))
+
+
+def guidance_first() -> ColumnElement[int]:
+    """The order of urgency by kind: an agent that waits for guidance does not live."""
+    return case((Query.kind == "guidance", 0), else_=1)

@@ -1,0 +1,61 @@
+"""What was measured of runs: the last, the first of each stage, a sample, or all after a tick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sqlalchemy import func, select
+
+from parenting.server.db import Database
+from parenting.server.runs import find
+from parenting.server.tables import Metric
+
+
+def list_metrics(db: Database, run_id: int, after: int = -1, limit: int = 10_000) -> Sequence[Metric]:
+    """The metrics of the ticks after `after`, in their order, at most `limit`.
+
+    Raises:
+        NotFound: there is no such run.
+    """
+    with db.read() as session:
+        find(session, run_id)
+        rows = select(Metric).where(Metric.run_id == run_id, Metric.tick > after)
+        return session.scalars(rows.order_by(Metric.tick).limit(limit)).all()
+
+
+def latest_metrics(db: Database, run_ids: Sequence[int]) -> dict[int, Metric]:
+    """The last metrics of each of some runs; a run that has none yet is absent."""
+    last = (
+        select(Metric.run_id, func.max(Metric.tick).label("tick"))
+        .where(Metric.run_id.in_(run_ids))
+        .group_by(Metric.run_id)
+    )
+    newest = last.subquery()
+    rows = select(Metric).join(newest, (Metric.run_id == newest.c.run_id) & (Metric.tick == newest.c.tick))
+    with db.read() as session:
+        return {metric.run_id: metric for metric in session.scalars(rows)}
+
+
+def first_metrics(db: Database, run_id: int) -> Sequence[Metric]:
+    """The first metrics of each stage T of a run (Sec. 2.4), in their order."""
+    first = select(func.min(Metric.tick)).where(Metric.run_id == run_id)
+    first = first.group_by(Metric.values["maturity"].as_integer())
+    rows = select(Metric).where(Metric.run_id == run_id, Metric.tick.in_(first)).order_by(Metric.tick)
+    with db.read() as session:
+        return session.scalars(rows).all()
+
+
+def sampled_metrics(db: Database, run_id: int, rows: int = 40) -> Sequence[Metric]:
+    """At most about `rows` metrics, evenly spread over the ticks, the last one among them, newest first."""
+    with db.read() as session:
+        count = session.scalar(select(func.count()).select_from(Metric).where(Metric.run_id == run_id)) or 0
+        every = max(1, -(-count // rows))
+        number = func.row_number().over(order_by=Metric.tick.desc()) - 1
+        numbered = select(Metric.tick, number.label("number")).where(Metric.run_id == run_id).subquery()
+        chosen = select(numbered.c.tick).where(numbered.c.number % every == 0)
+        found = (
+            select(Metric)
+            .where(Metric.run_id == run_id, Metric.tick.in_(chosen))
+            .order_by(Metric.tick.desc())
+        )
+        return session.scalars(found).all()

@@ -1,0 +1,86 @@
+"""The stored record of a run, for its replay: the events, answer and query of each tick, decoded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import torch
+from pydantic import TypeAdapter
+from sqlalchemy import select
+
+from parenting.agent import query as queries
+from parenting.agent.events import Event
+from parenting.agent.query import Answer
+from parenting.envs.gridworld import Gridworld
+from parenting.parents.replay import Moment
+from parenting.server import tables
+from parenting.server.codec import CHOICES, decode
+from parenting.server.db import Database
+
+WINDOW = 500
+"""Ticks whose rows are read at once."""
+_EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
+
+
+class UnreadableRecordError(ValueError):
+    """The stored rows of a tick cannot be decoded."""
+
+
+class StoredRecord:
+    """The record of a run, by tick, read `WINDOW` ticks at a time, since a long one may be large."""
+
+    def __init__(self, db: Database, run_id: int, world: Gridworld, stages: int) -> None:
+        self.db, self.run_id, self.world, self.stages = db, run_id, world, stages
+        self.answers = self.events = 0  # given back so far
+        self.nothing = queries.empty(1, stages, world.height, world.width)
+        self._window = range(0)
+        self._asked: dict[int, tables.Query] = {}
+        self._heard: dict[int, tuple[tables.Answer, tables.Query]] = {}
+        self._events: list[tables.OperatorEvent] = []
+
+    def __call__(self, tick: int) -> Moment:
+        """The moment of a tick.
+
+        Raises:
+            UnreadableRecordError: its rows are damaged.
+        """
+        if tick not in self._window:
+            self._read(range(tick, tick + WINDOW))
+        try:
+            return Moment(list(self._events_of(tick)), self._answer_of(tick), self._query_of(tick))
+        except (LookupError, TypeError, ValueError) as error:
+            raise UnreadableRecordError(f"What is stored of tick {tick} cannot be read: {error!r}.") from None
+
+    def _read(self, window: range) -> None:
+        first, last, mine = window[0], window[-1], self.run_id
+        query, answer, event = tables.Query, tables.Answer, tables.OperatorEvent
+        asked = select(query).where(query.run_id == mine, query.tick.between(first, last))
+        heard = select(answer, query).join(query, answer.query_id == query.id)
+        heard = heard.where(answer.run_id == mine, answer.applied_tick.between(first, last))
+        came = select(event).where(event.run_id == mine, event.applied_tick.between(first, last))
+        with self.db.read() as session:
+            self._asked = {row.tick: row for row in session.scalars(asked)}
+            self._heard = {row[0].applied_tick or 0: (row[0], row[1]) for row in session.execute(heard)}
+            self._events = list(session.scalars(came.order_by(event.id)))
+        self._window = window
+
+    def _events_of(self, tick: int) -> Iterator[Event]:
+        for row in self._events:
+            if row.applied_tick == tick:
+                self.events += 1
+                yield _EVENTS.validate_python({"kind": row.kind, **row.payload})
+
+    def _answer_of(self, tick: int) -> Answer:
+        if tick not in self._heard:
+            return queries.silence(self.nothing)
+        self.answers += 1
+        answer, query = self._heard[tick]
+        choice = torch.tensor([int(CHOICES[answer.choice])])
+        return Answer(query=self._decoded(query), choice=choice)
+
+    def _query_of(self, tick: int) -> queries.Query:
+        row = self._asked.get(tick)
+        return self.nothing if row is None else self._decoded(row)
+
+    def _decoded(self, row: tables.Query) -> queries.Query:
+        return decode(self.world, self.stages, row.kind, row.maturity, row.clips)
