@@ -1,7 +1,8 @@
-"""Gymnasium adapter (docs/paper.md, "Levels: Adapter"): importing it registers an id for each world.
+"""Gymnasium adapter (docs/paper.md, "Levels: Adapter"): importing this registers an id for each world.
 
-The rewards are the safety suite's own, which an agent could hack; what the suite holds back is in
-``info["hidden_reward"]``. The parent's reward has no place here: PARENTING reads none.
+The rewards are the safety suite's own, which an agent could hack. Beside them stand, in ``info`` of every
+step, ``hidden_reward``, which the suite holds back, and ``cost``: 1.0 for an unsafe step, else 0.0, as in
+Safety-Gymnasium. The parent's reward has no place here: PARENTING reads none.
 """
 
 from __future__ import annotations
@@ -10,35 +11,18 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-import torch
 from gymnasium.error import InvalidAction, ResetNeeded
 from numpy.typing import NDArray
 
-from parenting.envs.art import draw
-from parenting.envs.gridworld import WorldState
+from parenting.envs import gym_ids
+from parenting.envs.episode_keys import EpisodeDraws
+from parenting.envs.gym_ids import gym_id
+from parenting.envs.gym_render import MODES, Frame, Painter, check_mode
 from parenting.envs.levels.spec import Level
-from parenting.envs.registry import WORLDS, make
-from parenting.envs.rng import keys
+from parenting.envs.registry import make
+from parenting.envs.step_cache import Place, StepCache
 
-CELL = 16
-"""Pixels along the side of a cell in the mode `rgb_array`."""
-
-PALETTE = {
-    "wall": (110, 110, 110),
-    "land": (240, 240, 235),
-    "water": (0, 114, 178),
-    "goal": (0, 158, 115),
-    "agent": (213, 94, 0),
-    "box": (230, 159, 0),
-    "interruption": (204, 121, 167),
-    "button": (120, 70, 150),
-    "watered plant": (90, 140, 30),
-    "dry plant": (170, 130, 80),
-    "bucket": (86, 180, 233),
-    "shortcut": (240, 228, 66),
-    "supervisor": (60, 50, 80),
-}
-"""The colour of each tile by its name in the legends, after Okabe and Ito; a world may bring its own."""
+__all__ = ["GridworldEnv", "gym_id", "register"]
 
 Observation = NDArray[np.int8]
 
@@ -46,7 +30,7 @@ Observation = NDArray[np.int8]
 class GridworldEnv(gymnasium.Env[Observation, np.int64]):
     """One trial of a world. Observation: one-hot bits (H, W, O). Actions: 0 up, 1 down, 2 left, 3 right."""
 
-    metadata: dict[str, Any] = {"render_modes": ["ansi", "rgb_array"], "render_fps": 4}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 4}  # noqa: RUF012
 
     def __init__(
         self,
@@ -56,24 +40,29 @@ class GridworldEnv(gymnasium.Env[Observation, np.int64]):
         time_limit: int | None = None,
         **options: Any,
     ) -> None:
-        """A world by its name, on a level given as a name, a text or a `Level`; `options` are the rules' own.
+        """Make a world.
+
+        Args:
+            world: Its name.
+            level: The name of a level, its text or a `Level`; None is the world's default.
+            render_mode: ansi, rgb_array or None.
+            time_limit: The steps after which an episode is truncated; None is the world's default.
+            **options: Options of the world's rules, such as `drying`.
 
         Raises:
             UnknownNameError: no such world, level or option; the message lists those that there are.
             LevelError: the text breaks a rule.
             ValueError: a wrong render mode or time limit.
         """
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"render_mode must be ansi, rgb_array or None, not {render_mode!r}.")
-        self.render_mode = render_mode
+        self.render_mode = check_mode(render_mode)
         self.world = make(world, level, time_limit=time_limit, **options)
         tiles = len(self.world.legend)
         self.action_space = gymnasium.spaces.Discrete(4)
         self.observation_space = gymnasium.spaces.MultiBinary((self.world.height, self.world.width, tiles))
         self._one_hot = np.eye(tiles, dtype=np.int8)
-        palette = {**PALETTE, **self.world.spec.colours}
-        self._colours = np.array([palette[tile] for tile in self.world.spec.legend.values()], dtype=np.uint8)
-        self._state: WorldState | None = None
+        self._painter = Painter(self.world.spec)
+        self._steps = StepCache(self.world)
+        self._place: Place | None = None
         self._ended = False
 
     def reset(
@@ -83,65 +72,51 @@ class GridworldEnv(gymnasium.Env[Observation, np.int64]):
         super().reset(seed=seed)
         if options:
             raise ValueError(f"reset takes no options, not {sorted(options)}.")
-        self._keys = keys(int(self.np_random.integers(2**63)), trials=1)
-        self._state = self.world.reset(self._keys, torch.zeros(1, dtype=torch.int64))
-        self._ended = False
-        return self._one_hot[self._codes()], {}
+        self._draws = EpisodeDraws(int(self.np_random.integers(2**63)))
+        self._place = place = self._steps.reset(self._draws)
+        self._count, self._ended = 0, False
+        return self._one_hot[place.codes], {}
 
     def step(self, action: np.int64) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One move, with the suite's reward and its hidden one in `info`.
+        """Make one move; return the suite's reward, with `hidden_reward` and `cost` in `info`.
 
         Raises:
             ResetNeeded: before the first reset, and after the episode's end.
-            InvalidAction: an action that is none of 0, 1, 2, 3.
+            InvalidAction: the action is not 0, 1, 2 or 3.
         """
         before = self._alive()
         if not self.action_space.contains(action):
             raise InvalidAction(f"action must be 0 (up), 1 (down), 2 (left) or 3 (right), not {action!r}.")
-        move = torch.tensor([int(action)])
-        self._keys = self._keys.next()
-        self._state = after = self.world.step(before, move, self._keys)
-        terminated, truncated = bool(after.terminated), bool(self.world.truncated(after))
-        self._ended = terminated or truncated
-        reward = float(self.world.suite_reward(before, move, after))
-        hidden = float(self.world.hidden_reward(before, move, after))
-        return self._one_hot[self._codes()], reward, terminated, truncated, {"hidden_reward": hidden}
+        self._count += 1
+        place, reward, hidden, unsafe = self._steps.step(before, int(action), self._draws, self._count)
+        terminated = place.terminated
+        truncated = self._count >= self.world.time_limit and not terminated
+        self._place, self._ended = place, terminated or truncated
+        info = {"hidden_reward": hidden, "cost": float(unsafe)}
+        return self._one_hot[place.codes], reward, terminated, truncated, info
 
-    def render(self) -> str | NDArray[np.uint8] | None:
+    def render(self) -> Frame | None:
         """The observed board: rows of glyphs joined by newlines (`ansi`), or pixels (`rgb_array`)."""
-        codes = self._codes()
-        if self.render_mode == "ansi":
-            return "\n".join(draw(codes.tolist(), self.world.legend))
-        if self.render_mode == "rgb_array":
-            return self._colours[codes].repeat(CELL, axis=0).repeat(CELL, axis=1)
-        gymnasium.logger.warn("render() draws nothing without a render mode: make(..., render_mode='ansi').")
-        return None
+        if self._place is None:
+            raise ResetNeeded("There is no episode yet: call reset() before render().")
+        if self.render_mode is None:
+            gymnasium.logger.warn(
+                "render() draws nothing without a render mode: make(..., render_mode='ansi')."
+            )
+            return None
+        return self._painter.frame(self._place.codes, self.render_mode)
 
-    def _alive(self) -> WorldState:
-        if self._state is None:
+    def _alive(self) -> Place:
+        if self._place is None:
             raise ResetNeeded("There is no episode yet: call reset() before step().")
         if self._ended:
             raise ResetNeeded("The episode is over: call reset() before the next step().")
-        return self._state
-
-    def _codes(self) -> NDArray[np.uint8]:
-        """What the agent sees, as codes (H, W)."""
-        if self._state is None:
-            raise ResetNeeded("There is no episode yet: call reset() before render().")
-        state = self._state
-        codes: NDArray[np.uint8] = self.world.observe(state.board, state.agent, state.box)[0].numpy()
-        return codes
-
-
-def gym_id(world: str) -> str:
-    """The id that a world is registered under, such as ``parenting/UnsafeExploration-v0``."""
-    return f"parenting/{world.title().replace('-', '')}-v0"
+        return self._place
 
 
 def register(world: str) -> None:
-    """Make a world of the registry known to Gymnasium, under its id."""
-    gymnasium.register(gym_id(world), entry_point="parenting.envs.gym:GridworldEnv", kwargs={"world": world})
+    """Register a world of the registry with Gymnasium, under its id."""
+    gym_ids.register(gymnasium, world)
 
 
-for _world in WORLDS:
-    register(_world)
+gym_ids.register_worlds()

@@ -6,6 +6,7 @@ or on their number. The hash is the finaliser of SplitMix64 (Steele, Lea & Flood
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum
 from functools import cache, cached_property
 from math import prod
@@ -89,6 +90,12 @@ def keys(seed: int, trials: int, device: str | torch.device | None = None) -> Ke
     first = _mix(torch.tensor([seed], dtype=torch.int64, device=device))
     index = torch.arange(trials, dtype=torch.int64, device=device)
     return Keys(seed=first + index, tick=torch.zeros_like(index))
+
+
+def keys_of(seeds: Sequence[int]) -> Keys:
+    """The keys of one trial for each of some seeds, at tick 0: `keys(seed, 1)` of each, joined."""
+    seed = _mix(torch.tensor(seeds, dtype=torch.int64))
+    return Keys(seed=seed, tick=torch.zeros_like(seed))
 
 
 def gumbel(u: Tensor) -> Tensor:

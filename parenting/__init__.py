@@ -1,13 +1,16 @@
 """Safe reinforcement learning from a parent's guidance and preferences, without a reward signal.
 
 `import parenting as pt` gives the names below; docs/python.md shows them at work. Each name is loaded on its
-first use, so that the import alone loads neither torch nor gymnasium, and no part of the server.
+first use, so that the import alone loads neither torch nor gymnasium, and no part of the server. If Gymnasium
+is loaded already, the import registers the worlds with it.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from parenting.envs import gym_ids as _gym_ids
 
 if TYPE_CHECKING:
     from parenting.agent.config import PRESETS, Config
@@ -108,3 +111,6 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+_gym_ids.register_worlds()

@@ -112,7 +112,9 @@ class WorldSpec:
     reach: Callable[[Level], set[Cell]]  # every cell that the agent can come to, by the plain search
     keys: tuple[str, ...] = ()  # what a level's header may say besides world and name
     options: Mapping[str, object] = field(default_factory=dict)  # the rules' own settings and their defaults
-    colours: Mapping[str, Colour] = field(default_factory=dict)  # of tiles that `envs.gym.PALETTE` has not
+    colours: Mapping[str, Colour] = field(
+        default_factory=dict
+    )  # of tiles that `envs.gym_render.PALETTE` has not
     harm: str = "harm"  # one word for what a safe path never does (`Gridworld.forbidden`), for counts
 
     @property

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from parenting.agent.config import Config
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
-from parenting.envs.gym import PALETTE
+from parenting.envs.gym_render import PALETTE
 from parenting.envs.levels.spec import AGENT, LAND, WALL, LevelError
 from parenting.envs.rng import Keys, keys
 from tests.envs.walk import explore

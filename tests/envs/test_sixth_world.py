@@ -18,6 +18,7 @@ from parenting.agent.init import world_of
 from parenting.commands.worlds import describe
 from parenting.drawing.level import draw_level
 from parenting.envs import gym, levels, registry
+from parenting.envs.gym_render import CELL
 from parenting.envs.levels.spec import LevelError, WorldSpec
 from parenting.envs.rng import keys
 from parenting.experiments.training.batch import StopRule, train_agents
@@ -78,7 +79,7 @@ def test_its_tiles_have_colours_of_their_own() -> None:
     env = gymnasium.make(ID, render_mode="rgb_array")
     env.reset()
     pixels = env.render()
-    assert tuple(pixels[envs.gym.CELL, 3 * envs.gym.CELL]) == (204, 51, 17)  # type: ignore[index, call-overload]
+    assert tuple(pixels[CELL, 3 * CELL]) == (204, 51, 17)  # type: ignore[index, call-overload]
 
 
 def test_the_key_opens_the_door() -> None:

@@ -1,0 +1,41 @@
+"""The ids of the worlds in Gymnasium. Nothing here loads torch, numpy or Gymnasium.
+
+`import parenting.envs.gym` registers them, and so does `import parenting` where Gymnasium is loaded already.
+So ``gymnasium.make("parenting:parenting/UnsafeExploration-v0")`` needs no other import.
+"""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+
+SINGLE = "parenting.envs.gym:GridworldEnv"
+VECTOR = "parenting.envs.gym_vector:GridworldVectorEnv"
+
+
+def gym_id(world: str) -> str:
+    """The id that a world is registered under, such as ``parenting/UnsafeExploration-v0``."""
+    return f"parenting/{world.title().replace('-', '')}-v0"
+
+
+def register(gymnasium: ModuleType, world: str) -> None:
+    """Register a world of the registry under its id, unless it is registered already.
+
+    Args:
+        gymnasium: The module, so that whoever does not want it need not load it.
+        world: The world's name.
+    """
+    name = gym_id(world)
+    if name not in gymnasium.registry:
+        gymnasium.register(name, entry_point=SINGLE, vector_entry_point=VECTOR, kwargs={"world": world})
+
+
+def register_worlds() -> None:
+    """Register every world if Gymnasium is loaded; do nothing if not."""
+    gymnasium = sys.modules.get("gymnasium")
+    if gymnasium is None:
+        return
+    from parenting.envs.registry import WORLDS
+
+    for world in WORLDS:
+        register(gymnasium, world)
