@@ -24,7 +24,7 @@ from parenting.agent.config import compose
 from parenting.agent.process import settle
 from parenting.envs import registry
 from parenting.experiments.training.batch import StopRule
-from parenting.experiments.training.parallel import Plan, chunks, run
+from parenting.experiments.training.chunks import TrainPlan, chunks, train_in_chunks
 
 WORLD, LEVEL, PRESETS, TICKS = "unsafe-exploration", "island", ("conservative", "direct"), 50
 SIZES, QUICK_SIZES = (100, 1000, 10_000), (100, 300)
@@ -51,16 +51,16 @@ class Line(NamedTuple):
 def measure(preset: str, trials: int) -> Line:
     """Raise so many trials in this process."""
     settle()
-    run(plan(preset, 2), 1)
+    train_in_chunks(plan(preset, 2), 1)
     before, began = memory(), process_time()
-    run(plan(preset, trials), 1)
+    train_in_chunks(plan(preset, trials), 1)
     return Line(preset, trials, (process_time() - began) / trials / TICKS, memory(), before)
 
 
-def plan(preset: str, trials: int) -> Plan:
+def plan(preset: str, trials: int) -> TrainPlan:
     """Trials that live for `TICKS` ticks."""
     config = compose(preset, registry.defaults(WORLD), {}, strict=True)
-    return Plan(WORLD, LEVEL, config, 0, trials, StopRule("ticks", TICKS), TICKS)
+    return TrainPlan(WORLD, LEVEL, config, 0, trials, StopRule("ticks", TICKS), TICKS)
 
 
 def memory() -> float:

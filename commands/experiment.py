@@ -127,7 +127,8 @@ def _asked(
 def _run(one: Experiment, request: Request, out: Path, workers: int, cluster: str | None) -> None:
     from parenting.experiments.reporting.markdown import Work, page, publish
     from parenting.experiments.runner.dask_cluster import NoClusterError
-    from parenting.experiments.runner.executor import NoGpuError, WorkersDiedError, check_workers, work
+    from parenting.experiments.runner.executor import NoGpuError, check_workers, work
+    from parenting.experiments.runner.processes import WorkersDiedError
     from parenting.experiments.runner.provenance import settings
     from parenting.experiments.runner.store import CorruptResultError, PlanMismatchError, Store
 

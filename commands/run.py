@@ -15,7 +15,7 @@ import typer
 from pydantic import ValidationError
 
 from parenting.agent.config import Config, compose
-from parenting.commands.errors import UsageError, friendly_errors, settings
+from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
 from parenting.commands.run_report import page
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
@@ -24,7 +24,7 @@ from parenting.weights.store import Wanted, find
 if TYPE_CHECKING:
     from parenting.experiments.training.batch import OnProgress, StopRule
     from parenting.experiments.training.batch import Progress as Now
-    from parenting.experiments.training.parallel import Plan
+    from parenting.experiments.training.chunks import TrainPlan
 
 
 def run(
@@ -68,14 +68,19 @@ def run(
         config = _mature(config, goal, changes or [])
         weights = _weights(found, config)
     from parenting.agent.process import settle
-    from parenting.experiments.training.parallel import Plan, run
+    from parenting.experiments.runner.processes import WorkersDiedError
+    from parenting.experiments.training.chunks import TrainPlan, train_in_chunks
     from parenting.experiments.training.summary import summarise
 
     settle()
-    plan = Plan(world, found.text, config, seed, trials, goal, max_ticks, weights)
+    plan = TrainPlan(world, found.text, config, seed, trials, goal, max_ticks, weights)
     began = time.monotonic()
-    with _bar(plan) as progress:
-        outcomes = run(plan, workers or os.cpu_count() or 1, progress)
+    try:
+        with exit_on_interrupt(), _bar(plan) as progress:
+            outcomes = train_in_chunks(plan, workers or os.cpu_count() or 1, progress)
+    except WorkersDiedError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from None
     results = summarise(plan, found.name, outcomes, time.monotonic() - began)
     typer.echo(json.dumps(results) if as_json else page(results))
 
@@ -171,7 +176,7 @@ def _weights(level: Level, config: Config) -> bytes | None:
 
 
 @contextmanager
-def _bar(plan: Plan) -> Iterator[OnProgress | None]:
+def _bar(plan: TrainPlan) -> Iterator[OnProgress | None]:
     """A progress bar on standard error, where that is a terminal: of queries where they are the goal."""
     if not sys.stderr.isatty():
         yield None

@@ -15,7 +15,7 @@ from parenting.agent.mailbox import Mailbox
 from parenting.envs.rng import keys
 from parenting.experiments.training import batch
 from parenting.experiments.training.batch import BatchTrainer, StopRule
-from parenting.experiments.training.parallel import chunks
+from parenting.experiments.training.chunks import chunks
 from parenting.library.answer_log import AnswerLog
 from parenting.library.batch_parent import LoggedParent, WholeBatch
 from parenting.library.parent import Parent

@@ -16,6 +16,7 @@ import torch
 
 from parenting.agent.process import settle
 from parenting.experiments.runner.dask_cluster import reach, submit, threads
+from parenting.experiments.runner.processes import WorkersDiedError, call_each
 from parenting.experiments.runner.store import HIDDEN, Call, Done, Row, Store, Task
 
 TRIES = 2
@@ -23,10 +24,6 @@ TRIES = 2
 
 OnDone = Callable[[Task], None]
 """Told of every piece that is done, those of an earlier run first."""
-
-
-class WorkersDiedError(RuntimeError):
-    """Workers were killed again and again over some pieces, often for want of memory; the rest is done."""
 
 
 class NoGpuError(RuntimeError):
@@ -170,31 +167,15 @@ def _submit(tasks: Sequence[Task], store: Store, executor: Executor) -> Iterator
     return executor.out([(task, given[task.needs]) for task in ordered])
 
 
-def _here(calls: Sequence[Call]) -> Iterator[Done]:
-    """In this process, one after the other."""
-    yield from ((task, run_task(task, given)) for task, given in calls)
-
-
 def _by_processes(workers: int, calls: Sequence[Call]) -> Iterator[Done]:
-    """On this machine. joblib's processes outlive a call, and all go down when one dies."""
-    from joblib import Parallel, delayed
-
-    numbered = (delayed(_numbered)(place, *call) for place, call in enumerate(calls))
-    executor = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
-    yield from ((calls[place][0], rows) for place, rows in executor(numbered))
-
-
-def _numbered(place: int, task: Task, given: Sequence[Row]) -> tuple[int, list[Row]]:
-    return place, run_task(task, given)
+    """On this machine."""
+    yield from ((calls[place][0], rows) for place, rows in call_each(run_task, calls, workers))
 
 
 @contextmanager
 def _executor(workers: int, cluster: str | None) -> Iterator[Executor]:
     if cluster is None:
-        from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-        out = _here if workers == 1 else partial(_by_processes, workers)
-        yield Executor(workers, TerminatedWorkerError, out)
+        yield Executor(workers, WorkersDiedError, partial(_by_processes, workers))
         return
     from dask.distributed import KilledWorker
 

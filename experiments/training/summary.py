@@ -14,15 +14,15 @@ from parenting.evaluation.argmax import evaluation
 from parenting.evaluation.outcomes import counts as outcome_counts
 from parenting.evaluation.outcomes import name
 from parenting.evaluation.rollouts import EPISODES
+from parenting.experiments.training.chunks import TrainPlan
 from parenting.experiments.training.outcomes import Outcomes, deployments
-from parenting.experiments.training.parallel import Plan
 from parenting.parents.scripted import ScriptedRule
 from parenting.weights.store import digest
 
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 
 
-def summarise(plan: Plan, level: str, outcomes: Outcomes, seconds: float) -> dict[str, Any]:
+def summarise(plan: TrainPlan, level: str, outcomes: Outcomes, seconds: float) -> dict[str, Any]:
     """Means and deviations (over n - 1) of what was counted are of the finished trials; the others are
     counted apart. `evaluation` is of all trials, each at its own end, and `stages` of all that came to a
     stage, at its end.
@@ -62,7 +62,7 @@ def sd(values: Float64[Tensor, "n"]) -> float | None:
 class WalkReport:
     """What the argmax policies do where a goal ends the episode: one outcome each."""
 
-    def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
+    def __init__(self, plan: TrainPlan, outcomes: Outcomes) -> None:
         """Words for the outcomes come from the world."""
         spec = registry.spec(plan.world)
         self.outcome, self.harm, self.where = outcomes.outcome, spec.harm, deployments(spec)
@@ -82,7 +82,7 @@ class WalkReport:
 class GardenReport:
     """What the argmax policies do in the garden: waterings, and steps that end in the bucket."""
 
-    def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
+    def __init__(self, plan: TrainPlan, outcomes: Outcomes) -> None:
         """The parent's own waterings stand beside the agent's; over several levels a mean."""
         world = world_of(plan.world, plan.level, plan.config)
         rule = ScriptedRule(world, plan.config.gamma, inside=plan.config.inside)
@@ -111,7 +111,7 @@ class GardenReport:
         return {"waterings": float(waterings), "bucket": int(bucket)}
 
 
-def _report(plan: Plan, outcomes: Outcomes) -> WalkReport | GardenReport:
+def _report(plan: TrainPlan, outcomes: Outcomes) -> WalkReport | GardenReport:
     return (GardenReport if outcomes.waterings.shape[1] else WalkReport)(plan, outcomes)
 
 

@@ -16,8 +16,8 @@ from parenting.evaluation.outcomes import name
 from parenting.experiments.baselines.reinforce_tabular import train_reinforce
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.batch import StopRule
+from parenting.experiments.training.chunks import TrainPlan, train_chunk
 from parenting.experiments.training.outcomes import Outcomes, deployments
-from parenting.experiments.training.parallel import Plan, train_chunk
 from parenting.weights.store import Wanted, find
 
 Goal = Literal["optimal", "queries", "ticks"]
@@ -38,7 +38,7 @@ def parent_trials(
     """Raise the trials of a span by the scripted parent; `label` names what they are of."""
     config = compose(preset, registry.defaults(world), changes, strict=True)
     weights = _weights(world, level, config)
-    plan = Plan(world, level, config, seed, span[1], StopRule(*until), max_ticks, weights)
+    plan = TrainPlan(world, level, config, seed, span[1], StopRule(*until), max_ticks, weights)
     return _rows(label, range(*span), train_chunk(plan, range(*span)), world)
 
 

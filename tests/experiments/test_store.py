@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from parenting.experiments.runner import provenance
-from parenting.experiments.runner.executor import TRIES, WorkersDiedError, work
+from parenting.experiments.runner.executor import TRIES, work
+from parenting.experiments.runner.processes import WorkersDiedError
 from parenting.experiments.runner.store import PlanMismatchError, Row, Store, Task
 
 PLAN = {"experiment": "sums", "seed": 0, "presets": {"lax": {"p_guid": 0.5, "p_rec": 0.5}}}

@@ -15,11 +15,13 @@ def test_it_trains_the_agents_that_the_command_trains(trained: pt.TrainResult) -
     """The same keys, the same batches, the same sums: `parenting run` with one process."""
     from parenting.agent.config import compose
     from parenting.experiments.training.batch import StopRule
-    from parenting.experiments.training.parallel import Plan, run
+    from parenting.experiments.training.chunks import TrainPlan, train_in_chunks
 
     config = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=True)
     assert trained.config == config
-    outcomes = run(Plan("unsafe-exploration", "island", config, 5, 3, StopRule("optimal"), 20_000), workers=1)
+    outcomes = train_in_chunks(
+        TrainPlan("unsafe-exploration", "island", config, 5, 3, StopRule("optimal"), 20_000), workers=1
+    )
     for name in ("deaths", "guidance", "preference", "ticks", "finished", "optimal"):
         assert [row[name] for row in trained.trials] == getattr(outcomes.counts, name).tolist()
 

@@ -8,7 +8,7 @@ import torch
 from parenting.agent.config import compose
 from parenting.envs import registry
 from parenting.experiments.training.batch import Progress, StopRule
-from parenting.experiments.training.parallel import CHUNK, Plan, chunks, run
+from parenting.experiments.training.chunks import CHUNK, TrainPlan, chunks, train_in_chunks
 
 
 @pytest.mark.parametrize("trials", [1, 2, 3, 4, 20, 99, 100, 101, 150, 1000])
@@ -26,16 +26,16 @@ def test_hundred_trials_are_two_chunks_of_fifty() -> None:
     assert chunks(4) == [range(2), range(2, 4)]
 
 
-def plan() -> Plan:
+def plan() -> TrainPlan:
     world = "unsafe-exploration"
     config = compose("conservative", registry.defaults(world), {}, strict=False)
-    return Plan(world, "island", config, 0, 6, StopRule("queries", 3), 1000)
+    return TrainPlan(world, "island", config, 0, 6, StopRule("queries", 3), 1000)
 
 
 def test_progress_and_bits_on_one_core_and_on_two() -> None:
     here: list[Progress] = []
     there: list[Progress] = []
-    one, two = run(plan(), 1, here.append).check(), run(plan(), 2, there.append)
+    one, two = train_in_chunks(plan(), 1, here.append).check(), train_in_chunks(plan(), 2, there.append)
     assert bool(one.counts.finished.all())
     assert all(torch.equal(one.tensors()[name], tensor) for name, tensor in two.tensors().items())
     # in this process every tick is told; others are looked at now and then
