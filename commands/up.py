@@ -21,8 +21,8 @@ from typing import Annotated
 import typer
 
 from parenting.commands.errors import friendly_errors, settings
-from parenting.commands.lifeline import VARIABLE
 from parenting.server.db import connect
+from parenting.server.lifeline import VARIABLE, follow
 from parenting.server.migrate import upgrade
 from parenting.server.serve import bind
 from parenting.server.settings import Settings
@@ -43,6 +43,7 @@ def up(
 
     Example: parenting up --port 0 --no-browser
     """
+    follow()
     with friendly_errors():
         chosen = settings(port=port)
         listener = bind(chosen.host, chosen.port, chosen.container)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from parenting.commands.errors import friendly_errors, settings
-from parenting.commands.lifeline import follow
+from parenting.server.lifeline import follow
 from parenting.server.serve import bind, make_server
 
 Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a free one.", show_default="8765")]

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from parenting.commands.errors import friendly_errors, settings
-from parenting.commands.lifeline import follow
 from parenting.server.db import connect
+from parenting.server.lifeline import follow
 from parenting.server.log import set_up_log
 from parenting.server.migrate import require_current
 from parenting.server.settings import Settings

@@ -7,8 +7,9 @@ then `move`, `enter` and `chance` in each step. What it is worth to a parent sta
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
+from types import MappingProxyType
 from typing import ClassVar
 
 import torch
@@ -44,6 +45,9 @@ class Gridworld(ABC):
     walls: ClassVar[str] = WALL  # the glyphs that stop the agent
     ends: ClassVar[str] = "G"  # the glyphs that end an episode when the agent enters them
     hides: ClassVar[str] = ""  # the glyphs under which the agent is not drawn
+
+    options: Mapping[str, object] = MappingProxyType({})
+    """The rules' own settings, as `envs.registry.make` gave them."""
 
     def __init__(
         self, levels: Sequence[Level], time_limit: int, device: str | torch.device | None = None

@@ -106,4 +106,6 @@ def make(
     limit = int(found.defaults["time_limit"]) if time_limit is None else time_limit
     module, name = found.rules.split(":")
     rules: type[Gridworld] = getattr(import_module(module), name)
-    return rules(chosen, time_limit=limit, device=device, **{**found.options, **options})
+    made = rules(chosen, time_limit=limit, device=device, **{**found.options, **options})
+    made.options = {**found.options, **options}
+    return made

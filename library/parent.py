@@ -17,6 +17,10 @@ from parenting.library.question import Query, Question, choice_of, question
 from parenting.library.worlds import World
 
 
+class EndedError(Exception):
+    """Training ends before its time: a callback or a parent says so. The agents are kept as they are."""
+
+
 class Open(NamedTuple):
     """A question that waits for its answer."""
 

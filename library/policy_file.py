@@ -30,7 +30,7 @@ def about_world(world: World) -> dict[str, Any]:
     return {
         "world": world.name,
         "levels": [level.text for level in world.levels],
-        "options": dict(getattr(world, "options", {})),
+        "options": dict(world.options),
     }
 
 

@@ -12,7 +12,6 @@ from parenting.agent.config import Config
 from parenting.evaluation.outcomes import name
 from parenting.experiments.training import batch
 from parenting.experiments.training.outcomes import Outcomes, deployments, examine
-from parenting.library.answer_log import AnswerLog
 from parenting.library.policy import Policy
 from parenting.library.result_folder import Fields, Record, read, write
 from parenting.library.task import Task
@@ -119,7 +118,13 @@ def load_result(folder: str | Path) -> TrainResult:
 
 
 def collect(
-    task: Task, parts: Sequence[batch.TrainResult], log: AnswerLog, *, seed: int, until: str
+    task: Task,
+    parts: Sequence[batch.TrainResult],
+    answers: list[Record],
+    *,
+    seed: int,
+    until: str,
+    events: Sequence[Record] = (),
 ) -> TrainResult:
     """Collect the batches of a run, one after the other."""
     trials: list[Record] = []
@@ -133,7 +138,7 @@ def collect(
             own = {"stage": stage, "trial": number, "seed": seed}
             policies.append(Policy(task.world, task.config, parameters, **own))
             trials.append(_record(task.world, outcomes, row, number))
-    return TrainResult(task.world, task.config, seed, until, policies, trials, log.records())
+    return TrainResult(task.world, task.config, seed, until, policies, trials, answers, [*events])
 
 
 def _record(world: World, outcomes: Outcomes, row: int, number: int) -> Record:

@@ -97,9 +97,9 @@ def check_number(name: str, value: object, least: int, most: int) -> None:
 def _settings(world: World) -> dict[str, object]:
     """Return the hyperparameters that a world holds already, so that nobody gives them twice."""
     found: dict[str, object] = {"time_limit": world.time_limit}
-    options = getattr(world, "options", {})
-    if "supervised" in options:
-        found["supervised"] = next(word for word, one in SUPERVISION.items() if one is options["supervised"])
+    if "supervised" in world.options:
+        given = world.options["supervised"]
+        found["supervised"] = next(word for word, option in SUPERVISION.items() if option is given)
     return found
 
 

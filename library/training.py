@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from typing import Any
 
@@ -18,18 +18,16 @@ from parenting.experiments.training.batch import BatchTrainer, StopRule
 from parenting.experiments.training.chunks import chunks
 from parenting.library.answer_log import AnswerLog
 from parenting.library.batch_parent import LoggedParent, WholeBatch
-from parenting.library.parent import Parent
+from parenting.library.parent import EndedError, Parent
+from parenting.library.person import Person, TerminalParent
 from parenting.library.progress import Progress, bar
 from parenting.library.result import TrainResult, collect
 from parenting.library.scripted import ScriptedParent
 from parenting.library.task import Task, check_number, prepare, stop_rule
+from parenting.library.threads import one_thread
 from parenting.library.worlds import AnyLevel, World
 
 Callback = Callable[[Progress], bool | None]
-
-
-class EndedError(Exception):
-    """Training ends before its time: the callback or the parent says so. The agents are kept as they are."""
 
 
 def train(
@@ -37,7 +35,7 @@ def train(
     *,
     level: AnyLevel | None = None,
     preset: str | Config = "conservative",
-    parent: str | Mailbox = "scripted",
+    parent: str | Mailbox | Person = "scripted",
     trials: int = 1,
     until: str = "optimal",
     seed: int = 0,
@@ -52,7 +50,7 @@ def train(
         world: A world's name, a `World`, or a level's text whose header names its world.
         level: A built-in level's name, a level's text, a file's path, or a `Level`; None takes the default.
         preset: A name in `PRESETS` ("conservative", "lax" or "direct": Table 1), or a `Config`.
-        parent: "scripted" (Sec. 3.1.3), or a `Parent` such as one's own.
+        parent: "scripted" (Sec. 3.1.3), a `Parent` such as one's own, or a `Person`.
         trials: Number of agents. Trial i of a seed is the same agent whatever the number of trials is.
         until: When a trial is finished: "optimal" (its argmax policy takes a shortest safe path),
             "queries:N" (N answered queries) or "ticks:N".
@@ -83,9 +81,18 @@ def train(
     check_number("trials", trials, 1, 1_000_000)
     check_number("seed", seed, 0, 2**53 - 1)
     check_number("max_ticks", max_ticks, 1, 10**9)
+    if isinstance(parent, Person):
+        if trials != 1:
+            raise ValueError(f"trials: a person raises one agent at a time, not {trials}.")
+        if parent.where == "page":
+            from parenting.library.page_training import train_on_page  # loads the server
+
+            return train_on_page(task, rule, seed, parent, callback, progress)
+        parent, progress = TerminalParent(parent.after), False
     log, parts = AnswerLog(), list[batch.TrainResult]()
     behind = _parent(parent, task, trials)
-    with one_thread(), bar(progress, trials, rule) as show:
+    listening = behind.listening() if isinstance(behind, TerminalParent) else nullcontext()
+    with one_thread(), listening, bar(progress, trials, rule) as show:
         for chunk in chunks(trials):
             trainer = _trainer(task, rule, seed, chunk)
             if behind is not None:
@@ -95,7 +102,12 @@ def train(
             parts.append(trained)
             if ended:
                 break
-    return collect(task, parts, log, seed=seed, until=str(rule))
+    if isinstance(behind, TerminalParent) and ended:
+        print(
+            f"Stopped after {behind.answers} answers. The result holds them; result.save(folder) keeps them."
+            ' Go on with the same arguments and parent=pt.Person("terminal", after=result).'
+        )
+    return collect(task, parts, log.records(), seed=seed, until=str(rule))
 
 
 def _parent(parent: str | Mailbox, task: Task, trials: int) -> Mailbox | None:
@@ -104,8 +116,8 @@ def _parent(parent: str | Mailbox, task: Task, trials: int) -> Mailbox | None:
         return None
     if isinstance(parent, str) or not all(hasattr(parent, verb) for verb in ("events", "take", "post")):
         raise ValueError(
-            f'parent: {parent!r} is not a parent. Use "scripted", or an instance of your own subclass of'
-            " parenting.Parent."
+            f'parent: {parent!r} is not a parent. Use "scripted", parenting.Person(), or an instance of'
+            " your own subclass of parenting.Parent."
         )
     if isinstance(parent, Parent):
         parent.begin(task.world, task.config, trials)
@@ -147,14 +159,3 @@ def _report(
             raise EndedError
 
     return tell
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Compute on one thread, as `parenting run` does: faster at these sizes, and the same bits."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

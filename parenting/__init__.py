@@ -20,12 +20,14 @@ if TYPE_CHECKING:
     from parenting.library.evaluating import Evaluation, evaluate
     from parenting.library.loop import Tick, configure, init, step, tick
     from parenting.library.parent import Parent
+    from parenting.library.person import Person
     from parenting.library.policy import Policy, load_policy
     from parenting.library.policy_file import FormatError
     from parenting.library.progress import Progress
     from parenting.library.question import Query, Question
     from parenting.library.replay import ReplayError, ReplayParent
-    from parenting.library.result import TrainResult, load_result
+    from parenting.library.result import TrainResult
+    from parenting.library.result_folder import load_result
     from parenting.library.scripted import ScriptedParent
     from parenting.library.show import Drawing, show
     from parenting.library.training import train
@@ -42,6 +44,7 @@ _MODULES = {
     "FormatError": "library.policy_file",
     "Level": "envs.levels.spec",
     "Parent": "library.parent",
+    "Person": "library.person",
     "Policy": "library.policy",
     "Progress": "library.progress",
     "Query": "library.question",
@@ -56,7 +59,7 @@ _MODULES = {
     "evaluate": "library.evaluating",
     "init": "library.loop",
     "load_policy": "library.policy",
-    "load_result": "library.result",
+    "load_result": "library.result_folder",
     "make": "library.worlds",
     "show": "library.show",
     "step": "library.loop",
@@ -77,6 +80,7 @@ __all__ = [
     "FormatError",
     "Level",
     "Parent",
+    "Person",
     "Policy",
     "Progress",
     "Query",

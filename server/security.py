@@ -20,6 +20,8 @@ from parenting.server.errors import Forbidden, ServerError, TooLargeError, Unkno
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 HOSTS = ("localhost", "127.0.0.1", "[::1]")
 
+NOBODY = "frame-ancestors 'none'"
+
 log = structlog.get_logger()
 
 
@@ -28,7 +30,8 @@ def policy(inline_styles: bool = False) -> str:
     styles = "'self' 'unsafe-inline'" if inline_styles else "'self'"
     return (
         f"default-src 'self'; style-src {styles}; img-src 'self' data: blob:; object-src 'none'; "
-        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+        "base-uri 'none'; form-action 'self'; "
+        f"{NOBODY}"
     )
 
 
@@ -71,6 +74,7 @@ class SecurityMiddleware:
                 headers = MutableHeaders(scope=message)
                 for name, value in HEADERS.items():
                     headers.setdefault(name, value)
+                _let_frame(headers, scope)
             await send(message)
 
         try:
@@ -99,6 +103,14 @@ class SecurityMiddleware:
         if origin is not None:
             return None if origin.partition("://")[2] == host else Forbidden()
         return None
+
+
+def _let_frame(headers: MutableHeaders, scope: Scope) -> None:
+    """Name the sites that may show the page in a frame: a notebook, where the settings say so."""
+    settings = getattr(scope["app"].state, "settings", None)
+    if settings is not None and settings.frame_ancestors != "none":
+        name = "Content-Security-Policy"
+        headers[name] = headers[name].replace(NOBODY, f"frame-ancestors {settings.frame_ancestors}")
 
 
 def _without_port(host: str) -> str:

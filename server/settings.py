@@ -45,6 +45,11 @@ class Settings(BaseSettings):
     claim_seconds: float = Field(
         5.0, gt=0, description="How long a run stays with a worker that gives no sign of life."
     )
+    frame_ancestors: str = Field(
+        "none",
+        description="Sites that may show the pages in a frame, as the header Content-Security-Policy names "
+        "them; a notebook needs http://localhost:*.",
+    )
     streams: int = Field(50, ge=1, description="Live streams of events that may be open at once.")
     log_level: str = Field("warning", description="debug, info, warning or error.")
 

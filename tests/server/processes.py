@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from parenting.commands.lifeline import VARIABLE
+from parenting.server.lifeline import VARIABLE
 
 PRELOADED = [
     "parenting.commands.main",

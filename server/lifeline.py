@@ -1,4 +1,4 @@
-"""A pipe between `parenting up` and its two processes: when `up` dies, however it dies, they stop too."""
+"""A pipe from one process to those that it starts: when it ends, however it ends, they stop too."""
 
 from __future__ import annotations
 
