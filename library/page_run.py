@@ -13,7 +13,8 @@ from parenting.experiments.training import batch
 from parenting.experiments.training.batch import StopRule, no_counts
 from parenting.library.page_server import is_ready
 from parenting.library.person import Person
-from parenting.library.result import Record, TrainResult, collect
+from parenting.library.result import TrainResult, collect
+from parenting.library.result_folder import Record
 from parenting.library.task import Task
 from parenting.library.threads import one_thread
 from parenting.parents.scripted import ScriptedRule
@@ -132,9 +133,9 @@ def _as_batch(snapshot: Snapshot, run: Run, task: Task, rule: StopRule) -> batch
     state, counted = snapshot.state, snapshot.tally
     values = ScriptedRule(task.world, task.config.gamma, inside=task.config.inside).values
     judged = evaluation(task.world, values, task.config.gamma)
-    policies = torch.cat((state.learner.elders, torch.zeros_like(state.learner.live)[None]))
-    policies[state.maturity - 1] = state.learner.live
-    optimal = judged.optimal(state.learner.live)
+    policies = torch.cat((state.learner.frozen, torch.zeros_like(state.learner.params)[None]))
+    policies[state.maturity - 1] = state.learner.params
+    optimal = judged.optimal(state.learner.params)
     reached = {
         "optimal": optimal,
         "queries": counted.kinds.sum(1) >= rule.number,
@@ -148,7 +149,7 @@ def _as_batch(snapshot: Snapshot, run: Run, task: Task, rule: StopRule) -> batch
         maturity=state.maturity,
         optimal=optimal,
         finished=reached[rule.kind],
-        stuck=state.stuck,
+        stuck=state.all_refused,
     )
     return batch.TrainResult(counts, policies, judged)
 

@@ -120,7 +120,7 @@ class TerminalParent(Parent):
         given = self._given.get((question.trial, self._tick))
         if given is not None:
             return str(given)
-        print(f"\n{both_clips(question)}")
+        print(f"\n{both_clips(question.kind, question.left, question.right)}")
         self.asking = True
         try:
             while (said := input(PROMPT).strip().lower()) not in KEYS:

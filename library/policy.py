@@ -14,6 +14,8 @@ from torch import Tensor
 from parenting.agent.config import Config
 from parenting.agent.init import network_of
 from parenting.library import observation as observations
+from parenting.library.pictures import Drawing
+from parenting.library.policy_drawing import drawn
 from parenting.library.policy_file import FormatError, about_world, read_tensors, world_from, write_tensors
 from parenting.library.worlds import World
 
@@ -152,10 +154,12 @@ class Policy:
             layers = self._network.unpack(self.parameters[None])
             return self._network.heads(layers, seen[None], near[None]).logits[0].double()
 
-    def _repr_html_(self) -> str:
-        from parenting.library.show import show
+    def drawing(self) -> Drawing:
+        """Draw arrows on the levels that it was trained on; `show` does."""
+        return drawn(self.world, self.probabilities)
 
-        return show(self)._repr_html_()
+    def _repr_html_(self) -> str:
+        return self.drawing()._repr_html_()
 
     def __repr__(self) -> str:
         return f"<Policy {self.world.name}, level {self.world.levels[0].name}, stage {self.stage}>"

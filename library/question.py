@@ -10,11 +10,15 @@ import torch
 
 from parenting.agent import query as queries
 from parenting.agent.query import Choice, QueryKind
-from parenting.drawing import clip as drawing
+from parenting.drawing.query import draw_query
 from parenting.drawing.query_tensors import read_clips
-from parenting.envs.levels.spec import AGENT, BOX
+from parenting.library.clip import Clip, plain_clip
+from parenting.library.pictures import Drawing
+from parenting.library.text import both_clips
 from parenting.library.worlds import World
 
+SHOWN = 4
+"""Questions of a query that a notebook draws at most."""
 CHOICES = {"left": Choice.LEFT, "right": Choice.RIGHT, "either": Choice.EITHER, "neither": Choice.NEITHER}
 
 
@@ -63,10 +67,13 @@ class Query(queries.Query):
         """Return the query of one trial alone, N = 1."""
         return self.pick(torch.tensor([trial], device=self.kind.device))
 
-    def _repr_html_(self) -> str:
-        from parenting.library.show import show
+    def drawing(self) -> Drawing:
+        """Draw the first questions; `show` does."""
+        each = [question.drawing() for question, _ in zip(self, range(SHOWN), strict=False)]
+        return Drawing([one.pictures[0] for one in each], "\n\n".join(one.text for one in each))
 
-        return show(self)._repr_html_()
+    def _repr_html_(self) -> str:
+        return self.drawing()._repr_html_()
 
     def __repr__(self) -> str:
         trials = f"{len(self)} trial{'' if len(self) == 1 else 's'}"
@@ -76,29 +83,6 @@ class Query(queries.Query):
 
 FIELDS = tuple(queries.Query.__dataclass_fields__)
 """The names of a query's tensors."""
-
-
-@dataclass(frozen=True)
-class Clip:
-    """One side of a question: moves, and what happened.
-
-    Attributes:
-        actions: The moves by name: up, down, left, right.
-        boards: Every frame as rows of glyphs, with the agent `A` and the box `X` drawn; one frame more than
-            there are moves.
-        observed: The same as the agent saw it, which differs where it is deluded (Sec. 3.2.2).
-        cells: Where the agent is in each frame: row and column, counted from 0.
-        tiles: The glyph of the ground under the agent in each frame.
-    """
-
-    actions: tuple[str, ...]
-    boards: tuple[tuple[str, ...], ...]
-    observed: tuple[tuple[str, ...], ...]
-    cells: tuple[tuple[int, int], ...]
-    tiles: tuple[str, ...]
-
-    def __str__(self) -> str:
-        return " ".join(self.actions)
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,10 +105,16 @@ class Question:
     trial: int
     query: Query = field(compare=False)
 
-    def _repr_html_(self) -> str:
-        from parenting.library.show import show
+    def drawing(self) -> Drawing:
+        """Draw both clips; `show` does."""
+        query = self.query
+        clips = read_clips(query, query.world.legend)
+        level = query.world.levels[int(query.level[0])]
+        picture = draw_query(clips, level, self.kind, self.stage, query.world.spec)
+        return Drawing([picture], both_clips(self.kind, self.left, self.right))
 
-        return show(self)._repr_html_()
+    def _repr_html_(self) -> str:
+        return self.drawing()._repr_html_()
 
     def __repr__(self) -> str:
         return f"<Question of trial {self.trial}, {self.kind}: left {self.left}, right {self.right}>"
@@ -136,8 +126,8 @@ def question(query: Query, row: int, trial: int | None = None) -> Question:
     clips = read_clips(one, one.world.legend)
     return Question(
         kind=QueryKind(int(one.kind[0])).name.lower(),
-        left=_clip(clips["left"]),
-        right=_clip(clips["right"]),
+        left=plain_clip(clips["left"]),
+        right=plain_clip(clips["right"]),
         stage=int(one.maturity[0]),
         trial=row if trial is None else trial,
         query=one,
@@ -158,24 +148,3 @@ def choice_of(said: Any, who: str) -> Choice:
         f"{who}.answer returned {said!r}. Return 'left', 'right', 'either' or 'neither', the same as a"
         " parenting.Choice, or None to answer later."
     )
-
-
-def _clip(clip: drawing.Clip) -> Clip:
-    moments = clip["frames"]
-    cells = tuple((moment["agent"][0], moment["agent"][1]) for moment in moments)
-    return Clip(
-        actions=tuple(clip["actions"]),
-        boards=tuple(_drawn(moment) for moment in moments),
-        observed=tuple(tuple(moment["observed"]) for moment in moments),
-        cells=cells,
-        tiles=tuple(moment["ground"][y][x] for moment, (y, x) in zip(moments, cells, strict=True)),
-    )
-
-
-def _drawn(moment: drawing.Frame) -> tuple[str, ...]:
-    """Return the ground with box and agent on it."""
-    cells = [list(row) for row in moment["ground"]]
-    for glyph, place in ((BOX, moment["box"]), (AGENT, moment["agent"])):
-        if place is not None:
-            cells[place[0]][place[1]] = glyph
-    return tuple("".join(row) for row in cells)

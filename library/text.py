@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from parenting.library.question import Clip, Question
+from parenting.library.clip import Clip
 
 WIDTH = 100
 """Characters of a line at most; frames that do not fit go below the others."""
@@ -10,10 +10,10 @@ GAP = "   "
 ASKS = {"guidance": "Which move is better?", "preference": "Which clip is better?"}
 
 
-def both_clips(question: Question) -> str:
+def both_clips(kind: str, left: Clip, right: Clip) -> str:
     """Return a question as text: what it asks, then both clips, each from its first frame to its last."""
-    parts = [f"{question.kind}: {ASKS[question.kind]}"]
-    for name, clip in (("left", question.left), ("right", question.right)):
+    parts = [f"{kind}: {ASKS[kind]}"]
+    for name, clip in (("left", left), ("right", right)):
         parts += [f"{name}: {clip}", frames(clip)]
     return "\n".join(parts)
 

@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from parenting.library.loop import Tick, configure, init, step, tick
     from parenting.library.parent import Parent
     from parenting.library.person import Person
+    from parenting.library.pictures import Drawing
     from parenting.library.policy import Policy, load_policy
     from parenting.library.policy_file import FormatError
     from parenting.library.progress import Progress
     from parenting.library.question import Query, Question
     from parenting.library.replay import ReplayError, ReplayParent
-    from parenting.library.result import TrainResult
-    from parenting.library.result_folder import load_result
+    from parenting.library.result import TrainResult, load_result
     from parenting.library.scripted import ScriptedParent
-    from parenting.library.show import Drawing, show
+    from parenting.library.show import show
     from parenting.library.training import train
     from parenting.library.worlds import World, make, worlds
 
@@ -39,7 +39,7 @@ _MODULES = {
     "Answer": "agent.query",
     "Choice": "agent.query",
     "Config": "agent.config",
-    "Drawing": "library.show",
+    "Drawing": "library.pictures",
     "Evaluation": "library.evaluating",
     "FormatError": "library.policy_file",
     "Level": "envs.levels.spec",
@@ -59,7 +59,7 @@ _MODULES = {
     "evaluate": "library.evaluating",
     "init": "library.loop",
     "load_policy": "library.policy",
-    "load_result": "library.result_folder",
+    "load_result": "library.result",
     "make": "library.worlds",
     "show": "library.show",
     "step": "library.loop",

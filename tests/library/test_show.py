@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 import parenting as pt
-from parenting.library.show import arrows
+from parenting.library.policy_drawing import arrows
 
 
 def pictures(html: str) -> list[ElementTree.Element]:
@@ -56,7 +56,7 @@ def test_a_level_draws_itself() -> None:
 
 def test_an_optimal_policy_points_to_the_goal(policy: pt.Policy) -> None:
     """Follow the arrows from the start, as a reader does."""
-    level, found = policy.world.levels[0], arrows(policy)
+    level, found = policy.world.levels[0], arrows(policy.world, policy.probabilities)
     cell, steps = level.find("A")[0], 0
     while level.glyph(cell) != "G":
         chances = found[cell]
@@ -71,7 +71,7 @@ def test_an_optimal_policy_points_to_the_goal(policy: pt.Policy) -> None:
 
 def test_no_arrow_stands_where_no_agent_can_act(policy: pt.Policy) -> None:
     level = policy.world.levels[0]
-    assert not {cell for cell in arrows(policy) if level.glyph(cell) in "W#G"}
+    assert not {cell for cell in arrows(policy.world, policy.probabilities) if level.glyph(cell) in "W#G"}
 
 
 def test_one_picture_is_saved_as_svg_and_several_are_refused(policy: pt.Policy, tmp_path: Path) -> None:
