@@ -18,11 +18,11 @@ from parenting.library.result_folder import Record
 from parenting.library.task import Task
 from parenting.library.threads import one_thread
 from parenting.parents.scripted import ScriptedRule
-from parenting.server import new_run, record, runs
+from parenting.server import checkpoints, new_run, operator_events, runs
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError, NotFound
 from parenting.server.new_run import NewRun
-from parenting.server.queue import parent_side
+from parenting.server.queue import leases
 from parenting.server.reads import answers
 from parenting.server.settings import Settings
 from parenting.server.snapshot import Snapshot, initial_snapshot, initial_weights, unpack
@@ -99,7 +99,7 @@ def _offer_again(db: Database, number: int) -> None:
     with db.read() as session:
         rows = session.execute(held).all()
     for query, client in rows:
-        parent_side.release(db, query, str(client))
+        leases.release(db, query, str(client))
 
 
 def all_heard(db: Database, number: int) -> bool:
@@ -122,7 +122,7 @@ def read_back(db: Database, number: int, task: Task, rule: StopRule, seed: int) 
 
 def _snapshot(db: Database, run: Run, task: Task, seed: int) -> Snapshot:
     weights = initial_weights(db, run, task.world)
-    saved = next((one for one in record.load_checkpoints(db, run.id) if one.intact), None)
+    saved = next((one for one in checkpoints.load_checkpoints(db, run.id) if one.intact), None)
     if saved is None:
         return initial_snapshot(task.world, task.config, seed, weights)
     return unpack(task.world, task.config, saved.blob, weights)
@@ -178,6 +178,6 @@ def _answer(row: answers.Answered) -> Record:
 
 def _events(db: Database, number: int) -> list[Record]:
     found: list[dict[str, Any]] = []
-    for event in record.list_events(db, number):
+    for event in operator_events.list_operator_events(db, number):
         found.append({"tick": event.applied_tick, "kind": event.kind, **event.payload})
     return found

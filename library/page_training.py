@@ -129,11 +129,11 @@ def _is_done(now: RunSchema, rule: StopRule) -> bool:
 
 def _settle(db: Database, run: int) -> None:
     """Wait until the worker of another server has saved what it lived."""
-    from parenting.server import record
+    from parenting.server import checkpoints
 
     end = time.monotonic() + SETTLE_SECONDS
     while time.monotonic() < end:
-        saved = record.load_checkpoints(db, run)
+        saved = checkpoints.load_checkpoints(db, run)
         if saved and saved[0].tick >= runs.get_run(db, run).tick:
             return
         time.sleep(LOOK_SECONDS)
