@@ -68,6 +68,10 @@ def experiment(
             parser=folder, metavar="FOLDER", help="Folder for results; what is done already lies there."
         ),
     ] = Path("results"),
+    pages: Annotated[
+        bool,
+        typer.Option("--pages", help="With report: write the Markdown pages again from the stored trials."),
+    ] = False,
 ) -> None:
     """Run an experiment of the paper, or go on with it, and write its page, figures and data.
 
@@ -79,17 +83,19 @@ def experiment(
     with friendly_errors():
         if name == "report":
             _only_out(context)
-            _report(out)
+            _report(out, pages)
             return
+        if pages:
+            raise UsageError("--pages works with report only: parenting experiment report --pages.")
         request = _asked(NAMES if name == "all" else (name,), scale, trials, seed, device)
         for one, what in request:
             _run(one, what, out, workers or os.cpu_count() or 1, cluster)
 
 
 def _only_out(context: typer.Context) -> None:
-    """The page is made of what is done; so all but --out would say nothing."""
+    """Refuse options that would change nothing, because no trial is run."""
     given = [one for one in context.params if _given(context, one)]
-    idle = [f"--{one}" for one in given if one not in ("name", "out")]
+    idle = [f"--{one}" for one in given if one not in ("name", "out", "pages")]
     if idle:
         raise UsageError(
             f"report makes a page of what is done, and takes --out alone. Leave out {', '.join(idle)}."
@@ -101,15 +107,28 @@ def _given(context: typer.Context, option: str) -> bool:
     return source is not None and source.name == "COMMANDLINE"
 
 
-def _report(out: Path) -> None:
+def _report(out: Path, pages: bool) -> None:
     from parenting.experiments.reporting.html import BrokenResults, NoResults, report
 
     try:
+        if pages:
+            _pages(out)
         typer.echo(f"Written: {report(out)}")
     except (BrokenResults, NoResults) as error:
         raise UsageError(str(error)) from None
     except OSError as error:
         raise UsageError(_at(out, error)) from None
+
+
+def _pages(out: Path) -> None:
+    """Write every page below a folder again that has stored trials."""
+    from parenting.experiments.registry import experiment
+    from parenting.experiments.reporting.html import stored
+    from parenting.experiments.reporting.publish import publish_again
+
+    for results in stored(out):
+        publish_again(experiment(results.name), out)
+        typer.echo(f"Written: {out / results.name}.md")
 
 
 def _asked(
@@ -125,7 +144,8 @@ def _asked(
 
 
 def _run(one: Experiment, request: Request, out: Path, workers: int, cluster: str | None) -> None:
-    from parenting.experiments.reporting.markdown import Work, page, publish
+    from parenting.experiments.reporting.markdown import page
+    from parenting.experiments.reporting.publish import Work, publish
     from parenting.experiments.runner.dask_cluster import NoClusterError
     from parenting.experiments.runner.executor import NoGpuError, check_workers, work
     from parenting.experiments.runner.processes import WorkersDiedError

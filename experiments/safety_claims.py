@@ -1,7 +1,7 @@
 """Safety claims with exact counts: what the argmax policies of many trials do after 50 queries (Sec. 3.2).
 
-A claim is tried in variants: with the paper's defaults and with the conservative preset, pre-trained or not,
-and with the paper's letter on comparing twice. What policies do before any query stands beside them.
+Each claim is tested in variants: with the paper's defaults and with the conservative preset, with and without
+pre-training, and with repeated queries, as the paper is written. The initial policies are counted as well.
 """
 
 from __future__ import annotations
@@ -11,15 +11,23 @@ from typing import Any, NamedTuple
 
 from parenting.agent.config import PRESETS, Config
 from parenting.envs import registry
-from parenting.experiments.reporting.comparison import NEVER, SILENT, Comparison, compare_count, compare_mean
+from parenting.experiments.reporting.comparison import (
+    NEVER,
+    NONE_OF_100,
+    SILENT,
+    Comparison,
+    compare_count,
+    compare_mean,
+)
 from parenting.experiments.reporting.plots import Proportion, plot_proportions
+from parenting.experiments.reporting.prose import paragraphs
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Request, Results, chunk_ranges
 
 QUERIES, MAX_TICKS = 50, 5_000
 BORN = "before any query, pre-trained"
 FRESH = "before any query, not pre-trained"
-MEANS = (("unsafe moves while parented", "deaths"), ("ticks", "ticks"))
+MEANS = (("unsafe moves during parenting", "deaths"), ("ticks", "ticks"))
 
 
 class Variant(NamedTuple):
@@ -36,7 +44,7 @@ VARIANTS: dict[str, Variant] = {
     "conservative": Variant("conservative", {}),
     "conservative, not pre-trained": Variant("conservative", {"pretrain": False}, 0.3),
 }
-"""By name; the first is the paper's, and is what we hold against it."""
+"""By their names in trials.csv. Only the first, with the paper's settings, is compared with the paper."""
 
 
 class Counted(NamedTuple):
@@ -45,7 +53,7 @@ class Counted(NamedTuple):
     what: str
     words: tuple[str, ...]
     column: str = "outcome"
-    paper: int | str = SILENT
+    paper: str = SILENT
 
 
 class Claim(NamedTuple):
@@ -54,7 +62,7 @@ class Claim(NamedTuple):
     world: str
     level: str
     counted: Sequence[Counted]
-    words: Sequence[str]
+    prose: str  # the template of the page
     more: Mapping[str, Variant] = {}
 
     @property
@@ -111,7 +119,9 @@ class Claim(NamedTuple):
         names = self.tried(request)
         found = [one for name in names for one in self._findings(name, _of(name, rows))]
         counts = [one for name in [*names, FRESH] for one in self._shares(name, _of(name, rows))]
-        words = [*self.words, *WORDS]
+        words = paragraphs(
+            self.prose, presets=PRESETS, entropy=Config().lambda_global, queries=QUERIES, max_ticks=MAX_TICKS
+        )
         return Results(
             [*found, *self._born(rows)], words, {"shares": lambda figure: plot_proportions(figure, counts)}
         )
@@ -120,61 +130,51 @@ class Claim(NamedTuple):
         done = [row for row in mine if row["finished"]]
         left = f"{len(mine) - len(done)} of {len(mine)} trials unfinished" if len(done) < len(mine) else ""
         for one in self.counted:
-            note = f"{left}, counted as they ended" if left else ""
+            note = f"{left}, counted by their last policy" if left else ""
             yield _count(name, one, mine, self._paper(name, one), note)
         for what, column in MEANS:
-            note = f"{left}, not in the mean" if left else ""
-            yield compare_mean(f"{name}: {what}", [row[column] for row in done], note)
+            note = f"{left}, excluded from the mean" if left else ""
+            yield compare_mean(f"{_shown(name)}: {what}", [row[column] for row in done], note)
 
     def _born(self, rows: Sequence[Row]) -> Iterator[Comparison]:
-        """What the one pre-trained policy does, and how many of the fresh ones do harm."""
+        """The outcome of the one pre-trained policy, and how many of the untrained ones are unsafe."""
         (only,) = _of(BORN, rows)
-        note = "one policy: all begin with the same weights"
+        note = "one policy: all trials start from the same weights"
         for column in dict.fromkeys(one.column for one in self.counted):
             where = " ".join(column.split("_")[1:])
             what = f"{BORN}: what the argmax policy does" + (f", {where}" if where else "")
-            yield Comparison(what, SILENT, only[column], note=note)
+            yield Comparison(what, SILENT, only[column], note=note, reference=None)
         for one in self._harmful:
             yield _count(FRESH, one, _of(FRESH, rows), SILENT)
 
     def _shares(self, name: str, mine: Sequence[Row]) -> Iterator[Proportion]:
         for one in self._harmful if name == FRESH else self.counted:
             paper = self._paper(name, one)
-            share = 0.0 if paper == NEVER else None if isinstance(paper, str) else paper / 100
-            yield Proportion(name, one.what, _hits(one, mine), len(mine), share)
+            share = 0.0 if paper in (NEVER, NONE_OF_100) else None
+            yield Proportion(_shown(name), one.what, _hits(one, mine), len(mine), share)
 
     @property
     def _harmful(self) -> list[Counted]:
         harm = registry.spec(self.world).harm
         return [one for one in self.counted if harm in one.words]
 
-    def _paper(self, name: str, one: Counted) -> int | str:
-        """The paper's count, of what we hold against it."""
+    def _paper(self, name: str, one: Counted) -> str:
+        """The paper's count; only the first variant is compared with it."""
         return one.paper if name == next(iter(VARIANTS)) else SILENT
+
+
+def _shown(name: str) -> str:
+    """A variant's name on the page."""
+    return name.replace("comparing twice", "repeated queries")
 
 
 def _of(name: str, rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if row["of"] == name]
 
 
-def _count(name: str, one: Counted, rows: Sequence[Row], paper: int | str, note: str = "") -> Comparison:
-    return compare_count(f"{name}: {one.what}", paper, _hits(one, rows), len(rows), note)
+def _count(name: str, one: Counted, rows: Sequence[Row], paper: str, note: str = "") -> Comparison:
+    return compare_count(f"{_shown(name)}: {one.what}", paper, _hits(one, rows), len(rows), note)
 
 
 def _hits(one: Counted, rows: Sequence[Row]) -> int:
     return sum(row[one.column] in one.words for row in rows)
-
-
-def _chances(preset: str) -> str:
-    return ", ".join(map(str, PRESETS[preset].values()))
-
-
-WORDS = (
-    "*Defaults* are the paper's settings where it notes no others (Sec. 3.1.2), the *lax* ones of Table 1. "
-    "Only their rows are held against it. Their numbers are lost in our copy. Ours are "
-    f"{_chances('lax')} for `p_guid`, `p_rec` and `p_pref`, and {Config().lambda_global} for the weights of "
-    f"entropy where nothing else is said. *Conservative* ({_chances('conservative')}) asks more often.",
-    "Agents begin pre-trained except where a row says otherwise. *Comparing twice* is the paper's letter; "
-    "without it, which is our rule, no pair is asked about again (docs/paper.md, Recorder and pairs). "
-    f"Trials end after {QUERIES} answered queries, and are given up after {MAX_TICKS} ticks.",
-)

@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.store import Row, Task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from parenting.experiments.reporting.comparison import Comparison
 
 Scale = Literal["quick", "paper"]
 Device = Literal["cpu", "cuda"]

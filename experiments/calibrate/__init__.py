@@ -1,8 +1,8 @@
-"""Calibration: which of the lost settings bring the legible numbers of Table 1 back? (Sec. 3.2.1)
+"""Calibration: a search for settings that reproduce the legible numbers of Table 1 (Sec. 3.2.1).
 
-A grid of layouts and settings is tried with a few trials each. The nearest setting of all
-(`experiments/calibrate/distance.py`) is then confirmed with trials that this search has not seen, and lax and
-conservative parenting are raised beside it. The grid was not chosen blindly: docs/paper.md, "Calibration".
+It tries a grid of layouts and settings with a few trials each. The nearest setting (`distance.py`) is then
+confirmed with trials that the search has not used, together with lax and conservative parenting. The grid was
+not chosen blindly: docs/paper.md, "Calibration".
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ from parenting.experiments.calibrate.settings import (
     SOME,
     WORLD,
 )
+from parenting.experiments.reporting.prose import paragraphs
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Experiment, Request, Results, Scale, chunk_ranges
-from parenting.experiments.table1.report import AGREEMENT, ALGORITHMS
+from parenting.experiments.table1.report import ALGORITHMS
 
 
 def _grid(scale: Scale) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -90,37 +91,16 @@ def _confirming(request: Request) -> Iterator[Task]:
 
 
 def _report(request: Request, rows: Sequence[Row]) -> Results:
-    return Results(findings(rows), WORDS, {"search": lambda figure: scatter(figure, rows)})
+    words = paragraphs("calibrate/page.md", search_ticks=SEARCH_TICKS, search_steps=SEARCH_STEPS)
+    return Results(findings(rows), words, {"search": lambda figure: scatter(figure, rows)})
 
-
-WORDS = (
-    "Lost in our copy are the layout, all probabilities and both entropy weights. Tried is every combination "
-    "of a layout, one chance for recording and asking alike, a pair of entropy weights, and comparing twice "
-    "or not (`recompare`); and, for policy gradients, of a layout and a weight of entropy of their own, of "
-    "which the paper says nothing. Layouts lie between `island` and `island-bottleneck` by a rule: "
-    "`bottleneck-w-a` has a strait of w cells between its two rooms, a columns beside the straight way.",
-    "The distance of a setting is the sum over 47 +- 14, 51 and 2300 +- 700 of ((ours - the paper's) / the "
-    "paper's deviation) squared; the deviation of the 51 is lost, and 14 stands in for it. A setting that "
-    f"leaves more than an eighth of its trials unfinished within {SEARCH_TICKS} ticks, or {SEARCH_STEPS} "
-    "steps of policy gradients, is out. The nearest one is raised again, by trials that this search has not "
-    "seen: those are the rows by algorithm. Lax parenting has its own `p_guid`, and all else from direct "
-    "policy learning; conservative parenting has its own chances (docs/paper.md, Lost numbers).",
-    "So three numbers are *fitted*: that they agree says that there are such settings, on a layout of ours, "
-    "and not that the paper had them. Traditional RL has a knob of its own, its weight of entropy, which "
-    "nothing else depends on. Lax and conservative parenting are out of sample: nothing was chosen by what "
-    "they came to. Nor was the grid chosen blindly: an earlier look had been there (docs/paper.md, "
-    "Calibration, says what it saw).",
-    *AGREEMENT,
-    "In the figure each point is a setting: on the left one of direct policy learning, on the right one of "
-    "policy gradients.",
-)
 
 EXPERIMENT = Experiment(
     name="calibrate",
-    title="Calibration: the settings that bring Table 1 back",
+    title="Calibration: settings that reproduce Table 1",
     section="3.2.1",
-    claim="Direct policy learning dies 47 +- 14 times with about 51 preference queries where traditional RL "
-    "dies 2300 +- 700 times.",
+    claim="Direct policy learning has 47 +- 14 deaths with about 51 preference queries, and traditional RL "
+    "2300 +- 700 deaths.",
     trials={"quick": 2, "paper": 100},
     config=_config,
     tasks=_tasks,

@@ -1,4 +1,4 @@
-"""The search for the lost settings of Table 1, drawn: every setting, those that are out, and the paper."""
+"""Plot of the calibration search: every setting, the excluded ones, and the paper's numbers."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Point(NamedTuple):
 
     x: float
     y: float
-    stands: bool  # it is not out: enough of its trials finished
+    included: bool  # enough of its trials finished
 
 
 def scatter(figure: Figure, rows: Sequence[Row]) -> None:
@@ -53,11 +53,11 @@ def scatter(figure: Figure, rows: Sequence[Row]) -> None:
         rewarded = grouped(mine, TRADITIONAL, ("entropy",))
         _dots(right, _points(rewarded.values(), "entropy", "deaths"), colour)
         _crosses(right, rewarded, colour)
-    _ring(left, best.rows, "preference", "deaths")
-    _ring(right, best.rewarded, "entropy", "deaths")
-    _signs(left)
+    _mark_selected(left, best.rows, "preference", "deaths")
+    _mark_selected(right, best.rewarded, "entropy", "deaths")
+    _legend_entries(left)
     _name(left, "preference queries", "deaths of direct policy learning")
-    _name(right, "weight of entropy", "deaths of policy gradients")
+    _name(right, "entropy coefficient", "deaths of policy gradients")
     figure.legend(loc="outside lower center", ncols=4, fontsize=8)
 
 
@@ -66,10 +66,10 @@ def _layouts(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _paper(left: Axes, right: Axes) -> None:
-    """The paper's numbers; the deviation of the queries is a stand-in."""
+    """The paper's numbers; for the lost standard deviation of the queries, that of the deaths."""
     low, high = BY_REWARD.mean - BY_REWARD.deviation, BY_REWARD.mean + BY_REWARD.deviation
     right.axhspan(low, high, color="black", alpha=0.12)
-    said = "the paper (14 stands in for the deviation of the 51)"
+    said = "the paper (14 is used for the lost deviation of the 51)"
     stand_in = QUERIES.deviation
     left.errorbar(
         QUERIES.mean, DEATHS.mean, xerr=stand_in, yerr=DEATHS.deviation, fmt="k*", capsize=3, label=said
@@ -77,40 +77,40 @@ def _paper(left: Axes, right: Axes) -> None:
 
 
 def _points(settings: Iterable[list[Row]], x: str, y: str) -> Iterator[Point]:
-    """Each setting of which any trial finished."""
+    """Each setting with at least one finished trial."""
     for some in settings:
         done = [row for row in some if row["finished"]]
         if done:
-            stands = isfinite(distance(some))
-            yield Point(fmean(row[x] for row in done), fmean(row[y] for row in done), stands)
+            included = isfinite(distance(some))
+            yield Point(fmean(row[x] for row in done), fmean(row[y] for row in done), included)
 
 
 def _dots(axes: Axes, points: Iterable[Point], colour: str, layout: str | None = None) -> None:
     for one in points:
-        face = colour if one.stands else "none"
+        face = colour if one.included else "none"
         axes.scatter(one.x, one.y, s=18, facecolors=face, edgecolors=colour)
     if layout:
         axes.scatter([], [], s=18, color=colour, label=layout)
 
 
 def _crosses(axes: Axes, settings: Mapping[tuple[Any, ...], list[Row]], colour: str) -> None:
-    """At the foot: weights of entropy of which no trial finished, those of several layouts side by side."""
+    """At the bottom: entropy coefficients with which no trial finished, side by side for several layouts."""
     for (weight,), some in settings.items():
         if not any(row["finished"] for row in some):
             place = weight + 0.015 * COLOURS.index(colour)
             axes.plot(place, 0.02, "x", color=colour, markersize=5, transform=axes.get_xaxis_transform())
 
 
-def _ring(axes: Axes, rows: list[Row], x: str, y: str) -> None:
+def _mark_selected(axes: Axes, rows: list[Row], x: str, y: str) -> None:
     for one in _points([rows], x, y):
         axes.scatter(one.x, one.y, s=110, facecolors="none", edgecolors="black")
 
 
-def _signs(axes: Axes) -> None:
-    """For the legend alone."""
-    axes.scatter([], [], s=18, facecolors="none", edgecolors="grey", label="out: too many unfinished")
+def _legend_entries(axes: Axes) -> None:
+    """Empty series for the legend."""
+    axes.scatter([], [], s=18, facecolors="none", edgecolors="grey", label="excluded: too many unfinished")
     axes.scatter([], [], s=20, marker="x", color="grey", label="no trial finished")
-    axes.scatter([], [], s=110, facecolors="none", edgecolors="black", label="what was taken")
+    axes.scatter([], [], s=110, facecolors="none", edgecolors="black", label="selected")
 
 
 def _name(axes: Axes, x: str, y: str) -> None:

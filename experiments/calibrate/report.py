@@ -1,4 +1,4 @@
-"""What the calibration found: the nearest setting of each layout, and Table 1 with the nearest of all."""
+"""Rows of the calibration: Table 1 with the selected setting, and the nearest setting of each layout."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from parenting.experiments.calibrate.distance import (
     Target,
     search,
 )
-from parenting.experiments.reporting.comparison import Comparison, mean_sd
+from parenting.experiments.reporting.comparison import LOST, Comparison, mean_sd
 from parenting.experiments.runner.store import Row
 from parenting.experiments.table1.report import ALGORITHMS, Algorithm, born, cells, order
 
@@ -35,13 +35,12 @@ def findings(rows: Sequence[Row]) -> list[Comparison]:
 
 
 def _marked(one: Algorithm, row: Comparison) -> Comparison:
-    """A row on an algorithm, or on how it differs from the one before it; it says whether it was aimed at."""
-    mark = "fitted: the search aims at it" if one.name in FITTED else "not fitted"
-    return replace(row, note="; ".join(filter(None, (mark, row.note))))
+    """A row on an algorithm, or on its difference from the previous one: tuned to the paper or not."""
+    return replace(row, reference="fit") if one.name in FITTED else row
 
 
 def _chosen(best: Found) -> Comparison:
-    return Comparison("the setting taken", "lost", f"{best.layout}: {_said(best)}")
+    return Comparison("selected setting", LOST, f"{best.layout}: {_said(best)}", reference="fit")
 
 
 def _said(found: Found) -> str:
@@ -57,29 +56,31 @@ def _nearest(found: Found) -> Comparison:
         for some, column in ((direct, "deaths"), (direct, "preference"), (rewarded, "deaths"))
     ]
     left = len(found.rows) - len(direct), len(found.rewarded) - len(rewarded)
-    far = f"distance {found.distance:.1f}" if isfinite(found.distance) else "too many unfinished"
+    far = f"distance {found.distance:.1f}" if isfinite(found.distance) else "excluded"
     return Comparison(
-        f"search, nearest on {found.layout}: deaths, queries, deaths by reward",
+        f"search, nearest on {found.layout}: deaths and queries, deaths of policy gradients",
         WANTED,
         ", ".join(means),
         far,
         note=f"{_said(found)}; unfinished {left[0]} of {len(found.rows)}, {left[1]} of {len(found.rewarded)}",
+        reference="fit",
     )
 
 
 def _together(rows: Sequence[Row]) -> Comparison:
-    """Whether one setting brings all three numbers, each within the paper's deviation."""
+    """Reproduction of all three numbers by one setting, each within the paper's standard deviation."""
     met = {
         f"{name}: {target.column}": _meets([row for row in rows if row["of"] == name], target)
         for name, target in (("direct", DEATHS), ("direct", QUERIES), ("traditional", BY_REWARD))
     }
     missed = [what for what, holds in met.items() if not holds]
     return Comparison(
-        "all three numbers at once, each within the paper's deviation over trials",
+        "all three numbers at once, each within the paper's standard deviation",
         "yes",
         "no: " + ", ".join(missed) if missed else "yes",
         agrees=not missed,
-        note="fitted: the search aims at all three; 14 stands in for the deviation of the 51, which is lost",
+        note="the standard deviation of the 51 is lost; we use 14",
+        reference="fit",
     )
 
 

@@ -134,8 +134,8 @@ EXPERIMENT = Experiment(
     name="figure2",
     title="Figure 2: maturation in the garden",
     section="3.3",
-    claim="Matured through T = 1 .. 4, an agent outperforms its parent at once and comes close to policy "
-    "gradients, which water more than 5 plants in an episode of 10 steps; the parent waters about 2.",
+    claim="Maturing through T = 1 to 4, the agent outperforms its parent and approaches policy gradients. "
+    "Policy gradients water more than 5 plants in an episode of 10 steps, the parent about 2.",
     trials={"quick": 1, "paper": 3},
     config=_config,
     tasks=_tasks,

@@ -1,4 +1,4 @@
-"""The drawing of Fig. 2: a panel for each garden and parent; below, the levers, and a sample that grows."""
+"""The plot of Fig. 2: a panel for each garden and parent; below, the ablations, and T = 1 by queries."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any, Literal
 
-from parenting.experiments.figure2.rows import LIVED, MANY, kinds, of
+from parenting.experiments.figure2.rows import COVERAGE, MAIN, MANY, arms, of, shown
 from parenting.experiments.runner.store import Row
 
 if TYPE_CHECKING:
@@ -14,26 +14,26 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
 
-Look = dict[str, Any]
+Style = dict[str, Any]
 Outside = Literal["outside upper center", "outside lower center"]
-AHEAD: Look = {"color": "#009e73", "marker": "^"}
-CURVES: dict[str, Look] = {
+AHEAD: Style = {"color": "#009e73", "marker": "^"}
+CURVES: dict[str, Style] = {
     "look-ahead": AHEAD,
-    "coverage": {"color": "#d55e00", "marker": "D", "linestyle": "-."},
-    LIVED: {"color": "#0072b2", "marker": "o"},
+    COVERAGE: {"color": "#d55e00", "marker": "D", "linestyle": "-."},
+    MAIN: {"color": "#0072b2", "marker": "o"},
 }
-LEVERS = (("#e69f00", "s"), ("#56b4e9", "v"), ("#000000", "P"), ("#cc79a7", "X"), ("#8c6d31", "<"))
-"""Colour and mark of the other lives, by turns."""
+ABLATIONS = (("#e69f00", "s"), ("#56b4e9", "v"), ("#000000", "P"), ("#cc79a7", "X"), ("#8c6d31", "<"))
+"""Colour and marker of the other arms, in turn."""
 PARENT, GRADIENTS = "#777777", "#882255"
-ASIDE = 0.06
-"""How far apart lives stand along T, so that their bars do not hide each other."""
+JITTER = 0.06
+"""Distance of arms along T, so that their error bars do not hide each other."""
 
 
 def draw(figure: Figure, rows: Sequence[Row]) -> None:
-    """What is lived everywhere, by garden and parent; and what is tried in one of them, below."""
-    places = {(name == LIVED, level, inside): None for name, level, inside in kinds(rows)}
-    everywhere = [place for lived, *place in places if lived]
-    tried = [place for lived, *place in places if not lived]
+    """The main arm by garden and parent, and the other arms below."""
+    places = {(name == MAIN, level, inside): None for name, level, inside in arms(rows)}
+    everywhere = [place for main, *place in places if main]
+    tried = [place for main, *place in places if not main]
     upper = -(-len(everywhere) // 2)
     figure.set_size_inches(9, 1.5 + 2.7 * upper + 3.6 * len(tried))
     grid = figure.add_gridspec(upper + len(tried), 2, height_ratios=[3] * upper + [4] * len(tried))
@@ -50,18 +50,18 @@ def draw(figure: Figure, rows: Sequence[Row]) -> None:
 
 
 def _below(figure: Figure, room: SubplotSpec, rows: Sequence[Row], title: str) -> list[Axes]:
-    """The levers, and beside them the sample that grows, where there is one."""
+    """The ablations, and next to them T = 1 by queries, if there is such an arm."""
     growing, grid = of(rows, MANY), room.subgridspec(1, 3)
     panels = [figure.add_subplot(grid[: 2 if growing else 3])]
-    _levers(panels[0], rows, title)
+    _ablations(panels[0], rows, title)
     if growing:
         panels.append(figure.add_subplot(grid[2]))
-        _sample(panels[1], growing, rows)
+        _by_queries(panels[1], growing, rows)
     return panels
 
 
 def _at(rows: Sequence[Row], level: str, inside: str) -> list[Row]:
-    """The rows of a garden and parent, without trials that did not come so far."""
+    """The rows of a garden and parent, without trials that did not reach their number of queries."""
     here = [row for row in rows if (row["level"], row.get("inside", inside)) == (level, inside)]
     return [row for row in here if row.get("there", True)]
 
@@ -71,7 +71,7 @@ def _called(level: str, inside: str) -> str:
 
 
 def _legend(figure: Figure, panels: Sequence[Axes], where: Outside) -> None:
-    """One for several panels, each name once."""
+    """One legend for several panels, each name once."""
     known: dict[str, Any] = {}
     for axes in panels:
         handles, names = axes.get_legend_handles_labels()
@@ -85,37 +85,37 @@ def _legend(figure: Figure, panels: Sequence[Axes], where: Outside) -> None:
 def _everywhere(axes: Axes, rows: Sequence[Row], title: str) -> None:
     _parent(axes, rows)
     _gradients(axes, of(rows, "policy gradients"))
-    for name, look in CURVES.items():
-        _curve(axes, name, of(rows, name), look)
+    for name, style in CURVES.items():
+        _curve(axes, name, of(rows, name), style)
     _finish(axes, title)
 
 
-def _levers(axes: Axes, rows: Sequence[Row], title: str) -> None:
-    """All lives whose stages are alike, beside each other; and how far the look-ahead is."""
+def _ablations(axes: Axes, rows: Sequence[Row], title: str) -> None:
+    """All arms with stages of equal length, and the look-ahead."""
     names = [name for name in dict.fromkeys(row["of"] for row in rows if "queries" in row) if name != MANY]
     _parent(axes, rows)
     _curve(axes, "look-ahead", of(rows, "look-ahead"), AHEAD)
     for number, name in enumerate(names):
-        colour, mark = LEVERS[number % len(LEVERS)]
-        look = CURVES.get(name, {"color": colour, "marker": mark, "linewidth": 1.0})
-        _curve(axes, name, of(rows, name), look, ASIDE * (number - (len(names) - 1) / 2))
-    _finish(axes, f"levers: {title}")
+        colour, mark = ABLATIONS[number % len(ABLATIONS)]
+        style = CURVES.get(name, {"color": colour, "marker": mark, "linewidth": 1.0})
+        _curve(axes, name, of(rows, name), style, JITTER * (number - (len(names) - 1) / 2))
+    _finish(axes, f"ablations: {title}")
 
 
-def _sample(axes: Axes, rows: Sequence[Row], lines: Sequence[Row]) -> None:
-    """T = 1 as its sample grows; the axis of queries is logarithmic."""
+def _by_queries(axes: Axes, rows: Sequence[Row], lines: Sequence[Row]) -> None:
+    """T = 1 after increasing numbers of queries, on a logarithmic axis."""
     first = [row for row in rows if row["stage"] == 1]
     groups = {queries: _values(first, queries) for queries in sorted({row["queries"] for row in first})}
     _parent(axes, lines)
     for row in of(lines, "look-ahead"):
         if row["stage"] == 1:
             axes.axhline(row["waterings"], color=AHEAD["color"], label="look-ahead")
-    _bars(axes, MANY, groups, {"color": "#332288", "marker": "s"})
+    _bars(axes, shown(MANY), groups, {"color": "#332288", "marker": "s"})
     axes.set_xscale("log")
     axes.set_xticks(list(groups), [str(queries) for queries in groups], fontsize=7)
     axes.minorticks_off()
     axes.set_xlabel("queries at T = 1")
-    axes.set_title("a growing sample", fontsize=10)
+    axes.set_title("T = 1 by queries", fontsize=10)
 
 
 def _finish(axes: Axes, title: str) -> None:
@@ -126,7 +126,7 @@ def _finish(axes: Axes, title: str) -> None:
     axes.set_title(title, fontsize=10)
 
 
-# What stands in them
+# The parts of a panel
 
 
 def _parent(axes: Axes, rows: Sequence[Row]) -> None:
@@ -135,7 +135,7 @@ def _parent(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 def _gradients(axes: Axes, rows: Sequence[Row]) -> None:
-    """Their mean at the last of their steps, and a band for the deviation over the trials."""
+    """Their mean after the last gradient step, and a band of one standard deviation over trials."""
     last = max((row["steps"] for row in rows), default=0)
     values = [row["waterings"] for row in rows if row["steps"] == last]
     if values:
@@ -144,26 +144,27 @@ def _gradients(axes: Axes, rows: Sequence[Row]) -> None:
         axes.axhspan(mean - off, mean + off, color=GRADIENTS, alpha=0.15, linewidth=0)
 
 
-def _curve(axes: Axes, name: str, rows: Sequence[Row], look: Look, aside: float = 0.0) -> None:
-    """By T, at the last milestone of each stage."""
+def _curve(axes: Axes, name: str, rows: Sequence[Row], style: Style, offset: float = 0.0) -> None:
+    """By T, at the last evaluation of each stage."""
     groups = {}
     for stage in sorted({row["stage"] for row in rows}):
         mine = [row for row in rows if row["stage"] == stage]
-        groups[stage + aside] = _values(mine, max(row.get("queries", 0) for row in mine))
-    if name == LIVED and rows:
-        name = f"{name}, {max(row['queries'] for row in rows if row['stage'] == 1)} queries a stage"
-    _bars(axes, name, groups, look)
+        groups[stage + offset] = _values(mine, max(row.get("queries", 0) for row in mine))
+    label = shown(name)
+    if name == MAIN and rows:
+        label = f"{label}, {max(row['queries'] for row in rows if row['stage'] == 1)} queries a stage"
+    _bars(axes, label, groups, style)
 
 
 def _values(rows: Sequence[Row], queries: int) -> list[float]:
     return [row["waterings"] for row in rows if row.get("queries", 0) == queries]
 
 
-def _bars(axes: Axes, name: str, groups: dict[Any, list[float]], look: Look) -> None:
-    """Means over the trials, with bars of their deviation where there are several."""
+def _bars(axes: Axes, name: str, groups: dict[Any, list[float]], style: Style) -> None:
+    """Means over trials, with error bars of one standard deviation."""
     if groups:
         means = [fmean(values) for values in groups.values()]
         off = [stdev(values) if len(values) > 1 else 0.0 for values in groups.values()]
         axes.errorbar(
-            list(groups), means, off if any(off) else None, capsize=2, markersize=5, label=name, **look
+            list(groups), means, off if any(off) else None, capsize=2, markersize=5, label=name, **style
         )

@@ -1,74 +1,53 @@
-"""The rows of Fig. 2: which are of what, and how surely their means are known."""
+"""Rows of Figure 2's trials: selection by arm, garden, parent and stage, and intervals of their means."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, sqrt
-from statistics import fmean, stdev
-from typing import NamedTuple
+from statistics import fmean
 
-from parenting.experiments.reporting.comparison import Z
+from parenting.experiments.reporting.statistics import Interval, mean_interval
 from parenting.experiments.runner.store import Row
 
-LIVED = "more guidance"
-"""The life that is lived in all gardens, by both parents."""
+MAIN = "more guidance"
+"""The arm that is run in all gardens with both parents."""
 MANY = "10,000 a stage"
-"""The life whose sample grows within a stage."""
-STUDENT = {2: 12.706, 3: 4.303, 4: 3.182, 5: 2.776, 6: 2.571, 7: 2.447, 8: 2.365, 9: 2.306, 10: 2.262}
-"""Two-sided 95 % of Student's t by the number of trials: three of them say much less than Z would have it."""
+"""The arm that is evaluated several times within a stage, as its queries accumulate."""
+COVERAGE = "coverage"
+NAMES = {
+    MAIN: "p_guid=0.99",
+    "conservative": "p_guid=0.95",
+    "more guidance, starts spread": "p_guid=0.99, exploring starts",
+    "more guidance, own length": "p_guid=0.99, own stage only",
+    "more guidance, 4 gradient steps": "p_guid=0.99, 4 gradient steps",
+    "more guidance, pre-trained": "p_guid=0.99, pre-trained",
+    MANY: "10,000 queries a stage",
+    COVERAGE: "full-coverage agent",
+}
+"""Names in trials.csv, and what they are called on the page: an arm by its setting."""
 
 
-class Range(NamedTuple):
-    """A 95 % confidence interval."""
-
-    low: float
-    high: float
-
-    def __str__(self) -> str:
-        """As the tables show it."""
-        return f"{self.low:.2f} to {self.high:.2f}"
-
-    def above(self, line: float) -> bool | None:
-        """Whether all of it lies above a line, or all of it does not; None where it holds the line."""
-        return None if self.low <= line <= self.high else self.low > line
+def shown(name: str) -> str:
+    """The name of an arm on the page."""
+    return NAMES.get(name, name)
 
 
-def around(mean: float, error: float) -> Range:
-    """Of a mean over episodes with its standard error: what one policy waters."""
-    return Range(mean - Z * error, mean + Z * error)
-
-
-def among(values: Sequence[float], error: float) -> Range | None:
-    """Of a mean over trials; None for fewer than two, which say nothing of others.
-
-    `error` is the standard error that the shared weather gives every trial alike, and so their mean, too.
-    """
-    if len(values) < 2:
-        return None
-    trials = STUDENT.get(len(values), Z) * stdev(values) / sqrt(len(values))
-    half = hypot(trials, Z * error)
-    return Range(fmean(values) - half, fmean(values) + half)
-
-
-def watered(rows: Sequence[Row]) -> Range | None:
-    """The interval of what trials water on their mean, in one weather."""
-    if not rows:
-        return None
-    return among([row["waterings"] for row in rows], fmean(row["error"] for row in rows))
-
-
-def kinds(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
-    """Life, garden and parent, of all lives."""
-    return list(dict.fromkeys((row["of"], row["level"], row["inside"]) for row in rows if "queries" in row))
+def setting(row: Row) -> str:
+    """Garden and parent of a row, as the page names them."""
+    return f"{row['level']}, parent {row['inside']}"
 
 
 def of(rows: Sequence[Row], name: str) -> list[Row]:
-    """The rows of a life or a line."""
+    """The rows of an arm or a baseline."""
     return [row for row in rows if row["of"] == name]
 
 
-def line(rows: Sequence[Row], name: str, like: Row) -> float | None:
-    """What a line says where a row is: same garden, same parent, and for the look-ahead same T."""
+def arms(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
+    """Name, garden and parent of every arm that answers queries."""
+    return list(dict.fromkeys((row["of"], row["level"], row["inside"]) for row in rows if "queries" in row))
+
+
+def baseline(rows: Sequence[Row], name: str, like: Row) -> float | None:
+    """Mean waterings of a baseline for the same garden and parent; of the look-ahead at the same T."""
     for row in of(rows, name):
         alike = (row["level"], row["inside"]) == (like["level"], like["inside"])
         if alike and (name == "parent" or row["stage"] == like["stage"]):
@@ -77,6 +56,23 @@ def line(rows: Sequence[Row], name: str, like: Row) -> float | None:
     return None
 
 
-def where(row: Row) -> str:
-    """Its garden and its parent."""
-    return f"{row['level']}, {row['inside']}"
+def gradients(rows: Sequence[Row], level: str) -> list[Row]:
+    """Policy gradients in a garden after the last of their gradient steps, a row for each trial."""
+    mine = [row for row in of(rows, "policy gradients") if row["level"] == level]
+    last = max((row["steps"] for row in mine), default=0)
+    return [row for row in mine if row["steps"] == last]
+
+
+def waterings(rows: Sequence[Row]) -> list[float]:
+    """Mean waterings of each trial."""
+    return [row["waterings"] for row in rows]
+
+
+def error(rows: Sequence[Row]) -> float:
+    """Standard error that all trials share, because they are evaluated on the same episodes."""
+    return fmean(row["error"] for row in rows)
+
+
+def interval(rows: Sequence[Row]) -> Interval | None:
+    """Interval of the mean waterings over trials."""
+    return mean_interval(waterings(rows), error(rows)) if rows else None

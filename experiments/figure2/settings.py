@@ -1,4 +1,4 @@
-"""Settings of Figure 2: the arms that are trained, and the baselines beside them (Sec. 3.3)."""
+"""Settings of Figure 2: arms, and the baselines that they are compared with, at each scale (Sec. 3.3)."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ COMBINATIONS = tuple(
 
 
 TRIED = ("garden-mirrored", "up-down")
-"""Where the levers are tried: the parent leaves most to be learnt there, as in the paper's figure."""
+"""Garden and parent of the ablations: its parent leaves most to learn, as in the paper's figure."""
 
 
 class Arm(NamedTuple):
-    """How agents are raised through their stages."""
+    """Settings with which agents are parented through their stages."""
 
     changes: Mapping[str, Any]  # to the conservative preset
     every: int  # queries of a stage
-    milestones: tuple[int, ...]  # queries after which they are looked at
-    cost: float  # of the work
-    everywhere: bool = False  # in all gardens, by all parents
+    milestones: tuple[int, ...]  # queries after which they are evaluated
+    cost: float  # of a trial, relative to other arms
+    everywhere: bool = False  # in all gardens, with all parents
     starts: bool = False  # episodes of parenting begin anywhere on bare soil
 
 
 ASKS = {"batch": 32, "p_guid": 0.99}
-"""What makes an agent go on asking: with 0.95, three agents had 3800 answers after 100,000 ticks."""
+"""Settings with which an agent keeps asking: with 0.95, three agents had 3800 answers after 100,000 ticks."""
 
 
 ARMS: dict[Scale, dict[str, Arm]] = {
@@ -54,11 +54,11 @@ ARMS: dict[Scale, dict[str, Arm]] = {
         ),
     },
 }
-"""The lives of each scale; their pieces and those of the other scale may lie in one folder."""
+"""The arms of each scale by their names in trials.csv. Task results of both scales may lie in one folder."""
 
 
 class Budget(NamedTuple):
-    """How much work a stage may be."""
+    """The work of a stage of the full-coverage agent."""
 
     episodes: int
     rounds: int  # of walking, asking and training
@@ -66,13 +66,13 @@ class Budget(NamedTuple):
 
 
 class Baselines(NamedTuple):
-    """What the lives are held against."""
+    """What the arms are compared with."""
 
     depth: int  # of the look-ahead
     episodes: int
-    evaluation_points: tuple[int, ...]  # gradient steps after which policy gradients are looked at
-    budget: Budget  # of the coverage agent
-    stages: Mapping[tuple[str, str], int]  # of the coverage agent
+    evaluation_points: tuple[int, ...]  # gradient steps after which policy gradients are evaluated
+    budget: Budget  # of the full-coverage agent
+    stages: Mapping[tuple[str, str], int]  # of the full-coverage agent
 
 
 BASELINES: dict[Scale, Baselines] = {

@@ -10,6 +10,7 @@ from parenting.experiments.figure3.plot import draw
 from parenting.experiments.figure3.report import findings
 from parenting.experiments.figure3.settings import SIZES, Curve, Size, curves, whole
 from parenting.experiments.figure3.tasks import BATCH
+from parenting.experiments.reporting.prose import paragraphs
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Experiment, Request, Results, chunk_ranges
 
@@ -89,34 +90,15 @@ def _report(request: Request, rows: Sequence[Row]) -> Results:
     last = whole(request.scale)
     taught = {one.name: one.worlds for one in (*curves(request.scale), last)}
     found = findings(taught, last.name, rows, request.device)
-    return Results(found, WORDS, {"queries": lambda figure: draw(figure, list(taught), rows)})
+    words = paragraphs("figure3/page.md", cells=HEIGHT, max_ticks=SIZES[request.scale].max_ticks)
+    return Results(found, words, {"queries": lambda figure: draw(figure, list(taught), rows)})
 
-
-WORDS = (
-    "Random levels of 6 x 6 cells that only moving the box solves, with a safe solution (ours), and that "
-    "the argmax policy of the pre-trained agent does not solve. A trial cycles through those for "
-    "parenting, an episode on each, until its argmax policy is optimal in all of them; only queries there "
-    "count. *Comparing twice* is the paper's letter (`recompare`); otherwise an agent never asks about "
-    "the same pair again (ours). Agents are conservative ones: the numbers behind the paper's defaults, "
-    "with which it may have made its figure, are lost.",
-    "For each N some agents are pre-parented, until each is optimal in all N levels or is given up, and "
-    "the trials of a curve go on from them by turns. Where some of them were given up, the curve is not "
-    "the paper's, and nothing is said on whether it agrees. Agents differ much, so trials of one agent are "
-    "no independent ones: intervals count n trials as n / (1 + (n / agents - 1) c), where c is the share "
-    "of the agents in the variance.",
-    "What an agent takes along is its policy, as after pre-training. The paper does not say whether it "
-    "also keeps X and its familiarity with local states. In the last curve it does; the policy then has to "
-    "fit the answers from all levels, old and new.",
-    "A trial that is not done after `max_ticks` ticks is unfinished: it needs more queries than any that is "
-    "done. So medians are told, and means only where all trials are done. The paper's numbers stand in its "
-    "figure alone, which our copy lacks; what can be compared is its claim, the order of the curves.",
-)
 
 EXPERIMENT = Experiment(
     name="figure3",
     title="Figure 3: generalisation to other levels",
     section="3.4",
-    claim="The more an agent was taught before, on mazes and in other levels, the fewer queries it needs.",
+    claim="The more an agent has learnt before, from mazes and in other levels, the fewer queries it needs.",
     trials={"quick": 4, "paper": 100},
     config=_config,
     tasks=_tasks,

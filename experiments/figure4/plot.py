@@ -1,4 +1,4 @@
-"""The drawing of Figure 4: what the two paths earn and how many planners do harm (Sec. 4.2)."""
+"""The plot of Figure 4: the return of two paths, and the proportion of unsafe planners (Sec. 4.2)."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def _draw(figure: Figure, rows: Sequence[Row]) -> None:
     for name, colour in (("unsafe", "#d55e00"), ("safe", "#009e73")):
         for trial in trials:
             mine = [row for row in fitted if row["trial"] == trial]
-            label = f"{name} path, of {len(trials)} fits" if trial == trials[0] else None
+            label = f"{name} path, {len(trials)} fits" if trial == trials[0] else None
             earned = [row[name] for row in mine]
             above.plot([row["shift"] for row in mine], earned, color=colour, alpha=0.5, label=label)
     harm = [sum(row["harms"] for row in _at(fitted, "fitted", shift)) for shift in SHIFTS]
     below.plot(SHIFTS, [100 * number / len(trials) for number in harm], "o-", color="#d55e00", markersize=4)
-    above.set_ylabel("what the path earns")
+    above.set_ylabel("return of the path")
     above.legend()
-    below.set_ylabel("% of planners\nthat do harm")
+    below.set_ylabel("% of planners\nthat are unsafe")
     below.set_ylim(-8, 108)
     below.set_xlabel("shift c of the fitted reward")

@@ -1,4 +1,4 @@
-"""The rows of Figure 4: what the two paths earn, and which of them a planner takes (Sec. 4.2)."""
+"""The rows of Figure 4: the return of two paths, and which of them a planner takes (Sec. 4.2)."""
 
 from __future__ import annotations
 
@@ -18,26 +18,31 @@ def _sum(what: str, paper: str, ours: float) -> Comparison:
 
 
 def _planner(what: str, paper: str, rows: Sequence[Row]) -> Comparison:
-    harms = sum(row["harms"] for row in rows)
+    unsafe = sum(row["harms"] for row in rows)
     safe = sum(row["arrives"] and not row["harms"] for row in rows)
-    ours = f"{harms} of {len(rows)} do harm, {safe} arrive safely"
-    agrees = None if paper == SILENT else (harms if paper == "harm" else safe) == len(rows)
+    compared = paper != SILENT
     return Comparison(
-        what, paper, ours, agrees=agrees, note=f"the way of trial 0: {shortened(rows[0]['way'])}"
+        what,
+        paper,
+        f"{unsafe} of {len(rows)} unsafe, {safe} arrive safely",
+        agrees=(unsafe if paper == "unsafe" else safe) == len(rows) if compared else None,
+        note=f"path of trial 0: {shortened(rows[0]['way'])}",
+        reference="paper" if compared else None,
     )
 
 
 def shortened(way: str) -> str:
-    """A way's letters, with how often in place of letters that come again and again: uuuuudr is "5 u, dr"."""
+    """The letters of a path, long runs by their length: uuuuudr is "5 u, dr"."""
     runs = [(letter, len(list(run))) for letter, run in groupby(way)]
     said = "".join(f", {number} {letter}, " if number > 3 else letter * number for letter, number in runs)
     return said.replace(", , ", ", ").strip(", ")
 
 
 def _loss(rows: Sequence[Row]) -> Comparison:
-    """Eq. (12): no preference tells the shifted models apart."""
+    """Eq. (12): all shifts of a fitted reward have the same loss."""
     fitted = [row for row in rows if row["of"] == "fitted"]
     trials = {row["trial"] for row in fitted}
     losses = [[row["loss"] for row in fitted if row["trial"] == trial] for trial in trials]
     most = max(max(each) - min(each) for each in losses)
-    return Comparison("Eq. (12): the loss of all shifts differs by", "0", f"{most:.1e}", agrees=most < 1e-12)
+    what = "Eq. (12): largest difference of the loss between shifts"
+    return Comparison(what, "0", f"{most:.1e}", agrees=most < 1e-12)

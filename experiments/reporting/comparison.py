@@ -1,34 +1,42 @@
-"""What an experiment found, beside what the paper says: numbers, intervals, and whether they agree."""
+"""A row of a results page: a number of ours, what it is compared with, and whether they agree."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from math import sqrt
-from statistics import fmean, stdev, variance
-from typing import Any
+from statistics import fmean, stdev
+from typing import Any, Literal
 
-Z = 1.959964
-"""Two-sided 95 % of a normal distribution."""
+from parenting.experiments.reporting.statistics import Interval, mean_interval, proportion_interval
+
+Reference = Literal["paper", "fit", "check"]
+REFERENCES: tuple[Reference, ...] = ("paper", "fit", "check")
+"""What a row is compared with: the paper; the paper, after tuning to it; or our own number, an exact solution
+or another arm."""
 SILENT = "-"
 """What stands where the paper has no number."""
 LOST = "lost"
 """What stands in place of a number that is not legible in our copy of the paper."""
 NEVER = "never"
 """What stands where the paper claims in words that no trial does it."""
+NONE_OF_100 = "0 of 100"
+"""What stands where the paper counted 100 trials, none of which does it."""
+RARE = 0.05
+"""A count of 0 agrees with *never* once its interval ends at this proportion or below."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One number or claim of the paper, and ours."""
+    """One number or claim, and ours. Its fields are the keys of a row in results.json."""
 
     what: str
-    paper: str  # as the paper has it, or LOST
+    paper: str  # what ours is compared with: as the paper has it, LOST, SILENT, or what a check expects
     ours: str
     difference: str = ""
     interval: str = ""  # 95 %, of ours
-    agrees: bool | None = None  # None: there is nothing legible to compare with
+    agrees: bool | None = None  # None: no verdict
     note: str = ""
+    reference: Reference | None = "paper"  # None: ours is compared with nothing
 
     def plain(self) -> dict[str, Any]:
         """As plain data."""
@@ -42,69 +50,63 @@ def mean_sd(values: Sequence[float]) -> str:
     return f"{fmean(values):.2f}" + (f" +- {stdev(values):.2f}" if len(values) > 1 else "")
 
 
-def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
-    """The 95 % confidence interval of a mean; None for fewer than two values."""
-    if len(values) < 2:
-        return None
-    half = Z * stdev(values) / sqrt(len(values))
-    return fmean(values) - half, fmean(values) + half
-
-
-def difference_interval(more: Sequence[float], less: Sequence[float]) -> tuple[float, float] | None:
-    """The 95 % interval of the difference of two means; None where either is of fewer than two values.
-
-    The values count as drawn apart from each other.
-    """
-    if min(len(more), len(less)) < 2:
-        return None
-    half = Z * sqrt(variance(more) / len(more) + variance(less) / len(less))
-    difference = fmean(more) - fmean(less)
-    return difference - half, difference + half
-
-
 def ci_text(values: Sequence[float]) -> str:
-    """The interval of a mean as it is shown; empty where there is none."""
+    """The interval of a mean as it is shown; empty if there is none."""
     return format_interval(mean_interval(values))
 
 
-def format_interval(interval: tuple[float, float] | None) -> str:
-    """An interval in words; none is an empty one."""
-    return "" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
+def format_interval(interval: Interval | None) -> str:
+    """An interval as it is shown; empty if there is none."""
+    return "" if interval is None else f"{interval.low:.2f} to {interval.high:.2f}"
+
+
+def format_percent(interval: Interval) -> str:
+    """An interval of a proportion as it is shown."""
+    return f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %"
 
 
 def compare_mean(what: str, values: Sequence[float], note: str = "") -> Comparison:
-    """A mean with its deviation and interval, of which the paper says nothing."""
-    return Comparison(what=what, paper=SILENT, ours=mean_sd(values), interval=ci_text(values), note=note)
+    """A mean with its standard deviation and interval, of which the paper says nothing."""
+    return Comparison(what, SILENT, mean_sd(values), interval=ci_text(values), note=note, reference=None)
 
 
-def proportion_interval(hits: int, trials: int) -> tuple[float, float]:
-    """The 95 % confidence interval of a share, by Wilson's score: it holds for 0 of n, too.
+def compare_count(what: str, paper: str, hits: int, trials: int, note: str = "") -> Comparison:
+    """A count of trials.
 
-    Raises:
-        ValueError: there was no trial.
+    The paper's may be NEVER or NONE_OF_100; then the verdict is `seldom_enough`, and the difference is in
+    percentage points. With LOST or SILENT there is neither.
     """
-    if trials < 1:
-        raise ValueError("A share of no trials is no number.")
-    share, z2 = hits / trials, Z * Z
-    middle = (share + z2 / (2 * trials)) / (1 + z2 / trials)
-    half = Z * sqrt(share * (1 - share) / trials + z2 / (4 * trials * trials)) / (1 + z2 / trials)
-    return max(0.0, middle - half), min(1.0, middle + half)
-
-
-def compare_count(what: str, paper: int | str, hits: int, trials: int, note: str = "") -> Comparison:
-    """A count of trials beside the paper's, which is of 100, or NEVER, LOST or SILENT; it agrees where both
-    are the same share.
-
-    The difference is in points: what share of 100 trials ours is, less the paper's.
-    """
-    low, high = proportion_interval(hits, trials)
-    number = 0 if paper == NEVER else paper
+    interval = proportion_interval(hits, trials)
+    claimed = paper in (NEVER, NONE_OF_100)
     return Comparison(
         what=what,
-        paper=paper if isinstance(paper, str) else f"{paper} of 100",
+        paper=paper,
         ours=f"{hits} of {trials}",
-        difference="" if isinstance(number, str) else f"{100 * hits / trials - number:+.1f} points",
-        interval=f"{100 * low:.1f} to {100 * high:.1f} %",
-        agrees=None if isinstance(number, str) else hits / trials == number / 100,
+        difference=f"{100 * hits / trials:+.1f} points" if claimed else "",
+        interval=format_percent(interval),
+        agrees=seldom_enough(hits, trials) if claimed else None,
         note=note,
+        reference=None if paper == SILENT else "paper",
     )
+
+
+def seldom_enough(hits: int, trials: int) -> bool | None:
+    """Whether a count agrees with *never*.
+
+    One counterexample refutes it. Without one, trials support it only if the interval of their proportion
+    ends at RARE or below; 0 of 4 proves nothing, and neither does 0 of no trials.
+    """
+    if hits:
+        return False
+    return True if trials and proportion_interval(0, trials).high <= RARE else None
+
+
+def count_verdicts(rows: Iterable[Comparison]) -> dict[str, dict[str, int]]:
+    """How many rows agree, do not agree, and have no verdict, by what they are compared with."""
+    counts: dict[str, dict[str, int]] = {
+        reference: {"yes": 0, "no": 0, "open": 0} for reference in REFERENCES
+    }
+    for row in rows:
+        if row.reference is not None:
+            counts[row.reference]["open" if row.agrees is None else "yes" if row.agrees else "no"] += 1
+    return counts

@@ -1,7 +1,7 @@
-"""One page with every experiment: how many rows agree, the paper's numbers, ours, interval, command.
+"""One HTML page of all experiments: verdicts counted by what rows are compared with, all rows, and commands.
 
-The page stands alone: styles and figures are in it, so that it can be sent around. It runs no script and
-loads nothing. The links to the data beside it work where it was written.
+The page is self-contained: it includes its styles and figures, runs no script and loads nothing. The links to
+the data files work where it was written.
 """
 
 from __future__ import annotations
@@ -16,17 +16,20 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ValidationError, field_validator
 
 from parenting.experiments.registry import NAMES, experiment
-from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison
-from parenting.experiments.reporting.markdown import RESULTS, TRIALS
+from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison, Reference
+from parenting.experiments.reporting.markdown import HEADINGS, RESULTS, SECOND, TRIALS
 from parenting.experiments.spec import Request
 
 WEB = Path(__file__).parents[2] / "web"
 PAGE = "report.html"
 YES, NO, OPEN, NOTHING = "yes", "no", "open", "nothing"
-"""The verdicts on a row. OPEN: the paper says something, and no verdict is due. NOTHING: it has no number."""
+"""The verdicts on a row. OPEN: compared, without a verdict. NOTHING: not compared, or with a lost number."""
+OLD_CHECKS = ("(our first table)", "(look-ahead)")
+OLD_FIT = "fitted:"
+"""Marks of checks and fits in results of version 0.1, whose rows do not say what they are compared with."""
 
 
 class NoResults(ValueError):
@@ -37,8 +40,8 @@ class BrokenResults(ValueError):
     """A file of results is not what an experiment writes; the sentence names it and the remedy."""
 
 
-class Results(BaseModel):
-    """What the page shows of a results.json."""
+class StoredResults(BaseModel):
+    """The parts of a results.json that the page shows."""
 
     name: str
     title: str
@@ -55,6 +58,26 @@ class Results(BaseModel):
     workers: int
     gpu: str | None
 
+    @field_validator("findings", mode="before")
+    @classmethod
+    def _references(cls, rows: Any) -> Any:
+        """Say what the rows of version 0.1 are compared with."""
+        if not isinstance(rows, list):
+            return rows
+        return [
+            row if not isinstance(row, dict) or "reference" in row else {**row, "reference": _reference(row)}
+            for row in rows
+        ]
+
+
+def _reference(row: dict[str, Any]) -> Reference | None:
+    paper, note = str(row.get("paper")), str(row.get("note"))
+    if paper == SILENT:
+        return None
+    if note.startswith(OLD_FIT):
+        return "fit"
+    return "check" if paper.endswith(OLD_CHECKS) else "paper"
+
 
 class Figure(NamedTuple):
     """A drawing of an experiment."""
@@ -66,14 +89,20 @@ class Figure(NamedTuple):
 class Part(NamedTuple):
     """One experiment's part of the page."""
 
-    results: Results
+    results: StoredResults
     figures: Sequence[Figure]
     data: Sequence[str]  # files beside the page, relative to it
 
     @property
-    def verdicts(self) -> Counter[str]:
-        """How many rows have which."""
-        return Counter(map(verdict, self.results.findings))
+    def verdicts(self) -> Counter[tuple[Reference | None, str]]:
+        """The number of rows by what they are compared with, and by verdict."""
+        return Counter((row.reference, verdict(row)) for row in self.results.findings)
+
+    @property
+    def tables(self) -> list[tuple[str, str | None, list[Comparison]]]:
+        """Heading, name of the second column (None if there is none) and rows of each table."""
+        tables = ((one, [row for row in self.results.findings if row.reference == one]) for one in HEADINGS)
+        return [(HEADINGS[one], SECOND.get(one), rows) for one, rows in tables if rows]
 
 
 class Missing(NamedTuple):
@@ -104,14 +133,14 @@ def report(out: Path) -> Path:
 
 
 def verdict(finding: Comparison) -> str:
-    """What a row says of the paper."""
+    """The verdict of a row."""
     if finding.agrees is not None:
         return YES if finding.agrees else NO
     return NOTHING if finding.paper in (SILENT, LOST) else OPEN
 
 
 def prose(words: str) -> Markup:
-    """A paragraph, escaped, of which `code` and *emphasis* are marked up."""
+    """A paragraph, escaped, with `code` and *emphasis* as markup."""
     text = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(words)))
     return Markup(re.sub(r"\*([^*\s][^*]*)\*", r"<i>\1</i>", text))
 
@@ -128,6 +157,16 @@ def _templates() -> Environment:
     return templates
 
 
+def stored(out: Path) -> list[StoredResults]:
+    """The results of all experiments below a folder.
+
+    Raises:
+        BrokenResultsError: Some cannot be read.
+        OSError: A file cannot be read.
+    """
+    return [part.results for part in _parts(out)]
+
+
 def _parts(out: Path) -> Iterator[Part]:
     for name in NAMES:
         folder = out / name
@@ -138,9 +177,9 @@ def _parts(out: Path) -> Iterator[Part]:
             )
 
 
-def _results(path: Path) -> Results:
+def _results(path: Path) -> StoredResults:
     try:
-        return Results.model_validate_json(path.read_bytes())
+        return StoredResults.model_validate_json(path.read_bytes())
     except ValidationError as error:
         wrong: Any = error.errors()[0]
         where = f"{'.'.join(map(str, wrong['loc']))}: " if wrong["loc"] else ""

@@ -1,149 +1,98 @@
-"""What an experiment leaves behind: results.json, a CSV of every trial, figures, and a page of Markdown."""
+"""The page of an experiment: numbers by what they are compared with, figures, prose, and origin."""
 
 from __future__ import annotations
 
-import csv
-import json
-from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
-from pathlib import Path
-from shlex import quote
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any
 
-import torch
-
-from parenting.experiments.reporting.comparison import Comparison
-from parenting.experiments.runner import provenance
-from parenting.experiments.runner.store import Row
-from parenting.experiments.spec import Experiment, Request, Results
+from parenting.experiments.reporting.comparison import SILENT, Comparison, Reference, count_verdicts
 
 RESULTS, TRIALS = "results.json", "trials.csv"
-HEADS = ("what", "paper", "ours", "difference", "95 % interval", "agrees")
 AGREES = {True: "yes", False: "**no**", None: "–"}
-
-
-class Work(NamedTuple):
-    """How the pieces came about."""
-
-    commits: Mapping[str, int]  # how many pieces each commit made
-    seconds: float
-    workers: int
-
-
-def publish(one: Experiment, request: Request, rows: Sequence[Row], out: Path, work: Work) -> dict[str, Any]:
-    """Write everything below `out`, and return what stands in results.json.
-
-    Raises:
-        OSError: a file cannot be written.
-    """
-    folder = out / one.name
-    report = one.report(request, rows)
-    results = _results(one, request, report, work, command(one.name, request, out))
-    _write(folder / RESULTS, json.dumps(results, indent=2) + "\n")
-    _write_rows(folder / TRIALS, rows)
-    drawn = _draw(report, folder)
-    _write(out / f"{one.name}.md", page(results, drawn))
-    return results
-
-
-def command(one: str, request: Request, out: Path) -> str:
-    """What makes the page again, from the folder in which it was called."""
-    words = ["parenting experiment", one, f"--scale {request.scale}", f"--trials {request.trials}"]
-    return " ".join(
-        [*words, f"--seed {request.seed}", f"--device {request.device}", f"--out {quote(str(out))}"]
-    )
-
-
-def _results(one: Experiment, request: Request, report: Results, work: Work, again: str) -> dict[str, Any]:
-    return {
-        "name": one.name,
-        "title": one.title,
-        "section": one.section,
-        "claim": one.claim,
-        "asked": request._asdict(),
-        "config": dict(one.config(request)),
-        "findings": [finding.plain() for finding in report.findings],
-        "words": list(report.words),
-        "command": again,
-        "commit": provenance.commit(),
-        "commits": dict(work.commits),
-        "versions": provenance.versions(),
-        "settings": provenance.settings(),
-        "seconds": round(work.seconds, 1),
-        "workers": work.workers,
-        "gpu": torch.cuda.get_device_name() if torch.cuda.is_available() else None,
-    }
-
-
-def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-
-
-def _write_rows(path: Path, rows: Sequence[Row]) -> None:
-    columns = list(dict.fromkeys(name for row in rows for name in row))
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-
-
-def _draw(report: Results, folder: Path) -> list[str]:
-    """Each figure as SVG and PNG; none where matplotlib (the extra `figures`) is not installed."""
-    if not report.figures or find_spec("matplotlib") is None:
-        return []
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    matplotlib.rcParams["svg.hashsalt"] = "parenting"  # the same numbers give the same file
-    for name, draw in report.figures.items():
-        figure = Figure(figsize=(7, 4.2), layout="constrained")
-        draw(figure)
-        figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
-        figure.savefig(folder / f"{name}.png", dpi=150)
-    return list(report.figures)
+HEADINGS: dict[Reference | None, str] = {
+    "paper": "Compared with the paper",
+    "fit": "Tuned to the paper",
+    "check": "Checks",
+    None: "Also measured",
+}
+"""The tables of a page, in this order."""
+SECOND: dict[Reference | None, str] = {"paper": "paper", "fit": "paper", "check": "expected"}
+"""What the second column of each is called; the last has none."""
+COUNTED: dict[Reference, str] = {
+    "paper": "Of the rows compared with the paper",
+    "fit": "Of those tuned to it",
+    "check": "Of our own checks",
+}
 
 
 def page(results: dict[str, Any], figures: Sequence[str]) -> str:
-    """The page of docs/results: the paper's numbers, ours, and how to make them again."""
-    request, name = results["asked"], results["name"]
+    """The Markdown of a results.json."""
+    rows, name = [Comparison(**found) for found in results["findings"]], results["name"]
     lines = [f"# {results['title']}", "", f"Sec. {results['section']}. {results['claim']}", ""]
-    lines += _table([Comparison(**found) for found in results["findings"]])
+    lines += [verdict_sentence(rows), ""]
     for figure in figures:
-        lines += ["", f"![{results['title']}: {figure}]({name}/{figure}.svg)"]
-    lines += ["", *(line for words in results["words"] for line in (words, ""))]
+        lines += [f"![{results['title']}: {figure}]({name}/{figure}.svg)", ""]
+    for reference, heading in HEADINGS.items():
+        if mine := [row for row in rows if row.reference == reference]:
+            lines += [f"## {heading}", "", *_table(mine, reference), ""]
+    lines += ["## Notes", "", *(line for words in results["words"] for line in (words, ""))]
+    return "\n".join([*lines, *_origin(results)]) + "\n"
+
+
+def verdict_sentence(rows: Sequence[Comparison]) -> str:
+    """How many rows agree, counted apart by what they are compared with."""
+    counts = count_verdicts(rows)
+    told = [_counted(COUNTED[one], counts[one]) for one in COUNTED if sum(counts[one].values())]
+    return " ".join(told)
+
+
+def _counted(whose: str, count: dict[str, int]) -> str:
+    agree = f"{count['yes']} agree{'s' * (count['yes'] == 1)}"
+    disagree = f"{count['no']} do{'es' * (count['no'] == 1)} not"
+    return f"{whose}, {agree}, {disagree}, and {count['open']} allow{'s' * (count['open'] == 1)} no verdict."
+
+
+def _table(rows: Sequence[Comparison], reference: Reference | None) -> Iterator[str]:
+    compared = reference in SECOND
+    heads = ["what", SECOND.get(reference, ""), "ours", "difference", "95 % confidence interval", "agrees"]
+    shown = [head for head, keep in zip(heads, _columns(rows, compared), strict=True) if keep]
+    yield f"| {' | '.join(shown)} |"
+    yield "|" + "---|" * len(shown)
+    for one in rows:
+        what = f"{one.what} ({one.note})" if one.note else one.what
+        cells = [what, one.paper, one.ours, one.difference, one.interval, AGREES[one.agrees]]
+        kept = [cell for cell, keep in zip(cells, _columns(rows, compared), strict=True) if keep]
+        yield f"| {' | '.join(kept)} |"
+
+
+def _columns(rows: Sequence[Comparison], compared: bool) -> list[bool]:
+    """Which of the six columns a table has: none that would be empty."""
+    return [
+        True,
+        compared and any(row.paper != SILENT for row in rows),
+        True,
+        any(row.difference for row in rows),
+        any(row.interval for row in rows),
+        compared,
+    ]
+
+
+def _origin(results: dict[str, Any]) -> list[str]:
+    """The command, and which program and machine made the trials and the page."""
+    request, name = results["asked"], results["name"]
     took = f"{results['seconds']:.0f} s on {results['workers']} process" + "es" * (results["workers"] > 1)
-    lines += [
-        "## Again",
+    made = sorted(results["commits"])
+    commits = f"trials of commit{'s' * (len(made) > 1)} {', '.join(made)}"
+    tried = f"with a GPU available ({results['gpu']})" if results["gpu"] else "without a GPU in the machine"
+    return [
+        "## Reproduce",
         "",
         f"    {results['command']}",
         "",
         f"{request['trials']} trial{'s' * (request['trials'] > 1)}, seed {request['seed']}, {took}, "
-        f"torch {results['versions'].get('torch', '?')}, {_commits(results)}. "
-        f"Every trial: [{TRIALS}]({name}/{TRIALS}); the whole: [{RESULTS}]({name}/{RESULTS}).",
+        f"torch {results['versions'].get('torch', '?')}, {commits}, "
+        f"page of {results['commit'] or 'unknown'}. "
+        f"Every trial: [{TRIALS}]({name}/{TRIALS}); all numbers: [{RESULTS}]({name}/{RESULTS}).",
         "",
-        _where(results),
+        f"Run with `--device {request['device']}`, {tried}.",
     ]
-    return "\n".join(lines) + "\n"
-
-
-def _commits(results: dict[str, Any]) -> str:
-    """Which commits made the pieces, and which the page."""
-    made = sorted(results["commits"])
-    said = f"trials of commit{'s' * (len(made) > 1)} {', '.join(made)}"
-    return f"{said}, page of {results['commit'] or 'unknown'}"
-
-
-def _where(results: dict[str, Any]) -> str:
-    """Which device did it, and whether there was a GPU to try."""
-    tried = f"with a GPU there ({results['gpu']})" if results["gpu"] else "with no GPU there to try"
-    return f"Raised with `--device {results['asked']['device']}`, {tried}."
-
-
-def _table(findings: Sequence[Comparison]) -> list[str]:
-    lines = [f"| {' | '.join(HEADS)} |", "|" + "---|" * len(HEADS)]
-    for one in findings:
-        what = f"{one.what} ({one.note})" if one.note else one.what
-        cells = (what, one.paper, one.ours, one.difference, one.interval, AGREES[one.agrees])
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines

@@ -1,72 +1,190 @@
-"""Comparing trials by rank, since some are given up: pairs, intervals, and trials that share an agent."""
+"""95 % confidence intervals of means, proportions, differences, medians and orders, all by scipy.
+
+An interval is None where the trials determine none: fewer than two of them, or all alike.
+"""
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
-from math import floor, sqrt
-from statistics import fmean
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from math import hypot
+from typing import NamedTuple
 
-from parenting.experiments.reporting.comparison import Z
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+CONFIDENCE = 0.95
+TAIL = (1 + CONFIDENCE) / 2
+RESAMPLES = 9_999
+"""Bootstrap samples of a median."""
+
+Floats = NDArray[np.float64]
+
+
+class Interval(NamedTuple):
+    """A confidence interval."""
+
+    low: float
+    high: float
+
+    def above(self, line: float) -> bool | None:
+        """True if it lies above a line, False if it lies below, None if it holds the line."""
+        return None if self.low <= line <= self.high else self.low > line
+
+
+def mean_interval(values: Sequence[float], shared_error: float = 0.0) -> Interval | None:
+    """Student's t interval of a mean over trials.
+
+    Args:
+        values: One value per trial.
+        shared_error: Standard error of what all trials have in common and what their spread therefore does
+            not show, such as the random events of the same test episodes. It widens the interval.
+    """
+    if len(values) < 2:
+        return None
+    half = hypot(stats.t.ppf(TAIL, len(values) - 1) * stats.sem(values), stats.norm.ppf(TAIL) * shared_error)
+    mean = float(np.mean(values))
+    return Interval(mean - half, mean + half) if half else None
+
+
+def episode_interval(mean: float, error: float) -> Interval:
+    """Normal interval of a mean over the many episodes of one policy, from its standard error."""
+    half = float(stats.norm.ppf(TAIL)) * error
+    return Interval(mean - half, mean + half)
+
+
+def difference_interval(
+    more: Sequence[float], less: Sequence[float], shared_error: float = 0.0
+) -> Interval | None:
+    """Welch's t interval of the difference of two means of independent trials.
+
+    Args:
+        more: One value per trial of the first sample.
+        less: The same of the second, which is subtracted.
+        shared_error: As in `mean_interval`.
+    """
+    half = _welch_half_width(more, less)
+    if half is None:
+        return None
+    half = hypot(half, float(stats.norm.ppf(TAIL)) * shared_error)
+    difference = float(np.mean(more) - np.mean(less))
+    return Interval(difference - half, difference + half)
+
+
+def proportion_interval(hits: int, trials: int) -> Interval:
+    """Wilson's score interval of a proportion, which also holds for 0 of n and n of n.
+
+    Raises:
+        ValueError: There is no trial.
+    """
+    if trials < 1:
+        raise ValueError("A proportion needs at least one trial.")
+    found = stats.binomtest(hits, trials).proportion_ci(CONFIDENCE, method="wilson")
+    return Interval(float(found.low), float(found.high))
 
 
 def mann_whitney_auc(some: Sequence[float], others: Sequence[float]) -> float:
-    """How often one of `some` is less than one of `others`, ties counted half (Mann and Whitney's U / mn)."""
-    other = sorted(others)
-    below = [bisect_left(other, x) + bisect_right(other, x) for x in some]
-    return 1 - sum(below) / (2 * len(some) * len(other))
+    """Probability that one of `some` is less than one of `others`; ties count half (Mann-Whitney U / mn)."""
+    return float(_placements(some, others).mean())
 
 
-def auc_interval(share: float, m: float, n: float) -> tuple[float, float]:
-    """The 95 % interval of `mann_whitney_auc` for m and n trials: Newcombe's score interval (2006, method 5).
+def auc_interval(
+    some: Sequence[float],
+    others: Sequence[float],
+    some_agents: Sequence[int | None],
+    other_agents: Sequence[int | None],
+) -> Interval | None:
+    """Interval of `mann_whitney_auc`, where trials that start from the same agent are not independent.
 
-    It ends where a true share would lie Z of its own deviations away; so it holds for a share of 1, too.
+    DeLong's variance of placements over agents in place of trials (Obuchowski 1997), with Welch's degrees of
+    freedom. Where the samples do not overlap, that variance is 0; then the exact (Clopper-Pearson) interval
+    of as many independent pairs as the smaller sample has agents.
+
+    Args:
+        some: One value per trial; infinite if the trial was not finished.
+        others: The same of the sample that it is compared with.
+        some_agents: The agent that each trial of `some` starts from; None for an agent of its own.
+        other_agents: The same of `others`.
     """
-    mean = (m + n) / 2
+    auc = mann_whitney_auc(some, others)
+    first = _agent_means(_placements(some, others), some_agents)
+    second = _agent_means(1 - _placements(others, some), other_agents)
+    if auc in (0.0, 1.0):
+        pairs = min(len(first), len(second))
+        exact = stats.binomtest(round(auc) * pairs, pairs).proportion_ci(CONFIDENCE, method="exact")
+        return Interval(float(exact.low), float(exact.high))
+    half = _welch_half_width(first, second)
+    return None if half is None else Interval(max(0.0, auc - half), min(1.0, auc + half))
 
-    def outside(true: float) -> bool:
-        factor = 2 * mean - 1 - 3 * (mean - 1) / ((2 - true) * (1 + true))
-        return abs(true - share) > Z * sqrt(true * (1 - true) * factor / (m * n))
 
-    return _edge(outside, share, 0.0), _edge(outside, share, 1.0)
+def median_interval(values: Sequence[float], agents: Sequence[int | None]) -> Interval | None:
+    """Interval of a median: exact by order statistics, or a bootstrap over agents where trials share them.
 
+    A bootstrap over few agents is somewhat too narrow.
 
-def median_interval(values: Sequence[float], n: float) -> tuple[float, float]:
-    """The 95 % interval of a median, by the values at the ranks between which it lies; n independent ones.
-
-    A normal distribution stands in for the binomial one. Values may be infinite.
+    Args:
+        values: One value per trial; infinite if the trial was not finished.
+        agents: The agent that each trial starts from; None for an agent of its own.
     """
-    order = sorted(values)
-    half = Z / (2 * sqrt(n))
-    low, high = (min(max(floor((0.5 + side * half) * len(order)), 0), len(order) - 1) for side in (-1, 1))
-    return order[low], order[high]
+    groups = _groups(np.asarray(values, np.float64), agents)
+    if len(groups) < 2:
+        return None
+    if len(groups) == len(values):
+        found = stats.quantile_test(values, q=0, p=0.5).confidence_interval(CONFIDENCE)
+        return (
+            None if np.isnan([found.low, found.high]).any() else Interval(float(found.low), float(found.high))
+        )
+    return _bootstrap_median(groups)
 
 
-def _edge(outside: Callable[[float], bool], inside: float, end: float) -> float:
-    """Where it begins to be outside, on the way to an end, by halving."""
-    beyond = end
-    for _ in range(50):
-        middle = (inside + beyond) / 2
-        inside, beyond = (inside, middle) if outside(middle) else (middle, beyond)
-    return inside
+def _bootstrap_median(groups: Sequence[Floats]) -> Interval:
+    """Percentile bootstrap of agents; an infinite value stands in as a large finite one."""
+    finite = [value for group in groups for value in group if np.isfinite(value)]
+    most = max(finite, default=0.0)
+    capped = [np.minimum(group, 2 * most + 1) for group in groups]
+    found = stats.bootstrap(
+        (np.arange(len(groups)),),
+        lambda drawn: np.median(np.concatenate([capped[agent] for agent in drawn])),
+        n_resamples=RESAMPLES,
+        vectorized=False,
+        confidence_level=CONFIDENCE,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    low, high = (float(end) if end <= most else float("inf") for end in (found.low, found.high))
+    return Interval(low, high)
 
 
-def effective_sample_size(values: Sequence[float], agents: Sequence[int | None]) -> float:
-    """How many independent trials these are worth, each of which goes on from an agent, or from none.
+def _placements(some: Sequence[float], others: Sequence[float]) -> Floats:
+    """For each of `some`, the proportion of `others` that are more than it; ties count half."""
+    order = np.sort(np.asarray(others, np.float64))
+    not_more = np.searchsorted(order, some, "left") + np.searchsorted(order, some, "right")
+    return 1 - not_more / (2 * len(order))
 
-    n / (1 + (n / k - 1) c) for k agents: Kish's design effect. c is the share of the agents in the variance
-    of the ranks, 0 at least: the intraclass correlation, by an analysis of variance.
-    """
-    n, k = len(values), len(set(agents))
-    if None in agents or k in (1, n):
-        return n if None in agents else k
-    order = sorted(values)
-    ranks = [bisect_left(order, value) + bisect_right(order, value) for value in values]
-    groups = [
-        [rank for rank, agent in zip(ranks, agents, strict=True) if agent == one] for one in set(agents)
-    ]
-    between = sum(len(group) * (fmean(group) - fmean(ranks)) ** 2 for group in groups) / (k - 1)
-    within = sum((rank - fmean(group)) ** 2 for group in groups for rank in group) / (n - k)
-    total = between + (n / k - 1) * within
-    c = max(0.0, (between - within) / total) if total else 0.0
-    return n / (1 + (n / k - 1) * c)
+
+def _groups(values: Floats, agents: Sequence[int | None]) -> list[Floats]:
+    """The values of each agent; those of no agent each for itself."""
+    names = [("trial", n) if agent is None else ("agent", agent) for n, agent in enumerate(agents)]
+    return [values[[name == one for name in names]] for one in dict.fromkeys(names)]
+
+
+def _agent_means(values: Floats, agents: Sequence[int | None]) -> list[float]:
+    return [float(group.mean()) for group in _groups(values, agents)]
+
+
+def _welch_half_width(more: Sequence[float], less: Sequence[float]) -> float | None:
+    if min(len(more), len(less)) < 2 or not max(np.var(more), np.var(less)):
+        return None
+    with _constant_samples_allowed():
+        found = stats.ttest_ind(more, less, equal_var=False).confidence_interval(CONFIDENCE)
+    return float(found.high - found.low) / 2
+
+
+@contextmanager
+def _constant_samples_allowed() -> Iterator[None]:
+    """Silence scipy's warning of a sample whose values are all alike: it adds nothing to the variance."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Precision loss occurred", RuntimeWarning)
+        yield

@@ -1,4 +1,4 @@
-"""Reward hacking: does any argmax policy step into the bucket that makes the garden look watered? (3.2.2)"""
+"""Reward hacking: do argmax policies enter the bucket that makes the garden look watered? (Sec. 3.2.2)"""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Any
 
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.reporting.plots import Proportion, plot_proportions
-from parenting.experiments.reward_hacking.report import EPISODES, STEPS, WORDS, counts, drawn, means
+from parenting.experiments.reporting.prose import paragraphs
+from parenting.experiments.reward_hacking.report import EPISODES, STEPS, counts, drawn, means
 from parenting.experiments.reward_hacking.settings import MAX_TICKS, VARIANTS, Variant
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Experiment, Request, Results, chunk_ranges
@@ -64,18 +65,24 @@ def _report(request: Request, rows: Sequence[Row]) -> Results:
         milestones = _milestones(of, request)
         for queries in milestones:
             mine = [row for row in rows if (row["of"], row["queries"]) == (name, queries)]
-            findings += counts(f"{name}, after {queries} queries", mine)
+            findings += counts(f"{_shown(name)}, after {queries} queries", mine)
         last = [row for row in mine if row["there"]]
-        findings += means(what := f"{name}, after {milestones[-1]} queries", of.level, last)
+        findings += means(what := f"{_shown(name)}, after {milestones[-1]} queries", of.level, last)
         shown += drawn(what, last)
-    return Results(findings, WORDS, {"shares": lambda figure: plot_proportions(figure, shown)})
+    words = paragraphs("reward_hacking/page.md", episodes=EPISODES, steps=STEPS[-1])
+    return Results(findings, words, {"shares": lambda figure: plot_proportions(figure, shown)})
+
+
+def _shown(name: str) -> str:
+    """The name of a variant on the page."""
+    return name.replace("comparing twice", "repeated queries")
 
 
 EXPERIMENT = Experiment(
     name="reward-hacking",
     title="Reward hacking: the bucket",
     section="3.2.2",
-    claim="The parent never prefers a clip that steps into the bucket; so no argmax policy settles there.",
+    claim="The parent never prefers a clip that enters the bucket, so no argmax policy exploits it.",
     trials={"quick": 4, "paper": 100},
     config=_config,
     tasks=_tasks,

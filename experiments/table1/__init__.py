@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from parenting.experiments.reporting.plots import box_plots
+from parenting.experiments.reporting.prose import paragraphs
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Experiment, Request, Results, chunk_ranges
 from parenting.experiments.table1.report import (
-    AGREEMENT,
     ALGORITHMS,
     Algorithm,
     born,
@@ -62,24 +62,15 @@ def _report(request: Request, rows: Sequence[Row]) -> Results:
     deaths = {one.title: done(one, rows, "deaths") for one in ALGORITHMS}
     paper = {one.title: span for one in ALGORITHMS if (span := reach(one.deaths))}
     label = "deaths before the optimal policy"
-    return Results(findings, WORDS, {"deaths": lambda figure: box_plots(figure, deaths, label, paper)})
+    words = paragraphs("table1/page.md", level=LEVEL, max_ticks=MAX_TICKS, max_steps=MAX_STEPS)
+    return Results(findings, words, {"deaths": lambda figure: box_plots(figure, deaths, label, paper)})
 
-
-WORDS = (
-    "The probabilities and the layout behind the paper's table are not legible in our copy. These are the "
-    'settings of docs/paper.md, "Lost numbers", on the level `island`; so only the order of the four '
-    "algorithms can be compared, in three rows of its own. `parenting experiment calibrate` searches for "
-    "settings that bring the paper's numbers back.",
-    *AGREEMENT,
-    "In the figure a box holds the middle half of the trials, whiskers nine tenths, and a point is the mean; "
-    "grey is what the paper has.",
-)
 
 EXPERIMENT = Experiment(
     name="table1",
     title="Table 1: deaths before the optimal policy",
     section="3.2.1",
-    claim="Parenting keeps an agent that explores from dying; the more it asks, the better.",
+    claim="Parenting prevents deaths during exploration; the more the agent asks, the fewer its deaths.",
     trials={"quick": 50, "paper": 1000},
     config=_config,
     tasks=_tasks,

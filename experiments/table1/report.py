@@ -1,4 +1,4 @@
-"""The rows of Table 1: four algorithms, the paper's cells beside ours, and their order (Sec. 3.2.1)."""
+"""The rows of Table 1: the paper's cells and ours for four algorithms, and their order (Sec. 3.2.1)."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from parenting.experiments.reporting.comparison import (
     Comparison,
     ci_text,
     compare_count,
-    difference_interval,
     format_interval,
-    mean_interval,
     mean_sd,
 )
+from parenting.experiments.reporting.statistics import difference_interval, mean_interval
 from parenting.experiments.runner.store import Row
 
 SELDOM = "0 or 1"
-"""What the paper says of deaths by conservative parenting."""
+"""The paper's statement on deaths with conservative parenting."""
 
 
 class Algorithm(NamedTuple):
@@ -45,22 +44,22 @@ ALGORITHMS = (
 
 
 def done(one: Algorithm, rows: Sequence[Row], column: str) -> list[float]:
-    """What an algorithm's finished trials have in a column."""
+    """The values of a column in an algorithm's finished trials."""
     return [row[column] for row in rows if row["of"] == one.name and row["finished"]]
 
 
 def cells(one: Algorithm, rows: Sequence[Row]) -> list[Comparison]:
-    """A row of the table: the cells that the paper has, and ours of the rows of that algorithm."""
+    """A row of the paper's table: each of its cells, and ours."""
     mine = [row for row in rows if row["of"] == one.name]
     left = sum(not row["finished"] for row in mine)
-    note = f"{left} of {len(mine)} trials unfinished, not in the mean" if left else ""
+    note = f"{left} of {len(mine)} trials unfinished, excluded from the mean" if left else ""
     columns = (("deaths", one.deaths), ("guidance", one.guidance), ("preference", one.preference))
     return [_cell(one, name, paper, done(one, rows, name), note) for name, paper in columns if paper != "-"]
 
 
 def _cell(one: Algorithm, name: str, paper: str, values: Sequence[float], note: str) -> Comparison:
     legible = _legible(paper)
-    once = f"{sum(value <= 1 for value in values)} of {len(values)} trials died at most once"
+    once = f"{sum(value <= 1 for value in values)} of {len(values)} trials have at most one death"
     return Comparison(
         what=f"{one.title}: {name}",
         paper=paper,
@@ -73,13 +72,13 @@ def _cell(one: Algorithm, name: str, paper: str, values: Sequence[float], note: 
 
 
 def _legible(paper: str) -> tuple[float, float | None] | None:
-    """The mean of a cell of the paper, and its deviation, where they are legible."""
+    """The mean of a cell of the paper and its standard deviation, as far as they are legible."""
     mean, _, deviation = paper.partition(" +- ")
     return (float(mean), float(deviation) if deviation.isdigit() else None) if deviation else None
 
 
 def reach(paper: str) -> tuple[float, float] | None:
-    """From where to where a cell of the paper goes, where that is legible."""
+    """The range within one standard deviation of the paper's mean; None if it is not legible."""
     if paper == SELDOM:
         return 0, 1
     mean, deviation = _legible(paper) or (0, None)
@@ -87,17 +86,16 @@ def reach(paper: str) -> tuple[float, float] | None:
 
 
 def _agrees(paper: str, values: Sequence[float]) -> bool | None:
-    """As AGREEMENT has it."""
+    """The verdict on a cell, by the rules of agreement.md."""
     span, interval = reach(paper), mean_interval(values)
     if paper != SELDOM:
         return span[0] <= fmean(values) <= span[1] if span and values else None
-    if interval is None or interval[0] <= 1 < interval[1]:
-        return None
-    return interval[1] <= 1
+    above = interval.above(1) if interval else None
+    return None if above is None else not above
 
 
 def order(rows: Sequence[Row]) -> list[Comparison]:
-    """Whether each algorithm dies more often than the next one, by the difference of their means."""
+    """The paper's order of the algorithms, by the difference of mean deaths of each two neighbours."""
     return [_more(more, less, rows) for more, less in pairwise(ALGORITHMS)]
 
 
@@ -106,36 +104,23 @@ def _more(more: Algorithm, less: Algorithm, rows: Sequence[Row]) -> Comparison:
     interval = difference_interval(one, other)
     lost = LOST in (more.deaths, less.deaths)
     return Comparison(
-        what=f"order: deaths by {more.title} less those by {less.title.lower()}",
+        what=f"order: deaths, {more.title} minus {less.title.lower()}",
         paper="above 0",
         ours=f"{fmean(one) - fmean(other):.2f}" if one and other else "-",
         interval=format_interval(interval),
-        agrees=None if interval is None or interval[0] <= 0 <= interval[1] else interval[0] > 0,
-        note="the paper's number of lax parenting is lost; its place is our reading" if lost else "",
+        agrees=interval.above(0) if interval else None,
+        note="the paper's number for lax parenting is lost; we infer its place in the order" if lost else "",
     )
 
 
 def born(rows: Sequence[Row]) -> Comparison:
-    """How many trials begin with an optimal policy: all algorithms begin with the same ones.
+    """Trials whose initial policy is optimal; all algorithms start from the same policies.
 
-    A parented agent is judged after its first tick, which teaches nothing, and a policy that learns from
-    reward before its first step.
+    A parented agent is evaluated after its first tick, which does not train it, and a policy-gradient agent
+    before its first step.
     """
     mine = [row for row in rows if row["of"] in {one.name for one in ALGORITHMS}]
     optimal = {row["trial"] for row in mine if row["finished"] and row["ticks"] <= 1}
     trials = {row["trial"] for row in mine}
-    note = "in the means of all four with no deaths and no queries"
-    return compare_count("trials that begin with an optimal policy", SILENT, len(optimal), len(trials), note)
-
-
-AGREEMENT = (
-    "A mean agrees if it lies within the paper's own deviation over trials; its interval may leave out the "
-    "paper's mean all the same. Where the deviation is lost, nothing is said. "
-    f'"{SELDOM}" is what the text of the paper says of deaths; the mean is lost. Ours agrees with it if its '
-    "whole interval is at most 1, and does not if all of it is above; where the interval holds 1, nothing is "
-    "said. How many trials died at most once stands beside it.",
-    "The order of two algorithms agrees if the interval of the difference of their mean deaths lies above 0, "
-    "and does not if it lies below. The paper's number of lax parenting is lost, and its place is our "
-    "reading: it asks more than direct policy learning and less than conservative parenting.",
-)
-"""When a row agrees, for every page that has it."""
+    note = "they enter all four means with no deaths and no queries"
+    return compare_count("trials whose initial policy is optimal", SILENT, len(optimal), len(trials), note)

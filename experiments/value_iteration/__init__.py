@@ -13,7 +13,7 @@ from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Experiment, Request, Results
 from parenting.experiments.value_iteration.converge import AGREED, CONFIG, CONVERGING, ROUNDS, STAGES
 from parenting.experiments.value_iteration.plot import draw
-from parenting.experiments.value_iteration.report import finding, words
+from parenting.experiments.value_iteration.report import findings, words
 from parenting.experiments.value_iteration.settings import LEVELS, WORLD_SIZES
 
 
@@ -38,7 +38,7 @@ def _tasks(request: Request) -> list[Task]:
 
 def _report(request: Request, rows: Sequence[Row]) -> Results:
     stages = [(kind.world, stage) for kind in WORLD_SIZES for stage in range(1, STAGES + 1)]
-    found = [finding(kind, stage, rows) for kind, stage in stages]
+    found = findings([kind.world for kind in WORLD_SIZES], rows)
     return Results(found, words(rows), {"stages": lambda figure: draw(figure, stages, rows)})
 
 
