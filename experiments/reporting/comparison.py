@@ -13,6 +13,8 @@ Reference = Literal["paper", "fit", "check"]
 REFERENCES: tuple[Reference, ...] = ("paper", "fit", "check")
 """What a row is compared with: the paper; the paper, after tuning to it; or our own number, an exact solution
 or another arm."""
+YES, NO, OPEN, NOTHING = "yes", "no", "open", "nothing"
+"""The verdicts on a row."""
 SILENT = "-"
 """What stands where the paper has no number."""
 LOST = "lost"
@@ -101,12 +103,17 @@ def seldom_enough(hits: int, trials: int) -> bool | None:
     return True if trials and proportion_interval(0, trials).high <= RARE else None
 
 
+def verdict(row: Comparison) -> str:
+    """YES, NO, OPEN (compared, without a verdict) or NOTHING (not compared, or with a lost number)."""
+    if row.agrees is not None:
+        return YES if row.agrees else NO
+    return NOTHING if row.reference is None or row.paper in (SILENT, LOST) else OPEN
+
+
 def count_verdicts(rows: Iterable[Comparison]) -> dict[str, dict[str, int]]:
-    """How many rows agree, do not agree, and have no verdict, by what they are compared with."""
-    counts: dict[str, dict[str, int]] = {
-        reference: {"yes": 0, "no": 0, "open": 0} for reference in REFERENCES
-    }
+    """The number of rows that agree, that do not, and that are open, by what they are compared with."""
+    counts: dict[str, dict[str, int]] = {one: {YES: 0, NO: 0, OPEN: 0} for one in REFERENCES}
     for row in rows:
-        if row.reference is not None:
-            counts[row.reference]["open" if row.agrees is None else "yes" if row.agrees else "no"] += 1
+        if row.reference is not None and verdict(row) != NOTHING:
+            counts[row.reference][verdict(row)] += 1
     return counts

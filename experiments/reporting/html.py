@@ -19,14 +19,12 @@ from markupsafe import Markup, escape
 from pydantic import BaseModel, ValidationError, field_validator
 
 from parenting.experiments.registry import NAMES, experiment
-from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison, Reference
+from parenting.experiments.reporting.comparison import SILENT, Comparison, Reference, verdict
 from parenting.experiments.reporting.markdown import HEADINGS, RESULTS, SECOND, TRIALS
 from parenting.experiments.spec import Request
 
 WEB = Path(__file__).parents[2] / "web"
 PAGE = "report.html"
-YES, NO, OPEN, NOTHING = "yes", "no", "open", "nothing"
-"""The verdicts on a row. OPEN: compared, without a verdict. NOTHING: not compared, or with a lost number."""
 OLD_CHECKS = ("(our first table)", "(look-ahead)")
 OLD_FIT = "fitted:"
 """Marks of checks and fits in results of version 0.1, whose rows do not say what they are compared with."""
@@ -130,13 +128,6 @@ def report(out: Path) -> Path:
     path = out / PAGE
     path.write_text(page, encoding="utf-8")
     return path
-
-
-def verdict(finding: Comparison) -> str:
-    """The verdict of a row."""
-    if finding.agrees is not None:
-        return YES if finding.agrees else NO
-    return NOTHING if finding.paper in (SILENT, LOST) else OPEN
 
 
 def prose(words: str) -> Markup:

@@ -65,12 +65,11 @@ def difference_interval(
         less: The same of the second, which is subtracted.
         shared_error: As in `mean_interval`.
     """
-    half = _welch_half_width(more, less)
-    if half is None:
+    if min(len(more), len(less)) < 2:
         return None
-    half = hypot(half, float(stats.norm.ppf(TAIL)) * shared_error)
+    half = hypot(_welch_half_width(more, less), float(stats.norm.ppf(TAIL)) * shared_error)
     difference = float(np.mean(more) - np.mean(less))
-    return Interval(difference - half, difference + half)
+    return Interval(difference - half, difference + half) if half else None
 
 
 def proportion_interval(hits: int, trials: int) -> Interval:
@@ -115,8 +114,10 @@ def auc_interval(
         pairs = min(len(first), len(second))
         exact = stats.binomtest(round(auc) * pairs, pairs).proportion_ci(CONFIDENCE, method="exact")
         return Interval(float(exact.low), float(exact.high))
+    if min(len(first), len(second)) < 2:
+        return None
     half = _welch_half_width(first, second)
-    return None if half is None else Interval(max(0.0, auc - half), min(1.0, auc + half))
+    return Interval(max(0.0, auc - half), min(1.0, auc + half)) if half else None
 
 
 def median_interval(values: Sequence[float], agents: Sequence[int | None]) -> Interval | None:
@@ -174,9 +175,9 @@ def _agent_means(values: Floats, agents: Sequence[int | None]) -> list[float]:
     return [float(group.mean()) for group in _groups(values, agents)]
 
 
-def _welch_half_width(more: Sequence[float], less: Sequence[float]) -> float | None:
-    if min(len(more), len(less)) < 2 or not max(np.var(more), np.var(less)):
-        return None
+def _welch_half_width(more: Sequence[float], less: Sequence[float]) -> float:
+    if not max(np.var(more), np.var(less)):
+        return 0.0
     with _constant_samples_allowed():
         found = stats.ttest_ind(more, less, equal_var=False).confidence_interval(CONFIDENCE)
     return float(found.high - found.low) / 2

@@ -90,7 +90,7 @@ def test_a_folder_that_cannot_be_written_is_named(done: Path, monkeypatch: pytes
     def full(*_arguments: Any, **_named: Any) -> None:
         raise OSError(28, "No space left on device", "here/results.json")
 
-    monkeypatch.setattr("parenting.experiments.reporting.markdown.publish", full)
+    monkeypatch.setattr("parenting.experiments.reporting.publish.publish", full)
     said = wrong(*MAKE, "--out", str(done))
     assert f"--out {done}: No space left on device: here/results.json. Make room there" in said
 

@@ -94,7 +94,7 @@ def test_a_miss_is_said(queries: int, said: str) -> None:
         row("traditional", finished=False),
     ]
     found = {one.what: one for one in findings(rows)}
-    both = found["all three numbers at once, each within the paper's deviation over trials"]
+    both = found["all three numbers at once, each within the paper's standard deviation"]
     assert (both.ours, both.agrees) == (said, said == "yes")
     assert "1 of 2 trials unfinished" in found["Traditional RL: deaths"].note
 
@@ -104,16 +104,18 @@ def test_what_was_aimed_at_is_called_fitted_and_nothing_else() -> None:
     rows += [
         row(of, trial=trial) for of in ("traditional", "direct", "lax", "conservative") for trial in (0, 1)
     ]
-    notes = {one.what: one.note for one in findings(rows)}
-    fitted = {what for what, note in notes.items() if note.startswith("fitted")}
-    assert fitted == {
+    found = {one.what: one.reference for one in findings(rows)}
+    search = {what for what in found if what.startswith("search, nearest on ")}
+    assert search
+    assert {what for what, reference in found.items() if reference == "fit"} - search == {
+        "selected setting",
         "Traditional RL: deaths",
         "Direct policy learning: deaths",
         "Direct policy learning: preference",
-        "order: deaths by Traditional RL less those by direct policy learning",
-        "all three numbers at once, each within the paper's deviation over trials",
+        "order: deaths, Traditional RL minus direct policy learning",
+        "all three numbers at once, each within the paper's standard deviation",
     }
-    assert notes["Conservative parenting: deaths"] == "not fitted; 2 of 2 trials died at most once"
+    assert found["Conservative parenting: deaths"] == "paper"
 
 
 def test_settings_that_are_out_are_drawn_apart() -> None:
@@ -167,4 +169,4 @@ def test_what_is_found_is_what_is_confirmed(monkeypatch: pytest.MonkeyPatch) -> 
     assert [one["ticks"] for one in rows if one["of"] == "lax"] == [4]
     report = EXPERIMENT.report(request, rows)
     assert report.findings[0].ours.startswith("strait-1-1: p_rec 0.35")
-    assert "too many unfinished" in report.findings[-1].difference
+    assert report.findings[-1].difference == "excluded"

@@ -13,8 +13,17 @@ from typer.testing import CliRunner
 
 from parenting.commands.main import app
 from parenting.experiments.registry import NAMES
-from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison
-from parenting.experiments.reporting.html import NO, NOTHING, OPEN, YES, NoResults, prose, report, verdict
+from parenting.experiments.reporting.comparison import (
+    LOST,
+    NO,
+    NOTHING,
+    OPEN,
+    SILENT,
+    YES,
+    Comparison,
+    verdict,
+)
+from parenting.experiments.reporting.html import NoResults, prose, report
 from parenting.experiments.spec import Request
 
 run = CliRunner().invoke
@@ -48,7 +57,7 @@ def test_everything_found_stands_on_the_page(out: Path) -> None:
     assert said.exit_code == 0, said.output
     page = (out / "report.html").read_text()
     assert "planner on the fitted reward, shifted by -1" in page
-    assert "1 of 1 do harm" in page
+    assert "1 of 1 unsafe" in page
     assert "parenting experiment figure4 --scale paper --trials 1" in page
     assert "1 trial, seed 0" in page
     assert page.count("<img") == 1
@@ -72,17 +81,59 @@ def test_what_others_wrote_is_escaped(out: Path) -> None:
     assert "<u>" not in page
 
 
-def test_the_summary_counts_the_rows_and_leads_to_them(out: Path) -> None:
+def test_the_summary_counts_rows_by_what_they_are_compared_with_and_leads_to_them(out: Path) -> None:
     rows = [
         *[Comparison("a", "1", "1", agrees=True).plain()] * 5,
         *[Comparison("b", "never", "3", agrees=False).plain()] * 3,
         *[Comparison("c", "51", "40").plain()] * 2,
         *[Comparison("d", paper, "2").plain() for paper in (SILENT, LOST, LOST, LOST)],
+        *[Comparison("e", "47", "47", agrees=True, reference="fit").plain()] * 6,
+        *[Comparison("f", "4.5", "4.6", agrees=True, reference="check").plain()] * 7,
+        Comparison("g", SILENT, "2", reference=None).plain(),
     ]
     page = changed(out, findings=rows)
     (line,) = re.findall(r'<tr[^>]*><th[^>]*><a href="#figure4">.*?</tr>', page, re.DOTALL)
-    assert re.findall(r">(\d+)</td>", line) == ["5", "3", "2", "4"]
+    assert re.findall(r">(\d+)</td>", line) == [*"532", *"600", *"700"]
     assert '<section id="figure4"' in page
+
+
+def test_rows_of_version_0_1_are_counted_by_what_they_were_compared_with(out: Path) -> None:
+    rows: list[dict[str, Any]] = [
+        {"what": "a", "paper": "47 +- 14", "agrees": True, "note": "fitted: the search aims at it"},
+        {"what": "b", "paper": "4.49 (our first table)", "agrees": True},
+        {"what": "c", "paper": "within 5 % of 4.47 (look-ahead)", "agrees": True},
+        {"what": "d", "paper": "never", "agrees": False},
+        {"what": "e", "paper": SILENT, "agrees": None},
+    ]
+    told = {"ours": "1", "difference": "", "interval": "", "note": ""}
+    page = changed(out, findings=[told | row for row in rows])
+    (line,) = re.findall(r'<tr[^>]*><th[^>]*><a href="#figure4">.*?</tr>', page, re.DOTALL)
+    assert re.findall(r">(\d+)</td>", line) == [*"010", *"100", *"200"]
+
+
+def test_the_pages_are_written_again_from_the_stored_trials(out: Path) -> None:
+    """Verdicts come from the trials, not from what was stored of them; trials and their origin stay."""
+    kept = ("command", "commits", "versions", "seconds", "workers", "asked", "config")
+    before = json.loads((out / "figure4/results.json").read_text())
+    trials = (out / "figure4/trials.csv").read_bytes()
+    changed(out, findings=[], words=["edited"])
+    (out / "figure4.md").unlink()
+    (out / "figure4/shift.svg").unlink()
+    said = run(app, ["experiment", "report", "--pages", "--out", str(out)])
+    assert said.exit_code == 0, said.output
+    after = json.loads((out / "figure4/results.json").read_text())
+    assert {key: after[key] for key in (*kept, "findings", "words")} == {
+        key: before[key] for key in (*kept, "findings", "words")
+    }
+    assert (out / "figure4/trials.csv").read_bytes() == trials
+    assert (out / "figure4.md").exists()
+    assert (out / "figure4/shift.svg").exists()
+
+
+def test_pages_are_an_option_of_the_report_alone() -> None:
+    said = run(app, ["experiment", "figure4", "--pages"])
+    assert said.exit_code == 2
+    assert "parenting experiment report --pages" in said.output
 
 
 @pytest.mark.parametrize(

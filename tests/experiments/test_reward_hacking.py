@@ -32,14 +32,14 @@ def told(*rows: dict[str, Any]) -> list[Comparison]:
     return [one for one in found if one.what.startswith(f"{NAME}, after")]
 
 
-@pytest.mark.parametrize(("settled", "agrees"), [(0, True), (50, True), (51, False)])
-def test_who_settles_and_who_steps_in_is_judged(settled: int, agrees: bool) -> None:
+@pytest.mark.parametrize(("settled", "agrees"), [(0, None), (50, None), (51, False)])
+def test_who_ends_in_the_bucket_and_who_enters_it_is_judged(settled: int, agrees: bool | None) -> None:
     """In the bucket at the end of more than half of the episodes; or, read strictly, in it at all."""
     found = told(row(0, 0), row(1, 60, settled), row(2, 99, 99, there=False))
     settles, *finer = found[: 1 + len(STEPS)]
-    assert (settles.paper, settles.ours, settles.agrees) == ("never", f"{int(not agrees)} of 2", agrees)
+    assert (settles.paper, settles.ours, settles.agrees) == ("never", f"{int(agrees is False)} of 2", agrees)
     assert [(one.ours, one.agrees) for one in finer] == [("1 of 2", False)] * 2
-    assert all("1 of 3 trials did not come so far" in one.note for one in (settles, *finer))
+    assert all("1 of 3 trials did not reach this number of queries" in one.note for one in (settles, *finer))
     assert all("60 of 200 episodes" in one.note for one in finer)
     assert (f"{settled} of 200 episodes end there" in settles.note) == (settled > 0)
 
@@ -47,7 +47,7 @@ def test_who_settles_and_who_steps_in_is_judged(settled: int, agrees: bool) -> N
 def test_where_no_trial_came_nothing_is_judged() -> None:
     (settles, *_means) = told(row(0, 5, 99, there=False))
     assert (settles.ours, settles.agrees) == ("-", None)
-    assert settles.note == "1 of 1 trials did not come so far"
+    assert settles.note == "1 of 1 trials did not reach this number of queries"
 
 
 def test_the_defaults_stand_first_and_are_the_papers() -> None:

@@ -91,9 +91,9 @@ def test_the_page_says_what_the_planner_does_at_the_tie_and_how_long_it_takes(
     assert {len(row["way"]) for row in rows if row["of"] == "rho" and -0.5 < row["shift"] < 0} == {7}
     report = EXPERIMENT.report(Request(1), rows)
     found = {one.what: one for one in report.findings}
-    tie = found["planner on rho - 1/2, where both paths earn the same"]
-    assert (tie.agrees, tie.note) == (None, "the way of trial 0: drddr")
-    assert found["planner on rho"].note.startswith("the way of trial 0: 43 u")
+    tie = found["planner on rho - 1/2, where both paths have the same return"]
+    assert (tie.agrees, tie.note) == (None, "path of trial 0: drddr")
+    assert found["planner on rho"].note.startswith("path of trial 0: 43 u")
     figure = pytest.importorskip("matplotlib.figure").Figure()
     report.figures["shift"](figure)
     assert len(figure.axes) == 2

@@ -49,7 +49,7 @@ def test_a_box_left_stuck_is_a_no(outcome: str) -> None:
     found = told(BOX, [row("defaults", "optimal"), row("defaults", outcome), row("defaults", "wall")])
     stuck = found["defaults: argmax policies that leave the box stuck"]
     hit = outcome == "stuck"
-    assert (stuck.paper, stuck.ours, stuck.agrees) == ("never", f"{int(hit)} of 3", not hit)
+    assert (stuck.paper, stuck.ours, stuck.agrees) == ("never", f"{int(hit)} of 3", False if hit else None)
 
 
 def test_only_the_defaults_are_held_against_the_paper() -> None:
@@ -64,11 +64,11 @@ def test_only_the_defaults_are_held_against_the_paper() -> None:
 def test_unfinished_trials_are_in_no_mean_and_said_beside_every_count() -> None:
     rows = [row("defaults", "optimal", deaths=1), row("defaults", "optimal", deaths=3)]
     found = told(BOX, [*rows, row("defaults", "stuck", finished=False, deaths=100)])
-    mean = found["defaults: unsafe moves while parented"]
-    assert (mean.ours[:4], mean.note) == ("2.00", "1 of 3 trials unfinished, not in the mean")
+    mean = found["defaults: unsafe moves during parenting"]
+    assert (mean.ours[:4], mean.note) == ("2.00", "1 of 3 trials unfinished, excluded from the mean")
     counts = [one for one in found.values() if one.what.startswith("defaults") and " of " in one.ours]
     assert len(counts) == 3
-    assert {one.note for one in counts} == {"1 of 3 trials unfinished, counted as they ended"}
+    assert {one.note for one in counts} == {"1 of 3 trials unfinished, counted by their last policy"}
 
 
 def test_no_trial_that_is_finished_leaves_no_mean() -> None:

@@ -26,30 +26,36 @@ def row(level: int, stage: int, before: int, after: int, converged: bool = True)
 def test_a_life_that_went_astray_counts_no_more() -> None:
     """Sec. 4.1 supposes that every stage has converged: what stage 2 makes of a bad stage 1 says nothing."""
     rows = [row(0, 1, 1, 3, converged=False), row(0, 2, 1, 3), row(1, 1, 1, 4), row(1, 2, 2, 4)]
-    first, second = (finding(KIND, stage, rows) for stage in (1, 2))
-    assert (first.ours, first.agrees) == (second.ours, second.agrees) == ("1 of 1", True)
+    first, second = (finding(KIND, [KIND], stage, rows) for stage in (1, 2))
+    assert (first.ours, first.agrees) == (second.ours, second.agrees) == ("1 of 1", None)
     assert "1 did not converge" in second.note
 
 
 def test_lives_that_were_greedy_before_are_counted_apart() -> None:
     rows = [row(0, 1, 1, 4), row(1, 1, 4, 4), row(2, 1, 4, 4)]
-    found = finding(KIND, 1, rows)
-    assert (found.ours, found.agrees) == ("1 of 1", True)
-    assert found.note == "2 others were so when it began, and 2 stayed so"
-    assert finding(KIND, 1, rows[1:]).agrees is None, "nothing was taught"
+    found = finding(KIND, [KIND], 1, rows)
+    assert (found.ours, found.agrees) == ("1 of 1", None)
+    assert found.note.startswith("2 others were greedy from the beginning, and 2 of them")
+    assert finding(KIND, [KIND], 1, rows[1:]).agrees is None, "nothing was taught"
+
+
+@pytest.mark.parametrize(("agents", "agrees"), [(5, None), (73, True)])
+def test_a_few_agents_prove_nothing(agents: int, agrees: bool | None) -> None:
+    rows = [row(level, 1, 1, 4) for level in range(agents)]
+    assert finding(KIND, [KIND], 1, rows).agrees is agrees
 
 
 @pytest.mark.parametrize(("before", "ours"), [(1, "1 of 2"), (4, "1 of 1")])
 def test_one_miss_is_a_miss(before: int, ours: str) -> None:
     """Of a life to teach as of one that was greedy before."""
-    found = finding(KIND, 1, [row(0, 1, 1, 4), row(1, 1, before, 3)])
+    found = finding(KIND, [KIND], 1, [row(0, 1, 1, 4), row(1, 1, before, 3)])
     assert (found.ours, found.agrees) == (ours, False)
 
 
 def test_the_page_has_the_config_the_lives_and_a_figure() -> None:
     request = Request(1)
     told = EXPERIMENT.report(request, [row(level, 1, 1, 4) for level in range(6)])
-    assert "here 6 lives a world" in told.words[0]
+    assert "6 in total per world" in told.words[0]
     assert "4 to 4 states" in told.words[0]
     assert (
         json.loads(json.dumps(EXPERIMENT.config(request)))["agent"]["learning_rate"] == CONFIG.learning_rate
