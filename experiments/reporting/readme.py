@@ -66,8 +66,9 @@ def verdict(rows: Sequence[Comparison]) -> str:
         return "reproduced"
     if count["no"] == len(rows):
         return "not reproduced"
-    told = (("yes", "agree"), ("no", "do not agree"), ("open", "undecided"))
-    return ", ".join(f"{count[key]} {word}" for key, word in told if count[key])
+    words = {"yes": ("agrees", "agree"), "no": ("does not", "do not"), "open": ("undecided", "undecided")}
+    told = [(count[key], *words[key]) for key in words if count[key]]
+    return ", ".join(f"{number} {one if number == 1 else several}" for number, one, several in told)
 
 
 def summary(pages: Published) -> list[Line]:
