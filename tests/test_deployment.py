@@ -14,11 +14,12 @@ import pytest
 
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect, sqlite_module
-from parenting.server.migrate import require_current, upgrade
+from parenting.server.migrate import require_current
 from parenting.server.new_run import NewRun, start
 from parenting.server.runs import list_runs, set_status
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
+from tests.database import migrated
 from tests.services import read_compose
 from tests.tree import ROOT
 
@@ -28,8 +29,7 @@ TEXT = (ROOT / "docs/deployment.md").read_text(encoding="utf-8")
 @pytest.fixture
 def db(tmp_path: Path) -> Iterator[Database]:
     """A data folder with two runs in its database."""
-    database = connect(Settings(data=tmp_path, database_url=None))
-    upgrade(database)
+    database = migrated(Settings(data=tmp_path, database_url=None))
     for name in ("first", "second"):
         start(database, NewRun(world="unsafe-exploration", name=name))
     yield database

@@ -11,9 +11,9 @@ from fastapi.testclient import TestClient
 
 from parenting.commands.client import Client
 from parenting.server.app import create_app
-from parenting.server.db import Database, connect
-from parenting.server.migrate import upgrade
+from parenting.server.db import Database
 from parenting.server.settings import Settings
+from tests.database import migrated
 
 
 @pytest.fixture
@@ -26,8 +26,7 @@ def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Settings:
 
 @pytest.fixture
 def db(settings: Settings) -> Iterator[Database]:
-    database = connect(settings)
-    upgrade(database)
+    database = migrated(settings)
     yield database
     database.close()
 

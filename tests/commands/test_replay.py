@@ -22,8 +22,8 @@ from parenting.commands.main import app
 from parenting.server import operator_events
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
-from parenting.server.migrate import upgrade
 from parenting.server.settings import Settings
+from tests.database import migrated
 from tests.server.eventful_run import TICKS, raise_eventful_run
 from tests.server.heard import heard_answers
 from tests.tree import ROOT
@@ -34,8 +34,7 @@ def raised(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A data folder with one run that was raised by hand."""
     data = tmp_path_factory.mktemp("raised")
     settings = Settings(data=data, database_url=None)
-    db = connect(settings)
-    upgrade(db)
+    db = migrated(settings)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             "parenting.server.session.CHECKPOINT_SECONDS", 1e9

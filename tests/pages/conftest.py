@@ -16,12 +16,12 @@ from playwright.sync_api import Browser, sync_playwright
 
 from parenting.server import runs
 from parenting.server.app import create_app
-from parenting.server.db import Database, connect
-from parenting.server.migrate import upgrade
+from parenting.server.db import Database
 from parenting.server.notify import Notifier
 from parenting.server.runs import Claim
 from parenting.server.serve import Server, bind
 from parenting.server.settings import Settings
+from tests.database import migrated
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
 
@@ -41,8 +41,7 @@ def settings(tmp_path: Path) -> Settings:
 
 @pytest.fixture
 def db(settings: Settings) -> Iterator[Database]:
-    database = connect(settings)
-    upgrade(database)
+    database = migrated(settings)
     yield database
     database.close()
 

@@ -1,10 +1,10 @@
-"""A person answers thirty questions by keyboard in every world, at T = 1 and in stages up to T = 2, through
-real processes, while a dashboard moves.
+"""A person answers questions by keyboard in every world, at T = 1 and in stages up to T = 2, through real
+processes, while a dashboard moves: 14 questions each, and 30 in `make torture`.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import httpx2
@@ -12,15 +12,26 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from parenting.envs import registry
+from tests.lengths import length
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import create, until, up
 
-QUESTIONS = 30
+QUESTIONS = length(14, 30)
 STAGES = {
     1: {},
-    2: {"stages": 2, "mature_every": 12, "p_guid": 0.8},  # clips of two steps have to come about, too
+    2: {
+        "stages": 2,
+        "mature_every": length(6, 12),
+        "p_guid": 0.8,
+    },  # clips of two steps have to come about, too
 }
-RUNS = [(world, stage) for world in registry.WORLDS for stage in STAGES]
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """`parenting up` with a database of its own."""
+    with up(tmp_path_factory.mktemp("up")) as found:
+        yield found
 
 
 def key(page: Page, number: int) -> str:
@@ -49,7 +60,7 @@ def answer(page: Page, number: int) -> str:
 
 
 def raised(tabs: BrowserTabs, world: str, stage: int) -> dict[str, Any]:
-    """A run with thirty answers by keyboard: what the API says of it."""
+    """A run with its answers by keyboard: what the API says of it."""
     run = create(tabs.address, world=world, config=STAGES[stage], goal=QUESTIONS, seed=5)
     dashboard = tabs.open(f"/runs/{run}")
     page = tabs.open(f"/runs/{run}/parent")
@@ -63,7 +74,7 @@ def raised(tabs: BrowserTabs, world: str, stage: int) -> dict[str, Any]:
     assert len(seen["tick"]) > 1, seen  # told with what is measured, which in the garden is now and then
     expect(page.get_by_role("heading", name="That was the last question of this goal.")).to_be_visible()
     expect(dashboard.locator("#now-answered")).to_have_text(str(QUESTIONS))
-    expect(dashboard.get_by_role("status")).to_contain_text("The goal of 30 questions is reached.")
+    expect(dashboard.get_by_role("status")).to_contain_text(f"The goal of {QUESTIONS} questions is reached.")
     expect(dashboard.locator("#now-maturity")).to_have_text(str(stage))
     expect(dashboard.locator(".js-plotly-plot").first).to_be_visible()
     told: dict[str, Any] = httpx2.get(f"{tabs.address}/api/v1/runs/{run}").json()
@@ -72,14 +83,15 @@ def raised(tabs: BrowserTabs, world: str, stage: int) -> dict[str, Any]:
     return told
 
 
-@pytest.mark.timeout(600)
-def test_thirty_answers_in_every_world_and_stage(browser: Browser, tmp_path: Path) -> None:
-    with up(tmp_path) as url:
-        tabs = BrowserTabs(browser, url)
-        for world, stage in RUNS:
-            run = raised(tabs, world, stage)
-            assert (run["answers"], run["maturity"], run["resting"]) == (QUESTIONS, stage, True), world
-            assert run["status"] == "active"
-        tabs.close()
-        assert tabs.wrong == []
-        until(lambda: httpx2.get(f"{url}/readyz").status_code == 200, 5, "the worker is gone")
+@pytest.mark.torture
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("world", registry.WORLDS)
+def test_answers_in_every_world_and_stage(browser: Browser, url: str, world: str, stage: int) -> None:
+    tabs = BrowserTabs(browser, url)
+    run = raised(tabs, world, stage)
+    assert (run["answers"], run["maturity"], run["resting"]) == (QUESTIONS, stage, True)
+    assert run["status"] == "active"
+    tabs.close()
+    assert tabs.wrong == []
+    until(lambda: httpx2.get(f"{url}/readyz").status_code == 200, 30, "the worker is gone")

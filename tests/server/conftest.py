@@ -10,13 +10,13 @@ import pytest
 from fastapi.testclient import TestClient
 
 from parenting.server.app import create_app
-from parenting.server.db import Database, connect
-from parenting.server.migrate import upgrade
+from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, claim
 from parenting.server.settings import Settings
 from parenting.server.tables import Run
+from tests.database import migrated
 
 CLIP = {
     "actions": ["up"],
@@ -54,8 +54,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def db(settings: Settings, clock: Clock) -> Iterator[Database]:
-    database = connect(settings, clock)
-    upgrade(database)
+    database = migrated(settings, clock)
     yield database
     database.close()
 

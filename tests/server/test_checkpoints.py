@@ -14,9 +14,8 @@ import torch
 
 from parenting.agent.query import Query
 from parenting.agent.state import RENAMED
-from parenting.server.db import Database, connect
+from parenting.server.db import Database
 from parenting.server.errors import ServerError
-from parenting.server.migrate import upgrade
 from parenting.server.new_run import start
 from parenting.server.queue import worker_side
 from parenting.server.replay import equal
@@ -26,6 +25,7 @@ from parenting.server.settings import Settings
 from parenting.server.snapshot import INFO, Snapshot, pack, versions
 from parenting.server.tables import Checkpoint
 from tests.agent.batched_runs import random_parent
+from tests.database import migrated
 from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, same_bits
 
 AFTERWARDS = 50
@@ -180,10 +180,15 @@ def test_other_threads_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 # The same through the database
 
 
+@pytest.fixture(autouse=True)
+def no_checkpoint_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Checkpoints are written where a test says so, however long its ticks take."""
+    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+
+
 @pytest.fixture
 def db(tmp_path: object) -> Iterator[Database]:
-    database = connect(Settings(data=tmp_path))  # type: ignore[arg-type]
-    upgrade(database)
+    database = migrated(Settings(data=tmp_path))  # type: ignore[arg-type]
     yield database
     database.close()
 

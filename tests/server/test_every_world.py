@@ -16,8 +16,7 @@ from structlog.testing import capture_logs
 
 from parenting.envs import registry
 from parenting.server.app import create_app
-from parenting.server.db import Database, connect
-from parenting.server.migrate import upgrade
+from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue import worker_side
 from parenting.server.reads.metrics import list_metrics
@@ -27,6 +26,7 @@ from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Weights
 from parenting.server.worker import Worker
+from tests.database import migrated
 from tests.server.raising import Begun, inline, last, same_bits, script
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]
@@ -55,8 +55,7 @@ def settings(tmp_path: Path) -> Settings:
 
 @pytest.fixture
 def db(settings: Settings) -> Iterator[Database]:
-    database = connect(settings)
-    upgrade(database)
+    database = migrated(settings)
     yield database
     database.close()
 

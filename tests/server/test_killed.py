@@ -1,7 +1,8 @@
-"""SIGKILL of web, worker and the answering scripts while they raise ten runs: no answer is lost, none is
-counted twice, and the bits are those of runs that nobody disturbed.
+"""SIGKILL of web, worker and the answering scripts while they raise a run in every world: no answer is lost,
+none is counted twice, and the bits are those of runs that nobody disturbed.
 
-Every CI run kills 24 times. By hand, a hundred rounds with other moments each, 2,400 kills in about an hour:
+Every CI run kills 24 times; `make torture` kills 240 times, in ten rounds with other moments each. By hand, a
+hundred rounds, 2,400 kills in about an hour:
 
     PARENTING_KILL_ROUNDS=100 pytest -n 0 tests/server/test_killed.py
 """
@@ -22,13 +23,16 @@ from sqlalchemy import func, select
 
 from parenting.server.db import Database
 from parenting.server.tables import Answer
+from tests.lengths import length
 from tests.server.processes import Command
 from tests.server.raising import Begun
 from tests.server.serving import free_port
-from tests.server.test_same_bits import GOAL, answering, begin, check, until_heard
+from tests.server.test_same_bits import GOAL, RUNS, STAGES, answering, begin, check, until_heard
 
-ROUNDS = int(os.environ.get("PARENTING_KILL_ROUNDS", "1"))
-KILLS = 24
+ROUNDS = int(os.environ.get("PARENTING_KILL_ROUNDS", length(1, 10)))
+KILLS = 12
+"""So many in a round at T = 1, and as many at T = 2."""
+KINDS = ["web", "worker", "script"]
 SOON = 0.15
 """A kill comes up to so many seconds after the answer that it was drawn for: at any place between two."""
 PATCHES = {"parenting.server.session.CHECKPOINT_SECONDS": 0.05}
@@ -73,11 +77,11 @@ class House:
             else:  # killed, or a script that found no server, or a server that found its port taken
                 self.commands[name] = Command(*order, data=self.data, patches=PATCHES)
 
-    def kill(self, rng: random.Random) -> None:
-        """One of the three kinds, whichever of its processes live."""
+    def kill(self, kind: str, rng: random.Random) -> None:
+        """One process of this kind, or of another where none of it lives."""
         living = [name for name in self.orders if name in self.commands and self.commands[name].alive]
         kinds = sorted({name.split()[0] for name in living})
-        kind = rng.choice(kinds)
+        kind = kind if kind in kinds else rng.choice(kinds)
         self.commands[rng.choice([name for name in living if name.split()[0] == kind])].kill()
         self.killed[kind] += 1
 
@@ -95,26 +99,33 @@ def stored(db: Database) -> int:
 
 def disturb(db: Database, house: House, moments: Iterator[float], rng: random.Random) -> None:
     """Kill at each moment, a number of stored answers, and let the rest come to its end."""
-    end, moment = time.monotonic() + 400, next(moments, None)
+    end, moment, kinds = (
+        time.monotonic() + 400,
+        next(moments, None),
+        rng.sample(KINDS, counts=[4, 4, 4], k=12),
+    )
     while any(order[0] == "answer" for order in house.orders.values()):
         assert time.monotonic() < end, f"{stored(db)} answers, killed: {house.killed}"
         house.keep()
         if moment is not None and stored(db) >= moment:
             time.sleep(rng.uniform(0, SOON))
-            house.kill(rng)
+            house.kill(kinds[house.killed.total()], rng)
             moment = next(moments, None)
         time.sleep(0.01)
 
 
+@pytest.mark.torture
 @pytest.mark.timeout(500)
+@pytest.mark.parametrize("stages", STAGES)
 @pytest.mark.parametrize("seed", range(ROUNDS))
-def test_killed_at_random_moments(tmp_path: Path, db: Database, seed: int) -> None:
-    rng, runs = random.Random(seed), begin(db)
+def test_killed_at_random_moments(tmp_path: Path, db: Database, seed: int, stages: int) -> None:
+    rng = random.Random(10 * seed + stages)
+    runs = begin(db, [begun for begun in RUNS if begun.config.stages == stages])
     moments = sorted(rng.uniform(0, len(runs) * (GOAL - 2)) for _ in range(KILLS))
     with House(tmp_path, runs) as house:
         disturb(db, house, iter(moments), rng)
         assert house.killed.total() == KILLS
-        assert set(house.killed) == {"web", "worker", "script"}
+        assert set(house.killed) == set(KINDS)
         until_heard(db, runs)
         house.keep()
         assert house.commands["worker"].stop() == 0

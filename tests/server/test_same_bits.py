@@ -32,9 +32,9 @@ RUNS = [
 """Guidance and preferences, clips that end early, truncations, a maturation where there are two stages."""
 
 
-def begin(db: Database) -> dict[int, Begun]:
-    """All runs at once, so that one worker raises them in turn."""
-    return {start(db, begun.new("human", GOAL)).id: begun for begun in RUNS}
+def begin(db: Database, begun_with: list[Begun]) -> dict[int, Begun]:
+    """Runs that begin at once, so that one worker raises them in turn."""
+    return {start(db, begun.new("human", GOAL)).id: begun for begun in begun_with}
 
 
 def answering(url: str, run: int, *more: str) -> tuple[str, ...]:
@@ -66,8 +66,12 @@ def check(db: Database, run: int, begun: Begun) -> None:
 
 
 @pytest.mark.timeout(300)
-def test_raised_through_http(tmp_path: Path, db: Database) -> None:
-    runs, url = begin(db), f"http://127.0.0.1:{free_port()}"
+@pytest.mark.parametrize("stages", STAGES)
+def test_raised_through_http(tmp_path: Path, db: Database, stages: int) -> None:
+    runs, url = (
+        begin(db, [begun for begun in RUNS if begun.config.stages == stages]),
+        f"http://127.0.0.1:{free_port()}",
+    )
     with ExitStack() as stack:
 
         def run(*arguments: str) -> Command:

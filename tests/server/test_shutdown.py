@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from parenting.server.db import connect
-from parenting.server.migrate import upgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.settings import Settings
+from tests.database import migrated
 from tests.server.serving import Stream, free_port, parenting, until_up
 
 SOON = 2.0
@@ -23,8 +23,7 @@ SIGNALS = [signal.SIGINT, signal.SIGTERM]
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
     """A migrated database with one run that nobody has to raise: it is paused."""
-    db = connect(Settings(data=tmp_path, database_url=None))
-    upgrade(db)
+    db = migrated(Settings(data=tmp_path, database_url=None))
     start(db, NewRun(world="unsafe-exploration"))
     db.close()
     return tmp_path

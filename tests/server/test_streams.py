@@ -10,15 +10,15 @@ import pytest
 import uvicorn
 
 from parenting.server.app import create_app
-from parenting.server.db import Database, connect
+from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
-from parenting.server.migrate import upgrade
 from parenting.server.notify import Notifier
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, report_progress
 from parenting.server.settings import Settings
 from parenting.server.streams import POLL_SECONDS
+from tests.database import migrated
 from tests.server.conftest import CLIPS
 from tests.server.serving import Stream, until_up
 
@@ -26,8 +26,7 @@ from tests.server.serving import Stream, until_up
 @pytest.fixture
 def db(settings: Settings) -> Iterator[Database]:
     """With the real clock: the server of these tests is real too."""
-    database = connect(settings)
-    upgrade(database)
+    database = migrated(settings)
     yield database
     database.close()
 
