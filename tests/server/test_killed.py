@@ -102,7 +102,7 @@ def disturb(db: Database, house: House, moments: Iterator[float], rng: random.Ra
     end, moment, kinds = (
         time.monotonic() + 400,
         next(moments, None),
-        rng.sample(KINDS, counts=[4, 4, 4], k=12),
+        rng.sample(KINDS, counts=[KILLS // 3] * 3, k=KILLS),
     )
     while any(order[0] == "answer" for order in house.orders.values()):
         assert time.monotonic() < end, f"{stored(db)} answers, killed: {house.killed}"
