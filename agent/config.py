@@ -9,6 +9,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from parenting.envs.names import did_you_mean
+
 Dtype = Literal["float32", "float64"]
 Supervision = Literal["present", "absent", "random"]
 Inside = Literal["up-down", "left"]
@@ -99,7 +101,8 @@ def compose(
 
 
 class UnknownPreset(ValueError):
-    """There is no preset of that name; the sentence lists those that there are."""
+    """There is no preset of that name; the sentence names the nearest and lists all."""
 
     def __init__(self, name: str) -> None:
-        super().__init__(f"There is no preset '{name}'; there is: {', '.join(PRESETS)}.")
+        hint = did_you_mean(name, PRESETS)
+        super().__init__(f"There is no preset '{name}'.{hint} The presets are: {', '.join(PRESETS)}.")

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from parenting.agent.config import UnknownPreset
 from parenting.envs.levels.spec import LevelError
-from parenting.envs.registry import UnknownNameError
+from parenting.envs.names import UnknownNameError
 from parenting.server.errors import ServerError
 from parenting.server.settings import Settings
 from parenting.weights.store import NoWeightsError

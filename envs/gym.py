@@ -50,7 +50,7 @@ class GridworldEnv(gymnasium.Env[Observation, np.int64]):
             **options: Options of the world's rules, such as `drying`.
 
         Raises:
-            UnknownNameError: no such world, level or option; the message lists those that there are.
+            UnknownNameError: there is no such world, level or option; the message names the nearest.
             LevelError: the text breaks a rule.
             ValueError: a wrong render mode or time limit.
         """
@@ -119,4 +119,4 @@ def register(world: str) -> None:
     gym_ids.register(gymnasium, world)
 
 
-gym_ids.register_worlds()
+gym_ids.register_worlds(gymnasium)

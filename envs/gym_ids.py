@@ -6,8 +6,9 @@ So ``gymnasium.make("parenting:parenting/UnsafeExploration-v0")`` needs no other
 
 from __future__ import annotations
 
-import sys
 from types import ModuleType
+
+from parenting.envs.registry import WORLDS
 
 SINGLE = "parenting.envs.gym:GridworldEnv"
 VECTOR = "parenting.envs.gym_vector:GridworldVectorEnv"
@@ -30,12 +31,7 @@ def register(gymnasium: ModuleType, world: str) -> None:
         gymnasium.register(name, entry_point=SINGLE, vector_entry_point=VECTOR, kwargs={"world": world})
 
 
-def register_worlds() -> None:
-    """Register every world if Gymnasium is loaded; do nothing if not."""
-    gymnasium = sys.modules.get("gymnasium")
-    if gymnasium is None:
-        return
-    from parenting.envs.registry import WORLDS
-
+def register_worlds(gymnasium: ModuleType) -> None:
+    """Register every world."""
     for world in WORLDS:
         register(gymnasium, world)

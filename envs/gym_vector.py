@@ -53,7 +53,7 @@ class GridworldVectorEnv(VectorEnv[Observations, NDArray[np.int64], NDArray[Any]
         """Make `num_envs` trials of a world; the other arguments are those of `GridworldEnv`.
 
         Raises:
-            UnknownNameError: no such world, level or option; the message lists those that there are.
+            UnknownNameError: there is no such world, level or option; the message names the nearest.
             LevelError: the text breaks a rule.
             ValueError: a wrong render mode or time limit, or a number of trials below 1.
         """

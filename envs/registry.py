@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from parenting.envs.art import parse
 from parenting.envs.levels.spec import Level, Setting, WorldSpec
+from parenting.envs.names import UnknownNameError
 
 if TYPE_CHECKING:
     from parenting.envs.gridworld import Gridworld
@@ -32,21 +33,11 @@ WORLDS: dict[str, WorldSpec] = {world.name: world for world in map(read, FILES)}
 """Every world by its name."""
 
 
-class UnknownNameError(ValueError):
-    """There is no world, level or option of that name; the sentence lists those that there are."""
-
-    def __init__(self, what: str, name: str, known: Iterable[str], of: str = "") -> None:
-        where = f" of {of}" if of else ""
-        super().__init__(
-            f"There is no {what} '{name}'{where}; the {what}s are: {', '.join(known) or 'none'}."
-        )
-
-
 def spec(world: str) -> WorldSpec:
     """The world of a name.
 
     Raises:
-        UnknownNameError: lists the worlds.
+        UnknownNameError: there is no such world.
     """
     if world not in WORLDS:
         raise UnknownNameError("world", world, WORLDS)
@@ -59,7 +50,7 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
     What holds a line break is a text; none is the world's default level. `source` names the text in errors.
 
     Raises:
-        UnknownNameError: no such world or level; lists those that there are.
+        UnknownNameError: there is no such world or level.
         LevelError: the text breaks a rule; names `source`, line, column and rule.
     """
     found = spec(world)
@@ -92,7 +83,7 @@ def make(
     torch's default device. `options` are the rules' own settings.
 
     Raises:
-        UnknownNameError: no such world, level or option.
+        UnknownNameError: there is no such world, level or option.
         LevelError: a text breaks a rule.
         ValueError: no levels, levels of different sizes or of another world, or a time limit below 1.
     """

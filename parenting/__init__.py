@@ -7,10 +7,9 @@ is loaded already, the import registers the worlds with it.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
-
-from parenting.envs import gym_ids as _gym_ids
 
 if TYPE_CHECKING:
     from parenting.agent.config import PRESETS, Config
@@ -117,4 +116,10 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-_gym_ids.register_worlds()
+def _register_worlds() -> None:
+    gymnasium = sys.modules.get("gymnasium")
+    if gymnasium is not None:
+        import_module("parenting.envs.gym_ids").register_worlds(gymnasium)
+
+
+_register_worlds()

@@ -6,7 +6,7 @@ No torch here.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,6 +23,7 @@ from pydantic import (
 from parenting.agent.config import PRESETS, Config
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, LevelError
+from parenting.envs.names import UnknownNameError, did_you_mean
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.runs import create_run
@@ -157,9 +158,13 @@ def messages(errors: Any, skip: tuple[str, ...] = ()) -> list[tuple[str, str]]:
     return list(found.items())
 
 
+def _unknown(what: str, name: str, known: Collection[str]) -> str:
+    return f"There is no such {what}.{did_you_mean(name, known)} There is: {', '.join(known)}."
+
+
 def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
     if new.world not in registry.WORLDS:
-        wrong.append(("world", f"There is no such world; there is: {', '.join(registry.WORLDS)}."))
+        wrong.append(("world", _unknown("world", new.world, registry.WORLDS)))
         return None
     if new.level is not None and new.level_text is not None:
         wrong.append(("level", "Name a level or give its text, not both."))
@@ -169,9 +174,9 @@ def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
     text = new.level if new.level_text is None else new.level_text.replace("\r\n", "\n") + "\n"
     try:
         return registry.level(new.world, text)
-    except registry.UnknownNameError:
-        known = ", ".join(registry.spec(new.world).levels)
-        wrong.append((field, f"There is no such level of {new.world}; there is: {known}."))
+    except UnknownNameError:
+        known = registry.spec(new.world).levels
+        wrong.append((field, _unknown(f"level of {new.world}", str(new.level), known)))
     except LevelError as error:
         wrong.append((field, str(error)))
     return None
@@ -183,7 +188,7 @@ def _config(new: NewRun, wrong: list[tuple[str, str]]) -> Config | None:
     A script answers at once, so its agent waits for each of its answers.
     """
     if new.preset not in PRESETS:
-        wrong.append(("preset", f"There is no such preset; there is: {', '.join(PRESETS)}."))
+        wrong.append(("preset", _unknown("preset", new.preset, PRESETS)))
         return None
     world = registry.defaults(new.world) if new.world in registry.WORLDS else {}
     waits = {"max_open_preferences": 0} if new.parent == "scripted" else {}

@@ -78,7 +78,7 @@ def test_the_default_level() -> None:
     [
         (
             {"level": "atoll"},
-            "no level 'atoll' of unsafe-exploration; the levels are: island, island-bottleneck",
+            "no level 'atoll' of unsafe-exploration. The levels are: island, island-bottleneck",
         ),
         ({"level": "WWW\nWAG\nWW\n"}, "level, line 3, column 3: rows must be of one length"),
         ({"drying": 0.05}, "no option 'drying'"),

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from parenting.envs import registry
+from parenting.envs.names import UnknownNameError
 
 POND = "WWWW\nWA W\nW GW\nWWWW\n"
 
@@ -29,22 +30,36 @@ def test_the_first_level_is_the_default() -> None:
     [
         (
             lambda: registry.spec("garden"),
-            f"There is no world 'garden'; the worlds are: {', '.join(registry.WORLDS)}.",
+            f"There is no world 'garden'. The worlds are: {', '.join(registry.WORLDS)}.",
         ),
         (
             lambda: registry.level("unsafe-exploration", "atoll"),
-            "There is no level 'atoll' of unsafe-exploration; the levels are: island, island-bottleneck.",
+            "There is no level 'atoll' of unsafe-exploration. The levels are: island, island-bottleneck.",
+        ),
+        (
+            lambda: registry.make("side-effect"),
+            "There is no world 'side-effect'. Did you mean 'side-effects'? "
+            f"The worlds are: {', '.join(registry.WORLDS)}.",
+        ),
+        (
+            lambda: registry.level("unsafe-exploration", "islnd"),
+            "There is no level 'islnd' of unsafe-exploration. Did you mean 'island'? "
+            "The levels are: island, island-bottleneck.",
+        ),
+        (
+            lambda: registry.make("reward-hacking", dryng=0.1),
+            "There is no option 'dryng' of reward-hacking. Did you mean 'drying'? The options are: drying.",
         ),
         (
             lambda: registry.make("unsafe-exploration", drying=0.1),
-            "There is no option 'drying' of unsafe-exploration; the options are: none.",
+            "There is no option 'drying' of unsafe-exploration. The options are: none.",
         ),
     ],
 )
 def test_a_name_that_does_not_exist_is_answered_with_those_that_do(
     call: Callable[[], object], message: str
 ) -> None:
-    with pytest.raises(registry.UnknownNameError) as caught:
+    with pytest.raises(UnknownNameError) as caught:
         call()
     assert str(caught.value) == message
 
