@@ -11,7 +11,7 @@ from parenting.server.queue.worker_side import watch
 from parenting.server.replay import differences, equal, relive
 from parenting.server.runs import claim, get_run
 from parenting.server.session import RunSession
-from parenting.server.snapshot import Snapshot
+from parenting.server.snapshot import INFO, Snapshot
 from tests.server.raising import ISLAND, inline
 
 
@@ -48,7 +48,7 @@ def test_every_piece_is_held_against_its_own() -> None:
         return kept._replace(state=kept.state.map(flip), tally=kept.tally.map(flip))
 
     names = [name for name, part in kept.state.tensors().items() if part.numel()]
-    names = [name for name in names if not name.startswith("report.")]
+    names = [name for name in names if not name.startswith(INFO)]
     assert len(names) > 30
     assert [name for name in names if differences(changed(name), kept) != [name]] == []
     assert [differences(changed(name), kept) for name in ("deaths", "choices")] == [
