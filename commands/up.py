@@ -1,6 +1,6 @@
-"""`parenting up`: everything in one command.
+"""`parenting up`: start everything by one command.
 
-Web and worker are processes of their own, so that neither stops the other.
+Web and worker are separate processes, so that neither blocks the other.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from parenting.server.migrate import upgrade
 from parenting.server.serve import bind
 from parenting.server.settings import Settings
 
-PATIENCE = 1.6
-"""Seconds that web and worker get to stop by themselves; killed then, they lose nothing."""
+STOP_SECONDS = 1.6
+"""Seconds that web and worker get to stop by themselves. Killed after that, they lose nothing."""
 
 Children = Mapping[str, subprocess.Popen[bytes]]
 
@@ -39,7 +39,7 @@ def up(
     ] = None,
     browser: Annotated[bool, typer.Option(help="Open the pages in a browser.")] = True,
 ) -> None:
-    """Migrate the database, start the pages and a worker, and open the pages in a browser. Ctrl-C stops all.
+    """Migrate the database, start the pages and a worker, and open a browser. Ctrl-C stops everything.
 
     Example: parenting up --port 0 --no-browser
     """
@@ -73,7 +73,7 @@ def _migrate(chosen: Settings) -> None:
 
 @contextmanager
 def _signals() -> Iterator[threading.Event]:
-    """An event that Ctrl-C and SIGTERM set; while this holds neither does anything else."""
+    """Yield an event that Ctrl-C and SIGTERM set; inside this block they do nothing else."""
     told = threading.Event()
 
     def tell(_number: int, _frame: FrameType | None) -> None:
@@ -89,7 +89,7 @@ def _signals() -> Iterator[threading.Event]:
 
 @contextmanager
 def _children(listener: socket.socket) -> Iterator[Children]:
-    """Web and worker, in sessions of their own: Ctrl-C reaches `up` alone, which stops both."""
+    """Start web and worker in sessions of their own: Ctrl-C reaches `up` alone, which stops both."""
     lifeline, held = os.pipe()
     web = ["web", "--fd", str(listener.fileno())]
     children: dict[str, subprocess.Popen[bytes]] = {}
@@ -104,7 +104,8 @@ def _children(listener: socket.socket) -> Iterator[Children]:
 
 
 def _start(arguments: Sequence[str], lifeline: int, descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
-    # -P: the folder that we are called in must not hide our package.
+    # With -P, Python does not look for packages in the current folder: a project of the user's may have a
+    # package of our name there.
     command = [sys.executable, "-P", "-m", "parenting.commands.main", *arguments]
     environment = {**os.environ, VARIABLE: str(lifeline)}
     return subprocess.Popen(
@@ -117,7 +118,7 @@ def _start(arguments: Sequence[str], lifeline: int, descriptors: Sequence[int]) 
 
 
 def _first_to_end(children: Children, told: threading.Event) -> str | None:
-    """The name of the first process that ends; None if we are told to stop before."""
+    """Return the name of the first process that ends, or None if the event is set before."""
     while not told.wait(0.1):
         for name, child in children.items():
             if child.poll() is not None:
@@ -129,7 +130,7 @@ def _stop(children: Children) -> None:
     for child in children.values():
         if child.poll() is None:
             child.terminate()
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + STOP_SECONDS
     for child in children.values():
         try:
             child.wait(max(0.0, end - time.monotonic()))
@@ -139,7 +140,7 @@ def _stop(children: Children) -> None:
 
 
 def _has_screen() -> bool:
-    """Whether a browser would open a window; without one, some would take over the terminal."""
+    """Return whether a browser can open a window; without a screen, some take over the terminal."""
     screens = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
     return sys.platform != "linux" or any(os.environ.get(name) for name in screens)
 
