@@ -16,7 +16,7 @@ from parenting.server.pages.labels import MetricLabels, describe_start, metric_l
 from parenting.server.pages.operator_log import PROBABILITIES, log_entries, probabilities
 from parenting.server.pages.render import format_number, page
 from parenting.server.pages.stages import stage_rows
-from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, page_state, run_title
+from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, run_title
 from parenting.server.reads.metrics import first_metrics, sampled_metrics
 from parenting.server.schemas import run_schema
 from parenting.server.security import policy
@@ -74,13 +74,12 @@ def dashboard_page(
         NotFound: there is no such run.
     """
     run = runs.get_run(db, run_id)
-    now = "paused" if run.status == "paused" else page_state(run_schema(db, run_id), offered=True)
     response = page(
         "dashboard.html",
         422 if errors else 200,
         run=run,
         title=run_title(run),
-        state=now,
+        state=run_schema(db, run_id).state,
         sentences=STATUS,
         start=describe_start(run),
         more=GOAL_STEP,

@@ -25,10 +25,11 @@ from parenting.server.errors import NotFound
 from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.question import QuestionView, question_view
 from parenting.server.pages.render import page, redirect
-from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, page_state, run_title
+from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, run_title
 from parenting.server.queue import answers, leases
 from parenting.server.queue.leases import lease_ahead, may_lease
 from parenting.server.schemas import run_schema
+from parenting.server.statuses import RunState
 from parenting.server.streams import Streams
 from parenting.server.tables import Run
 
@@ -54,7 +55,7 @@ def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = Non
     run = runs.get_run(db, run_id)
     client = _client(request)
     shown = None if query is None else _open_question(db, run, query)
-    now = page_state(run_schema(db, run_id), may_lease(db, run_id, client))
+    now = _page_state(run_schema(db, run_id).state, may_lease(db, run_id, client))
     response = page(
         "parent.html",
         run=run,
@@ -64,7 +65,7 @@ def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = Non
         state=now,
         sentences=STATE_TEXTS,
         more=GOAL_STEP,
-        refresh=shown is None and now in ("exploring", "idle", "elsewhere"),
+        refresh=shown is None and now in ("exploring", "no_worker", "elsewhere"),
     )
     response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")
     return response
@@ -142,6 +143,18 @@ def _open_question(db: Database, run: Run, query_id: int) -> QuestionView | None
     if query.run_id != run.id:
         raise NotFound(f"Question {query_id} is not one of run {run.id}.")
     return question_view(query, run) if query.status == "open" else None
+
+
+def _page_state(state: RunState, offered: bool) -> str:
+    """Return which of `STATE_TEXTS` holds for one parent.
+
+    A question is offered while the run is paused, too. A question that is not offered is with somebody else.
+    """
+    if state in (RunState.OVER, RunState.RESTING):
+        return state
+    if offered:
+        return "question"
+    return "elsewhere" if state is RunState.QUESTION else state
 
 
 def _client(request: Request) -> str:

@@ -16,10 +16,11 @@ from parenting.server.errors import InvalidFieldsError
 from parenting.server.new_run import LARGEST_INT, plan, read_form, start
 from parenting.server.pages.labels import metric_labels
 from parenting.server.pages.render import page, redirect
-from parenting.server.pages.texts import STATE_WORDS, page_state, run_title
+from parenting.server.pages.texts import run_title
 from parenting.server.reads.metrics import latest_metrics
 from parenting.server.reads.pagination import runs_before
-from parenting.server.schemas import RunSchema, run_schemas
+from parenting.server.schemas import run_schemas
+from parenting.server.statuses import STATE_LABELS
 from parenting.server.tables import Metric, Run
 
 router = APIRouter(include_in_schema=False)
@@ -173,7 +174,7 @@ def _page(
         "start.html",
         422 if errors else 200,
         runs=_rows(db, listed.rows),
-        words=STATE_WORDS,
+        state_labels=STATE_LABELS,
         older=listed.next,
         before=before,
         worlds=WORLDS.values(),
@@ -191,15 +192,9 @@ def _rows(db: Database, listed: Sequence[Run]) -> list[RunRow]:
     """What the list says of some runs."""
     latest = latest_metrics(db, [run.id for run in listed])
     return [
-        RunRow(run, run_title(run), _state(shape), metric_labels(run.legend).harm, _deaths(latest, run.id))
-        for run, shape in zip(listed, run_schemas(db, listed), strict=True)
+        RunRow(run, run_title(run), schema.state, metric_labels(run.legend).harm, _deaths(latest, run.id))
+        for run, schema in zip(listed, run_schemas(db, listed), strict=True)
     ]
-
-
-def _state(shape: RunSchema) -> str:
-    """Who waits for whom. A script answers at once, so its questions wait for nobody."""
-    now = "paused" if shape.status == "paused" else page_state(shape, offered=True)
-    return "exploring" if now == "question" and shape.parent == "scripted" else now
 
 
 def _deaths(latest: Mapping[int, Metric], run_id: int) -> float | int | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from parenting.server.schemas import RunSchema
 from parenting.server.tables import Run
 
 LEADS = {
@@ -22,7 +21,7 @@ STATE_TEXTS = {
         "You refused all four moves, so the agent stands still. End this episode, and it starts again.",
     ),
     "paused": ("The run is paused.", "No time passes for the agent until the run is resumed."),
-    "idle": (
+    "no_worker": (
         "No worker is running.",
         "Nothing moves until one is started (parenting worker).",
     ),
@@ -39,35 +38,7 @@ STATE_TEXTS = {
 GOAL_STEP = 50
 """Answers that a goal grows by where it is reached, by a button."""
 
-STATE_WORDS = {
-    "question": "a question waits",
-    "exploring": "exploring",
-    "stuck": "no action acceptable",
-    "paused": "paused",
-    "idle": "no worker",
-    "resting": "goal reached",
-}
-"""The same in a word or two, for the list of runs; a run that is over has its status for it."""
-
 
 def run_title(run: Run) -> str:
     """What a run is called on every page."""
     return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}, run {run.id}"
-
-
-def page_state(run: RunSchema, offered: bool) -> str:
-    """Which of `STATE_TEXTS` holds; web/static/live.js tells it in the same way.
-
-    `offered` says whether an open question is free for this parent.
-    """
-    if run.worker == "done":
-        return "over"
-    if run.resting:
-        return "resting"
-    if run.open.guidance or run.open.preference:
-        return "question" if offered else "elsewhere"
-    if run.status == "paused":
-        return "paused"
-    if run.worker == "silent":
-        return "idle"
-    return "stuck" if run.waiting == "stuck" else "exploring"

@@ -14,11 +14,11 @@ from sqlalchemy import select
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
-from parenting.server.pages.texts import STATE_TEXTS, page_state
-from parenting.server.queue import answers
+from parenting.server.pages.texts import STATE_TEXTS
+from parenting.server.queue import answers, leases
 from parenting.server.runs import Claim
-from parenting.server.schemas import OpenSchema, RunSchema, run_schema
 from parenting.server.settings import Settings
+from parenting.server.statuses import RunState, RunStatus
 from parenting.server.tables import Answer, OperatorEvent, Query, Run
 from tests.pages import island_fixtures as fixtures
 
@@ -215,31 +215,37 @@ def test_an_optimal_agent_is_announced(client: httpx2.Client, db: Database, life
     assert note.search(client.get("/runs/1/parent").text)[1] is None  # type: ignore[index]
 
 
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({}, "exploring"),
-        ({"worker": "done", "open": OpenSchema(guidance=1, preference=0)}, "over"),
-        ({"open": OpenSchema(guidance=1, preference=0), "status": "paused"}, "question"),
-        ({"open": OpenSchema(guidance=0, preference=1), "worker": "silent"}, "question"),
-        ({"status": "paused", "worker": "silent"}, "paused"),
-        ({"worker": "silent", "waiting": "stuck"}, "idle"),
-        ({"waiting": "stuck"}, "stuck"),
-        ({"waiting": "guidance"}, "exploring"),  # the answer is on its way
-    ],
-)
-def test_who_waits_for_whom(
-    db: Database, life: tuple[Run, Claim], changes: dict[str, Any], expected: str
+def state_of(page: httpx2.Response) -> str:
+    """What the page says about who waits for whom."""
+    return page.text.partition("<main")[2].partition('data-state="')[2].partition('"')[0]
+
+
+def test_the_page_says_who_waits_for_whom(
+    client: httpx2.Client, db: Database, life: tuple[Run, Claim]
 ) -> None:
-    shape: RunSchema = run_schema(db, life[0].id).model_copy(update=changes)
-    assert page_state(shape, offered=True) == expected
-    assert expected in STATE_TEXTS
+    """A question is offered while the run is paused; one that is leased is with somebody else."""
+    assert state_of(client.get("/runs/1/parent")) == "exploring"
+    query = fixtures.ask(db, life[1], 1, "guidance", fixtures.guidance("left", "down"))
+    runs.set_status(db, 1, RunStatus.PAUSED)
+    assert state_of(client.get("/runs/1/parent")) == "question"
+    leases.lease(db, 1, "somebody", 60.0)
+    assert state_of(client.get("/runs/1/parent")) == "paused"
+    runs.set_status(db, 1, RunStatus.ACTIVE)
+    assert state_of(client.get("/runs/1/parent")) == "elsewhere"
+    runs.set_goal(db, 1, 1)
+    answers.answer(db, query, "left", "somebody", "human")
+    assert state_of(client.get("/runs/1/parent")) == "resting"
+    runs.set_status(db, 1, RunStatus.STOPPED)
+    assert state_of(client.get("/runs/1/parent")) == "over"
+
+
+def test_every_state_of_a_run_has_its_words_on_the_page() -> None:
+    assert set(RunState) <= set(STATE_TEXTS)
 
 
 def test_a_silent_worker_is_told_of(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
     runs.let_go(db, [life[1]])
-    page = client.get("/runs/1/parent").text
-    assert 'data-state="idle"' in page.partition("<main")[2].partition(">")[0]
+    assert state_of(client.get("/runs/1/parent")) == "no_worker"
 
 
 def test_a_request_for_a_question_waits_for_it(

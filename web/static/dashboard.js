@@ -1,5 +1,5 @@
 // The dashboard: numbers, the table of stages and small charts by Plotly, fed by the run's metrics as they come.
-import { follow, stateOf } from "./live.js";
+import { follow } from "./live.js";
 
 const main = document.getElementById("main"), run = main.dataset.run;
 const lineOf = (id) => document.querySelector(`[data-chart=${id}]`)?.dataset.line;
@@ -152,7 +152,7 @@ const tell = {
   after: () => last,
   metrics: add,
   run(now) {
-    status(now.status === "paused" ? "paused" : stateOf(now));
+    status(now.state);
     main.dataset.status = now.status;
     put("tick", now.tick);
     put("answered", now.answers);

@@ -1,16 +1,6 @@
 // What the server says of a run, as it happens: a stream of events, or a poll every 500 ms wherever no stream comes through.
 const POLL = 500, HIDDEN = 3000;
 
-// The state of the page (server/pages/texts.py, STATE_TEXTS).
-export function stateOf(run) {
-  if (run.worker === "done") return "over";
-  if (run.resting) return "resting";
-  if (run.open.guidance || run.open.preference) return "question";
-  if (run.status === "paused") return "paused";
-  if (run.worker === "silent") return "idle";
-  return run.waiting === "stuck" ? "stuck" : "exploring";
-}
-
 // Calls tell.run(run) with every change, tell.question(question or null) as soon as another one waits, tell.metrics(rows)
 // for the ticks after tell.after(), and tell.lost() while the server cannot be reached.
 // With `background`, a hidden tab goes on asking, slowly; without, it is silent until it is seen again.

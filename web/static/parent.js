@@ -1,7 +1,7 @@
 // The parent's page: shows one question after another, takes keys and clicks, and says who waits for whom.
 // The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
 import { recordAnswer, timeLeft } from "./eta.js";
-import { follow, stateOf } from "./live.js";
+import { follow } from "./live.js";
 import { flush, keep, kept } from "./outbox.js";
 import { play } from "./play.js";
 
@@ -138,7 +138,7 @@ function announce(which) {
 
 const tell = {
   run(now) {
-    state = stateOf(now);
+    state = now.state;
     goal = now.goal;
     if (now.reason) $("reason").textContent = now.reason;
     $("optimal").hidden = !now.optimal || state === "over";
