@@ -11,12 +11,13 @@ import hashlib
 import json
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from time import monotonic
 from typing import Any, NamedTuple
 
 from parenting.experiments.runner import provenance
+from parenting.experiments.runner.aliases import before
 
 Row = dict[str, Any]
 """Name -> number, word, truth value or null. A name that begins with HIDDEN is for other pieces alone."""
@@ -80,9 +81,9 @@ class Store:
             PlanMismatchError: a finished piece of the same name is of another task.
             CorruptResultError: one cannot be read.
         """
-        self._of = described(tasks)
+        self._of, older = described(tasks), described(tasks, before)
         done = [task.key for task in tasks if self.has(task.key)]
-        other = [key for key in done if self._piece(key)[OF] != self._of[key]]
+        other = [key for key in done if self._piece(key)[OF] not in (self._of[key], older[key])]
         if other:
             raise PlanMismatchError(
                 f"{', '.join(other)}: these pieces in {self.folder} are of other tasks than now. "
@@ -131,7 +132,7 @@ class Store:
         return self.folder / f"{key}.json"
 
 
-def described(tasks: Sequence[Task]) -> dict[str, Any]:
+def described(tasks: Sequence[Task], words: Callable[[Any], Any] = lambda said: said) -> dict[str, Any]:
     """Key -> what a piece is of, as plain data: what is called with what, where, and what it needs.
 
     A needed piece stands there by the digest of what it is of; so a change of it reaches all that need it.
@@ -143,7 +144,7 @@ def described(tasks: Sequence[Task]) -> dict[str, Any]:
         if task.key not in found:
             needs = {key: _digest(of(by_key[key])) if key in by_key else None for key in task.needs}
             said = {"call": task.call, "arguments": task.arguments, "device": task.device, "needs": needs}
-            found[task.key] = _plain(said)
+            found[task.key] = words(_plain(said))
         return found[task.key]
 
     for task in tasks:
@@ -181,7 +182,7 @@ def _write(path: Path, data: object) -> None:
 
 
 def _same(folder: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
-    differs = list(_differences(found, wanted))
+    differs = min((list(_differences(found, words)) for words in (wanted, before(wanted))), key=len)
     if differs:
         raise PlanMismatchError(
             f"{folder} holds pieces of another plan: {', '.join(differs)}. "
