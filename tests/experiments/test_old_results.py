@@ -87,7 +87,7 @@ def test_it_goes_on_where_it_was_stopped(results: Path) -> None:
 
 
 def test_another_task_is_refused_in_old_words_too(results: Path) -> None:
-    """The aliases loosen nothing: with another seed the old folder is another plan, its pieces other tasks."""
+    """Neither with another seed: then the old folder is of another plan, and its pieces of other tasks."""
     folder, one = results / "table1/pieces", experiment("table1")
     plan = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
     with pytest.raises(PlanMismatchError, match="seed was 0 and is 1 now"):
