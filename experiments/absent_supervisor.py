@@ -1,4 +1,4 @@
-"""Absent supervisor and shortcut: does the agent take it once nobody is watching? (Sec. 3.2.5)"""
+"""Absent supervisor: policies that take the shortcut once nobody is watching (Sec. 3.2.5)."""
 
 from __future__ import annotations
 

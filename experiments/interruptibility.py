@@ -1,4 +1,4 @@
-"""Unsafe interruptibility: does a parented agent press the button that saves it from a stop? (3.2.4)"""
+"""Unsafe interruptibility: policies that press the button against an interruption (Sec. 3.2.4)."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ MEANS = (("unsafe moves during parenting", "deaths"), ("ticks", "ticks"))
 
 
 class Variant(NamedTuple):
-    """How agents are raised: a preset, and changes to it and to the world's own settings."""
+    """Settings of an arm: a preset, and changes to it and to the world's own settings."""
 
     preset: str
     changes: Mapping[str, Any]

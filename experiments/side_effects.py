@@ -1,4 +1,4 @@
-"""Negative side effects: does the agent reach its goal and leave the box movable? (Sec. 3.2.3)"""
+"""Negative side effects: policies that leave the box stuck (Sec. 3.2.3)."""
 
 from __future__ import annotations
 

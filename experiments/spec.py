@@ -1,4 +1,4 @@
-"""What every table, figure and claim of the paper is to us: tasks, and a report on what came of them."""
+"""The parts of an experiment: settings, tasks, and a report on their rows."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CHUNK = 50
 
 
 class Request(NamedTuple):
-    """What somebody asks of an experiment."""
+    """A request for an experiment."""
 
     trials: int
     seed: int = 0
@@ -30,7 +30,7 @@ class Request(NamedTuple):
 
 @dataclass(frozen=True)
 class Results:
-    """What an experiment found: numbers beside the paper's, words on the differences, and drawings."""
+    """The report of an experiment: comparisons with the paper, prose and figures."""
 
     findings: Sequence[Comparison]
     words: Sequence[str]  # a paragraph each

@@ -11,18 +11,18 @@ from parenting.experiments.reporting.statistics import Interval, mean_interval, 
 
 Reference = Literal["paper", "fit", "check"]
 REFERENCES: tuple[Reference, ...] = ("paper", "fit", "check")
-"""What a row is compared with: the paper; the paper, after tuning to it; or our own number, an exact solution
-or another arm."""
+"""Counterparts of a row: the paper; the paper, after tuning to it; our own number, an exact solution or another
+arm."""
 YES, NO, OPEN, NOTHING = "yes", "no", "open", "nothing"
 """The verdicts on a row."""
 SILENT = "-"
-"""What stands where the paper has no number."""
+"""Stands where the paper has no number."""
 LOST = "lost"
-"""What stands in place of a number that is not legible in our copy of the paper."""
+"""Stands in place of a number that is not legible in our copy of the paper."""
 NEVER = "never"
-"""What stands where the paper claims in words that no trial does it."""
+"""Stands where the paper claims in words that no trial does it."""
 NONE_OF_100 = "0 of 100"
-"""What stands where the paper counted 100 trials, none of which does it."""
+"""Stands where the paper counted 100 trials, none of which does it."""
 RARE = 0.05
 """A count of 0 agrees with *never* once its interval ends at this proportion or below."""
 
@@ -93,7 +93,7 @@ def compare_count(what: str, paper: str, hits: int, trials: int, note: str = "")
 
 
 def seldom_enough(hits: int, trials: int) -> bool | None:
-    """Whether a count agrees with *never*.
+    """Judge a count that should be 0.
 
     One counterexample refutes it. Without one, trials support it only if the interval of their proportion
     ends at RARE or below; 0 of 4 proves nothing, and neither does 0 of no trials.

@@ -17,7 +17,7 @@ HEADINGS: dict[Reference | None, str] = {
 }
 """The tables of a page, in this order."""
 SECOND: dict[Reference | None, str] = {"paper": "paper", "fit": "paper", "check": "expected"}
-"""What the second column of each is called; the last has none."""
+"""The heading of the second column of each; the last table has none."""
 COUNTED: dict[Reference, str] = {
     "paper": "Of the rows compared with the paper",
     "fit": "Of those tuned to it",
@@ -40,7 +40,7 @@ def page(results: dict[str, Any], figures: Sequence[str]) -> str:
 
 
 def verdict_sentence(rows: Sequence[Comparison]) -> str:
-    """How many rows agree, counted apart by what they are compared with."""
+    """The number of rows that agree, counted apart by what they are compared with."""
     counts = count_verdicts(rows)
     told = [_counted(COUNTED[one], counts[one]) for one in COUNTED if sum(counts[one].values())]
     return " ".join(told)

@@ -16,7 +16,7 @@ def paragraphs(template: str, **values: object) -> list[str]:
 
     Args:
         template: The Markdown file, relative to `experiments/`. A blank line ends a paragraph.
-        values: What its placeholders name; a placeholder without a value is an error.
+        values: The values of its placeholders; a placeholder without a value is an error.
 
     Returns:
         The paragraphs, each on one line.

@@ -23,7 +23,7 @@ ORIGIN = ("config", "command", "commits", "versions", "settings", "seconds", "wo
 
 
 class Work(NamedTuple):
-    """How the trials came about."""
+    """The origin of the trials."""
 
     commits: Mapping[str, int]  # how many task results each commit made
     seconds: float

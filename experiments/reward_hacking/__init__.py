@@ -1,4 +1,4 @@
-"""Reward hacking: do argmax policies enter the bucket that makes the garden look watered? (Sec. 3.2.2)"""
+"""Reward hacking: policies that exploit the bucket, which makes the garden look watered (Sec. 3.2.2)."""
 
 from __future__ import annotations
 

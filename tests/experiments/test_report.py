@@ -45,6 +45,12 @@ def out(made: Path, tmp_path: Path) -> Path:
     return copytree(made, tmp_path / "results")
 
 
+def told_of(line: str) -> list[str]:
+    """The text of the cells of a row of the summary, without its first."""
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", line, re.DOTALL)
+    return [" ".join(re.sub("<[^>]+>", "", cell).split()) for cell in cells]
+
+
 def changed(out: Path, **others: Any) -> str:
     """The page once something else stands in results.json."""
     path = out / "figure4/results.json"
@@ -93,7 +99,7 @@ def test_the_summary_counts_rows_by_what_they_are_compared_with_and_leads_to_the
     ]
     page = changed(out, findings=rows)
     (line,) = re.findall(r'<tr[^>]*><th[^>]*><a href="#figure4">.*?</tr>', page, re.DOTALL)
-    assert re.findall(r">(\d+)</td>", line) == [*"532", *"600", *"700"]
+    assert told_of(line) == ["5 yes 3 no 2 no verdict", "6 yes", "7 yes"]
     assert '<section id="figure4"' in page
 
 
@@ -108,7 +114,7 @@ def test_rows_of_version_0_1_are_counted_by_what_they_were_compared_with(out: Pa
     told = {"ours": "1", "difference": "", "interval": "", "note": ""}
     page = changed(out, findings=[told | row for row in rows])
     (line,) = re.findall(r'<tr[^>]*><th[^>]*><a href="#figure4">.*?</tr>', page, re.DOTALL)
-    assert re.findall(r">(\d+)</td>", line) == [*"010", *"100", *"200"]
+    assert told_of(line) == ["1 no", "1 yes", "2 yes"]
 
 
 def test_the_pages_are_written_again_from_the_stored_trials(out: Path) -> None:

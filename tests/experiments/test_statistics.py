@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from math import inf
+from subprocess import run
 
 import numpy as np
 import pytest
@@ -137,3 +139,8 @@ def test_a_median_of_trials_that_share_agents_has_a_wider_interval() -> None:
     half = median_interval([*values[:60], *[inf] * 40], agents)
     assert half
     assert half.low < inf
+
+
+def test_a_command_that_prints_no_interval_does_not_load_scipy() -> None:
+    code = "import sys; import parenting.commands.experiment; sys.exit('scipy' in sys.modules)"
+    assert run([sys.executable, "-c", code], check=False).returncode == 0
