@@ -11,8 +11,8 @@ from parenting.experiments.reporting.statistics import Interval, mean_interval, 
 
 Reference = Literal["paper", "fit", "check"]
 REFERENCES: tuple[Reference, ...] = ("paper", "fit", "check")
-"""Counterparts of a row: the paper; the paper, after tuning to it; our own number, an exact solution or another
-arm."""
+"""Counterparts of a row: the paper; the paper, after tuning to it; our own number, an exact
+solution or another arm."""
 YES, NO, OPEN, NOTHING = "yes", "no", "open", "nothing"
 """The verdicts on a row."""
 SILENT = "-"
