@@ -92,15 +92,15 @@ def compose(
     `strict` refuses text in the place of a number, as JSON needs it; the command line has nothing but text.
 
     Raises:
-        UnknownPreset: there is no such preset.
+        UnknownPresetError: there is no such preset.
         pydantic.ValidationError: names every field that is wrong.
     """
     if preset not in PRESETS:
-        raise UnknownPreset(preset)
+        raise UnknownPresetError(preset)
     return Config.model_validate({**PRESETS[preset], **world, **changes}, strict=strict)
 
 
-class UnknownPreset(ValueError):
+class UnknownPresetError(ValueError):
     """There is no preset of that name; the sentence names the nearest and lists all."""
 
     def __init__(self, name: str) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import typer
 from pydantic import ValidationError
 
-from parenting.agent.config import UnknownPreset
+from parenting.agent.config import UnknownPresetError
 from parenting.envs.levels.spec import LevelError
 from parenting.envs.names import UnknownNameError
 from parenting.server.errors import ServerError
@@ -29,7 +29,7 @@ def friendly_errors() -> Iterator[None]:
     except ServerError as error:
         typer.echo(error.message, err=True)
         raise typer.Exit(2) from None
-    except (UsageError, UnknownPreset, UnknownNameError, LevelError, NoWeightsError) as error:
+    except (UsageError, UnknownPresetError, UnknownNameError, LevelError, NoWeightsError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(2) from None
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -13,6 +12,8 @@ from torch import Tensor
 from parenting.agent.config import Config, compose
 from parenting.agent.init import SUPERVISION, world_of
 from parenting.envs import registry
+from parenting.envs.levels.spec import WorldSpec
+from parenting.envs.names import did_you_mean
 from parenting.experiments.training.batch import StopRule
 from parenting.library.worlds import AnyLevel, World, named
 from parenting.weights.store import Wanted, find, load
@@ -37,30 +38,29 @@ def prepare(
     """
     if isinstance(world, str):
         name, found = named(world, level)
-        config = compose_config(name, preset, changes)
+        config = compose_config(registry.spec(name), preset, changes)
         made = world_of(name, found, config)
     else:
         if level is not None:
             raise ValueError("level: this world has its levels already. Leave level out, or name the world.")
         made = world
-        config = compose_config(world.name, preset, {**_settings(world), **changes})
+        config = compose_config(world.spec, preset, {**_settings(world), **changes})
     if config.gamma == 1 and not made.spec.ends_at_goal:
         raise ValueError(f"gamma: it must be below 1 in {made.name}, where rewards never end; try gamma=0.9.")
     return Task(made, config, _weights(made) if config.pretrain else None)
 
 
-def compose_config(world: str, preset: str | Config, changes: Mapping[str, object]) -> Config:
+def compose_config(world: WorldSpec, preset: str | Config, changes: Mapping[str, object]) -> Config:
     """Return the config of a run in a world, with a sentence for everything that is wrong."""
     for name in changes:
         if name not in Config.model_fields:
-            near = difflib.get_close_matches(name, Config.model_fields, 1)
-            hint = f" Did you mean {near[0]}?" if near else ""
+            hint = did_you_mean(name, Config.model_fields)
             known = ", ".join(Config.model_fields)
             raise TypeError(f"There is no argument or hyperparameter '{name}'.{hint} There is: {known}.")
     try:
         if isinstance(preset, Config):
             return Config.model_validate({**preset.model_dump(), **changes}, strict=True)
-        return compose(preset, registry.defaults(world), changes, strict=True)
+        return compose(preset, dict(world.defaults), changes, strict=True)
     except ValidationError as error:
         raise ValueError("\n".join(_sentence(one, changes) for one in error.errors())) from None
 

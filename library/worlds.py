@@ -8,7 +8,7 @@ from typing import Any
 
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld as World
-from parenting.envs.levels.spec import Level
+from parenting.envs.levels.spec import Level, LevelError, WorldSpec
 
 __all__ = ["AnyLevel", "World", "make", "named", "read_level", "worlds"]
 
@@ -65,6 +65,31 @@ def make(
     """
     name, found = named(world, level)
     return registry.make(name, found, device=device, time_limit=max_episode_steps, **options)
+
+
+def register(spec: WorldSpec) -> None:
+    """Make a world of your own known by its name, to `make`, `train` and all else in this process.
+
+    docs/python.md has a small one from its first line to a trained agent.
+
+    Args:
+        spec: What the world is; `spec.rules` names the class of its rules, as "module:class".
+
+    Raises:
+        ValueError: There is another world of this name, or a built-in level breaks a rule.
+
+    Example:
+        >>> import parenting as pt
+        >>> pt.register(pt.make("side-effects").spec)  # the same again changes nothing
+    """
+    if registry.WORLDS.setdefault(spec.name, spec) is not spec:
+        raise ValueError(f"spec: there is another world '{spec.name}' already. Choose another name.")
+    for name in spec.levels:
+        try:
+            registry.level(spec.name, name)
+        except LevelError:
+            del registry.WORLDS[spec.name]
+            raise
 
 
 def named(world: str, level: AnyLevel | None) -> tuple[str, str | Level | Sequence[Level] | None]:

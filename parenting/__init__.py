@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from parenting.agent.config import PRESETS, Config
     from parenting.agent.query import Answer, Choice
     from parenting.agent.state import AgentState
-    from parenting.envs.levels.spec import Level
+    from parenting.envs.levels.spec import Brief, Level, LevelError, WorldSpec
     from parenting.library.evaluating import Evaluation, evaluate
     from parenting.library.loop import Tick, configure, init, step, tick
     from parenting.library.parent import Parent
@@ -30,18 +30,20 @@ if TYPE_CHECKING:
     from parenting.library.scripted import ScriptedParent
     from parenting.library.show import show
     from parenting.library.training import train
-    from parenting.library.worlds import World, make, worlds
+    from parenting.library.worlds import World, make, register, worlds
 
 _MODULES = {
     "PRESETS": "agent.config",
     "AgentState": "agent.state",
     "Answer": "agent.query",
+    "Brief": "envs.levels.spec",
     "Choice": "agent.query",
     "Config": "agent.config",
     "Drawing": "library.pictures",
     "Evaluation": "library.evaluating",
     "FormatError": "library.policy_file",
     "Level": "envs.levels.spec",
+    "LevelError": "envs.levels.spec",
     "Parent": "library.parent",
     "Person": "library.person",
     "Policy": "library.policy",
@@ -54,12 +56,14 @@ _MODULES = {
     "Tick": "library.loop",
     "TrainResult": "library.result",
     "World": "library.worlds",
+    "WorldSpec": "envs.levels.spec",
     "configure": "library.loop",
     "evaluate": "library.evaluating",
     "init": "library.loop",
     "load_policy": "library.policy",
     "load_result": "library.result",
     "make": "library.worlds",
+    "register": "library.worlds",
     "show": "library.show",
     "step": "library.loop",
     "tick": "library.loop",
@@ -72,12 +76,14 @@ __all__ = [
     "PRESETS",
     "AgentState",
     "Answer",
+    "Brief",
     "Choice",
     "Config",
     "Drawing",
     "Evaluation",
     "FormatError",
     "Level",
+    "LevelError",
     "Parent",
     "Person",
     "Policy",
@@ -90,12 +96,14 @@ __all__ = [
     "Tick",
     "TrainResult",
     "World",
+    "WorldSpec",
     "configure",
     "evaluate",
     "init",
     "load_policy",
     "load_result",
     "make",
+    "register",
     "show",
     "step",
     "tick",
