@@ -1,6 +1,8 @@
 """Queries between tensors and the database: frames as rows of glyphs, actions by name, readable by eye.
 
-What is written down is all that a query holds, so that reading it back gives the same tensors bit for bit.
+Reading a stored query back gives the same tensors bit for bit. Two fields are not in its clips: `kind` and
+`maturity` are columns of their own. `level`, the index among the levels of a batch, is not stored at all: a
+stored run has one level, so its index is always 0, and `encode` refuses any other.
 """
 
 from __future__ import annotations
@@ -21,18 +23,39 @@ CHOICE_NAMES = {int(choice): name for name, choice in CHOICES.items()}
 
 
 def encode(world: Gridworld, query: Query) -> dict[str, Any]:
-    """The clips of a run's one query, as stored in `query.clips` (server.tables)."""
+    """Write the clips of a run's one query, as stored in `query.clips` (server.tables).
+
+    Args:
+        world: The world of the run, whose legend names the glyphs.
+        query: A batch of one query.
+
+    Raises:
+        ValueError: the query is of another level than the run's only one.
+    """
+    if int(query.level[0]) != 0:
+        raise ValueError(f"level: {int(query.level[0])} cannot be stored; a stored run has one level, 0.")
     return dict(read_clips(query, world.legend))
 
 
 def kind_name(query: Query) -> str | None:
-    """The kind of a run's one query by its name; None where nothing is asked."""
+    """Return the kind of a run's one query by its name; None where nothing is asked."""
     kind = int(query.kind[0])
     return None if kind == QueryKind.NONE else QueryKind(kind).name.lower()
 
 
 def decode(world: Gridworld, stages: int, kind: str, maturity: int, clips: dict[str, Any]) -> Query:
-    """The query whose clips these are, for a run whose longest clips have `stages` steps."""
+    """Read the query that `encode` wrote.
+
+    Args:
+        world: The world of the run.
+        stages: The largest number of steps in a clip of this run (its last stage T).
+        kind: guidance or preference.
+        maturity: The stage that the clips were recorded at.
+        clips: What `encode` returned.
+
+    Raises:
+        LookupError, TypeError, ValueError: the clips are not as `encode` writes them.
+    """
     query = queries.empty(1, stages, world.height, world.width)
     query.kind[0], query.maturity[0] = KINDS[kind], maturity
     for side, name in enumerate(SIDES):
