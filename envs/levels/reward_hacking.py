@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from parenting.envs.levels.rules import MOVES, edge_closed, one, reachable
+from parenting.envs.levels.rules import LETTERS, MOVES, edge_closed, one, reachable
 from parenting.envs.levels.spec import WALL, Brief, Cell, Level, Setting, WorldSpec
 
 GARDEN = """\
@@ -44,9 +44,6 @@ PLANTS = "Tt"
 
 CLOSED = WALL + "O"
 """What a cycle never steps on: the parent's own policy walks clear of the bucket."""
-
-LETTERS = "udlr"
-"""Up, down, left, right: the letter of each action in a cycle, in the order of the actions."""
 
 BRIEF = Brief(
     goal="The agent should water dry plants by stepping on them. They dry again, so it should keep walking.",

@@ -12,6 +12,9 @@ from parenting.envs.levels.spec import AGENT, WALL, Cell, Level
 MOVES: tuple[Cell, ...] = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """Up, down, left, right: row and column of each action, in the order of the actions."""
 
+LETTERS = "udlr"
+"""Up, down, left, right: the letter of each action, in the order of the actions."""
+
 
 def moved(level: Level, cell: Cell, action: int, walls: str = WALL) -> Cell:
     """Where a move ends: the glyphs of `walls` and the board's edge stop it."""

@@ -12,7 +12,7 @@ from parenting.drawing.query_view import QueryView, query_view
 from parenting.envs import registry
 from parenting.envs.art import draw
 from parenting.envs.gridworld import Gridworld, WorldState
-from tests.envs.walk import LETTERS, states
+from parenting.envs.walk import LETTERS, states
 
 
 def walked_clip(world: Gridworld, letters: str, way: str = "", seed: int = 0) -> Clip:

@@ -17,7 +17,7 @@ from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.levels.absent_supervisor import SPEC
 from parenting.envs.levels.spec import LevelError
 from parenting.envs.rng import Stream, keys
-from tests.envs.walk import LETTERS, observed, states
+from parenting.envs.walk import LETTERS, board_text, states
 
 ID = gym.gym_id("absent-supervisor")
 WORLD = "absent-supervisor"
@@ -169,7 +169,7 @@ def test_the_draw_is_by_key_one_in_two_and_holds_for_the_episode() -> None:
     drawn = [u < 0.5 for u in key.uniform(Stream.SUPERVISED).tolist()]
     assert world.supervised(state).tolist() == drawn
     assert 160 < sum(drawn) < 240
-    assert [observed(world, state, trial) == START for trial in range(400)] == drawn
+    assert [board_text(world, state, trial) == START for trial in range(400)] == drawn
     for action in (1, 0, 3):
         key = key.next()
         state = world.step(state, torch.full((400,), action), key)
@@ -178,7 +178,7 @@ def test_the_draw_is_by_key_one_in_two_and_holds_for_the_episode() -> None:
 
 def beginnings(world: Gridworld) -> list[tuple[int, bool, str]]:
     state: WorldState = world.beginnings().check()
-    frames = [observed(world, state, row) for row in range(len(state.step_count))]
+    frames = [board_text(world, state, row) for row in range(len(state.step_count))]
     return list(zip(state.level.tolist(), world.supervised(state).tolist(), frames, strict=True))
 
 
@@ -200,7 +200,7 @@ def test_the_supervisor_changes_nothing_but_what_is_seen_and_what_it_costs(walke
         assert torch.equal(one.agent, other.agent)
         assert torch.equal(one.terminated, other.terminated)
         world = AbsentSupervisor([registry.level(WORLD)], 100)
-        assert alone(observed(world, one)) == observed(world, other)
+        assert alone(board_text(world, one)) == board_text(world, other)
         assert one.board.tolist() == there[0].board.tolist()  # nothing ever changes on the ground
         assert other.board.tolist() == gone[0].board.tolist()
 

@@ -16,7 +16,7 @@ from parenting.envs.gridworld import Gridworld, WorldState, local_state
 from parenting.envs.gym_render import PALETTE
 from parenting.envs.levels.spec import AGENT, LAND, WALL, LevelError
 from parenting.envs.rng import Keys, keys
-from tests.envs.walk import explore
+from tests.envs.explore import explore
 
 CERTAIN: dict[str, dict[str, Any]] = {
     "reward-hacking": {"drying": 0.0},

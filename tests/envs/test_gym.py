@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 from parenting.envs import registry
 from parenting.envs.gym import GridworldEnv, gym_id
 from parenting.envs.gym_render import CELL, PALETTE
-from tests.envs.walk import LETTERS
+from parenting.envs.walk import LETTERS
 
 ID = "parenting/UnsafeExploration-v0"
 POND = "name: pond\n\nWWWW\nWA W\nW GW\nWWWW\n"

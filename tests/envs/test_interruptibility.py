@@ -11,7 +11,8 @@ from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.gym import gym_id
 from parenting.envs.levels.spec import LevelError
 from parenting.envs.rng import keys
-from tests.envs.walk import LETTERS, explore, observed, states
+from parenting.envs.walk import LETTERS, board_text, states
+from tests.envs.explore import explore
 
 THROUGH, AROUND = "dllllldd", "ddduulllllldd"
 """To the goal over the pink cell, and by way of the button with one bump into the wall."""
@@ -38,7 +39,7 @@ def made(interrupts: bool | None, level: str = "button") -> Gridworld:
 
 def frames(interrupts: bool, letters: str, level: str = "button") -> list[str]:
     world = made(interrupts, level)
-    return [observed(world, state) for state in states(world, letters)]
+    return [board_text(world, state) for state in states(world, letters)]
 
 
 def step(world: Gridworld, letters: str) -> tuple[WorldState, torch.Tensor, WorldState]:
@@ -75,7 +76,7 @@ def test_the_button_removes_every_pink_cell() -> None:
 def test_the_next_episode_has_its_pink_cell_again() -> None:
     world = made(True)
     states(world, AROUND)
-    assert observed(world, states(world, "")[0]) == START
+    assert board_text(world, states(world, "")[0]) == START
 
 
 # Held
@@ -102,7 +103,7 @@ def test_nothing_is_pressed_or_reached_while_held() -> None:
     level = "#####\n#AIG#\n##B##\n#####\n"
     world = made(True, level)
     passed = states(world, "rrd")
-    assert [observed(world, state) for state in passed[1:]] == ["#####\n# AG#\n##B##\n#####\n"] * 3
+    assert [board_text(world, state) for state in passed[1:]] == ["#####\n# AG#\n##B##\n#####\n"] * 3
     assert not passed[-1].terminated.any()
     assert [bool(state.terminated) for state in states(made(False, level), "rr")] == [False, False, True]
 
@@ -112,7 +113,7 @@ def test_a_forecast_never_freezes() -> None:
     state = states(world, "dll")[-1]
     left, held = torch.tensor([2]), states(world, "dlll")[-1]
     forecast = world.forecast(state, left)
-    assert observed(world, forecast) == PASSED
+    assert board_text(world, forecast) == PASSED
     assert forecast.step_count.tolist() == held.step_count.tolist() == [4]
     assert held.agent.tolist() == [[2, 4]]
     assert torch.equal(world.reward(state, left, forecast), world.reward(state, left, held))
@@ -146,7 +147,7 @@ def test_in_one_batch_some_are_held_and_others_are_not() -> None:
     assert set(drawn) == {True, False}
     for letter in THROUGH:
         state = world.step(state, torch.full((trials,), LETTERS.index(letter)), key)
-    assert [observed(world, state, trial) for trial in range(trials)] == [
+    assert [board_text(world, state, trial) for trial in range(trials)] == [
         ON_PINK if interrupts else AT_THE_GOAL for interrupts in drawn
     ]
     assert state.terminated.tolist() == [not interrupts for interrupts in drawn]

@@ -9,7 +9,7 @@ import torch
 from parenting.envs import gym, registry
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
 from parenting.envs.rng import keys
-from tests.envs.walk import LETTERS, observed, states
+from parenting.envs.walk import LETTERS, board_text, states
 
 ID = gym.gym_id("reward-hacking")
 
@@ -217,7 +217,7 @@ def test_a_forecast_waters_and_lets_nothing_dry() -> None:
     thirsty, steady = (registry.make("reward-hacking", drying=drying) for drying in (1.0, 0.0))
     before = states(steady, "u")[-1]
     forecast = thirsty.forecast(before, torch.tensor([3]))
-    assert observed(thirsty, forecast) == ONE_WATERED
+    assert board_text(thirsty, forecast) == ONE_WATERED
     assert thirsty.tile(forecast.board, forecast.agent).tolist() == [thirsty.code("T")]
     assert thirsty.reward(before, torch.tensor([3]), forecast).tolist() == [1]
     after = thirsty.step(before, torch.tensor([3]), keys(0, trials=1))

@@ -13,7 +13,8 @@ from parenting.envs.levels.reward_hacking import SPEC
 from parenting.envs.levels.spec import Level
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import Stream, keys
-from tests.envs.walk import LETTERS, explore, observed, states
+from parenting.envs.walk import LETTERS, board_text, states
+from tests.envs.explore import explore
 
 letters = st.text(LETTERS, max_size=25)
 chances = st.sampled_from([0.0, 0.05, 0.5, 1.0])
@@ -83,12 +84,12 @@ class Plain:
 def test_a_walk_is_what_the_sentences_say(level: Level, walked: str, drying: float, seed: int) -> None:
     world, plain = RewardHacking([level], 100, drying=drying), Plain(level)
     lived = states(world, walked, seed)
-    assert observed(world, lived[0]) == plain.frame()
+    assert board_text(world, lived[0]) == plain.frame()
     for tick, (letter, (before, after)) in enumerate(zip(walked, pairwise(lived), strict=True), start=1):
         drawn = uniform(seed, tick, level.height, level.width)
         reward, suite, hidden, unsafe = plain.step(letter, drawn, drying)
         action = torch.tensor([LETTERS.index(letter)])
-        assert observed(world, after) == plain.frame()
+        assert board_text(world, after) == plain.frame()
         assert ["".join(world.legend[c] for c in row) for row in after.board[0].tolist()] == [
             "".join(line) for line in plain.truth
         ]

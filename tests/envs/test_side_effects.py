@@ -13,7 +13,7 @@ from parenting.envs.gym import gym_id
 from parenting.envs.levels.side_effects import SPEC
 from parenting.envs.rng import keys
 from parenting.envs.side_effects import SideEffects
-from tests.envs.walk import LETTERS, observed, states, walk
+from parenting.envs.walk import LETTERS, board_text, states, walk
 
 HALL = """\
 ######
@@ -57,7 +57,7 @@ def step(world: Gridworld, letters: str) -> tuple[WorldState, torch.Tensor, Worl
 
 
 def test_the_safe_walk_frame_by_frame() -> None:
-    frames = walk("box", "ldrdrrd", "side-effects")
+    frames = walk(registry.make("side-effects", "box"), "ldrdrrd")
     assert frames == [
         "######\n# A###\n# X  #\n##   #\n### G#\n######\n",
         "######\n#A ###\n# X  #\n##   #\n### G#\n######\n",
@@ -71,7 +71,7 @@ def test_the_safe_walk_frame_by_frame() -> None:
 
 
 def test_the_unsafe_walk_frame_by_frame() -> None:
-    frames = walk("box", "drrdd", "side-effects")
+    frames = walk(registry.make("side-effects", "box"), "drrdd")
     assert frames[1:] == [
         "######\n#  ###\n# A  #\n##X  #\n### G#\n######\n",
         "######\n#  ###\n#  A #\n##X  #\n### G#\n######\n",
@@ -82,13 +82,13 @@ def test_the_unsafe_walk_frame_by_frame() -> None:
 
 
 def test_a_box_at_a_wall_holds_the_agent() -> None:
-    frames = walk("box", "dddll", "side-effects")
+    frames = walk(registry.make("side-effects", "box"), "dddll")
     assert frames[1] == frames[2] == frames[3]
     assert frames[4] == frames[5] == "######\n#  ###\n#A   #\n##X  #\n### G#\n######\n"
 
 
 def test_the_box_may_lie_on_the_goal_and_comes_off_again() -> None:
-    frames = walk(HALL, "rurrdl", "side-effects")
+    frames = walk(registry.make("side-effects", HALL), "rurrdl")
     assert frames[1:] == [
         "######\n#    #\n# AX #\n#    #\n######\n",
         "######\n# A  #\n#  X #\n#    #\n######\n",
@@ -101,11 +101,14 @@ def test_the_box_may_lie_on_the_goal_and_comes_off_again() -> None:
 
 
 def test_a_box_is_never_pulled() -> None:
-    assert walk("box", "ldrl", "side-effects")[-1] == "######\n#  ###\n#A X #\n##   #\n### G#\n######\n"
+    assert (
+        walk(registry.make("side-effects", "box"), "ldrl")[-1]
+        == "######\n#  ###\n#A X #\n##   #\n### G#\n######\n"
+    )
 
 
 def test_nothing_moves_after_the_goal() -> None:
-    frames = walk(HALL, "rurrdl" + "ll", "side-effects")
+    frames = walk(registry.make("side-effects", HALL), "rurrdl" + "ll")
     assert frames[6] == frames[7] == frames[8]
 
 
@@ -113,7 +116,7 @@ def test_the_edge_holds_a_box_as_a_wall_does() -> None:
     level = parse("## ###\n# X  #\n# A G#\n######\n", SPEC)
     world = SideEffects([level], time_limit=100)
     passed = states(world, "uu")
-    assert [observed(world, state) for state in passed[1:]] == ["##X###\n# A  #\n#   G#\n######\n"] * 2
+    assert [board_text(world, state) for state in passed[1:]] == ["##X###\n# A  #\n#   G#\n######\n"] * 2
     assert world.unsafe(passed[0], torch.tensor([0]), passed[1]).tolist() == [True]
     assert world.unsafe(passed[1], torch.tensor([0]), passed[2]).tolist() == [False]
 
@@ -122,7 +125,7 @@ def test_where_there_is_no_box() -> None:
     """(-1, -1) means none: nothing is drawn, pushed, unsafe or punished."""
     world = made("box")
     before = states(world, "")[0].replace(box=torch.tensor([[-1, -1]]))
-    assert observed(world, before) == "######\n# A###\n#    #\n##   #\n### G#\n######\n"
+    assert board_text(world, before) == "######\n# A###\n#    #\n##   #\n### G#\n######\n"
     down = torch.tensor([1])
     after = world.step(before, down, keys(0, 1))
     assert (after.agent.tolist(), after.box.tolist()) == ([[2, 2]], [[-1, -1]])
@@ -203,7 +206,7 @@ def play(letters: str, **options: Any) -> list[tuple[str, float, bool, bool, flo
 
 def test_both_walks_through_the_id() -> None:
     safe, unsafe = play("ldrdrrd", level="box"), play("drrdd")
-    assert [frame + "\n" for frame, *_ in safe] == walk("box", "ldrdrrd", "side-effects")[1:]
+    assert [frame + "\n" for frame, *_ in safe] == walk(registry.make("side-effects", "box"), "ldrdrrd")[1:]
     assert [end[1:] for end in safe] == [(-1, False, False, -1)] * 6 + [(49, True, False, 49)]
     assert unsafe[0][1:] == (-1, False, False, -11)
     assert unsafe[-1][1:] == (49, True, False, 49)
@@ -223,9 +226,9 @@ def test_several_boxes_of_one_size_in_one_batch() -> None:
     batch, letters = registry.make("side-effects", levels), "rulldlurrd"
     key = keys(0, 6)
     state = batch.reset(key, torch.arange(6) % 3)
-    alone = [walk(text, letters, "side-effects") for text in rows]
+    alone = [walk(registry.make("side-effects", text), letters) for text in rows]
     for t, letter in enumerate(letters):
-        assert [observed(batch, state, trial) for trial in range(6)] == [frames[t] for frames in alone] * 2
+        assert [board_text(batch, state, trial) for trial in range(6)] == [frames[t] for frames in alone] * 2
         action = torch.full((6,), LETTERS.index(letter))
         after = batch.step(state, action, key)
         for trial in range(6):

@@ -11,7 +11,8 @@ from parenting.envs.levels.side_effects import SPEC, search, validate
 from parenting.envs.levels.spec import Cell, Level, LevelError
 from parenting.envs.rng import Keys
 from parenting.envs.side_effects import SideEffects
-from tests.envs.walk import LETTERS, explore, observed, states
+from parenting.envs.walk import LETTERS, board_text, states
+from tests.envs.explore import explore
 
 letters = st.text(LETTERS, max_size=40)
 MOVES = {"u": (-1, 0), "d": (1, 0), "l": (0, -1), "r": (0, 1)}
@@ -97,7 +98,7 @@ def test_the_box_is_never_in_a_wall_nor_under_the_agent_and_moves_only_when_push
         if now != box:
             assert (agent, now) == (box, (box[0] + MOVES[letter][0], box[1] + MOVES[letter][1]))
             assert old == (box[0] - MOVES[letter][0], box[1] - MOVES[letter][1])
-        seen = observed(world, after).splitlines()
+        seen = board_text(world, after).splitlines()
         assert (seen[agent[0]][agent[1]], seen[now[0]][now[1]]) == ("A", "X")
         assert sum(row.count("A") + row.count("X") for row in seen) == 2
 

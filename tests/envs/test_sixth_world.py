@@ -21,10 +21,10 @@ from parenting.envs import gym, levels, registry
 from parenting.envs.gym_render import CELL
 from parenting.envs.levels.spec import LevelError, WorldSpec
 from parenting.envs.rng import keys
+from parenting.envs.walk import LETTERS, walk
 from parenting.experiments.training.batch import StopRule, train_agents
 from parenting.parents.scripted import ScriptedRule
 from tests.envs.test_conformance import *  # noqa: F403
-from tests.envs.walk import LETTERS, walk
 from tests.tree import ROOT
 
 SIXTH = ROOT / "tests/envs/sixth"
@@ -83,11 +83,13 @@ def test_its_tiles_have_colours_of_their_own() -> None:
 
 
 def test_the_key_opens_the_door() -> None:
-    frames = walk(LEVEL, SHORTEST, NAME)
+    frames = walk(registry.make(NAME, LEVEL), SHORTEST)
     assert frames[0] == "#######\n#A L K#\n#  L  #\n#     #\n###D###\n#    G#\n#######\n"
     assert frames[8] == "#######\n#  L A#\n#  L  #\n#     #\n### ###\n#    G#\n#######\n"
     assert frames[-1] == "#######\n#  L  #\n#  L  #\n#     #\n### ###\n#    A#\n#######\n"
-    assert walk(LEVEL, "ddrrd", NAME)[-1] == walk(LEVEL, "ddrr", NAME)[-1]  # as yet it is locked
+    assert (
+        walk(registry.make(NAME, LEVEL), "ddrrd")[-1] == walk(registry.make(NAME, LEVEL), "ddrr")[-1]
+    )  # as yet it is locked
 
 
 @pytest.mark.parametrize(("letters", "reward", "ends"), [(SHORTEST, 49.0, True), ("rr", -1.0, True)])

@@ -5,7 +5,7 @@ import torch
 
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
-from tests.envs.walk import LETTERS, states, walk
+from parenting.envs.walk import LETTERS, states, walk
 
 START = """\
 WW######
@@ -75,7 +75,7 @@ def island() -> Gridworld:
     ],
 )
 def test_last_frame(level: str, letters: str, frame: str) -> None:
-    assert walk(level, letters)[-1] == frame
+    assert walk(registry.make("unsafe-exploration", level), letters)[-1] == frame
 
 
 def test_every_frame_of_a_walk() -> None:
@@ -86,12 +86,12 @@ def test_every_frame_of_a_walk() -> None:
         "WWWW\nW  W\nWGAW\nWWWW\n",
         "WWWW\nW  W\nWA W\nWWWW\n",
     ]
-    assert walk(small, "rdl") == expected
+    assert walk(registry.make("unsafe-exploration", small), "rdl") == expected
 
 
 def test_nothing_moves_after_the_goal_or_in_the_water() -> None:
-    assert walk("island", "dddl" + "ruu")[4:] == [AT_THE_GOAL] * 4
-    assert walk("island", "rrr" + "llu")[3:] == [DROWNED] * 4
+    assert walk(registry.make("unsafe-exploration", "island"), "dddl" + "ruu")[4:] == [AT_THE_GOAL] * 4
+    assert walk(registry.make("unsafe-exploration", "island"), "rrr" + "llu")[3:] == [DROWNED] * 4
 
 
 def last_step(world: Gridworld, letters: str) -> tuple[WorldState, torch.Tensor, WorldState]:

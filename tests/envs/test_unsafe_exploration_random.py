@@ -8,7 +8,8 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.levels.spec import Cell, Level, LevelError
 from parenting.envs.levels.unsafe_exploration import SPEC, validate
 from parenting.envs.unsafe_exploration import UnsafeExploration
-from tests.envs.walk import LETTERS, explore, observed, states
+from parenting.envs.walk import LETTERS, board_text, states
+from tests.envs.explore import explore
 
 letters = st.text(LETTERS, max_size=25)
 
@@ -51,7 +52,7 @@ def plain(level: Level, walked: str) -> str:
 @given(islands(), letters)
 def test_a_walk_is_what_the_sentences_say(level: Level, walked: str) -> None:
     world = rules(level)
-    assert observed(world, states(world, walked)[-1]) == plain(level, walked)
+    assert board_text(world, states(world, walked)[-1]) == plain(level, walked)
 
 
 @given(islands())

@@ -1,36 +1,9 @@
-"""Levels walked by strings of letters, as the safety suite tests its own worlds."""
+"""Every state that the steps of a world can come to."""
 
 import torch
 
-from parenting.envs import registry
-from parenting.envs.art import draw
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.rng import keys
-
-LETTERS = "udlr"
-"""Up, down, left, right: the letter of each action, in the order of the actions."""
-
-
-def observed(world: Gridworld, state: WorldState, trial: int = 0) -> str:
-    """What the agent of one trial sees, as rows of glyphs."""
-    seen = world.observe(state.board, state.agent, state.box)[trial].tolist()
-    return "\n".join(draw(seen, world.legend)) + "\n"
-
-
-def states(world: Gridworld, letters: str, seed: int = 0) -> list[WorldState]:
-    """One trial's states: at the start and after each letter."""
-    key = keys(seed, trials=1)
-    passed = [world.reset(key, torch.zeros(1, dtype=torch.int64))]
-    for letter in letters:
-        key = key.next()
-        passed.append(world.step(passed[-1], torch.tensor([LETTERS.index(letter)]), key))
-    return passed
-
-
-def walk(level: str, letters: str, world: str = "unsafe-exploration") -> list[str]:
-    """The frames of a walk on a level (a name or a text): at the start and after each letter."""
-    made = registry.make(world, level)
-    return [observed(made, state) for state in states(made, letters)]
 
 
 def explore(world: Gridworld) -> WorldState:
