@@ -61,9 +61,21 @@ def _wall(level: Level, cell: Cell) -> bool:
     return not inside or level.glyph(cell) == WALL
 
 
+def query() -> str:
+    """Return the query as a picture that stands still."""
+    return draw_query(clips(), ISLAND, "preference", STAGE)
+
+
+def question() -> str:
+    """Return the query and its answer as a moving picture."""
+    return animate_query(clips(), ISLAND, "preference", "right", STAGE)
+
+
 PICTURES: dict[str, Callable[[], str]] = {
-    "docs/pictures/query.svg": lambda: draw_query(clips(), ISLAND, "preference", STAGE),
-    "docs/pictures/question.svg": lambda: animate_query(clips(), ISLAND, "preference", "right", STAGE),
+    "docs/pictures/query.svg": query,
+    "docs/pictures/question.svg": question,
+    "web/static/query.svg": query,
+    "web/static/question.svg": question,
     "docs/pictures/policy.svg": lambda: draw_policy(ISLAND, policy(ISLAND)),
     "web/static/icon.svg": lambda: standalone("icon.svg"),
 }

@@ -175,6 +175,7 @@ def _page(
         422 if errors else 200,
         runs=_rows(db, listed.rows),
         state_labels=STATE_LABELS,
+        fresh=not listed.rows and before is None and not errors,
         older=listed.next,
         before=before,
         worlds=WORLDS.values(),

@@ -13,6 +13,7 @@ import pytest
 from parenting.server.db import Database
 from parenting.server.pages.render import WEB
 from parenting.server.pages.texts import STATE_TEXTS
+from parenting.server.statuses import RunState
 from tests.pages import island_fixtures as fixtures
 
 PATHS = ("/", "/runs/1", "/runs/1/parent", "/runs/1/parent?query=1", "/runs/1/parent?query=2", "/runs/77")
@@ -84,9 +85,14 @@ def test_a_static_file_is_short(path: Path) -> None:
 
 
 def test_script_and_server_know_the_same_states() -> None:
-    told = re.findall(r'return "(\w+)"|\? "(\w+)" : "(\w+)"', (WEB / "static/live.js").read_text())
-    scripted = {name for names in told for name in names if name}
-    assert scripted | {"elsewhere", "offline"} == set(STATE_TEXTS)
+    """The state of a run comes from the server. A page adds what only it can know, and has words for each."""
+    own = {"elsewhere", "offline"}
+    assert {*RunState} | own == set(STATE_TEXTS)
+    script = (WEB / "static/parent.js").read_text()
+    named = set(re.findall(r'wait\("(\w+)"\)|state = "(\w+)"|\? "(\w+)" : ', script))
+    named = {name for names in named for name in names if name}
+    assert own <= named <= set(STATE_TEXTS)
+    assert not re.findall(r'"(over|resting|paused|no_worker|stuck)"', (WEB / "static/live.js").read_text())
 
 
 def test_pages_are_not_kept_by_the_browser(client: httpx2.Client, db: Database) -> None:

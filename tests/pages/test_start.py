@@ -26,13 +26,37 @@ FORM = {
 }
 
 
-def test_without_runs_the_form_stands_alone(client: httpx2.Client) -> None:
+def test_a_new_installation_has_one_picture_and_one_button_and_then_the_form(
+    client: httpx2.Client, db: Database
+) -> None:
     page = client.get("/")
     assert page.status_code == 200
-    assert "Raise an agent" in page.text
     assert 'class="runs"' not in page.text
+    button, form = page.text.index("Raise your first agent</button>"), page.text.index('class="fields"')
+    assert page.text.count("<img ") == 1
+    assert page.text.index("<img ") < button < form
+    assert page.text.count('class="primary"') == 2  # this one, and the form's own
+    width, height = re.findall(r'<img [^>]*width="(\d+)" height="(\d+)"', page.text)[0]
+    assert f'width="{width}" height="{height}"' in client.get("/static/question.svg").text
     first = page.text.index('value="conservative" checked')
     assert first < page.text.index('value="lax"') < page.text.index('value="direct"')
+
+
+def test_the_button_of_a_new_installation_starts_the_default_run(client: httpx2.Client, db: Database) -> None:
+    welcome = client.get("/").text.partition('class="welcome"')[2].partition("</section>")[0]
+    fields = dict(re.findall(r'<input type="hidden" name="([^"]+)" value="([^"]*)">', welcome))
+    reply = client.post("/runs", data=fields)
+    assert (reply.status_code, reply.headers["location"]) == (303, "/runs/1/parent")
+    run, default = get_run(db, 1), NewRun(world="unsafe-exploration", parent="human")
+    assert (run.world, run.level, run.parent) == ("unsafe-exploration", "island", "human")
+    assert (run.preset, run.seed, run.goal) == ("conservative", default.seed, None)
+    assert 'class="welcome"' not in client.get("/").text
+
+
+def test_a_wrong_field_brings_the_form_back_without_the_welcome(client: httpx2.Client) -> None:
+    page = client.post("/runs", data={**FORM, "seed": "many"}).text
+    assert 'class="welcome"' not in page
+    assert '<h1 id="new-title">Start a run</h1>' in page
 
 
 def test_a_run_of_mine_begins_at_the_parents_page(client: httpx2.Client, db: Database) -> None:
