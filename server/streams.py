@@ -54,7 +54,7 @@ class Streams:
         self.db, self.notifier, self.limit = db, notifier, limit
         self.subscriptions: dict[int, Subscription] = {}
         self.closed = False
-        self._waiting_requests = 0
+        self.waiting_requests = 0  # requests for a question that lie here
         self._notified = asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -118,8 +118,8 @@ class Streams:
         requests wait already as streams are allowed. It stops looking once the client is `gone`: a question
         would be leased to nobody.
         """
-        until = time.monotonic() + (seconds if self._waiting_requests < self.limit else 0.0)
-        self._waiting_requests += 1
+        until = time.monotonic() + (seconds if self.waiting_requests < self.limit else 0.0)
+        self.waiting_requests += 1
         try:
             while not await gone():
                 notified = self._notified
@@ -130,7 +130,7 @@ class Streams:
                 await _either(notified, min(left, POLL_SECONDS))
             return None
         finally:
-            self._waiting_requests -= 1
+            self.waiting_requests -= 1
 
     def _join(self, run_id: int) -> Subscription:
         subscription = self.subscriptions.setdefault(run_id, Subscription())
@@ -157,7 +157,7 @@ class Streams:
                 subscription.run, subscription.question = run, question
                 _tell(subscription)
             await _either(notified, POLL_SECONDS)
-            if notified.is_set() and self._waiting_requests:
+            if notified.is_set() and self.waiting_requests:
                 await asyncio.sleep(YIELD_SECONDS)
 
     def _on_notification(self) -> None:

@@ -17,7 +17,7 @@ from fastapi import APIRouter, Form, Query, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from parenting.server import runs
+from parenting.server import runs, tables
 from parenting.server.api.bodies import Choice, ClientId, RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker
@@ -89,8 +89,13 @@ async def question(
     """
     streams: Streams = request.app.state.streams
     run = await run_in_threadpool(runs.get_run, db, run_id)
-    take = partial(_markup, db, run, client_id, shown, settings.lease_seconds)
-    return await streams.wait_for(take, wait, request.is_disconnected) or Response(status_code=204)
+    lease = partial(_lease_next, db, run_id, client_id, shown, settings.lease_seconds)
+    query = await streams.wait_for(lease, wait, request.is_disconnected)
+    if query is None:
+        return Response(status_code=204)
+    if await request.is_disconnected():  # it left while the question was looked up
+        await run_in_threadpool(leases.release, db, query.id, client_id)
+    return await run_in_threadpool(_markup, run, query, client_id)
 
 
 @router.post("/runs/{run_id}/parent/next")
@@ -118,16 +123,16 @@ def answer(
     return _go_on(db, run_id, client_id, settings.lease_seconds, patience=PATIENCE)
 
 
-def _markup(
-    db: Database, run: Run, client_id: str, shown: tuple[int, ...], seconds: float
-) -> Response | None:
+def _lease_next(
+    db: Database, run_id: int, client_id: str, shown: tuple[int, ...], seconds: float
+) -> tables.Query | None:
     if shown:
-        query = lease_ahead(db, run.id, client_id, shown, seconds)
-    else:
-        query = leases.lease(db, run.id, client_id, seconds)
-    return (
-        None if query is None else page("_question.html", shown=question_view(query, run), client=client_id)
-    )
+        return lease_ahead(db, run_id, client_id, shown, seconds)
+    return leases.lease(db, run_id, client_id, seconds)
+
+
+def _markup(run: Run, query: tables.Query, client_id: str) -> Response:
+    return page("_question.html", shown=question_view(query, run), client=client_id)
 
 
 def _go_on(db: Database, run_id: int, client_id: str, seconds: float, patience: float = 0.0) -> Response:

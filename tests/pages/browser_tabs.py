@@ -27,7 +27,7 @@ class BrowserTabs:
         context = self.browser.new_context(**options)
         self.contexts.append(context)
         page = context.new_page()
-        page.set_default_timeout(10_000)
+        page.set_default_timeout(30_000)
         page.on("console", self._heard)
         page.on("pageerror", lambda error: self.wrong.append(str(error)))
         page.on("request", self._asked)
@@ -54,7 +54,7 @@ def given(db: Database) -> list[tuple[int, str]]:
         return [(row.query_id, row.choice) for row in rows]
 
 
-def until(holds: Callable[[], bool], seconds: float = 10.0) -> None:
+def until(holds: Callable[[], bool], seconds: float = 30.0) -> None:
     """Wait until something holds that no page shows."""
     end = time.monotonic() + seconds
     while not holds():

@@ -11,8 +11,9 @@ from typing import Any
 import httpx2
 import pytest
 import uvicorn
+from fastapi import FastAPI
 from fastapi.testclient import TestClient
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, expect, sync_playwright
 
 from parenting.server import runs
 from parenting.server.app import create_app
@@ -24,6 +25,8 @@ from parenting.server.settings import Settings
 from tests.database import migrated
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
+
+expect.set_options(timeout=30_000)  # a busy machine is slow; what does not come, does not come then either
 
 FLAGS = (
     "--no-sandbox",
@@ -47,15 +50,20 @@ def db(settings: Settings) -> Iterator[Database]:
 
 
 @pytest.fixture
-def client(settings: Settings, db: Database) -> Iterator[httpx2.Client]:
-    with TestClient(create_app(settings, db), base_url="http://localhost", follow_redirects=False) as caller:
+def client(site: FastAPI) -> Iterator[httpx2.Client]:
+    with TestClient(site, base_url="http://localhost", follow_redirects=False) as caller:
         yield caller
 
 
 @pytest.fixture
-def address(settings: Settings, db: Database) -> Iterator[str]:
+def site(settings: Settings, db: Database) -> FastAPI:
+    return create_app(settings, db)
+
+
+@pytest.fixture
+def address(site: FastAPI) -> Iterator[str]:
     """The site served at a free port, for a browser."""
-    app = create_app(settings, db)
+    app = site
     listener = bind("127.0.0.1", 0)
     server = Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})

@@ -41,7 +41,7 @@ def free_port() -> int:
         return port
 
 
-def until_up(url: str, seconds: float = 30) -> None:
+def until_up(url: str, seconds: float = 60) -> None:
     """Wait until the server answers."""
     end = time.monotonic() + seconds
     while True:
@@ -57,7 +57,7 @@ class Stream:
     """A browser's tab: an open stream, read in a thread."""
 
     def __init__(self, url: str) -> None:
-        self.events: list[tuple[str, Any, float]] = []
+        self.events: list[tuple[str, Any]] = []
         self.opened, self.ended = threading.Event(), threading.Event()
         self.headers: dict[str, str] = {}
         self._arrived = threading.Condition()
@@ -85,14 +85,14 @@ class Stream:
 
     def _add(self, name: str, data: object) -> None:
         with self._arrived:
-            self.events.append((name, data, time.monotonic()))
+            self.events.append((name, data))
             self._arrived.notify_all()
 
-    def wait_for(self, name: str, count: int = 1, seconds: float = 10) -> list[Any]:
+    def wait_for(self, name: str, count: int = 1, seconds: float = 60) -> list[Any]:
         """The data of the events of that name, once there are `count` of them."""
 
         def found() -> list[Any]:
-            return [data for event, data, _ in self.events if event == name]
+            return [data for event, data in self.events if event == name]
 
         with self._arrived:
             assert self._arrived.wait_for(lambda: len(found()) >= count, seconds), f"{name}: {self.events}"

@@ -64,23 +64,20 @@ def test_stream_begins_with_where_things_are(url: str, mine: Claim, guidance: in
 
 
 def test_question_is_told_when_the_bell_rings(
-    url: str, settings: Settings, db: Database, mine: Claim
+    url: str, settings: Settings, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Nothing is polled meanwhile."""
+    monkeypatch.setattr("parenting.server.streams.POLL_SECONDS", 3600)
     stream = follow(url, mine)
     assert stream.wait_for("question") == [None]
-    notifier, delays = Notifier(settings.data, "web"), []
+    notifier = Notifier(settings.data, "web")
     for tick in range(5):
         query = post_query(db, mine, tick, "guidance", 1, CLIPS)
-        posted = time.monotonic()
         notifier.notify()
         assert stream.wait_for("question", 2 * tick + 2)[-1] == {"id": query, "kind": "guidance"}
-        delays.append(
-            stream.events[-1][2] - posted if stream.events[-1][0] == "question" else time.monotonic() - posted
-        )
         answer(db, query, "left", "a", "human")
         notifier.notify()
         assert stream.wait_for("question", 2 * tick + 3)[-1] is None
-    assert sorted(delays)[2] < POLL_SECONDS / 2, "by the poll alone it would take as long as this on average"
 
 
 def test_question_is_told_without_any_bell(url: str, db: Database, mine: Claim) -> None:
