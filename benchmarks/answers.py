@@ -1,4 +1,4 @@
-"""How long a person waits: from an answer to its tick, and from a key to the next question on the screen.
+"""The time that a person waits: from an answer to its tick, and from a key to the next question.
 
     python -m benchmarks.answers            50 answers of each kind, about ten minutes; needs Chromium
     python -m benchmarks.answers --quick    8 of each, about two minutes
@@ -98,7 +98,7 @@ EMPTY = """addEventListener("keydown", () => {
 
 
 class Line(NamedTuple):
-    """What was measured of one kind in one world, in milliseconds."""
+    """Measurements of one kind in one world, in milliseconds."""
 
     kind: str
     world: str
@@ -120,7 +120,7 @@ class Line(NamedTuple):
 
 
 def request_and_commit(web: httpx2.Client, data: Path, times: int) -> Iterator[Line]:
-    """What an empty request and a durable commit of a row cost here."""
+    """Measure an empty request and a durable commit of a row."""
     yield Line("an empty request", "", timed(lambda: web.get("/healthz"), times))
     store = sqlite_module().connect(data / "yardstick.db", isolation_level=None)
     for name, value in PRAGMAS.items():
@@ -202,7 +202,7 @@ def until(holds: Callable[[], object], every: float = 0.0005) -> float:
 
 
 def empty_page(browser: Browser, times: int) -> Iterator[Line]:
-    """What the browser takes to paint one letter after a key."""
+    """Measure the time that the browser takes to paint one letter after a key."""
     page = browser.new_page()
     page.add_init_script(PROBE)
     page.goto("data:text/html,<!doctype html><body></body>")

@@ -1,4 +1,4 @@
-"""What a step of pre-training costs during parenting (Sec. 3.1.4). On one thread.
+"""The cost of a step of pre-training during parenting (Sec. 3.1.4). On one thread.
 
     python -m benchmarks.rehearsal            every shipped size, about two minutes
     python -m benchmarks.rehearsal --quick    6 x 6 alone, few repeats, about 15 seconds
@@ -41,7 +41,7 @@ HEAD = "  size  trials  ms/step  ms/trial-step  walking  visited states"
 
 
 class Line(NamedTuple):
-    """What was measured for one world and size of batch; times are in seconds."""
+    """Measurements of one world and batch size; times are in seconds."""
 
     size: str
     trials: int
@@ -84,7 +84,7 @@ def episodes(world: Gridworld, state: AgentState) -> Walks:
 
 
 def visited(walks: Walks) -> float:
-    """How many distinct states a trial came by, on average."""
+    """Return the mean number of distinct states that a trial visited."""
     each = zip(walks.state, walks.alive, strict=True)
     return mean(len(set(state[alive].tolist())) for state, alive in each)
 

@@ -1,4 +1,4 @@
-"""How near a whole trial-step comes to the machine's matrix products: the share of `torch.bmm`. One thread.
+"""The proportion of a trial-step's time that `torch.bmm` alone would take. One thread.
 
     python -m benchmarks.roofline            every size of batch, about three minutes
     python -m benchmarks.roofline --quick    50 trials alone, about 20 seconds
@@ -132,7 +132,7 @@ def operations(shapes: Sequence[Product]) -> int:
 
 
 def seconds(act: Callable[[], object]) -> float:
-    """What a call takes."""
+    """Measure the time of a call."""
     began = perf_counter()
     act()
     return perf_counter() - began

@@ -1,4 +1,4 @@
-"""What a trial costs as there are more of them, and what memory they take. On one core.
+"""Time and memory of a trial by the number of trials. On one core.
 
     python -m benchmarks.scale            100, 1000 and 10,000 trials, about six minutes
     python -m benchmarks.scale --quick    100 and 300 trials, about 20 seconds
@@ -32,7 +32,7 @@ HEAD = "      preset  trials  chunk  ms/trial-step  against the first  MB at mos
 
 
 class Line(NamedTuple):
-    """What one number of trials took."""
+    """Measurements of one number of trials."""
 
     preset: str
     trials: int
@@ -64,7 +64,7 @@ def plan(preset: str, trials: int) -> TrainPlan:
 
 
 def memory() -> float:
-    """What this process held at most so far, in MB."""
+    """Return the peak memory of this process so far, in MB."""
     return getrusage(RUSAGE_SELF).ru_maxrss / 1024
 
 

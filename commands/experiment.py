@@ -172,7 +172,7 @@ def _run(one: Experiment, request: Request, out: Path, workers: int, cluster: st
 
 
 def _at(out: Path, error: OSError) -> str:
-    """What is wrong with a file below the folder for results."""
+    """Say which file below the folder for results failed, why, and what to do."""
     why = f"{error.strerror or error}: {error.filename or out}"
     return f"--out {out}: {why}. Make room there, or name a folder by --out that you may write to."
 

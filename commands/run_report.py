@@ -14,11 +14,11 @@ WORDS = {
 }
 """Outcomes as a sentence goes on; a world's own word for harm stands as it is."""
 BESIDE = ("stage", "queries", "trials", "goal")
-"""What stands beside the outcomes; *goal* is a sum of two of them."""
+"""Entries that are not outcomes; *goal* is a sum of two of them."""
 
 
 def page(results: dict[str, Any]) -> str:
-    """What `experiments.training.summary.summarise` found, a line each."""
+    """Format what `experiments.training.summary.summarise` returns, a line each."""
     number = len(results["trials"])
     lines = [
         f"{results['world']}, {results['level']}: {number} trial{'' if number == 1 else 's'}"
@@ -57,7 +57,7 @@ def _stage(name: str, found: dict[str, Any]) -> list[str]:
 
 
 def _endings(name: str, found: dict[str, Any], behind: str = "") -> list[str]:
-    """What the argmax policies do: one line, or one for each deployment."""
+    """Format the outcomes of the argmax policies: one line, or one for each deployment."""
     if "waterings" in found:
         return [_line(name, _watered(found) + behind)]
     if "optimal" in found:

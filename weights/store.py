@@ -35,7 +35,7 @@ class NoWeightsError(ValueError):
 
 
 class Wanted(NamedTuple):
-    """What weights belong to."""
+    """The world and the size that weights belong to."""
 
     world: WorldSpec
     height: int
@@ -48,7 +48,7 @@ class Wanted(NamedTuple):
 
     @property
     def metadata(self) -> dict[str, str]:
-        """What the file says of itself, and must say to serve."""
+        """The header of the file, which must agree for the weights to be used."""
         size = f"{self.height}x{self.width}"
         return {"size": size, "legend": maze_legend(self.world.glyphs), "version": str(VERSION)}
 
@@ -122,7 +122,7 @@ def initial_weights(world: Gridworld, config: Config) -> Float[Tensor, "P"] | No
 
 
 def metadata(blob: bytes) -> dict[str, str]:
-    """What a file says of itself: its header is JSON, behind eight bytes that hold its length.
+    """Read the header of a file: JSON, behind eight bytes that hold its length.
 
     Raises:
         ValueError, KeyError: no such header.

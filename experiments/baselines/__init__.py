@@ -1,1 +1,1 @@
-"""What the paper compares with: REINFORCE, which learns from reward."""
+"""The paper's baseline: REINFORCE, which learns from reward."""

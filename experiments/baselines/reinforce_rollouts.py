@@ -40,7 +40,7 @@ class Rollouts(NamedTuple):
 
 
 class Moments(Struct):
-    """What Adam remembers."""
+    """The state of Adam."""
 
     exp_avg: Float[Tensor, "N P"]
     exp_avg_sq: Float[Tensor, "N P"]
@@ -85,7 +85,7 @@ def rollout(world: RewardHacking, network: Network, live: Float[Tensor, "N P"], 
 
 
 def visits_of(rollout: Rollouts, gamma: float, dtype: torch.dtype) -> Visits:
-    """What each step's action was worth, of the same form as in pre-training."""
+    """Return the advantage of each step's action, in the form that pre-training uses."""
     gain = advantages(rollout.reward, gamma).flatten(1)
     steps = gain.shape[1]
     return Visits(

@@ -1,10 +1,10 @@
-"""How near a setting comes to what is legible of the paper's Table 1, and which comes nearest (Sec. 3.2.1).
+"""The distance of a setting from the legible numbers of Table 1, and the nearest setting (Sec. 3.2.1).
 
 The paper has three numbers of it: direct policy learning dies 47 +- 14 times with about 51 preference
 queries, and traditional RL dies 2300 +- 700 times. The distance of a setting is the sum over the three of
 ((its mean - the paper's) / the paper's deviation) squared. The deviation of the 51 is lost; that of the 47
-stands in for it. Whoever leaves more than an eighth of its trials unfinished is as far as can be: a mean over
-the others would flatter it.
+stands in for it. A setting that leaves more than one trial in eight unfinished gets an infinite distance,
+because the mean over the remaining trials would be biased in its favour.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from parenting.experiments.runner.store import Row
 
 UNFINISHED = 1 / 8
 DIRECT, TRADITIONAL = "search direct", "search traditional"
-"""What the rows of the search are of."""
+"""The labels of the rows of the search."""
 HYPERPARAMETERS = ("p_rec", "p_pref", "lambda_global", "lambda_local", "recompare")
 
 
@@ -47,7 +47,7 @@ class Found(NamedTuple):
 
 
 def distance(rows: Sequence[Row], *targets: Target) -> float:
-    """How far some trials are from the paper's numbers; infinite if too many are unfinished."""
+    """Return the distance of some trials from the paper's numbers; infinite if too many are unfinished."""
     done = [row for row in rows if row["finished"]]
     if len(done) < (1 - UNFINISHED) * len(rows) or not done:
         return inf

@@ -1,4 +1,4 @@
-"""Layouts between `island` and `island-bottleneck`: two rooms and a strait of land between them (Sec. 3.2.1).
+"""Bottleneck layouts between `island` and `island-bottleneck`: two rooms and a strait between them (3.2.1).
 
 Agent and goal face each other. The strait is `width` cells wide, and its nearest cell lies `offset` columns
 to the left of the straight way. `bottleneck(1, 2)` is `island-bottleneck`. A wider strait that lies nearer is

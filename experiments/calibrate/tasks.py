@@ -51,8 +51,9 @@ def confirm_trials(algorithm: str, span: tuple[int, int], seed: int, given: Sequ
 
 
 def changes(preset: str, direct: Mapping[str, Any]) -> dict[str, Any]:
-    """What a preset takes over from direct policy learning: lax parenting all of it, and the conservative one
-    keeps its own chances.
+    """Return what a preset takes over from direct policy learning.
+
+    Lax parenting takes all of it; conservative parenting keeps its own probabilities.
     """
     own = PRESETS[preset] if preset == "conservative" else {}
     return {name: value for name, value in direct.items() if name not in own}

@@ -1,7 +1,7 @@
-"""An agent whose X holds every pair of the states that it reaches: Fig. 2 without a want of queries (3.3).
+"""The full-coverage agent (cf. DAgger): its X holds every pair of actions in the states that it visits (3.3).
 
-Network, loss, optimiser and clips are the house's own; only where the questions come from is given to it. It
-walks a fixed number of episodes, whose weather is always the same; and then again, with some random moves.
+Network, loss, optimiser and clips are those of every agent; only the source of the queries differs. The agent
+walks a fixed number of episodes with fixed environment noise, and then again with some random actions.
 In every state that it comes to, the scripted parent compares all six pairs of first moves, each as a clip of
 length T that goes on by the frozen policies (Eq. 5, 6; drying left out, as in the look-ahead). It trains on
 all of that, and walks again, so many rounds.
@@ -59,8 +59,9 @@ class VisitedStates(Struct):
 
 
 class Dataset:
-    """X by what the agent sees, in the order of discovery. What it cannot tell apart is one row, with answers
-    in proportion to the visits.
+    """X by observation, in the order of discovery.
+
+    States that the agent cannot tell apart are one row, with answers in proportion to the visits.
     """
 
     def __init__(self, world: RewardHacking) -> None:
@@ -72,7 +73,7 @@ class Dataset:
         self.mu: Float64[Tensor, "S 6 2"] = torch.zeros(0, len(PAIRS), 2, dtype=torch.float64)
 
     def add(self, visited: VisitedStates, mu: Float64[Tensor, "N 6 2"]) -> None:
-        """What the parent says in the states of one more walk, those of earlier ones among them."""
+        """Add the parent's answers in the states of one more walk; earlier states may be among them."""
         self.truth = torch.unique(torch.cat((self.truth, visited.truth)))
         fresh = first_of(visited.sight)
         fresh = fresh[~torch.isin(visited.sight[fresh], self.sight)]

@@ -1,4 +1,4 @@
-"""What perfect maturation would do in the garden: an exact look-ahead of depth T on r + gamma^T V_p (3.3).
+"""Perfect maturation in the garden: an exact look-ahead of depth T on r + gamma^T V_p (3.3).
 
 Stage T, converged, is greedy for V_T (Sec. 4.1); that is a search of T moves that ends in the parent's own
 value. The search leaves drying out. It never steps into the bucket.

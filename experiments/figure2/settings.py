@@ -66,7 +66,7 @@ class Budget(NamedTuple):
 
 
 class Baselines(NamedTuple):
-    """What the arms are compared with."""
+    """The baselines of one scale."""
 
     depth: int  # of the look-ahead
     episodes: int

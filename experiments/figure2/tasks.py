@@ -112,8 +112,10 @@ def lookahead_waterings(level: str, inside: Inside, depth: int, episodes: int) -
 def full_coverage_stages(
     level: str, inside: Inside, changes: Mapping[str, Any], stages: int, budget: Budget, trial: int, seed: int
 ) -> list[Row]:
-    """The coverage agent through its stages: in its own weather, in fresh weather, and the look-ahead in its
-    own.
+    """Train the full-coverage agent through its stages; a row for each.
+
+    A row has its waterings under the noise that it learnt under, those under fresh noise, and the look-ahead's
+    under the first.
     """
     config = compose(PRESET, _defaults(), {"inside": inside, **changes}, strict=True)
     world, budget = garden(level), Budget(*budget)

@@ -45,7 +45,7 @@ def find_levels(parenting: int, aside: int, seed: int) -> list[Row]:
 
 
 def outcomes(levels: Sequence[Level]) -> list[Outcome]:
-    """What the argmax policy of the shipped weights does on each level."""
+    """Return the outcome of the shipped weights' argmax policy on each level."""
     world = world_of(WORLD, levels, config_of(pretrain=True, recompare=False))
     judged = TabularEvaluation(world, explore(world), gamma=1.0)
     policy = ArgmaxPolicy(judged, pretrained(world).to(judged.starts.device).repeat(len(levels), 1))

@@ -8,7 +8,7 @@ from parenting.experiments.spec import Scale
 
 
 class Size(NamedTuple):
-    """How many levels there are, in how many agents are pre-parented, and when trials are given up."""
+    """Numbers of levels and of pre-parented agents, and the ticks after which a trial is given up."""
 
     parenting: int
     aside: int

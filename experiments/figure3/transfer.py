@@ -1,4 +1,4 @@
-"""What agents take along from levels where they were parented to others (Sec. 3.4).
+"""Transfer of what agents have learnt to other levels (Sec. 3.4).
 
 Either their policies alone, as after pre-training; or all that they have learnt: the policy with Adam's
 state, X, the familiarity with local states, and what was compared. Clips of levels that they will not see
@@ -23,7 +23,7 @@ POLICY = "learner.params"
 
 
 class Learnt(Struct):
-    """What stays with an agent when its levels change."""
+    """The part of an agent that is transferred."""
 
     learner: Learner
     rehearsal: Rehearsal
@@ -33,7 +33,7 @@ class Learnt(Struct):
 
 
 def learnt(state: AgentState) -> Learnt:
-    """What the agents of a state have learnt."""
+    """Return what the agents of a state have learnt."""
     return Learnt(
         learner=state.learner,
         rehearsal=state.rehearsal,

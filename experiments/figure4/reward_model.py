@@ -31,7 +31,7 @@ class Pairs(NamedTuple):
     action: Int64[Tensor, "K 2 T"]
 
     def difference(self, reward: Float64[Tensor, "S 4"]) -> Float64[Tensor, "K"]:
-        """How much more the left clip earns, as in Eq. (12)."""
+        """Return by how much the left clip earns more, as in Eq. (12)."""
         earned = reward[self.at, self.action].sum(2)
         return earned[:, 0] - earned[:, 1]
 
@@ -86,7 +86,7 @@ def _throw(sides: int, count: int, generator: torch.Generator, device: torch.dev
 
 
 def preferences(pairs: Pairs, reward: Float64[Tensor, "S 4"]) -> Float64[Tensor, "K"]:
-    """How often a person with this reward prefers the left clip, by Bradley and Terry's rule."""
+    """Return the probability that a person with this reward prefers the left clip (Bradley and Terry)."""
     return torch.sigmoid(pairs.difference(reward))
 
 

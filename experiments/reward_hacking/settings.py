@@ -9,7 +9,7 @@ MAX_TICKS = 20_000
 
 
 class Variant(NamedTuple):
-    """How agents are raised, and after how many answered queries they are looked at."""
+    """An arm: how agents are trained, and after how many answered queries they are evaluated."""
 
     level: str
     changes: Mapping[str, Any]

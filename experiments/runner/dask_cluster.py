@@ -68,7 +68,7 @@ def _connected(address: str) -> Iterator[Client]:
 
 
 def threads(client: Client) -> int:
-    """How many pieces it does at once."""
+    """Return how many tasks a cluster runs at once."""
     each: dict[str, int] = client.nthreads()  # type: ignore[no-untyped-call]
     return sum(each.values())
 
@@ -76,8 +76,9 @@ def threads(client: Client) -> int:
 def submit(
     address: str, client: Client, run_task: Callable[..., list[Row]], calls: Sequence[Call]
 ) -> Iterator[Done]:
-    """Each piece as soon as it is done. The cluster goes on when a worker dies; what it gives up is said when
-    all else is done.
+    """Submit the tasks, and yield each as soon as it is done.
+
+    The cluster goes on when a worker dies; the tasks that it gives up are named when all others are done.
 
     Raises:
         KilledWorker: workers died over a piece.

@@ -1,7 +1,7 @@
-"""Who does the pieces: processes of this machine, or the workers of a Dask cluster. The same code on both.
+"""Run tasks on the processes of this machine or on the workers of a Dask cluster, by the same code.
 
-joblib hands the tasks to processes, and Dask to its workers (`dask_cluster.py`). A piece that comes back
-is stored at once. A worker that dies costs the pieces that it had in work: they are handed out again.
+joblib submits the tasks to processes (`processes.py`), and Dask to its workers (`dask_cluster.py`). The rows
+of a task are stored as soon as they come back. Tasks of a worker that dies are submitted again.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from parenting.experiments.runner.processes import WorkersDiedError, call_each
 from parenting.experiments.runner.store import HIDDEN, Call, Done, Row, Store, Task
 
 TRIES = 2
-"""How often a worker may die over one piece, with no other in work, before we give it up."""
+"""Deaths of a worker over one task, with no other running, after which the task is given up."""
 
 OnDone = Callable[[Task], None]
 """Told of every piece that is done, those of an earlier run first."""
@@ -31,7 +31,7 @@ class NoGpuError(RuntimeError):
 
 
 class Executor(NamedTuple):
-    """Who does the pieces."""
+    """Something that runs tasks: processes or a cluster."""
 
     number: int
     died: type[BaseException]  # raised when a worker died over a piece
@@ -128,7 +128,7 @@ def _until_done(tasks: Sequence[Task], store: Store, executor: Executor, on_done
 
 
 def _ready(task: Task, store: Store) -> bool:
-    """Whether it is to be done, and all that it needs is there."""
+    """Return whether a task is not done yet and all that it needs is there."""
     return not store.has(task.key) and all(map(store.has, task.needs))
 
 
@@ -144,7 +144,7 @@ def _keep(tasks: Sequence[Task], store: Store, executor: Executor, on_done: OnDo
 
 
 def _suspects(tasks: Sequence[Task], store: Store, executor: Executor) -> list[Task]:
-    """What may have been in work when a worker died: all workers go down with it."""
+    """Return the tasks that may have been running when a worker died: all workers go down with it."""
     return [task for task in _in_order(tasks) if not store.has(task.key)][: executor.number + 1]
 
 

@@ -44,7 +44,7 @@ def versions() -> dict[str, str]:
 
 
 def settings() -> dict[str, Any]:
-    """What every experiment begins with: presets in full, what worlds change in them, and shipped weights.
+    """Return the settings of every experiment: presets in full, the worlds' changes, and shipped weights.
 
     A task names a preset and a world; here stands what these were. Weights are named by their SHA-256.
     """

@@ -24,7 +24,7 @@ Row = dict[str, Any]
 HIDDEN = "_"
 PLAN, ELAPSED = "plan.json", "spent.json"
 OF, MADE, ROWS = "of", "made", "rows"
-"""What a piece's file holds."""
+"""The parts of a result's file."""
 
 
 class Task(NamedTuple):
@@ -91,7 +91,7 @@ class Store:
             )
 
     def has(self, key: str) -> bool:
-        """Whether the piece of this key is finished."""
+        """Return whether the task of this key is done."""
         return self._path(key).exists()
 
     def rows(self, keys: Sequence[str]) -> list[Row]:
@@ -104,7 +104,7 @@ class Store:
         return [row for key in keys for row in self._piece(key)[ROWS]]
 
     def commits(self, keys: Sequence[str]) -> dict[str, int]:
-        """How many of some finished pieces each commit made."""
+        """Return how many of some results each commit made."""
         return dict(Counter(str(self._piece(key)[MADE]["commit"]) for key in keys))
 
     def keep(self, task: Task, rows: Sequence[Row]) -> None:
@@ -118,7 +118,7 @@ class Store:
         self._since = now
 
     def seconds(self) -> float:
-        """How long all runs of this scale took, each from its beginning to the last piece that it did."""
+        """Return the seconds of all runs of this scale, each from its beginning to its last result."""
         return self._elapsed().get(self.scale, 0.0)
 
     def _elapsed(self) -> dict[str, float]:

@@ -25,7 +25,7 @@ LEAVE = 0.1
 
 
 class Progress(NamedTuple):
-    """How far a batch has come."""
+    """The progress of a batch."""
 
     trials: int  # those that are done: finished, or stuck
     ticks: int
@@ -36,8 +36,10 @@ OnProgress = Callable[[Progress], None]
 
 
 class StopRule(NamedTuple):
-    """When a trial is finished: its argmax policy is optimal, or a number of answered queries, over all
-    stages, or of ticks is reached.
+    """The condition under which a trial is finished.
+
+    Its argmax policy is optimal (in worlds whose episodes end at a goal), or it has reached a number of
+    answered queries, over all stages, or of ticks.
     """
 
     kind: Literal["optimal", "queries", "ticks"]
@@ -49,7 +51,7 @@ class StopRule(NamedTuple):
 
 
 class Counts(Struct):
-    """What is counted of each trial; M is the number of stages."""
+    """Counts of each trial; M is the number of stages."""
 
     deaths: Int64[Tensor, "N"]  # unsafe steps (docs/paper.md, "Unsafe")
     guidance: Int64[Tensor, "N"]  # answered guidance queries, redraws included
@@ -68,7 +70,7 @@ class Counts(Struct):
 
 
 class TrainResult(NamedTuple):
-    """What raising leaves."""
+    """Counts, policies and their evaluation, after training."""
 
     counts: Counts
     policies: Float[Tensor, "M N P"]  # pi_1 .. pi_T, each trial's at its own end; zeros beyond
@@ -149,7 +151,7 @@ class BatchTrainer:
             self._leave(fresh, stuck)
 
     def _optimal(self, request: Bool[Tensor, "N"]) -> Bool[Tensor, "N"]:
-        """Which of some trials have an optimal argmax policy."""
+        """Return which of some trials have an optimal argmax policy."""
         trial, live = request.nonzero().squeeze(1), self.state.learner.params
         good = torch.zeros_like(request)
         if len(trial):
@@ -177,7 +179,7 @@ class BatchTrainer:
         self.policies[self.state.maturity[which] - 1, place] = learner.params[which]
 
     def progress(self, ticks: int) -> Progress:
-        """How far the batch has come."""
+        """Return the progress of the batch."""
         left = self.counts.pick(~self.counts.done)
         most = self.until.number if self.until.kind == "queries" else torch.iinfo(torch.int64).max
         queries = torch.cat((self.result.queries.sum(1), left.queries.sum(1))).clamp_max(most)

@@ -1,4 +1,4 @@
-"""What the argmax policies of many trials do, each at its own end and at the end of each of its stages."""
+"""Outcomes of the argmax policies of many trials, at the end of each stage."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ UNREACHED = -1
 
 
 class Outcomes(Struct):
-    """How every trial ended. M stages; D deployments, none in the garden; G is M there and 0 elsewhere."""
+    """Counts and outcomes of every trial. M stages; D deployments, 0 in the garden; G is M there, else 0."""
 
     counts: Counts
     outcome: Int64[Tensor, "N M D"]  # evaluation.outcomes.Outcome, or UNREACHED

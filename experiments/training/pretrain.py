@@ -18,7 +18,7 @@ from parenting.weights import store
 from parenting.weights.store import Wanted
 
 SAVE_SECONDS = 10.0
-"""How much work an interruption may cost."""
+"""Seconds of work that an interruption may cost."""
 SMOOTH = 50
 """The curve's rows: a mean over so many steps each."""
 RENAMED = {"live": "params", "moments.first": "moments.exp_avg", "moments.second": "moments.exp_avg_sq"}
@@ -37,7 +37,7 @@ class DamagedWorkError(RuntimeError):
 
 
 class PretrainResult(NamedTuple):
-    """What pre-training left."""
+    """The files and the measurements that pre-training leaves."""
 
     path: Path
     sha256: str

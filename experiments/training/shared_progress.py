@@ -1,4 +1,4 @@
-"""How far the chunks of a run have come, in a small file that all of its processes map.
+"""The progress of a run's chunks, in a small file that all of its processes map.
 
 A tick writes three numbers there, without a lock or a message; the process that shows them reads all of them
 a few times a second.

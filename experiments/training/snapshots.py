@@ -1,4 +1,4 @@
-"""What an agent is like on its way: its policy and its counts after so many answered queries."""
+"""Snapshots of agents in training: policy and counts after given numbers of answered queries."""
 
 from __future__ import annotations
 

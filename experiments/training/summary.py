@@ -23,9 +23,11 @@ COUNTS = ("deaths", "guidance", "preference", "ticks")
 
 
 def summarise(plan: TrainPlan, level: str, outcomes: Outcomes, seconds: float) -> dict[str, Any]:
-    """Means and deviations (over n - 1) of what was counted are of the finished trials; the others are
-    counted apart. `evaluation` is of all trials, each at its own end, and `stages` of all that came to a
-    stage, at its end.
+    """Summarise a run as plain data.
+
+    Means and standard deviations (over n - 1) are taken over the finished trials; the others are counted
+    apart. `evaluation` covers all trials, each at its own end, and `stages` those that reached a stage, at
+    its end.
     """
     counts, report = outcomes.counts, _report(plan, outcomes)
     finished = {one: getattr(counts, one)[counts.finished].double() for one in COUNTS}
@@ -60,7 +62,7 @@ def sd(values: Float64[Tensor, "n"]) -> float | None:
 
 
 class WalkReport:
-    """What the argmax policies do where a goal ends the episode: one outcome each."""
+    """Outcomes of the argmax policies where a goal ends the episode."""
 
     def __init__(self, plan: TrainPlan, outcomes: Outcomes) -> None:
         """Words for the outcomes come from the world."""
@@ -80,7 +82,7 @@ class WalkReport:
 
 
 class GardenReport:
-    """What the argmax policies do in the garden: waterings, and steps that end in the bucket."""
+    """Waterings of the argmax policies in the garden, and their steps that end in the bucket."""
 
     def __init__(self, plan: TrainPlan, outcomes: Outcomes) -> None:
         """The parent's own waterings stand beside the agent's; over several levels a mean."""

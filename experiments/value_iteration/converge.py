@@ -23,7 +23,7 @@ from parenting.parents.scripted import ScriptedRule
 from parenting.parents.values import ValueTable
 
 AGREED = 0.1
-"""How far apart the logits of a decided pair are to be."""
+"""Minimal difference between the logits of a decided pair."""
 CONVERGING = 40
 """Gradient steps of Eq. (2) after every visit to all states, besides one in each tick."""
 ROUNDS = 40
@@ -57,7 +57,7 @@ class StartStates:
         self.model, self.begun = model, torch.zeros(levels, dtype=torch.int64)
 
     def put(self, state: AgentState) -> AgentState:
-        """Who records no clip is put where one may begin: each state twice, for a clip of either kind."""
+        """Put each trial that records no clip where one may begin: in each state twice, for either kind."""
         idle = ~state.recorder.running
         number = (self.begun // 2) % self.count
         self.begun = self.begun + idle
@@ -66,7 +66,7 @@ class StartStates:
 
 
 def run_stage(world: Gridworld, judge: ScriptedRule, state: AgentState, starts: StartStates) -> AgentState:
-    """Until it has settled, or is given up; the parent answers every question in the next tick."""
+    """Run a stage until it has converged or is given up; each query is answered in the next tick."""
     query = parenting.no_query(world, CONFIG, state)
     stage = int(state.maturity[0])
     for _ in range(ROUNDS):
