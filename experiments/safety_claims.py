@@ -71,7 +71,7 @@ class Claim(NamedTuple):
         return {**VARIANTS, **self.more}
 
     def config(self, request: Request) -> Mapping[str, Any]:
-        """All that the pieces depend on."""
+        """Return all that the results depend on."""
         return {
             "world": self.world,
             "level": self.level,

@@ -46,7 +46,7 @@ class Experiment:
     section: str  # of the paper
     claim: str  # what the paper says, in a sentence of ours
     trials: Mapping[Scale, int]
-    config: Callable[[Request], Mapping[str, Any]]  # all that its pieces depend on beside the code
+    config: Callable[[Request], Mapping[str, Any]]  # all that its results depend on besides the code
     tasks: Callable[[Request], Sequence[Task]]
     report: Callable[[Request, Sequence[Row]], Results]
 

@@ -1,4 +1,4 @@
-"""The pieces of Fig. 2 (Sec. 3.3): lives through the stages, and the lines that they are held against.
+"""Tasks of Figure 2 (Sec. 3.3): agents through their stages, and the baselines beside them.
 
 A row says what one policy waters, on the mean over short episodes from the start, and how many of their steps
 end in the bucket. What is learnt, but for the coverage agent, is looked at in EPISODES of them; all others in
@@ -114,7 +114,7 @@ def full_coverage_stages(
 ) -> list[Row]:
     """Train the full-coverage agent through its stages; a row for each.
 
-    A row has its waterings under the noise that it learnt under, those under fresh noise, and the look-ahead's
+    A row has its waterings under the noise of its training, those under fresh noise, and the look-ahead's
     under the first.
     """
     config = compose(PRESET, _defaults(), {"inside": inside, **changes}, strict=True)

@@ -1,6 +1,6 @@
 """The levels of Figure 3: random ones that only moving the box solves, and the pre-trained agent does not.
 
-Each is written as a row of plain data, so that other pieces and the report read them from there.
+Each is written as a row of plain data, so that other tasks and the report read them from there.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The workers of a Dask cluster: who they are by an address, and how pieces are handed out to them.
+"""The workers of a Dask cluster: who they are by an address, and how tasks are submitted to them.
 
 A cluster hands out again by itself what a worker had that died. (joblib's own way to Dask waits for ever for
-a piece whose worker was killed.)
+a task whose worker was killed.)
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def submit(
     The cluster goes on when a worker dies; the tasks that it gives up are named when all others are done.
 
     Raises:
-        KilledWorker: workers died over a piece.
+        KilledWorker: workers died over a task.
         NoClusterError: the scheduler is gone.
     """
     from dask.distributed import KilledWorker, as_completed

@@ -23,7 +23,7 @@ TRIES = 2
 """Deaths of a worker over one task, with no other running, after which the task is given up."""
 
 OnDone = Callable[[Task], None]
-"""Told of every piece that is done, those of an earlier run first."""
+"""Called with every task that is done, those of an earlier run first."""
 
 
 class NoGpuError(RuntimeError):
@@ -34,8 +34,8 @@ class Executor(NamedTuple):
     """Something that runs tasks: processes or a cluster."""
 
     number: int
-    died: type[BaseException]  # raised when a worker died over a piece
-    out: Callable[[Sequence[Call]], Iterator[Done]]  # hands pieces out, and gives each back once it is done
+    died: type[BaseException]  # raised when a worker died over a task
+    out: Callable[[Sequence[Call]], Iterator[Done]]  # submits tasks, and yields each once it is done
 
 
 def check_workers(device: str, cluster: str | None) -> None:
@@ -66,9 +66,9 @@ def check_device(device: str) -> None:
 
 
 def run_task(task: Task, given: Sequence[Row] = ()) -> list[Row]:
-    """Do one piece in this process, with all its tensors on the task's device.
+    """Run one task in this process, with all its tensors on the task's device.
 
-    `given` are the rows of the pieces that it needs.
+    `given` are the rows of the tasks that it needs.
 
     Raises:
         NoGpuError: this machine has not the task's device.
@@ -90,7 +90,7 @@ def work(
     cluster: str | None = None,
     on_done: OnDone = lambda _task: None,
 ) -> list[Row]:
-    """Do what is not done yet, and return the rows of all pieces in the order of the tasks, less HIDDEN ones.
+    """Run the tasks that are not done yet; return the rows of all, in their order, without HIDDEN columns.
 
     `cluster` is the address of a Dask scheduler.
 
@@ -98,9 +98,9 @@ def work(
         WorkersDiedError: see there; what was done is stored.
         NoGpuError: a worker has not the device of its task.
         NoClusterError: the cluster does not answer, or has no worker, or is gone.
-        PlanMismatchError: a piece of the same name is of another task.
-        CorruptResultError: a stored piece cannot be read.
-        OSError: a piece cannot be stored; or one is needed that no task makes.
+        PlanMismatchError: a stored result of the same name is of another task.
+        CorruptResultError: a stored result cannot be read.
+        OSError: a result cannot be stored; or one is needed that no task makes.
     """
     store.expect(tasks)
     for task in tasks:
@@ -118,12 +118,12 @@ def _shown(row: Row) -> Row:
 def _until_done(tasks: Sequence[Task], store: Store, executor: Executor, on_done: OnDone) -> None:
     fatal: list[Task] = []
     while left := [task for task in tasks if task not in fatal and _ready(task, store)]:
-        if not _keep(left, store, executor, on_done):
+        if not _put(left, store, executor, on_done):
             fatal += _fatal(_suspects(left, store, executor), store, executor, on_done)
     if fatal:
         raise WorkersDiedError(
             f"Worker processes died {TRIES} times over {', '.join(task.key for task in fatal)}. "
-            "Memory may be short. Take fewer workers; all other pieces that can be are done and stored."
+            "Memory may be short. Take fewer workers; all other tasks that could be are done and stored."
         )
 
 
@@ -132,11 +132,11 @@ def _ready(task: Task, store: Store) -> bool:
     return not store.has(task.key) and all(map(store.has, task.needs))
 
 
-def _keep(tasks: Sequence[Task], store: Store, executor: Executor, on_done: OnDone) -> bool:
-    """Store each piece as it comes back; whether all workers lived."""
+def _put(tasks: Sequence[Task], store: Store, executor: Executor, on_done: OnDone) -> bool:
+    """Store each result as it comes back; return whether all workers lived."""
     try:
         for task, rows in _submit(tasks, store, executor):
-            store.keep(task, rows)
+            store.put(task, rows)
             on_done(task)
     except executor.died:
         return False
@@ -149,14 +149,14 @@ def _suspects(tasks: Sequence[Task], store: Store, executor: Executor) -> list[T
 
 
 def _fatal(suspects: Sequence[Task], store: Store, executor: Executor, on_done: OnDone) -> list[Task]:
-    """Do the suspects one at a time, so that a death falls on its own piece; return those that always die."""
+    """Run the suspects one at a time, so that a death falls on its own task; return those that always die."""
     return [
-        task for task in suspects if not any(_keep([task], store, executor, on_done) for _try in range(TRIES))
+        task for task in suspects if not any(_put([task], store, executor, on_done) for _try in range(TRIES))
     ]
 
 
 def _in_order(tasks: Sequence[Task]) -> list[Task]:
-    """The dear ones first, so that none is left over at the end."""
+    """Sort the most expensive first, so that none is left over at the end."""
     return sorted(tasks, key=lambda task: -task.cost)
 
 

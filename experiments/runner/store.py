@@ -1,8 +1,8 @@
-"""An experiment's work in pieces, each stored as soon as it is done: a kill costs the pieces in work alone.
+"""The results of an experiment's tasks, each stored at once: a kill costs only the tasks that were running.
 
-A piece is rows of plain data, one for each trial as a rule. What a piece holds depends on its task alone, not
-on who did it, when, or beside which others; seconds that it took are the one exception. A file says of which
-task it is, and by which commit and versions it was made.
+A result is rows of plain data, as a rule one for each trial. It depends on its task alone, not on the process
+that ran it, the time, or the other tasks; the seconds that it took are the one exception. A file names its
+task, and the commit and versions that made it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from parenting.experiments.runner import provenance
 from parenting.experiments.runner.aliases import before
 
 Row = dict[str, Any]
-"""Name -> number, word, truth value or null. A name that begins with HIDDEN is for other pieces alone."""
+"""Name -> number, word, truth value or null. A name that begins with HIDDEN is for other tasks alone."""
 HIDDEN = "_"
 PLAN, ELAPSED = "plan.json", "spent.json"
 OF, MADE, ROWS = "of", "made", "rows"
@@ -28,18 +28,18 @@ OF, MADE, ROWS = "of", "made", "rows"
 
 
 class Task(NamedTuple):
-    """One piece of work: a function by its name, and what it is called with. Plain data, for any machine."""
+    """A function by its name, and the arguments of its call. Plain data, for any machine."""
 
-    key: str  # names the piece and its file
+    key: str  # names the result and its file
     call: str  # "module:function"; the function takes the arguments by name and returns rows
     arguments: dict[str, Any]
-    cost: float = 1.0  # of the whole work, against other tasks, for the time left
-    device: str = "cpu"  # where its tensors are to be
-    needs: tuple[str, ...] = ()  # keys of pieces to be done before; the function takes their rows as `given`
+    cost: float = 1.0  # relative to other tasks, for the time left
+    device: str = "cpu"  # of its tensors
+    needs: tuple[str, ...] = ()  # keys of tasks whose rows the function takes as `given`
 
 
 Call = tuple[Task, Sequence[Row]]
-"""A task, and the rows of the pieces that it needs."""
+"""A task, and the rows of the tasks that it needs."""
 Done = tuple[Task, list[Row]]
 
 
@@ -48,19 +48,19 @@ class CorruptResultError(ValueError):
 
 
 class PlanMismatchError(ValueError):
-    """The folder holds pieces of something else; the sentence says what differs and what to do."""
+    """The folder holds results of something else; the sentence says what differs and what to do."""
 
 
 class Store:
-    """The pieces of one experiment in a folder."""
+    """The task results of one experiment in a folder."""
 
     def __init__(self, folder: Path, plan: Mapping[str, Any], scale: str = "paper") -> None:
-        """Open a folder, or make it. `plan` is all that pieces depend on beside their tasks.
+        """Open a folder, or make it. `plan` is all that results depend on besides their tasks.
 
         Time is counted for each `scale` by itself.
 
         Raises:
-            PlanMismatchError: the folder's pieces belong to another plan.
+            PlanMismatchError: the folder's results belong to another plan.
             CorruptResultError: its plan cannot be read.
             OSError: the folder cannot be made or read.
         """
@@ -75,18 +75,18 @@ class Store:
         _same(folder, _read(path), wanted)
 
     def expect(self, tasks: Sequence[Task]) -> None:
-        """Say which tasks pieces are of.
+        """Name the tasks whose results are wanted.
 
         Raises:
-            PlanMismatchError: a finished piece of the same name is of another task.
+            PlanMismatchError: a stored result of the same name is of another task.
             CorruptResultError: one cannot be read.
         """
         self._of, older = described(tasks), described(tasks, before)
         done = [task.key for task in tasks if self.has(task.key)]
-        other = [key for key in done if self._piece(key)[OF] not in (self._of[key], older[key])]
+        other = [key for key in done if self._result(key)[OF] not in (self._of[key], older[key])]
         if other:
             raise PlanMismatchError(
-                f"{', '.join(other)}: these pieces in {self.folder} are of other tasks than now. "
+                f"{', '.join(other)}: these results in {self.folder} are of other tasks. "
                 "Name another folder by --out, or remove them."
             )
 
@@ -95,20 +95,20 @@ class Store:
         return self._path(key).exists()
 
     def rows(self, keys: Sequence[str]) -> list[Row]:
-        """The rows of finished pieces.
+        """Return the rows of stored results.
 
         Raises:
             FileNotFoundError: one is not done.
             CorruptResultError: one cannot be read.
         """
-        return [row for key in keys for row in self._piece(key)[ROWS]]
+        return [row for key in keys for row in self._result(key)[ROWS]]
 
     def commits(self, keys: Sequence[str]) -> dict[str, int]:
         """Return how many of some results each commit made."""
-        return dict(Counter(str(self._piece(key)[MADE]["commit"]) for key in keys))
+        return dict(Counter(str(self._result(key)[MADE]["commit"]) for key in keys))
 
-    def keep(self, task: Task, rows: Sequence[Row]) -> None:
-        """Store a finished piece of an expected task, whole or not at all."""
+    def put(self, task: Task, rows: Sequence[Row]) -> None:
+        """Store the result of an expected task, whole or not at all."""
         made = {"commit": provenance.commit(), **provenance.versions()}
         _write(self._path(task.key), {OF: self._of[task.key], MADE: made, ROWS: list(rows)})
         now, elapsed = monotonic(), self._elapsed()
@@ -125,7 +125,7 @@ class Store:
         path = self.folder / ELAPSED
         return _read(path) if path.exists() else {}
 
-    def _piece(self, key: str) -> dict[str, Any]:
+    def _result(self, key: str) -> dict[str, Any]:
         return _read(self._path(key), OF, MADE, ROWS)
 
     def _path(self, key: str) -> Path:
@@ -133,9 +133,10 @@ class Store:
 
 
 def described(tasks: Sequence[Task], words: Callable[[Any], Any] = lambda said: said) -> dict[str, Any]:
-    """Key -> what a piece is of, as plain data: what is called with what, where, and what it needs.
+    """Describe tasks as plain data by their keys: call, arguments, device, and needed tasks.
 
-    A needed piece stands there by the digest of what it is of; so a change of it reaches all that need it.
+    A needed task stands there by the digest of its description, so a change of it reaches all that need it.
+    `words` translates each description, as `aliases.before` does.
     """
     by_key = {task.key: task for task in tasks}
     found: dict[str, Any] = {}
@@ -185,7 +186,7 @@ def _same(folder: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> 
     differs = min((list(_differences(found, words)) for words in (wanted, before(wanted))), key=len)
     if differs:
         raise PlanMismatchError(
-            f"{folder} holds pieces of another plan: {', '.join(differs)}. "
+            f"{folder} holds results of another plan: {', '.join(differs)}. "
             "Name another folder by --out, or remove this one."
         )
 

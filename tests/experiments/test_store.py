@@ -93,7 +93,7 @@ def test_a_piece_of_another_task_is_refused(store: Store) -> None:
     needed = Task("one", f"{__name__}:heavy", {"first": 1})
     work([both, needed], store, 1)
     work([both, needed], store, 1)
-    with pytest.raises(PlanMismatchError, match=r"^both: these pieces in .* or remove them\."):
+    with pytest.raises(PlanMismatchError, match=r"^both: these results in .* or remove them\."):
         work([both._replace(arguments={"and_": 2}), needed], store, 1)
     (store.folder / "one.json").unlink()
     with pytest.raises(PlanMismatchError, match=r"^both: "):
@@ -133,7 +133,7 @@ def test_the_time_of_all_runs_counts(store: Store, monkeypatch: pytest.MonkeyPat
     for first, scale in ((1, "paper"), (2, "paper"), (3, "quick")):
         again = Store(store.folder, PLAN, scale)
         again.expect([task(first)])
-        again.keep(task(first), [])
+        again.put(task(first), [])
         assert again.seconds() == {1: 5, 2: 12, 3: 3}[first]
 
 
@@ -150,7 +150,7 @@ def test_another_plan_is_refused(store: Store) -> None:
 def test_numbers_that_are_none_are_refused(store: Store) -> None:
     store.expect([task(1)])
     with pytest.raises(ValueError, match="JSON"):
-        store.keep(task(1), [{"sum": float("nan")}])
+        store.put(task(1), [{"sum": float("nan")}])
     assert not store.has("piece-1")
     assert json.loads((store.folder / "plan.json").read_text()) == PLAN
 
