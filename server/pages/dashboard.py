@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fastapi import APIRouter, Response
+from fastapi.responses import JSONResponse
 
 from parenting.server import operator_events, runs
 from parenting.server.api.bodies import RunId
@@ -15,12 +16,12 @@ from parenting.server.deps import Db
 from parenting.server.pages.labels import MetricLabels, describe_start, metric_labels
 from parenting.server.pages.operator_log import PROBABILITIES, log_entries, probabilities
 from parenting.server.pages.render import format_number, page
-from parenting.server.pages.stages import stage_rows
+from parenting.server.pages.stages import StageRow, stage_rows
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, run_title
-from parenting.server.reads.metrics import first_metrics, sampled_metrics
+from parenting.server.reads.metrics import first_metrics, latest_metrics, sampled_metrics
 from parenting.server.schemas import run_schema
 from parenting.server.security import policy
-from parenting.server.tables import Run
+from parenting.server.tables import Metric, Run
 
 router = APIRouter(include_in_schema=False)
 
@@ -61,6 +62,13 @@ HEADS = {"size": "entries", "entropy_global": "entropy global", "entropy_local":
 def dashboard(run_id: RunId, db: Db) -> Response:
     """The page."""
     return dashboard_page(db, run_id, {}, {})
+
+
+@router.get("/runs/{run_id}/stages")
+def stages(run_id: RunId, db: Db) -> Response:
+    """The table of stages as JSON, for the page's script."""
+    rows = _stages(db, runs.get_run(db, run_id), next(iter(latest_metrics(db, [run_id]).values()), None))
+    return JSONResponse([row._asdict() for row in rows], headers={"Cache-Control": "no-store"})
 
 
 def dashboard_page(
@@ -108,8 +116,12 @@ def _numbers(db: Database, run: Run) -> dict[str, object]:
         "columns": [(column, _head(column, names)) for column in COLUMNS],
         "rows": rows,
         "last": last.values if last else {},
-        "stages": stage_rows(count, run.maturity, first_metrics(db, run.id), last),
+        "stages": _stages(db, run, last),
     }
+
+
+def _stages(db: Database, run: Run, last: Metric | None) -> list[StageRow]:
+    return stage_rows(run.config["stages"], run.maturity, first_metrics(db, run.id), last)
 
 
 def _operator(db: Database, run: Run, typed: Mapping[str, str]) -> dict[str, object]:

@@ -1,4 +1,7 @@
-"""What happened in each stage of maturation, from the metrics: cumulative counts become those of a stage."""
+"""Compute the table of stages (Sec. 2.4) from the metrics: cumulative counts become those of each stage.
+
+The page and its script (web/static/dashboard.js) show these rows and compute none of their own.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ Values = Mapping[str, Number]
 
 
 class StageRow(NamedTuple):
-    """One row of the table; None where nothing is known yet. web/static/dashboard.js makes the same."""
+    """One row of the table; None where nothing is known yet."""
 
     number: int  # T, the length of its clips
     when: str  # past, now or later
@@ -20,13 +23,13 @@ class StageRow(NamedTuple):
     end: int | None  # the tick at which it ended, or the last one measured
     guidance: Number
     preference: Number
-    harm: Number
-    worth: Number  # what its policy came to at its end, or comes to now
-    line: Number  # what that is held against
+    unsafe: Number
+    value: Number  # the return of its policy at its end, or now
+    reference: Number  # the value that it is compared with
 
 
 def stage_rows(count: int, now: int, firsts: Sequence[Metric], last: Metric | None) -> list[StageRow]:
-    """A row for each of `count` stages, `now` being the one that the agent is in.
+    """Return a row for each of `count` stages, `now` being the one that the agent is in.
 
     `firsts` are the first metrics of each stage. The tick that ends a stage is measured, and says that it is
     the next one's: so it holds what the stage before ended with.
@@ -46,9 +49,9 @@ def stage_rows(count: int, now: int, firsts: Sequence[Metric], last: Metric | No
 
 
 def _within(before: Values, after: Values) -> tuple[Number, Number, Number, Number, Number]:
-    """What was counted between two ticks, and what the policy comes to at the later one."""
-    guidance, preference, harm = (
+    """Return what was counted between two ticks, and the policy's value at the later one."""
+    guidance, preference, unsafe = (
         None if (known := after.get(name)) is None else known - (before.get(name) or 0)
         for name in ("guidance", "preference", "deaths")
     )
-    return guidance, preference, harm, after.get("return"), after.get("optimal_return")
+    return guidance, preference, unsafe, after.get("return"), after.get("optimal_return")

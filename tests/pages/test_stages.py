@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import httpx2
 import pytest
 
 from parenting.server.db import Database
@@ -62,3 +63,28 @@ def test_counts_are_those_of_the_stage_alone(db: Database, mine: Claim) -> None:
 
 def test_nothing_is_known_before_the_first_metrics(db: Database, mine: Claim) -> None:
     assert stage_rows(1, 1, first_metrics(db, mine.run_id), None) == [StageRow(1, "now", *[None] * 7)]
+
+
+@pytest.mark.parametrize(
+    "begins",
+    [[0], [7], [3, 4], [0, 1, 2, 3], [5, 900], [2, 3, 998, 999], [0, 500, 501, 502, 999]],
+)
+def test_the_first_metrics_of_each_stage_are_found_wherever_it_begins(
+    db: Database, mine: Claim, begins: list[int]
+) -> None:
+    """Also where ticks are missing: a paused worker measures nothing."""
+    ticks = [tick for tick in range(begins[0], 1000) if tick % 7 or tick in begins]
+    rows = {tick: {"maturity": sum(begin <= tick for begin in begins)} for tick in ticks}
+    write_metrics(db, mine, rows)
+    assert [row.tick for row in first_metrics(db, mine.run_id)] == begins
+
+
+def test_the_script_gets_the_rows_of_the_page(client: httpx2.Client, db: Database, mine: Claim) -> None:
+    fixtures.measure(db, mine, 30)
+    (row,) = client.get("/runs/1/stages").json()
+    assert (row["number"], row["when"], row["begin"], row["end"]) == (1, "now", 0, 30)
+    assert (row["guidance"], row["preference"], row["unsafe"]) == (30, 6, 2)
+    table = client.get("/runs/1").text.partition('<tr data-stage="1"')[2].partition("</tr>")[0]
+    for value in (row["value"], row["reference"]):
+        assert f"<td>{value:.4g}</td>" in table
+    assert client.get("/runs/7/stages").status_code == 404

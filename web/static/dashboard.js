@@ -13,10 +13,10 @@ const SERIES = {
   entropy: [["entropy_global", "global head"], ["entropy_local", "local head"]],
   size: [["rows", "distinct rows"], ["size", "entries"]],
 };
-const CALM = 1000; // ms between two drawings: eight charts are dear, and the parent's page may share the machine
+const CALM = 1000; // ms between two drawings: eight charts cost much, and the parent's page may share the machine
 const COUNTS = new Set(["deaths", "asked", "answers", "size"]);
-const ticks = [], values = { maturity: [] }; // by name, one for each tick
-const firsts = [];                           // where in them each stage begins
+const ticks = [], values = {}; // by name, one for each tick
+let stages = [];
 let last = -1, queued = false, drawn = -CALM;
 
 for (const name of Object.values(SERIES).flat().map(([key]) => key)) values[name] = [];
@@ -25,34 +25,29 @@ const colour = (name) => getComputedStyle(document.documentElement).getPropertyV
 
 const largest = (id) => Math.max(...SERIES[id].map(([key]) => values[key].at(-1)));
 
-// ---- stages (server/pages/stages.py makes the same)
+// ---- stages
 
-// What each stage came to: between its first row and that of the next stage, which holds what it ended with.
-function stages() {
-  return firsts.map((from, number) => {
-    const end = firsts[number + 1] ?? ticks.length - 1;
-    const within = (name) => values[name][end] - (number ? values[name][from] : 0);
-    return {
-      T: values.maturity[from], worth: values.return[end],
-      cells: [values.return[end], values.optimal_return[end], ...["deaths", "guidance", "preference"].map(within), `${number ? ticks[from] : 0} to ${ticks[end]}`],
-    };
-  });
-}
-
-const shown = (value, digits = 4) => typeof value === "number" && !Number.isInteger(value) ? Number(value.toPrecision(digits)) : value ?? "–";
-
-function fill() {
-  for (const { T, cells } of stages()) {
-    const row = document.querySelector(`tr[data-stage="${T}"]`);
-    row?.querySelectorAll("td").forEach((cell, at) => { cell.textContent = shown(cells[at]); });
+// The rows of the table, as the server computes them (server/pages/stages.py).
+async function loadStages() {
+  const reply = await fetch(`/runs/${run}/stages`).catch(() => null);
+  if (reply?.ok) stages = await reply.json();
+  for (const { number, when, begin, end, value, reference, unsafe, guidance, preference } of stages) {
+    const row = document.querySelector(`tr[data-stage="${number}"]`);
+    const cells = [value, reference, unsafe, guidance, preference, begin === null ? null : `${begin} to ${end}`];
+    row.className = when;
+    row.querySelectorAll("td").forEach((cell, at) => { cell.textContent = shown(cells[at]); });
   }
 }
+
+const begun = () => stages.filter(({ begin }) => begin !== null);
+
+const shown = (value, digits = 4) => typeof value === "number" && !Number.isInteger(value) ? Number(value.toPrecision(digits)) : value ?? "–";
 
 // ---- charts
 
 // A line where each stage but the first begins.
 function borders() {
-  const at = firsts.slice(1).map((first) => [ticks[first], values.maturity[first]]);
+  const at = begun().slice(1).map(({ begin, number }) => [begin, number]);
   const line = { color: colour("quiet"), width: 1, dash: "dot" };
   return {
     shapes: at.map(([x]) => ({ type: "line", x0: x, x1: x, yref: "paper", y0: 0, y1: 1, line })),
@@ -68,7 +63,7 @@ function layout(id) {
     paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { family: "system-ui, DejaVu Sans, sans-serif", size: 12, color: colour("quiet") },
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { color: colour("ink") } },
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
-    xaxis: { ...axis, title: { text: by ? "T" : "tick", standoff: 4 }, showgrid: false, ...(by && { dtick: 1, range: [0.5, firsts.length + 0.5] }) },
+    xaxis: { ...axis, title: { text: by ? "T" : "tick", standoff: 4 }, showgrid: false, ...(by && { dtick: 1, range: [0.5, begun().length + 0.5] }) },
     yaxis: { ...axis, dtick: COUNTS.has(id) && largest(id) < 6 ? 1 : null, rangemode: COUNTS.has(id) || by ? "tozero" : "normal", type: logs.has(id) ? "log" : "linear" },
     ...(!by && borders()),
   };
@@ -85,10 +80,10 @@ function traces(id) {
 
 // A bar for each stage, and the line that it is held against.
 function bars() {
-  const all = stages(), x = all.map(({ T }) => T);
+  const all = begun(), x = all.map(({ number }) => number);
   const [[, policy], [, line]] = SERIES.stages;
   return [
-    { type: "bar", x, y: all.map(({ worth }) => worth), name: policy, width: 0.5, marker: { color: colour("blue") } },
+    { type: "bar", x, y: all.map(({ value }) => value), name: policy, width: 0.5, marker: { color: colour("blue") } },
     { type: "scatter", mode: "lines", x: [0.5, ...x, x.length + 0.5], y: Array(x.length + 2).fill(values.optimal_return.at(-1)), name: line, line: { color: colour("quiet"), width: 2, dash: "dash" } },
   ];
 }
@@ -96,9 +91,10 @@ function bars() {
 const logs = new Set();
 const figures = [...document.querySelectorAll("[data-chart]")];
 
-function draw() {
+async function draw() {
   queued = false;
   drawn = performance.now();
+  await loadStages();
   for (const figure of figures) {
     const id = figure.dataset.chart, plot = figure.querySelector(".plot");
     window.Plotly.react(plot, traces(id), layout(id), { displayModeBar: false, responsive: true });
@@ -125,11 +121,9 @@ function add(rows) {
     ticks.push(row.tick);
     last = row.tick;
     for (const name in values) values[name].push(row.values[name] ?? null);
-    if (!firsts.length || values.maturity.at(-1) > values.maturity[firsts.at(-1)]) firsts.push(ticks.length - 1);
   }
   const newest = rows.at(-1)?.values;
   if (newest) for (const name of ["deaths", "return", "optimal_return", "stage_queries"]) put(name, newest[name]);
-  fill();
   redraw();
 }
 
@@ -161,7 +155,6 @@ const tell = {
     if (now.reason) put("reason", now.reason);
     put("speed", now.speed);
     put("optimal", now.optimal ? "optimal" : "learning");
-    for (const row of document.querySelectorAll("tr[data-stage]")) row.className = ["past", "now", "later"][1 + Math.sign(row.dataset.stage - now.maturity)];
     for (const button of document.querySelectorAll("[data-more]")) button.value = now.goal + Number(button.dataset.more);
     applied(now.tick);
   },
