@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import zipfile
 from collections.abc import Iterable
 from importlib.metadata import packages_distributions
@@ -22,12 +23,32 @@ def files_of_the_project() -> list[str]:
     return git_files("--cached", "--others", "--exclude-standard")
 
 
-def build_wheel(folder: Path) -> Path:
-    """Built from a copy: it leaves nothing in the tree, and takes nothing from an earlier build."""
-    source, target = folder / "source", folder / "wheel"
+def copy_tree(source: Path) -> Path:
+    """The files of the project, links as links."""
     for name in [*files_of_the_project(), *LINKS]:
         (source / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, source / name, follow_symlinks=False)
+    return source
+
+
+def build_wheel(folder: Path) -> Path:
+    """Built from a copy: it leaves nothing in the tree, and takes nothing from an earlier build."""
+    return pip_wheel(copy_tree(folder / "source"), folder / "wheel")
+
+
+def build_sdist(folder: Path) -> Path:
+    """The archive of sources, built from a copy as well."""
+    source, target = copy_tree(folder / "source"), folder / "sdist"
+    target.mkdir()
+    code = f"from setuptools.build_meta import build_sdist; build_sdist({str(target)!r})"
+    result = subprocess.run([sys.executable, "-c", code], cwd=source, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
+    (built,) = target.glob("parenting-*.tar.gz")
+    return built
+
+
+def pip_wheel(source: Path, target: Path) -> Path:
+    """A wheel of a folder or of an archive of sources."""
     # No isolation: the build uses the setuptools at hand and needs no network.
     options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation", "--no-index"]
     command = [sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", str(target), str(source)]
@@ -47,6 +68,21 @@ def test_wheel_carries_exactly_the_files_of_our_folders(wheel: zipfile.ZipFile) 
     ours |= {"parenting/__init__.py", "parenting/py.typed"}
     carried = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert carried == ours
+    assert all(name.startswith("parenting/") for name in carried)
+
+
+def test_wheel_of_the_sdist_is_that_of_the_tree(wheel: zipfile.ZipFile, tmp_path: Path) -> None:
+    """Same names, same bytes: the links are files in the archive, and no file is there under two names."""
+    built = build_sdist(tmp_path)
+    with tarfile.open(built) as archive:
+        names = [name.partition("/")[2] for name in archive.getnames()]
+        assert not any(member.issym() or member.islnk() for member in archive)
+    flat = [name for name in names if name.split("/")[0] in FOLDERS and name.endswith(".py")]
+    assert flat == []
+    other = zipfile.ZipFile(pip_wheel(built, tmp_path / "wheel"))
+    files = [name for name in wheel.namelist() if ".dist-info/" not in name]
+    assert sorted(name for name in other.namelist() if ".dist-info/" not in name) == sorted(files)
+    assert [name for name in files if wheel.read(name) != other.read(name)] == []
 
 
 @pytest.mark.parametrize(
