@@ -4,6 +4,8 @@ The files of its recipe are held by tests/envs/test_sixth_world.py.
 """
 
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -74,3 +76,10 @@ def test_what_may_be_overridden_is_there_to_be_overridden() -> None:
     assert len(names) > 10
     assert [name for name in names if not hasattr(Gridworld, name)] == []
     assert {"reward", "unsafe"} == Gridworld.__abstractmethods__
+
+
+def test_the_code_for_gymnasium_prints_what_the_page_says() -> None:
+    first, second = re.findall(r"```python\n(.*?)```", SECTIONS["In Gymnasium"], re.DOTALL)
+    (promised,) = re.findall(r"# (\(6, 8, 5\).*)", first)
+    done = subprocess.run([sys.executable, "-c", first + second], cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout.startswith(f"{promised}\n######\n# A###\n# X  #\n"), done.stderr
