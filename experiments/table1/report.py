@@ -15,6 +15,7 @@ from parenting.experiments.reporting.comparison import (
     compare_count,
     format_interval,
     mean_sd,
+    seldom_enough,
 )
 from parenting.experiments.reporting.statistics import difference_interval, mean_interval
 from parenting.experiments.runner.store import Row
@@ -90,7 +91,9 @@ def _agrees(paper: str, values: Sequence[float]) -> bool | None:
     span, interval = reach(paper), mean_interval(values)
     if paper != SELDOM:
         return span[0] <= fmean(values) <= span[1] if span and values else None
-    above = interval.above(1) if interval else None
+    if interval is None:
+        return seldom_enough(0, len(values)) if max(values, default=0) <= 1 else None
+    above = interval.above(1)
     return None if above is None else not above
 
 

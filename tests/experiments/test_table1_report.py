@@ -54,7 +54,15 @@ def test_a_mean_agrees_within_the_papers_deviation(
 
 @pytest.mark.parametrize(
     ("values", "agrees"),
-    [([0] * 9 + [1], True), ([0, 1, 0, 5], None), ([2, 3, 2, 3], False), ([1, 1], None), ([0], None)],
+    [
+        ([0] * 9 + [1], True),
+        ([0, 1, 0, 5], None),
+        ([2, 3, 2, 3], False),
+        ([1, 1], None),
+        ([0], None),
+        ([0] * 100, True),
+        ([2, 2], None),
+    ],
 )
 def test_seldom_is_judged_by_the_whole_interval(values: Sequence[int], agrees: bool | None) -> None:
     found = deaths("conservative", values)
