@@ -27,6 +27,7 @@ from parenting.experiments.reporting.html import NoResults, prose, report
 from parenting.experiments.spec import Request
 
 run = CliRunner().invoke
+OLD = Path(__file__).parents[1] / "old/0.1.0/results"
 MAKE = ["experiment", "figure4", "--trials", "1", "--workers", "1", "--out"]
 
 
@@ -134,6 +135,19 @@ def test_the_pages_are_written_again_from_the_stored_trials(out: Path) -> None:
     assert (out / "figure4/trials.csv").read_bytes() == trials
     assert (out / "figure4.md").exists()
     assert (out / "figure4/shift.svg").exists()
+
+
+def test_pages_of_version_0_1_are_written_again(tmp_path: Path) -> None:
+    """Their rows then say what they are compared with, and their trials stay."""
+    results = copytree(OLD, tmp_path / "results")
+    said = run(app, ["experiment", "report", "--pages", "--out", str(results)])
+    assert said.exit_code == 0, said.output
+    for path in OLD.glob("*/results.json"):
+        name = path.parent.name
+        stored = json.loads((results / name / "results.json").read_text())
+        assert {one["reference"] for one in stored["findings"]} >= {"paper"}
+        assert (results / name / "trials.csv").read_bytes() == (OLD / name / "trials.csv").read_bytes()
+        assert "## Compared with the paper" in (results / f"{name}.md").read_text()
 
 
 def test_pages_are_an_option_of_the_report_alone() -> None:
