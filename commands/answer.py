@@ -21,10 +21,10 @@ Until = Literal["optimal", "over"]
 
 def answer(
     run: Annotated[int, typer.Option(min=1, help="The run's number; `parenting runs` lists them.")],
-    url: Annotated[str, typer.Option(help="Where the server is.")] = "http://localhost:8765",
+    url: Annotated[str, typer.Option(help="The server's address.")] = "http://localhost:8765",
     limit: Annotated[
         int | None,
-        typer.Option(min=1, help="End after so many answers.", show_default="all that are asked for"),
+        typer.Option(min=1, help="End after this many answers.", show_default="all that are asked for"),
     ] = None,
     until: Annotated[
         Until | None,
@@ -37,10 +37,10 @@ def answer(
         float, typer.Option(min=0.1, metavar="SECONDS", help="Give up after this long without a question.")
     ] = 60,
     end_episodes: Annotated[
-        bool, typer.Option("--end-episodes", help="Where no action is acceptable, end the episode.")
+        bool, typer.Option("--end-episodes", help="If no action is acceptable, end the episode.")
     ] = False,
     client_id: Annotated[
-        str, typer.Option(help="The name to answer under; two scripts at one run need two.")
+        str, typer.Option(help="The name to answer under; two scripts that answer one run need two names.")
     ] = "scripted",
     receipts: Annotated[
         Path | None,
@@ -49,17 +49,18 @@ def answer(
         ),
     ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print what came of it as JSON and nothing else.")
+        bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
     ] = False,
 ) -> None:
     """Answer a run's questions as the scripted parent does (Sec. 3.1.3), over the HTTP API.
 
-    It knows the rules of the worlds and what a question holds, nothing else. Web and worker may vanish and
-    come back meanwhile: an answer is sent until the server has said that it is stored. It ends after --limit
-    answers, or when the run is over or rests at its goal, or as --until says, whichever comes first.
+    The script knows the rules of the worlds and the question, nothing else. Web and worker may stop and come
+    back meanwhile: an answer is sent until the server has confirmed it. The command ends after --limit
+    answers, when the run is over or has reached its goal, or as --until says, whichever comes first.
 
-    Exit codes: 0 it came to one of these; 1 the run failed, or asked nothing for --timeout seconds, or no
-    action was acceptable; 2 there is no such run or server, or an option is wrong; 130 stopped by Ctrl-C.
+    Exit codes: 0 one of these ends was reached; 1 the run failed, asked nothing for --timeout seconds, or
+    found no acceptable action; 2 the run or the server does not exist, or an option is wrong; 130 stopped by
+    Ctrl-C.
 
     Example: parenting answer --url http://localhost:8765 --run 3 --limit 50
     """
@@ -96,10 +97,10 @@ def _work(work: Answering) -> Ending:
 
 
 def _first_look(client: Client, run: int) -> dict[str, Any]:
-    """The run, if it is one that a script may answer from outside.
+    """Return the run, if a script may answer it from outside.
 
     Raises:
-        UsageError: it is not, or there is no server, or no such run.
+        UsageError: it may not, or the server or the run does not exist.
     """
     try:
         found: dict[str, Any] = client.get(f"runs/{run}")
@@ -118,7 +119,7 @@ def _first_look(client: Client, run: int) -> dict[str, Any]:
 
 
 def _until(world: str, until: Until | None, limit: int | None) -> Until:
-    """A scripted parent has no more to teach once the argmax policy is optimal; in the garden none is."""
+    """Return when to end: at an optimal policy, which the garden does not have, or when the run is over."""
     endless = world in registry.WORLDS and not registry.spec(world).ends_at_goal
     if until == "optimal" and endless:
         raise UsageError(
@@ -129,7 +130,7 @@ def _until(world: str, until: Until | None, limit: int | None) -> Until:
 
 
 def _receipts(file: Path | None, stack: ExitStack) -> Callable[[dict[str, Any]], None]:
-    """What writes a receipt down, at once.
+    """Return a function that appends a receipt to the file, at once.
 
     Raises:
         UsageError: the file cannot be written.

@@ -1,4 +1,4 @@
-"""A script answers a run over HTTP: leases, answers, waits, and knows when to end."""
+"""A script that answers a run over HTTP: it leases, answers, waits, and knows when to end."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from parenting.commands.judge import Judge
 
 SHORTEST, LONGEST = 0.01, 0.5
-"""Seconds between two looks while nothing is asked. Each pause is half of the time already waited, so that
-few looks find little late; a stream of events would cost the server more than these few."""
+"""Seconds between two requests while nothing is asked. Each pause is half of the time waited so far, so that
+few requests lose little time. A stream of events would cost the server more."""
 LOOK_SECONDS = 0.25
-"""How often the run is looked at while it asks one question after another."""
+"""Seconds between two requests for the run while it asks one question after another."""
 STUCK_SECONDS = 1.0
-"""How long *no action acceptable* has to be told before it is believed: somebody may just have ended it."""
+"""A run counts as stuck after this long; before that, somebody may just have ended the episode."""
 
 EXITS = {
     "limit": 0,
@@ -31,12 +31,12 @@ EXITS = {
     "silent": 1,
     "ctrl-c": 130,
 }
-"""Every way in which it ends, with the exit code."""
+"""Each reason to end, with its exit code."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """What is wanted: whose questions, under which name, and when to end."""
+    """An order: the run whose questions to answer, the name to answer under, and when to end."""
 
     run: int
     client_id: str = "scripted"
@@ -48,7 +48,7 @@ class Order:
 
 @dataclass(frozen=True)
 class Ending:
-    """How it ended, one of `EXITS`, and the sentence that says so."""
+    """The reason why answering ended, one of `EXITS`, and the sentence that says so."""
 
     kind: str
     sentence: str
@@ -56,7 +56,7 @@ class Ending:
 
 @dataclass
 class Told:
-    """What the server said: that so many answers are stored, and that some questions needed none any more."""
+    """The server's replies, counted: answers that it stored, and questions that needed none any more."""
 
     choices: Counter[str] = field(default_factory=Counter)
     unneeded: int = 0  # withdrawn or answered by somebody else meanwhile
@@ -69,7 +69,7 @@ class Told:
 
 
 class Answering:
-    """One script before one run."""
+    """One script that answers one run."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ class Answering:
         judge: Judge,
         stored: Callable[[dict[str, Any]], object],
     ) -> None:
-        """`stored` is called with the server's receipt of each answer, once it was read to its end."""
+        """Prepare to answer; `stored` is called with the server's receipt of each answer."""
         self.client, self.order, self.judge, self.stored = client, order, judge, stored
         self.told = Told()
         self._asked_at = self._looked_at = time.monotonic()
@@ -90,7 +90,7 @@ class Answering:
         """Answer until there is a reason to end.
 
         Raises:
-            UsageError: the server refuses what no other try would change.
+            UsageError: the server refuses a request for good.
         """
         ending = self._look()
         while ending is None:
@@ -137,7 +137,7 @@ class Answering:
             return
 
     def _ending(self, asked: bool) -> Ending | None:
-        """Whether to end now; if not, and if nothing was asked, wait a little."""
+        """Return why to end now, or None; without a question, wait a little."""
         if self.order.limit is not None and self.told.answered >= self.order.limit:
             return Ending("limit", f"These are the {self.order.limit} that were wanted.")
         now = time.monotonic()
@@ -153,7 +153,7 @@ class Answering:
         return ending
 
     def _look(self) -> Ending | None:
-        """Look at the run: is there more to answer?"""
+        """Request the run, and return why there is nothing more to answer, or None."""
         try:
             run = self.client.get(f"runs/{self.order.run}")
         except UnavailableError as error:
@@ -171,7 +171,7 @@ class Answering:
         return self._stuck(run) if run["waiting"] == "stuck" else None
 
     def _stuck(self, run: dict[str, Any]) -> Ending | None:
-        """No action was acceptable: end the episode, once, or say that somebody has to."""
+        """End the episode once, or say that somebody has to: no action was acceptable."""
         tick, now = run["tick"], time.monotonic()
         if self.order.end_episodes:
             if tick != self._ended_at:

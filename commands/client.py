@@ -1,4 +1,4 @@
-"""A client of the HTTP API: what the server says becomes a sentence, and one that went away is waited for."""
+"""A client of the HTTP API. It tells a server that is away from one that refuses a request."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import httpx2
 from parenting.commands.errors import UsageError
 
 SECONDS = 10.0
-"""How long a single request may take."""
+"""Seconds that a single request may take."""
 
 
 class UnavailableError(Exception):
-    """The server does not answer now, or not as it should: it may again in a moment."""
+    """The server does not answer now, or not properly; it may in a moment."""
 
 
 class RefusedError(UsageError):
-    """The server says no, and why."""
+    """The server refuses a request, and says why."""
 
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
@@ -25,14 +25,17 @@ class RefusedError(UsageError):
 
 
 class Client:
-    """The API of one server, over a connection that is kept open."""
+    """The API of one server, over one open connection."""
 
     def __init__(self, url: str, http: httpx2.Client | None = None) -> None:
-        """Connects at the first request; `http` may be another connection, as to an application in this
-        process.
+        """Prepare a connection, which opens at the first request.
+
+        Args:
+            url: The server's address.
+            http: Another connection, for example to an application in this process.
 
         Raises:
-            UsageError: not an address.
+            UsageError: the address cannot be read.
         """
         self.url = url.rstrip("/")
         try:
@@ -40,8 +43,8 @@ class Client:
         except httpx2.InvalidURL as error:
             raise UsageError(f"--url: {url} cannot be read: {error}. {_EXAMPLE}") from None
         if address.scheme not in ("http", "https") or not address.host:
-            raise UsageError(f"--url: {url} is no address of a server. {_EXAMPLE}")
-        # The server takes requests under the names of this machine alone, so no proxy lies on the way.
+            raise UsageError(f"--url: {url} is not the address of a server. {_EXAMPLE}")
+        # The server accepts only the names of this machine, so no proxy lies on the way.
         self.http = http or httpx2.Client(timeout=SECONDS, trust_env=False)
 
     def close(self) -> None:
@@ -49,17 +52,17 @@ class Client:
         self.http.close()
 
     def get(self, path: str) -> Any:
-        """What lies at a path of the API.
+        """Return the reply to a GET of a path of the API.
 
         Raises:
             UnavailableError: the server does not answer now.
-            RefusedError: it says no.
-            UsageError: it is no server of Parenting.
+            RefusedError: the server refuses the request.
+            UsageError: the address is not that of a Parenting server.
         """
         return self._read(self._send("GET", path, None))
 
     def post(self, path: str, **body: Any) -> Any:
-        """The reply to a verb, read to its end; None where it is empty.
+        """Return the reply to a POST to a path of the API; None if it is empty.
 
         Raises:
             UnavailableError, RefusedError, UsageError: as `get`.

@@ -1,4 +1,4 @@
-"""The database of the settings, opened by commands that look into it."""
+"""The database of the settings, for commands that read it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from parenting.server.migrate import require_current
 
 @contextmanager
 def database() -> Iterator[Database]:
-    """The database, closed at the end. Call it within `friendly_errors`.
+    """Open the database, and close it at the end. Call this within `friendly_errors`.
 
     Raises:
         ServerError: a setting is wrong; there is no database yet, or it is not up to date.
@@ -25,8 +25,8 @@ def database() -> Iterator[Database]:
     url = chosen.url
     if url.startswith("sqlite") and not Path(make_url(url).database or "").is_file():
         raise SetupError(
-            f"There is no database at {make_url(url).database}. PARENTING_DATA names its folder; "
-            "parenting up makes one."
+            f"There is no database at {make_url(url).database}. Set PARENTING_DATA to its folder, "
+            "or make one: parenting up."
         )
     db = connect(chosen)
     try:

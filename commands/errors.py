@@ -1,4 +1,4 @@
-"""How the commands end early: with a sentence on standard error and an exit code, never with a traceback."""
+"""Errors of commands end with a sentence on standard error and an exit code, never with a traceback."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from parenting.weights.store import NoWeightsError
 
 
 class UsageError(ValueError):
-    """An option is not as it should be; the sentence says which and what would do."""
+    """An option is wrong; the sentence names it, its value and the remedy."""
 
 
 @contextmanager
 def friendly_errors() -> Iterator[None]:
-    """Print what is wrong as a sentence, and exit with 2."""
+    """Print an error of the user's as a sentence, and exit with 2."""
     try:
         yield
     except ServerError as error:
@@ -36,7 +36,7 @@ def friendly_errors() -> Iterator[None]:
 
 @contextmanager
 def exit_on_interrupt() -> Iterator[None]:
-    """On Ctrl-C say that it was stopped, and exit with 130, as a shell does."""
+    """On Ctrl-C, say that the command was stopped, and exit with 130, as a shell does."""
     try:
         yield
     except KeyboardInterrupt:
@@ -45,7 +45,7 @@ def exit_on_interrupt() -> Iterator[None]:
 
 
 def settings(**given: Any) -> Settings:
-    """The settings from the environment, `.env` and the options given (None: not given).
+    """Read the settings from the environment, `.env` and the options given (None: not given).
 
     Call it within `friendly_errors`.
 

@@ -1,4 +1,4 @@
-"""`parenting export`: the answers of a run as JSON lines."""
+"""`parenting export`: write the answers of a run as JSON lines."""
 
 from __future__ import annotations
 
@@ -26,13 +26,14 @@ def export(
             "--out", "-o", metavar="FILE", help="Write to this file.", show_default="standard output"
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the file if there is one.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
 ) -> None:
-    """Write the answers of a run as JSON lines: what was asked, what was said, by whom and when.
+    """Write the answers of a run as JSON lines: the question, the choice, who answered and when.
 
-    A file appears whole or not at all. It holds the answers up to now; the run may go on meanwhile.
+    The file is written completely or not at all. It holds the answers up to now; the run may go on meanwhile.
 
-    Exit codes: 0 written; 2 no such run or database, or the file cannot be written; 130 stopped by Ctrl-C.
+    Exit codes: 0 written; 2 the run or the database does not exist, or the file cannot be written; 130
+    stopped by Ctrl-C.
 
     Example: parenting export 3 -o run-3.jsonl
     """
@@ -47,9 +48,9 @@ def export(
 
 
 def _copy(found: Iterator[str], file: TextIO, total: int) -> int:
-    """Copy line by line; the number of lines."""
+    """Copy line by line, and return the number of lines."""
     number = 0
-    # Lines on a terminal show by themselves how far it is; a bar would stand between them.
+    # On a terminal the lines themselves show the progress, and a bar would break them.
     with nullcontext(_quiet) if file.isatty() else bar("answers") as show:
         for number, line in enumerate(found, start=1):
             file.write(line)
@@ -64,10 +65,10 @@ def _quiet(done: int, total: int | None = None) -> None:
 
 @contextmanager
 def _whole(target: Path, force: bool) -> Iterator[TextIO]:
-    """A file that takes its name once it is whole and safely stored.
+    """Open a file that takes its name once it is complete and safely stored.
 
     Raises:
-        UsageError: it exists, or its folder cannot be written to.
+        UsageError: the file exists, or its folder cannot be written to.
     """
     if target.exists() and not force:
         raise UsageError(f"-o: {target} exists already. Name another file, or give --force to replace it.")

@@ -1,4 +1,4 @@
-"""The scripted parent (Sec. 3.1.3) before a question as the API tells it: nothing else is known to it."""
+"""The scripted parent (Sec. 3.1.3) of a question in the API's words, which are all that it knows."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from parenting.server.codec import CHOICE_NAMES, decode
 
 
 class Judge:
-    """Answers the questions of one run; what it knows of the run's world it has from the first of them."""
+    """The judge of one run's questions. It makes the run's world from the first of them."""
 
     def __init__(self) -> None:
         self._world: Gridworld | None = None
         self._rule: ScriptedRule | None = None
 
     def choice(self, question: dict[str, Any]) -> str:
-        """left, right, either or neither.
+        """Return left, right, either or neither.
 
         Raises:
             UsageError: the question cannot be read.
@@ -35,7 +35,7 @@ class Judge:
         return CHOICE_NAMES[int(rule.answer(query)[0])]
 
     def _knowledge(self, world: dict[str, Any], parent: dict[str, Any]) -> tuple[Gridworld, ScriptedRule]:
-        """The world's rules, and the exact values of what can happen in it."""
+        """Return the world's rules, and the rule that answers by exact values."""
         if self._world is None or self._rule is None:
             self._world = registry.make(world["name"], world["text"])
             self._rule = ScriptedRule(self._world, parent["gamma"], inside=parent["inside"])

@@ -1,4 +1,4 @@
-"""Progress bars: on standard error, and only where that is a terminal."""
+"""Progress bars on standard error, if that is a terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Protocol
 
 
 class Show(Protocol):
-    """Told how far it is, and how far it will come where that is known."""
+    """A function that takes the progress, and the total if it is known."""
 
     def __call__(self, done: int, total: int | None = None) -> None:
         """Move the bar."""
@@ -17,7 +17,7 @@ class Show(Protocol):
 
 @contextmanager
 def bar(name: str) -> Iterator[Show]:
-    """A bar with the time left, or, as long as no total is known, one that only moves."""
+    """Show a bar with the remaining time; without a total, one that only moves."""
     if not sys.stderr.isatty():
         yield lambda done, total=None: None
         return

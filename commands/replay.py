@@ -1,4 +1,4 @@
-"""`parenting replay`: live a stored run again, and say whether the same comes of it bit for bit."""
+"""`parenting replay`: replay a stored run, and say whether the result is equal bit for bit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PIECES = {
     "config": "the config",
     "tally": "counts of answers and deaths",
 }
-"""What a piece of state is called, by the beginning of its name; the rest is counts and flags."""
+"""Names of pieces of state, by the beginning of their tensors' names; the rest is counts and flags."""
 
 
 def replay(
@@ -36,18 +36,18 @@ def replay(
         bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
     ] = False,
 ) -> None:
-    """Live a stored run again from its first tick, by its recorded answers and events.
+    """Replay a stored run from its first tick, by its recorded answers and operator events.
 
-    Each tick has to ask what it asked then. At its last checkpoint everything is compared bit for bit: the
-    policies, Adam's state, dataset X and all else that a checkpoint holds. It only reads, and a run that is
-    being raised may be replayed too.
+    Each tick has to ask what it asked the first time. At the run's last checkpoint, everything is compared
+    bit for bit: the policies, Adam's state, dataset X and all else that a checkpoint holds. The command only
+    reads, so a run that a worker is raising can be replayed too.
 
-    Exit codes: 0 equal; 1 not equal; 2 it cannot be replayed here; 130 stopped by Ctrl-C.
+    Exit codes: 0 equal; 1 not equal; 2 the run cannot be replayed here; 130 stopped by Ctrl-C.
 
     Example: parenting replay 3
     """
     with exit_on_interrupt(), friendly_errors(), database() as db:
-        get_run(db, run)  # whether there is one is said before torch is loaded
+        get_run(db, run)  # torch takes a second to load, so an unknown run is refused before
         from parenting.agent.process import settle
         from parenting.server.replay import relive
 
@@ -74,7 +74,7 @@ def _number(count: int, what: str) -> str:
 
 
 def _piece(name: str) -> str:
-    """The longest beginning of its name that has words of its own."""
+    """Return the name of a piece of state, by the longest beginning that `PIECES` knows."""
     parts = name.split(".")
     beginnings = [".".join(parts[:end]) for end in range(len(parts), 0, -1)]
     return next((PIECES[start] for start in beginnings if start in PIECES), name)

@@ -1,4 +1,4 @@
-"""`parenting runs`: the runs of the database, and who waits for whom in each."""
+"""`parenting runs`: list the runs of the database, and who waits for whom in each."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from parenting.server.statuses import STATE_LABELS, RunState
 
 COLUMNS = ("run", "name", "world", "level", "parent", "now", "stage", "tick", "answers", "optimal")
 NARROW = ("name", "level", "parent")
-"""What is left out on a terminal of fewer than `ENOUGH` columns."""
+"""Columns that a terminal narrower than `ENOUGH` characters does not show."""
 ENOUGH, WIDE = 120, 200
-"""Where no terminal shows it, it is as wide as it needs to be."""
+"""`WIDE` is the width when the output is not a terminal."""
 
 
 def runs(
-    limit: Annotated[int, typer.Option(min=1, max=10_000, help="At most so many, the newest.")] = 50,
+    limit: Annotated[int, typer.Option(min=1, max=10_000, help="List at most this many, the newest.")] = 50,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print them as JSON, as the API has them, and nothing else.")
+        bool, typer.Option("--json", help="Print the runs as JSON, as in the API, and nothing else.")
     ] = False,
 ) -> None:
-    """List the runs, newest first: where each is, and who waits for whom.
+    """List the runs, newest first, with their progress and who waits for whom.
 
-    Exit codes: 0; 2 there is no database, or it is not up to date.
+    Exit codes: 0 listed; 2 the database does not exist or is not up to date.
 
     Example: parenting runs --limit 5
     """

@@ -20,11 +20,11 @@ def worker(
     check: Annotated[
         bool,
         typer.Option(
-            "--check", help="Only say whether a worker of this machine lives: exit code 0, or else 1."
+            "--check", help="Only check that a worker of this machine is alive: exit code 0, or else 1."
         ),
     ] = False,
 ) -> None:
-    """Raise the agents of the database's runs until Ctrl-C; goes on exactly where an earlier worker was.
+    """Raise the agents of the database's runs until Ctrl-C, from exactly where an earlier worker stopped.
 
     Example: parenting worker
     """
@@ -35,14 +35,14 @@ def worker(
         chosen = settings()
         set_up_log(chosen.log_level)
         from parenting.server.worker import (
-            main,  # loads torch, which takes a second: settings are checked first
+            main,  # loads torch, which takes a second, so the settings are checked before
         )
 
         main(chosen)
 
 
 def _check() -> int:
-    """For health checks. Workers of other machines, which are named after those, do not count."""
+    """Return the exit code of a health check. Workers of other machines do not count."""
     with friendly_errors():
         names = [name for name in _alive(settings()) if name.rpartition(":")[0] == socket.gethostname()]
     if not names:

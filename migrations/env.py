@@ -1,4 +1,4 @@
-"""How alembic reaches the database: always through a connection that `server.migrate` opened."""
+"""Alembic's environment. It uses the connection that `server.migrate` has opened."""
 
 from alembic import context
 

@@ -53,7 +53,11 @@ log = structlog.get_logger()
 
 
 def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
-    """The application on a migrated database (`db` instead of the settings' own: for tests).
+    """Make the application on a migrated database.
+
+    Args:
+        settings: The settings of the web process.
+        db: Another database than the settings' own, for tests.
 
     Raises:
         SetupError: the database cannot be used as it is; the sentence names the remedy.
@@ -68,7 +72,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
 
 
 def bare_app() -> FastAPI:
-    """The routes alone, without a database: enough to describe the API."""
+    """Make the routes alone, without a database: enough to describe the API."""
     app = Described(
         title="Parenting",
         version="1",
@@ -99,7 +103,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 
 def _add_errors(app: FastAPI) -> None:
-    """One shape for every error; below /api it is JSON, elsewhere a page says the same."""
+    """Give every error one shape: JSON below /api, a page elsewhere."""
 
     @app.exception_handler(ServerError)
     def refused(request: Request, error: ServerError) -> Response:
@@ -123,9 +127,9 @@ def _add_errors(app: FastAPI) -> None:
 
 
 def _said(error: HTTPException) -> ServerError:
-    """What the framework refuses, in our words."""
+    """Return our error for one of the framework's."""
     kinds: dict[int, type[ServerError]] = {404: NotFound, 405: MethodNotAllowed, 413: TooLargeError}
-    if error.status_code == 400:  # a body that is no text, or no form
+    if error.status_code == 400:  # a body that is not text, or not a form
         return InvalidFieldsError([("body", "It cannot be read. Send JSON in UTF-8, or a form.")])
     if error.status_code in kinds:
         return kinds[error.status_code]()
@@ -135,7 +139,7 @@ def _said(error: HTTPException) -> ServerError:
 
 
 def _allowed(request: Request) -> str:
-    """The methods of an address, of all routes that it has: the framework names those of one alone."""
+    """Return the methods of all routes of an address; the framework names those of one route only."""
     scopes = ((method, {**request.scope, "method": method}) for method in METHODS)
     return ", ".join(
         method
@@ -160,12 +164,12 @@ def _add_health(app: FastAPI) -> None:
 
     @app.get("/healthz", summary="Ask for life", tags=["health"], responses=error_responses(*errors))
     def healthz() -> dict[str, str]:
-        """This process answers."""
+        """Say that this process answers."""
         return fine
 
     @app.get("/readyz", summary="Ask for readiness", tags=["health"], responses=error_responses(*errors, 503))
     def readyz(db: Db) -> dict[str, str]:
-        """The database answers, its tables are up to date, and a worker gives signs of life; else 503."""
+        """Check that the database answers, its tables are up to date, and a worker is alive; else 503."""
         try:
             require_current(db)
         except SetupError as error:

@@ -18,7 +18,7 @@ KEPT = 2
 
 @dataclass(frozen=True)
 class StoredCheckpoint:
-    """A checkpoint as it was read back; `intact` says whether its bytes are those that were written."""
+    """A stored checkpoint; `intact` is true if its bytes are those that were written."""
 
     tick: int
     blob: bytes
@@ -26,9 +26,9 @@ class StoredCheckpoint:
 
 
 def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
-    """Store the state after a tick, with its hash, and forget all but the last two.
+    """Store the state after a tick, with its hash, and delete all but the last two.
 
-    A tick saved again is replaced.
+    A second checkpoint of the same tick replaces the first.
 
     Raises:
         LostClaimError: another worker raises this run now.
@@ -50,9 +50,9 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
 
 
 def load_checkpoints(db: Database, run_id: int) -> Sequence[StoredCheckpoint]:
-    """The kept checkpoints, newest first.
+    """Return the stored checkpoints, newest first.
 
-    The caller takes the first intact one, and says so if it had to pass one over.
+    The caller takes the first intact one, and logs each damaged one that it passes over.
     """
     with db.read() as session:
         rows = session.scalars(

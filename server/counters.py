@@ -1,4 +1,4 @@
-"""What is counted of one run. It is in every checkpoint, so that no restart counts anything twice."""
+"""Counts of one run. Every checkpoint holds them, so that a restart counts nothing twice."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Counters(Struct):
 
 
 def no_counts() -> Counters:
-    """Nothing counted yet."""
+    """Return counts of zero."""
 
     def zeros(*shape: int) -> Tensor:
         return torch.zeros(1, *shape, dtype=torch.int64)
@@ -31,7 +31,7 @@ def no_counts() -> Counters:
 
 
 def count(world: Gridworld, tally: Counters, answer: Answer, state: AgentState) -> Counters:
-    """The counts after one more tick: the answer that it heard, and the state that it left."""
+    """Return the counts after one more tick, from the answer that it heard and the state after it."""
     report, now = state.info, state.world
     died = report.moved & world.unsafe(report.before, report.action, now)
     ended = report.moved & (now.terminated | world.truncated(now))

@@ -26,7 +26,7 @@ from parenting.server.errors import BusyError, DiskFullError, SetupError
 from parenting.server.settings import Settings
 
 SAFE_SQLITE = (3, 51, 3)
-"""Older ones may corrupt a database in WAL: a race between the log's reset and a checkpoint."""
+"""Older versions can corrupt a database in WAL mode: a race between the log's reset and a checkpoint."""
 BUSY_SECONDS = 5.0
 Seen = TypeVar("Seen")
 PRAGMAS = {
@@ -38,12 +38,12 @@ PRAGMAS = {
 
 
 def utc_now() -> datetime:
-    """Now, in UTC."""
+    """Return the present time in UTC."""
     return datetime.now(UTC)
 
 
 class Database:
-    """What every verb takes first. `read()` and `write()` are transactions; `clock()` is the time."""
+    """The database handle. `read()` and `write()` are transactions; `clock()` is the time."""
 
     def __init__(self, engine: Engine, clock: Callable[[], datetime] = utc_now) -> None:
         self.engine = engine
@@ -58,7 +58,7 @@ class Database:
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """A deferred transaction, for reading only; what is written in it is rolled back.
+        """Begin a deferred transaction, for reading only; writes in it are rolled back.
 
         Raises:
             BusyError: the database was locked for five seconds.
@@ -68,7 +68,7 @@ class Database:
 
     @contextmanager
     def write(self, durable: bool = True) -> Iterator[Session]:
-        """A transaction that holds the write lock from its beginning and commits at its end.
+        """Begin a transaction that holds the write lock from its beginning and commits at its end.
 
         What is not `durable` may be lost with the power, but only together with all that came after it. So
         it is for what nobody was promised, or what a worker does again: leases, ticks, metrics, checkpoints.
@@ -88,9 +88,9 @@ class Database:
             self._turn.release()
 
     def cached(self, key: Hashable, look: Callable[[], Seen]) -> Seen:
-        """What `look()` gives, or what the last look under this key gave if nobody has committed since.
+        """Return `look()`, or its last result under this key if nobody has committed since.
 
-        For polls: SQLite tells cheaply whether anything was committed. The last look alone is kept.
+        This is for polls: SQLite says cheaply whether anything was committed. Only the last result is kept.
         """
         with self._cache_lock:
             version = self.data_version()  # before the look: later commits belong to the next one
@@ -102,7 +102,7 @@ class Database:
             return seen
 
     def data_version(self) -> int | None:
-        """SQLite's number that changes with every commit of another connection; None in other databases."""
+        """Return SQLite's number that changes with each commit of another connection; None elsewhere."""
         if self.engine.dialect.name != "sqlite":
             return None
         with _translated_errors():
@@ -122,10 +122,10 @@ class Database:
 
 
 def connect(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Database:
-    """The database of these settings. Makes the data folder; makes no tables (see `server.migrate`).
+    """Open the database of these settings. This makes the data folder, but no tables (see `server.migrate`).
 
     Raises:
-        SetupError: an URL that cannot be read, a missing driver, or an SQLite too old to be safe.
+        SetupError: the URL cannot be read, a driver is missing, or SQLite is too old to be safe.
     """
     try:
         url = make_url(settings.url)
@@ -168,7 +168,7 @@ def make_folder(folder: Path) -> None:
 
 
 def sqlite_module() -> Any:
-    """SQLite's driver: `pysqlite3`, which brings its own SQLite, or Python's own where that is new enough.
+    """Return SQLite's driver: `pysqlite3`, which brings its own SQLite, or Python's if that is new enough.
 
     Raises:
         SetupError: neither is safe.

@@ -1,11 +1,13 @@
-"""What a route is given. Pages and API alike write, for example,
+"""The dependencies of routes.
+
+Pages and API write, for example:
 
     from parenting.server.deps import Db, SettingsOf
 
     @router.get("/runs/{run_id}")
     def page(request: Request, run_id: int, db: Db, settings: SettingsOf) -> Response: ...
 
-`Db` is the `server.db.Database` that every verb of `server.runs`, `queue` and `record` takes first. Write
+`Db` is the `server.db.Database` that every verb of `server.runs` and `server.queue` takes first. Write
 `def`, not `async def`: verbs block, so they belong in the thread pool. Raise `server.errors` freely:
 `server.app` turns them into the one JSON shape for programs (/api, /static, /healthz, /readyz), and into the
 pages' `error_page` elsewhere. After a stored answer or event call `notify_worker(request)`, so that the
@@ -23,13 +25,13 @@ from parenting.server.settings import Settings
 
 
 def database(request: Request) -> Database:
-    """The database of this application."""
+    """Return the database of this application."""
     db: Database = request.app.state.db
     return db
 
 
 def settings_of(request: Request) -> Settings:
-    """The settings that this application was made with."""
+    """Return the settings that this application was made with."""
     settings: Settings = request.app.state.settings
     return settings
 

@@ -1,10 +1,10 @@
-"""Every error that a user may meet, in one tree. The docstring is the default message.
+"""Every error that a user may meet, in one tree. The docstring of a class is its default message.
 
 All have one JSON shape:
 
 {"error": {"code": "invalid", "message": "...", "field": "seed", "fields": [{"field": ..., "message": ...}]}}
 
-`field` and `fields` stand there only where they apply.
+`field` and `fields` are present only where they apply.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class ServerError(Exception):
         super().__init__(self.message)
 
     def body(self) -> dict[str, Any]:
-        """The JSON shape of this error."""
+        """Return the JSON shape of this error."""
         error: dict[str, Any] = {"code": self.code, "message": self.message}
         if self.field is not None:
             error["field"] = self.field
@@ -32,7 +32,7 @@ class ServerError(Exception):
 
 
 class NotFound(ServerError):
-    """There is no such thing here."""
+    """This address does not exist."""
 
     status, code = 404, "not_found"
 
@@ -50,7 +50,7 @@ class Forbidden(ServerError):
 
 
 class UnknownHostError(ServerError):
-    """This server is called localhost or 127.0.0.1, and by no other name."""
+    """This server accepts the names localhost and 127.0.0.1 only."""
 
     status, code = 400, "unknown_host"
 
@@ -62,7 +62,7 @@ class MethodNotAllowed(ServerError):
 
 
 class TooManyStreamsError(ServerError):
-    """Too many live streams are open. Close a page and load this one again."""
+    """Too many live streams are open. Close another page and reload this one."""
 
     status, code = 503, "too_many"
 
@@ -92,7 +92,7 @@ class DiskFullError(ServerError):
 
 
 class InvalidFieldsError(ServerError):
-    """Some fields are not as they should be."""
+    """Some fields are wrong."""
 
     status, code = 422, "invalid"
 
@@ -104,7 +104,7 @@ class InvalidFieldsError(ServerError):
         )
 
     def body(self) -> dict[str, Any]:
-        """The JSON shape, with one message a field."""
+        """Return the JSON shape, with one message for each field."""
         body = super().body()
         body["error"]["fields"] = [{"field": field, "message": message} for field, message in self.fields]
         return body

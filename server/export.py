@@ -1,7 +1,7 @@
-"""The answers of a run as JSON lines: what was asked, what was said, by whom, when, and of which policy.
+"""The answers of a run as JSON lines: the question, the choice, who answered and when, and the policy.
 
-A line an answer, with the same keys in every line, so that other programs read it as a table (for example
-`datasets.load_dataset("json", data_files="run-1.jsonl")`). A corrected answer keeps its own line.
+Each answer is a line, with the same keys in every line, so that other programs read the file as a table (for
+example `datasets.load_dataset("json", data_files="run-1.jsonl")`). A superseded answer keeps its own line.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ MU = {"left": [1.0, 0.0], "right": [0.0, 1.0], "either": [0.5, 0.5], "neither": 
 
 
 def rows(db: Database, run_id: int) -> Iterator[dict[str, Any]]:
-    """The answers of a run up to now, oldest first, read in batches.
+    """Return the answers of a run up to now, oldest first, read in batches.
 
     Raises:
-        NotFound: there is no such run; raised here, not at the first row.
+        NotFound: the run does not exist; raised here, not at the first row.
     """
     run = get_run(db, run_id)
     return (_row(db, run, answered) for answered in every(db, run_id))
 
 
 def lines(db: Database, run_id: int) -> Iterator[str]:
-    """The same as JSON, one line each, in ASCII.
+    """Return the answers as JSON in ASCII, one line each.
 
     Raises:
-        NotFound: there is no such run; raised here, not at the first line.
+        NotFound: the run does not exist; raised here, not at the first line.
     """
     return (json.dumps(row, separators=(",", ":")) + "\n" for row in rows(db, run_id))
 
@@ -67,11 +67,11 @@ def _row(db: Database, run: Run, answered: Answered) -> dict[str, Any]:
 
 
 def _time(moment: datetime) -> str:
-    """ISO 8601 in UTC, always of the same length, so that it sorts as text."""
+    """Format a time as ISO 8601 in UTC, always of the same length, so that it sorts as text."""
     return moment.replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"
 
 
 def _number(db: Database, answer_id: int) -> int:
-    """The number, within its run, of the answer that another corrects."""
+    """Return the number, within its run, of an answer that another supersedes."""
     with db.read() as session:
         return session.scalars(select(Answer.number).where(Answer.id == answer_id)).one()

@@ -1,4 +1,4 @@
-"""Logs of web and worker: quiet unless something is wrong; `PARENTING_LOG_LEVEL=info` tells more."""
+"""Logs of web and worker: quiet unless something is wrong; `PARENTING_LOG_LEVEL=info` shows more."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from parenting.server.errors import SetupError
 
 
 def set_up_log(level: str) -> None:
-    """Logs of web and worker: one line each on standard error.
+    """Set up the log: one line for each message, on standard error.
 
     Raises:
-        SetupError: no such level.
+        SetupError: the level is unknown.
     """
     number = logging.getLevelNamesMapping().get(level.upper())
     if number is None:
-        raise SetupError(f"log_level: {level} is none of debug, info, warning and error.")
+        raise SetupError(f"log_level: {level} is not one of debug, info, warning and error.")
     logging.basicConfig(level=number, format="%(levelname)s %(name)s: %(message)s", stream=sys.stderr)
     structlog.configure(
         processors=[

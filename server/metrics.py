@@ -1,4 +1,4 @@
-"""Store what a worker measured, by tick. The reads are in `server.reads.metrics`."""
+"""Store the metrics of a run, by tick. `server.reads.metrics` reads them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from parenting.server.tables import Metric
 
 
 def write_metrics(db: Database, mine: Claim, rows: Mapping[int, Mapping[str, float | int | None]]) -> None:
-    """Store what was measured, by tick.
+    """Store metrics by tick.
 
-    A tick that is lived again replaces its row; what is not finite becomes null.
+    A replayed tick replaces its row; a number that is not finite becomes null.
 
     Raises:
         LostClaimError: another worker raises this run now.

@@ -1,4 +1,4 @@
-"""One row of metrics: what the dashboard draws."""
+"""One row of metrics, as the dashboard draws it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NOTHING_LEARNT: Row = {"loss": None, "entropy_global": None, "entropy_local": No
 
 
 def learnt(saved: Snapshot) -> Row:
-    """The last gradient step: loss (Eq. 2) and both entropies, a mean over the entries of X."""
+    """Return loss (Eq. 2) and both entropies of the last gradient step, means over the entries of X."""
     report = saved.state.info
     return {name: float(getattr(report, name)[0]) for name in NOTHING_LEARNT}
 

@@ -1,6 +1,6 @@
-"""Migrations: bring a database up to date, or say plainly why it cannot be used as it is.
+"""Migrations: bring a database up to date, or say why it cannot be used.
 
-The scripts lie in `migrations/`, beside the packages in a checkout and in an installed wheel alike.
+The scripts are in `migrations/`, in a checkout and in an installed wheel alike.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FOLDER = Path(__file__).parents[1] / "migrations"
 
 
 def upgrade(db: Database) -> bool:
-    """Apply what is missing, all or nothing; whether anything was. Doing it twice is doing it once.
+    """Apply the missing migrations, all or none, and return whether there were any.
 
     Raises:
         SetupError: the database was written by a newer version, or holds other tables than ours.
@@ -64,7 +64,7 @@ def require_current(db: Database) -> None:
     """Refuse to start on a database that is not up to date.
 
     Raises:
-        SetupError: it has no tables yet, older ones, or newer ones; the sentence names the remedy.
+        SetupError: the database has no tables, older ones or newer ones; the sentence names the remedy.
     """
     with db.read() as session:
         found = _revision(session.connection())

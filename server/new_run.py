@@ -1,6 +1,6 @@
-"""From a form or a JSON body to a run: every field checked on its own, each with its own message.
+"""New runs from a form or a JSON body; each field is checked on its own and has its own message.
 
-No torch here.
+This module imports no torch.
 """
 
 from __future__ import annotations
@@ -37,24 +37,24 @@ LEVEL_CHARACTERS = 8192
 FORM_FIELDS = ("world", "level", "level_text", "parent", "preset", "name", "seed", "goal", "pace")
 NUMBERS = ("seed", "goal", "pace")
 UNREAD = {
-    "json_invalid": "This is no JSON.",
+    "json_invalid": "This is not JSON.",
     "model_attributes_type": "Send a JSON object, with the header Content-Type: application/json.",
 }
-"""What is said of a body that is none, by Pydantic's word for it."""
+"""The message for a body that cannot be read, by Pydantic's type of error."""
 
 
 def _plain(text: str) -> str:
-    """Text without control characters (line ends excepted), and storable as UTF-8."""
+    """Refuse control characters (except line ends) and text that UTF-8 cannot store."""
     for character in text:
         if (ord(character) < 32 and character not in "\n\r\t") or 0x7F <= ord(character) < 0xA0:
-            raise ValueError(f"the control character U+{ord(character):04X} cannot stand here")
+            raise ValueError(f"the control character U+{ord(character):04X} is not allowed here")
         if 0xD800 <= ord(character) < 0xE000:
-            raise ValueError("half of a surrogate pair cannot stand here")
+            raise ValueError("half of a surrogate pair is not allowed here")
     return text
 
 
 def _whole(value: Any) -> Any:
-    """JSON's 657.0 is the integer 657."""
+    """Read JSON's 657.0 as the integer 657."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
@@ -72,7 +72,7 @@ Setting = bool | Integer | float | Name | None
 
 
 class NewRun(BaseModel):
-    """What a run is started with; `level` is a built-in level's name, `config` changes the preset."""
+    """The settings of a new run. `level` is a built-in level's name; `config` changes the preset."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
@@ -214,7 +214,7 @@ def _weights(
 
 
 def _number(text: str) -> Any:
-    """What a form's text says: a number, true, false or null where it reads as one, else the text itself."""
+    """Read a form's text as a number, true, false or null; return the text if it is none of these."""
     try:
         value = json.loads(text)
     except ValueError:

@@ -14,18 +14,18 @@ from parenting.server.tables import OperatorEvent
 
 
 def add_operator_event(db: Database, run_id: int, kind: str, payload: dict[str, Any]) -> OperatorEvent:
-    """Record what the operator did (agent.events); the worker applies it before the run's next tick.
+    """Store an operator event (agent.events); the worker applies it before the run's next tick.
 
     Raises:
         NotFound: there is no such run.
-        Conflict: the run is over, or it is told to mature in its last stage.
+        Conflict: the run is over, or the event would end its last stage.
     """
     with db.write() as session:
         run = living(session, run_id)
         if kind == "mature" and run.maturity >= run.config["stages"]:
             raise Conflict(
-                f"Run {run_id} is in its last stage, T = {run.maturity}; it never ends. "
-                "How many stages there are is said at the start (config.stages)."
+                f"Run {run_id} is in its last stage, T = {run.maturity}, which never ends. "
+                "The number of stages is set when a run is started (config.stages)."
             )
         event = OperatorEvent(run_id=run_id, kind=kind, payload=payload, created=db.clock())
         session.add(event)
@@ -34,7 +34,7 @@ def add_operator_event(db: Database, run_id: int, kind: str, payload: dict[str, 
 
 
 def list_operator_events(db: Database, run_id: int) -> Sequence[OperatorEvent]:
-    """The operator's events of a run, in their order."""
+    """Return the operator events of a run, in their order."""
     with db.read() as session:
         rows = select(OperatorEvent).where(OperatorEvent.run_id == run_id)
         return session.scalars(rows.order_by(OperatorEvent.id)).all()

@@ -1,4 +1,4 @@
-"""A stored run lived again from tick 0, from its answers and events, and held against its last checkpoint.
+"""Replay of a stored run from tick 0, by its answers and events, compared with its last checkpoint.
 
 `parents.replay.ReplayParent` is the parent; `server.reads.record` gives it the record. It writes nothing.
 """
@@ -35,16 +35,16 @@ from parenting.server.snapshot import (
 from parenting.server.tables import Run
 
 Progress = Callable[[int, int], None]
-"""Told, after every tick, which it was and which will be the last."""
+"""A function that is called after each tick with its number and the last one's."""
 
 
 def _silent(tick: int, last: int) -> None:
-    """Tell nobody."""
+    """Do nothing."""
 
 
 @dataclass(frozen=True)
 class Relived:
-    """What came of a run's second life, up to its last intact checkpoint or to where the two lives part."""
+    """The result of a replay, up to the last intact checkpoint or to the first difference."""
 
     run: int
     tick: int  # the last one that was lived again
@@ -56,14 +56,14 @@ class Relived:
 
     @property
     def equal(self) -> bool:
-        """Whether every question was asked again, and every piece of state is equal bit for bit."""
+        """Return whether every query was asked again and all state is equal bit for bit."""
         return self.parted is None and not self.differ
 
 
 def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
-    """Live a run again from tick 0 to its last intact checkpoint, and compare every piece of state with it.
+    """Replay a run from tick 0 to its last intact checkpoint, and compare all state with it.
 
-    A run that is being raised may be lived again, too: up to its last checkpoint nothing changes any more.
+    A run that a worker is raising can be replayed too: nothing changes any more up to its last checkpoint.
 
     Raises:
         NotFound: there is no such run, or no intact checkpoint of it.
@@ -132,7 +132,7 @@ def _said(parted: ReplayMismatchError) -> str:
 
 
 def differences(one: Snapshot, other: Snapshot) -> list[str]:
-    """The names of the pieces of state that are not equal bit for bit; the report is none."""
+    """Return the names of the pieces of state that are not equal bit for bit, `info` excepted."""
     wrong = [] if one.config == other.config else ["config"]
     for prefix, ours, theirs in (("", one.state, other.state), ("tally.", one.tally, other.tally)):
         expected = theirs.tensors()
@@ -145,7 +145,7 @@ def differences(one: Snapshot, other: Snapshot) -> list[str]:
 
 
 def equal(one: Tensor, other: Tensor) -> bool:
-    """Bit for bit, shape and dtype included: 0.0 and -0.0 are two, and a NaN equals itself."""
+    """Compare bit for bit, shape and dtype included: 0.0 differs from -0.0, and a NaN equals itself."""
     if one.dtype != other.dtype or one.shape != other.shape:
         return False
     return torch.equal(_bytes(one), _bytes(other))

@@ -23,12 +23,12 @@ from parenting.server.tables import Run
 
 CLAIM_SECONDS = 5.0
 PROGRESS_FIELDS = frozenset({"tick", "waiting", "optimal", "versions", "maturity", "speed"})
-"""What a worker reports of an agent."""
+"""The columns that a worker reports."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A worker's right to raise a run, until another claims it. Every write of a worker carries one."""
+    """A worker's right to raise a run, until another claims it. Every write of a worker needs one."""
 
     run_id: int
     worker: str
@@ -57,13 +57,13 @@ def create_run(db: Database, **fields: Any) -> Run:
 
 
 def list_runs(db: Database, limit: int = 200) -> Sequence[Run]:
-    """The runs, newest first."""
+    """Return the runs, newest first."""
     with db.read() as session:
         return session.scalars(select(Run).order_by(Run.id.desc()).limit(limit)).all()
 
 
 def get_run(db: Database, run_id: int) -> Run:
-    """One run.
+    """Return one run.
 
     Raises:
         NotFound: there is none of this id.
@@ -75,7 +75,7 @@ def get_run(db: Database, run_id: int) -> Run:
 def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None = None) -> Run:
     """Pause, resume (`active`) or stop a run, for the operator.
 
-    Doing it twice is doing it once. Stopping withdraws what is open.
+    A second call changes nothing. Stopping withdraws the open queries.
 
     Raises:
         NotFound: there is no such run.
@@ -91,7 +91,7 @@ def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None 
 
 
 def set_goal(db: Database, run_id: int, goal: int | None) -> Run:
-    """Let a run rest once so many questions are answered; None lets it go on for ever.
+    """Let a run rest once this many questions are answered; None removes the goal.
 
     Raises:
         NotFound: there is no such run.
@@ -104,7 +104,7 @@ def set_goal(db: Database, run_id: int, goal: int | None) -> Run:
 
 
 def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
-    """Let at most so many ticks pass in a second; None lets the agent live as fast as it can.
+    """Limit the ticks in a second; None removes the limit.
 
     Raises:
         NotFound: there is no such run.
@@ -117,7 +117,7 @@ def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
 
 
 def claim(db: Database, worker: str, seconds: float = CLAIM_SECONDS) -> Sequence[Claim]:
-    """Take every living run that is free, or whose worker gave no sign of life for `seconds`."""
+    """Claim every run that is not over and is free, or whose worker was silent for `seconds`."""
     late = db.clock() - timedelta(seconds=seconds)
     living = (Run.status.in_(LIVING), or_(Run.worker.is_(None), Run.heartbeat < late))
     with db.read() as session:  # nothing to claim is the common case, and takes no lock
@@ -131,7 +131,7 @@ def claim(db: Database, worker: str, seconds: float = CLAIM_SECONDS) -> Sequence
 
 
 def let_go(db: Database, claims: Sequence[Claim]) -> None:
-    """Give runs back at once, at a worker's orderly end; those that others hold by now are left alone."""
+    """Release claims at a worker's orderly end; runs that others have claimed since are left alone."""
     with db.write() as session:
         for mine in claims:
             run = find(session, mine.run_id)
@@ -140,7 +140,7 @@ def let_go(db: Database, claims: Sequence[Claim]) -> None:
 
 
 def heartbeat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
-    """A sign of life for all runs of a worker; gives back the claims that still hold."""
+    """Renew the claims of a worker, and return those that still hold."""
     with db.write(durable=False) as session:
         kept = []
         for mine in claims:
@@ -152,7 +152,7 @@ def heartbeat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
 
 
 def report_progress(db: Database, mine: Claim, **fields: Any) -> Run:
-    """Show where an agent is: any of `PROGRESS_FIELDS`. Also a sign of life.
+    """Store the progress of an agent: any of `PROGRESS_FIELDS`. This renews the claim too.
 
     Raises:
         LostClaimError: another worker raises this run now.
@@ -171,7 +171,7 @@ def report_progress(db: Database, mine: Claim, **fields: Any) -> Run:
 def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str | None = None) -> Run:
     """End a run as `finished` or `failed`, with a sentence for people and, if it failed, the details.
 
-    Withdraws what is open.
+    The open queries are withdrawn.
 
     Raises:
         LostClaimError: another worker raises this run now.
@@ -185,7 +185,7 @@ def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str
 
 
 def find(session: Session, run_id: int) -> Run:
-    """One run, in a transaction that is already open; raises NotFound."""
+    """Return one run, in a transaction that is already open; raises NotFound."""
     run = session.get(Run, run_id)
     if run is None:
         raise NotFound(f"There is no run {run_id}.")
@@ -193,7 +193,7 @@ def find(session: Session, run_id: int) -> Run:
 
 
 def hold(session: Session, run_id: int) -> Run:
-    """The same, with the row locked until the transaction ends (SQLite locks the whole file anyway)."""
+    """Return one run, its row locked until the transaction ends (SQLite locks the whole file anyway)."""
     run = session.get(Run, run_id, with_for_update=True)
     if run is None:
         raise NotFound(f"There is no run {run_id}.")
@@ -201,13 +201,13 @@ def hold(session: Session, run_id: int) -> Run:
 
 
 def lock(session: Session, run_id: int) -> None:
-    """`hold`, for those who need nothing of the run."""
+    """Lock a run without reading it."""
     if session.execute(_LOCKED, {"run_id": run_id}).scalar() is None:
         raise NotFound(f"There is no run {run_id}.")
 
 
 def living(session: Session, run_id: int) -> Run:
-    """`hold`, for what can be done to a run that is not over.
+    """Return one run, locked, if it is not over.
 
     Raises:
         NotFound: there is no such run.
@@ -215,12 +215,12 @@ def living(session: Session, run_id: int) -> Run:
     """
     run = hold(session, run_id)
     if run.status in OVER:
-        raise Conflict(f"Run {run_id} is {run.status}; nothing can be done to its agent any more.")
+        raise Conflict(f"Run {run_id} is {run.status}; its agent cannot be changed any more.")
     return run
 
 
 def held(session: Session, mine: Claim) -> Run:
-    """The run of a claim, locked, if the claim still holds: the first line of every write of a worker."""
+    """Return the run of a claim, locked, if the claim still holds. Every write of a worker begins here."""
     run = hold(session, mine.run_id)
     if (run.worker, run.fencing_token) != (mine.worker, mine.fencing_token):
         raise LostClaimError(
@@ -231,7 +231,7 @@ def held(session: Session, mine: Claim) -> Run:
 
 
 def held_status(session: Session, mine: Claim) -> RunStatus:
-    """`held`, for those who need no more of the run than its status: what a tick writes."""
+    """Return the status of a claim's run, locked, if the claim still holds."""
     status: RunStatus | None = session.execute(_MINE, vars(mine)).scalar()
     return held(session, mine).status if status is None else status
 

@@ -1,4 +1,4 @@
-"""What the API gives back, and what the pages draw: runs, questions, metrics. Times are ISO 8601 in UTC."""
+"""Schemas of the API's replies, which the pages use too. Times are ISO 8601 in UTC."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ By = Literal["human", "scripted"]
 
 
 class Schema(BaseModel):
-    """The root of all schemas: the sentence under a field describes it in the API's own description."""
+    """The root of all schemas. The text under a field is its description in OpenAPI."""
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
 
 class OpenSchema(Schema):
-    """How many questions wait for an answer, by kind."""
+    """The number of open questions, by kind."""
 
     guidance: int
     preference: int
@@ -53,7 +53,7 @@ class RunSchema(Schema):
     parent: By
     status: RunStatus
     reason: str | None
-    """Why it is over, in a sentence."""
+    """The reason why it is over, in a sentence."""
     tick: int
     """The last tick, as last reported."""
     maturity: int
@@ -61,35 +61,35 @@ class RunSchema(Schema):
     speed: float | None
     """Ticks a second, as last measured."""
     waiting: Waiting | None
-    """Why it does not tick: it waits for guidance, for fewer open preference questions, or for the operator
-    (*stuck*: no action was acceptable, so the episode has to be ended); null while it ticks.
+    """The reason why no tick passes: the agent waits for guidance, for fewer open preference questions, or
+    for the operator (*stuck*: no action was acceptable, so the episode has to be ended); null while it acts.
     """
     state: RunState
-    """Who waits for whom, in one word: over, paused, resting (the goal is reached), question (one waits for a
-    person), no_worker, stuck, or exploring. The first that holds, in this order.
+    """One word for who waits for whom, the first of these that holds: over, paused, resting (the goal is
+    reached), question (one waits for a person), no_worker, stuck, exploring.
     """
     goal: int | None
     """Answered questions after which the run rests; null: never."""
     resting: bool
-    """The goal is reached: no tick passes until it is raised."""
+    """True if the goal is reached: no tick passes until it is raised."""
     pace: float | None
     """Ticks a second at most; null: as fast as it can."""
     optimal: bool
-    """The policy without chance takes a shortest safe path to the goal (never in the garden)."""
+    """True if the argmax policy takes a shortest safe path to the goal (never in the garden)."""
     answers: int
-    """Answers so far, corrections counted."""
+    """The number of answers so far, superseded ones included."""
     open: OpenSchema
     worker: Literal["alive", "silent", "done"]
     """alive, silent (none raises this run just now), or done (the run is over)."""
 
 
 class FrameSchema(Schema):
-    """One moment of a clip: glyphs as they were true and as the agent saw them, and the pieces."""
+    """One moment of a clip: the true board, the board that the agent saw, and the positions."""
 
     ground: list[str]
-    """What was true, without agent and box: a string of glyphs a row."""
+    """The true board without agent and box, a string of glyphs for each row."""
     observed: list[str]
-    """What the agent saw."""
+    """The board that the agent saw."""
     agent: tuple[int, int]
     """Row and column."""
     box: tuple[int, int] | None
@@ -104,11 +104,11 @@ class ClipSchema(Schema):
 
 
 class PolicySchema(Schema):
-    """Which policy asked; null for questions that were asked before this was kept."""
+    """The policy that asked; null for questions of versions that did not store it."""
 
     stage: int | None
     gradient_steps: int | None
-    """Within its stage."""
+    """Gradient steps within its stage."""
 
 
 class QuerySchema(Schema):
@@ -125,33 +125,33 @@ class QuerySchema(Schema):
     status: QueryStatus
     posted: datetime
     leased_until: datetime | None
-    """Until then it is offered to nobody else."""
+    """The time until which it is offered to nobody else."""
     left: ClipSchema
     right: ClipSchema
 
 
 class WorldSchema(Schema):
-    """All that is needed to draw a clip, and to answer it without knowing the world's code."""
+    """Everything that is needed to draw and to answer a question without the world's code."""
 
     name: str
     level: str
     text: str
     """The level's file, header included."""
     legend: dict[str, str]
-    """What each glyph is."""
+    """The name of each glyph."""
     brief: dict[str, str]
     """The goal and the danger, a sentence each."""
 
 
 class ProgressSchema(Schema):
-    """How far the parent is."""
+    """The parent's progress."""
 
     answered: int
     open: int
 
 
 class ParentSchema(Schema):
-    """What the parent's own values depend on: Eq. (7)'s gamma, and the garden's way inside (Sec. 3.3)."""
+    """The settings of the parent's values: gamma of Eq. (7), and the garden's inner path (Sec. 3.3)."""
 
     gamma: float
     inside: Inside
@@ -171,7 +171,7 @@ class StoredSchema(Schema):
     query: int
     run: int
     number: int
-    """Which answer of the run it is, from 1 on."""
+    """The number of the answer within its run, from 1."""
     choice: Choice
     received: datetime
 
@@ -194,14 +194,14 @@ class AskedSchema(QuerySchema):
 
 
 class MetricSchema(Schema):
-    """What was measured at one tick; null where a number was not finite."""
+    """The metrics of one tick; null where a number was not finite."""
 
     tick: int
     values: dict[str, float | int | None]
 
 
 def run_schema(db: Database, run_id: int) -> RunSchema:
-    """A run as it is now.
+    """Return the schema of a run.
 
     Raises:
         NotFound: there is none of this id.
@@ -211,14 +211,14 @@ def run_schema(db: Database, run_id: int) -> RunSchema:
 
 
 def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema]:
-    """Runs as they are now."""
+    """Return the schemas of runs."""
     with db.read() as session:
         opened = open_by_run(session, [run.id for run in runs])
     return [_run_schema(run, opened[run.id], db.clock()) for run in runs]
 
 
 def query_schema(query: Query) -> QuerySchema:
-    """A question as it is stored."""
+    """Return the schema of a query."""
     names = ("id", "tick", "kind", "maturity", "status", "posted", "leased_until")
     policy = PolicySchema(stage=query.policy_stage, gradient_steps=query.policy_steps)
     own = {name: getattr(query, name) for name in names}
@@ -226,14 +226,14 @@ def query_schema(query: Query) -> QuerySchema:
 
 
 def asked_schema(query: Query, answer: Answer | None) -> AskedSchema:
-    """A question as it is stored, and the answer that stands for it."""
+    """Return the schema of a query, with the answer that stands for it."""
     names = ("number", "choice", "parent", "received", "applied_tick")
     said = None if answer is None else AnswerSchema(**{name: getattr(answer, name) for name in names})
     return AskedSchema(**query_schema(query).model_dump(), answer=said)
 
 
 def leased_schema(db: Database, query: Query) -> LeasedSchema:
-    """A question with its world, its parent's settings and the progress so far."""
+    """Return the schema of a leased query: with its world, the parent's settings and progress."""
     with db.read() as session:
         run = find(session, query.run_id)
         opened = open_in(session, run.id)
@@ -250,7 +250,7 @@ def leased_schema(db: Database, query: Query) -> LeasedSchema:
 
 
 def metric_schemas(rows: Sequence[Metric]) -> list[MetricSchema]:
-    """Metrics as the dashboard takes them."""
+    """Return the schemas of metrics."""
     return [MetricSchema(tick=row.tick, values=row.values) for row in rows]
 
 

@@ -1,8 +1,8 @@
-"""What stands before every route: known hosts, no cross-site acts, safe headers, and no traceback for anyone.
+"""The outermost middleware: it checks hosts, refuses cross-site writes, sets safe headers, hides tracebacks.
 
-Cross-site requests are told by `Sec-Fetch-Site`, which every browser of today sends, and by `Origin` in older
-ones (Datasette's and Go's way). A request with neither comes from no browser and passes: a program on this
-machine may answer too.
+A cross-site request is recognised by `Sec-Fetch-Site`, which every present browser sends, or by `Origin` in
+older ones (as in Datasette and Go). A request with neither comes from a program and passes, because programs
+on this machine may answer too.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ HEADERS = {
 
 
 class SecurityMiddleware:
-    """The outermost layer of the application."""
+    """ASGI middleware around the whole application."""
 
     def __init__(self, app: ASGIApp, largest_body: int, hosts: Sequence[str] = HOSTS) -> None:
         self.app = app
@@ -53,7 +53,7 @@ class SecurityMiddleware:
         self.hosts = hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let the request through, or refuse it in the one JSON shape."""
+        """Pass the request on, or refuse it with an error in JSON."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -63,7 +63,7 @@ class SecurityMiddleware:
             nonlocal size
             message = await receive()
             size += len(message.get("body", b""))
-            if size > self.largest_body:  # it came without a length, in pieces
+            if size > self.largest_body:  # a body without a declared length, in chunks
                 raise HTTPException(413)
             return message
 
@@ -84,11 +84,11 @@ class SecurityMiddleware:
         except Exception:
             log.exception("request failed", path=scope["path"], method=scope["method"])
             if started:
-                raise  # half of a reply is out; uvicorn closes the connection
+                raise  # part of the reply has been sent; uvicorn closes the connection
             await JSONResponse(ServerError().body(), 500)(scope, receive, safely)
 
     def refusal(self, method: str, headers: Headers) -> ServerError | None:
-        """Why this request must not pass, or None."""
+        """Return the error that refuses this request, or None."""
         host = headers.get("host", "")
         if _without_port(host) not in self.hosts:
             return UnknownHostError()

@@ -1,4 +1,4 @@
-"""The web process: uvicorn, which ends live streams when it is told to stop."""
+"""The web process: uvicorn, with an end to live streams at the signal to stop."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ GRACE = 1
 
 
 class Server(uvicorn.Server):
-    """uvicorn, which alone would wait for an open stream until its browser goes away."""
+    """A uvicorn server that ends open streams first; uvicorn alone would wait for their browsers."""
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """On SIGTERM and SIGINT: end the streams, then stop as uvicorn does."""
@@ -31,10 +31,10 @@ class Server(uvicorn.Server):
 
 
 def bind(host: str, port: int, container: bool = False) -> socket.socket:
-    """A listening socket on this machine only, or with `container` on all of its own network.
+    """Open a listening socket, on this machine only, or with `container` on its whole network.
 
     Raises:
-        SetupError: an address that would let others in, or a port that is taken.
+        SetupError: the address would let others in, or the port is taken.
     """
     if host != LOOPBACK and not (container and host == EVERYWHERE):
         raise SetupError(
@@ -57,7 +57,7 @@ def bind(host: str, port: int, container: bool = False) -> socket.socket:
 
 
 def make_server(settings: Settings) -> Server:
-    """A server that is ready to `run(sockets=[bind(...)])` until a signal says stop.
+    """Make a server that is ready to `run(sockets=[bind(...)])` until a signal stops it.
 
     Raises:
         SetupError: the database cannot be used as it is.
@@ -73,5 +73,5 @@ def make_server(settings: Settings) -> Server:
         timeout_keep_alive=30,
         server_header=False,
     )
-    gc.freeze()  # what is loaded stays: to look through it for garbage would take a tenth of a second
+    gc.freeze()  # loaded modules stay: searching them for garbage takes a tenth of a second
     return Server(config)

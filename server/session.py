@@ -1,4 +1,4 @@
-"""One run in a worker's hands: its agent, its mailbox, its checkpoints and what is measured of it."""
+"""One run in a worker: its agent, its parent, its checkpoints and its metrics."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ from parenting.server.tables import Run
 log = structlog.get_logger()
 
 CHECKPOINT_SECONDS = 2.0
-"""A restart lives at most the ticks of this long a second time; they replay exactly."""
+"""A restart repeats the ticks of at most this long; they replay exactly."""
 METRIC_SECONDS = 1.0
 HURRY_SECONDS = 0.25
-"""For so long after an answer nothing comes between the ticks that lead to the next question."""
+"""For this long after an answer, no metrics and no checkpoint delay the next question."""
 
 
 class RunSession:
-    """An agent between its birth, or its last checkpoint, and whatever ends it."""
+    """A run that a worker raises, from tick 0 or its last checkpoint until something ends it."""
 
     def __init__(self, db: Database, claim: Claim, run: Run, asked: Callable[[], None]) -> None:
         """Take up a run where its last intact checkpoint left it, or at tick 0.
@@ -65,7 +65,9 @@ class RunSession:
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
-        self._stuck_at = -1  # the tick it was told of: whoever ends episodes has to see that another is stuck
+        self._stuck_at = (
+            -1
+        )  # the tick that was reported as stuck: who ends episodes must see the next one too
         runs.report_progress(db, claim, versions=versions())
 
     def _parent(self, config: Config, rule: ScriptedRule, asked: Callable[[], None]) -> QueueParent:
@@ -82,13 +84,13 @@ class RunSession:
 
     @property
     def last_tick(self) -> int:
-        """The last tick that was lived."""
+        """Return the last tick that has passed."""
         return int(self.saved.state.keys.tick[0])
 
     # When it may live on
 
     def ready(self, seen: Watch) -> bool:
-        """Whether the next tick may pass: an agent never outruns its parent (docs/architecture.md)."""
+        """Return whether the next tick may pass: an agent never outruns its parent (docs/queue.md)."""
         if self.last_tick < self.record_ends:
             return True
         if idle(seen):
@@ -102,7 +104,7 @@ class RunSession:
         )
 
     def report_waiting(self, seen: Watch) -> None:
-        """Say who waits for whom, and save what was lived: nothing happens here for a while."""
+        """Report who waits for whom, and save a checkpoint: no tick passes for a while."""
         if self._news:
             self._measure(at_once=False)
         reason: Waiting | None = None
@@ -118,7 +120,7 @@ class RunSession:
         self.save_if_due()
 
     def delay(self, pace: float | None) -> float:
-        """Seconds until the next tick may pass at this pace; ticks that are lived again need not wait."""
+        """Return the seconds until the next tick may pass at this pace; replayed ticks need not wait."""
         if pace is None or self.last_tick < self.record_ends:
             return 0.0
         return max(0.0, self._lived_at + 1 / pace - time.monotonic())
@@ -148,7 +150,7 @@ class RunSession:
         return at_once
 
     def _hold_to_the_record(self, query: Query) -> None:
-        """A tick that is lived again asks what it asked the first time, or the run stops."""
+        """Stop the run if a replayed tick does not ask what it asked the first time."""
         stored = worker_side.asked_at(self.db, self.claim.run_id, self.last_tick)
         kind = kind_name(query)
         if (stored.kind if stored else None) != kind or (
@@ -159,7 +161,7 @@ class RunSession:
             )
 
     def _note(self) -> None:
-        """Keep what the next row of metrics says of this tick."""
+        """Keep what the next row of metrics needs of this tick."""
         assert self.parent.heard is not None
         if self.parent.heard.choice[0]:
             self._news, self._heard_at = True, self._lived_at
@@ -186,13 +188,13 @@ class RunSession:
         runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None, **shown)
 
     def finished(self) -> bool:
-        """A scripted parent has no more to teach once the argmax policy is optimal; a person may go on."""
+        """Return whether a scripted parent has no more to teach: the argmax policy is optimal."""
         return self.run.parent == "scripted" and self.optimal
 
     # Checkpoints
 
     def save_if_due(self) -> None:
-        """Save when the last checkpoint is old and something was lived since."""
+        """Save a checkpoint if the last one is old and a tick has passed since."""
         if self.last_tick != self._saved_tick and time.monotonic() - self._saved_at >= CHECKPOINT_SECONDS:
             self.save()
 
@@ -203,10 +205,10 @@ class RunSession:
 
 
 def goal_reached(seen: Watch) -> bool:
-    """Whether the goal of answered questions is reached: then a look comes before each tick."""
+    """Return whether the goal of answers is reached; the worker then looks before each tick."""
     return seen.goal is not None and seen.answered >= seen.goal
 
 
 def idle(seen: Watch) -> bool:
-    """Whether the goal is reached, and every answer heard: the agent rests."""
+    """Return whether the agent rests: the goal is reached, and every answer is heard."""
     return goal_reached(seen) and not seen.answers

@@ -11,14 +11,14 @@ from sqlalchemy import URL
 
 
 def state_folder() -> Path:
-    """Where data lives unless told otherwise: `parenting` in XDG's state folder."""
+    """Return the default data folder: `parenting` in XDG's state folder."""
     state = os.environ.get("XDG_STATE_HOME", "")
     root = Path(state) if Path(state).is_absolute() else Path.home() / ".local" / "state"
     return root / "parenting"
 
 
 class Settings(BaseSettings):
-    """What web and worker need to know. Each field is set by `PARENTING_` and its name in capitals."""
+    """The settings of web and worker. Each is set by `PARENTING_` and its name in capitals."""
 
     model_config = SettingsConfigDict(env_prefix="PARENTING_", env_file=".env", extra="ignore")
 
@@ -55,12 +55,12 @@ class Settings(BaseSettings):
 
     @property
     def weights(self) -> Path:
-        """Where `parenting pretrain` writes weights of one's own, and where new runs look for them."""
+        """Return the folder where `parenting pretrain` writes weights and where new runs look for them."""
         return self.data / "weights"
 
     @property
     def url(self) -> str:
-        """The database's URL."""
+        """Return the database's URL."""
         if self.database_url:
             return self.database_url
         path = (self.data / "parenting.db").absolute()

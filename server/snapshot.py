@@ -1,4 +1,4 @@
-"""An agent's whole state as bytes: tensors by name, read back without running any code."""
+"""The whole state of an agent as bytes: tensors by name, read back without running any code."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ INFO = "info."
 
 
 class DivergedError(ServerError):
-    """The record and the agent disagree; the run was stopped so that nothing is built on it."""
+    """The agent does not do what its record says; the run was stopped."""
 
 
 class Snapshot(NamedTuple):
-    """What a checkpoint holds: agent, counts, and the config as the operator's events left it."""
+    """The content of a checkpoint: agent, counts, and the config as operator events have changed it."""
 
     state: AgentState
     tally: Counters
@@ -40,12 +40,12 @@ class Snapshot(NamedTuple):
 
 
 def versions() -> dict[str, Any]:
-    """What bits depend on beside the record: torch's build and its threads."""
+    """Return what the bits depend on besides the record: torch's build and its number of threads."""
     return {"torch": str(torch.__version__), "threads": torch.get_num_threads()}
 
 
 def initial_weights(db: Database, run: Run, world: Gridworld) -> Tensor | None:
-    """The pre-trained weights that a run began with; None where it drew fresh ones (Sec. 3.1.4).
+    """Return the pre-trained weights that a run began with; None if it drew random ones (Sec. 3.1.4).
 
     Raises:
         NotFound: they are not in the database, or are damaged.
@@ -56,12 +56,12 @@ def initial_weights(db: Database, run: Run, world: Gridworld) -> Tensor | None:
 
 
 def initial_snapshot(world: Gridworld, config: Config, seed: int, weights: Tensor | None = None) -> Snapshot:
-    """A run at tick 0."""
+    """Return a run at tick 0."""
     return Snapshot(parenting.init(world, config, keys(seed, 1), weights), no_counts(), config)
 
 
 def pack(saved: Snapshot) -> bytes:
-    """A checkpoint's bytes."""
+    """Return a checkpoint's bytes."""
     whole = {
         "state": {name: part for name, part in saved.state.tensors().items() if not name.startswith(INFO)},
         "tally": saved.tally.tensors(),
@@ -74,7 +74,13 @@ def pack(saved: Snapshot) -> bytes:
 
 
 def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None = None) -> Snapshot:
-    """What the bytes hold; `weights` are those that the run began with.
+    """Read a checkpoint's bytes.
+
+    Args:
+        world: The run's world.
+        config: The config that the run was started with.
+        blob: What `pack` returned.
+        weights: The pre-trained weights that the run began with.
 
     Raises:
         DivergedError: other versions of torch or another number of threads wrote them: the bits would differ.

@@ -1,7 +1,7 @@
-"""Static files: our own, and what other packages carry (found there, never imported: some take a second).
+"""Static files: our own, and those that other packages carry (found without an import, which is slow).
 
-The browser asks each time whether its copy is still the newest, and hears 304 if so: after an upgrade nobody
-is left with a page of one version and a script of another.
+The browser asks each time whether its copy is current, and gets 304 if it is. So after an upgrade no page of
+one version runs a script of another.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ VENDOR = {
 
 
 class OurFiles(StaticFiles):
-    """What lies in web/static, and the style sheets of drawings."""
+    """The files of web/static, and the style sheets of drawings."""
 
     def __init__(self) -> None:
         super().__init__(directory=STATIC, packages=[("parenting.drawing", "style")])
@@ -42,14 +42,14 @@ class OurFiles(StaticFiles):
 
 
 class OthersFiles(OurFiles):
-    """What lies in other packages: only the files of `VENDOR`."""
+    """Files of other packages: only those of `VENDOR`."""
 
     def __init__(self, files: Mapping[str, tuple[str, str]] = VENDOR) -> None:
         super().__init__()
         self.found = {name: (package, _find(package, place)) for name, (package, place) in files.items()}
 
     def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
-        """Where a file is.
+        """Return the path of a file.
 
         Raises:
             NotFound: the package that carries it is not installed.

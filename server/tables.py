@@ -1,7 +1,7 @@
-"""The tables: a run, its queries, their answers, the operator's events, metrics, checkpoints, and others.
+"""The tables: runs, queries, answers, operator events, metrics, checkpoints, workers, weights.
 
-The database holds the invariants: one query a run and tick, one standing answer a query, known words only.
-Times are UTC. JSON is readable by eye; the shape of a clip is described at `Query.clips`.
+The database enforces the invariants: one query for each run and tick, one standing answer for each query,
+known words only. Times are UTC. JSON is readable by eye; `Query.clips` describes the shape of a clip.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ E = TypeVar("E", bound=StrEnum)
 
 
 class Utc(TypeDecorator[datetime]):
-    """A moment, stored without zone as UTC and read back as UTC, in every database alike."""
+    """A time, stored as UTC without a zone and read back as UTC, in every database alike."""
 
     impl = DateTime(timezone=False)
     cache_ok = True
@@ -101,7 +101,7 @@ def _one_of(column: str, words: Iterable[str], nullable: bool = False) -> CheckC
 
 
 class Run(Table):
-    """One agent's life: what it was started with, where it is, and which worker raises it."""
+    """A run: its settings, its progress, and the worker that raises it."""
 
     __tablename__ = "run"
     __table_args__ = (
@@ -149,7 +149,7 @@ class Run(Table):
 
 
 class Weights(Table):
-    """Pre-trained weights that runs begin with, whole: a worker needs no file (Sec. 3.1.4)."""
+    """Pre-trained weights that runs begin with (Sec. 3.1.4), so that a worker needs no file."""
 
     __tablename__ = "weights"
 
@@ -160,7 +160,7 @@ class Weights(Table):
 
 
 class Query(Table):
-    """One question of a run. A lease is a timestamp, not a state, so nothing sticks."""
+    """A query of a run. A lease is a time, not a status, so nothing sticks (docs/queue.md)."""
 
     __tablename__ = "query"
     __table_args__ = (
@@ -187,7 +187,7 @@ class Query(Table):
 
 
 class Answer(Table):
-    """What a parent said. Rows are only ever added; a correction names the row that it supersedes."""
+    """A parent's answer. Rows are only ever added; an answer that supersedes another names its row."""
 
     __tablename__ = "answer"
     __table_args__ = (
@@ -225,7 +225,7 @@ class Answer(Table):
 
 
 class OperatorEvent(Table):
-    """What the operator did to a living agent (agent.events), and the tick before which it was applied."""
+    """An operator event (agent.events), and the tick before which it was applied."""
 
     __tablename__ = "event"
     __table_args__ = (Index(None, "run_id", "applied_tick"),)
@@ -239,7 +239,7 @@ class OperatorEvent(Table):
 
 
 class Metric(Table):
-    """What the worker measured at a tick: name -> number, or null where it was not finite."""
+    """The metrics of a tick: name -> number, or null where it was not finite."""
 
     __tablename__ = "metric"
 
@@ -249,7 +249,7 @@ class Metric(Table):
 
 
 class Worker(Table):
-    """A worker process that gave a sign of life; it takes its row away when it ends in order."""
+    """A worker process that is alive; it deletes its row when it ends in order."""
 
     __tablename__ = "worker"
 

@@ -1,4 +1,4 @@
-"""Pre-trained weights in the database: a run's worker finds them there, on whichever machine it is."""
+"""Pre-trained weights in the database, where a run's worker finds them on any machine."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from parenting.weights.store import digest
 
 
 def put(db: Database, file: Path) -> str:
-    """Store a file of weights, once; returns its SHA-256."""
+    """Store a file of weights, once, and return its SHA-256."""
     blob = file.read_bytes()
     sha256 = digest(blob)
     with db.write() as session:
@@ -21,10 +21,10 @@ def put(db: Database, file: Path) -> str:
 
 
 def get(db: Database, sha256: str) -> bytes:
-    """The bytes of stored weights.
+    """Return the bytes of stored weights.
 
     Raises:
-        NotFound: there are none of this hash, or they have changed.
+        NotFound: no weights have this hash, or they have changed.
     """
     with db.read() as session:
         row = session.get(Weights, sha256)

@@ -1,4 +1,4 @@
-"""The worker: raises every living run in turn, a few ticks each, and waits where a parent has not answered.
+"""The worker: it raises every run in turn, a few ticks each, and waits for parents that have not answered.
 
 Between rounds it waits for a notification, which the web sends after each answer, and polls every 50 ms.
 """
@@ -33,15 +33,15 @@ log = structlog.get_logger()
 
 POLL_SECONDS = 0.05
 SLICE_SECONDS = 0.01
-"""How long one run may live on after a tick before the next has its turn."""
+"""Seconds that one run may go on after a tick before the next has its turn."""
 CLAIM_EVERY = 0.5
 
 
 class Worker:
-    """Raises runs until it is told to stop."""
+    """A worker process that raises runs until it is told to stop."""
 
     def __init__(self, db: Database, settings: Settings) -> None:
-        """A worker with a name of its own; it claims nothing yet."""
+        """Make a worker with a name of its own, which has claimed nothing yet."""
         self.db, self.settings = db, settings
         self.name = f"{socket.gethostname()}:{os.getpid()}"
         self.claims: dict[int, Claim] = {}
@@ -94,7 +94,7 @@ class Worker:
         }
 
     def _round(self) -> bool:
-        """A turn for every run that may live on, first where an answer waits; whether any did."""
+        """Give every run its turn, first those with an answer; return whether any tick has passed."""
         ticked = False
         found = worker_side.watch(self.db, list(self.claims))
         for run_id, seen in sorted(found.items(), key=lambda item: not item[1].answers):
@@ -105,7 +105,7 @@ class Worker:
         return ticked
 
     def _guarded(self, run_id: int, seen: Watch) -> bool:
-        """One run's turn. A run that fails stops alone, with its reason."""
+        """Give one run its turn. A run that fails stops alone, with its reason."""
         try:
             return self._turn(run_id, seen)
         except LostClaimError as error:
@@ -175,7 +175,7 @@ def main(settings: Settings) -> int:
     db = connect(settings)
     require_current(db)
     worker = Worker(db, settings)
-    gc.freeze()  # what is loaded stays: to look through it for garbage would take a tenth of a second
+    gc.freeze()  # loaded modules stay: searching them for garbage takes a tenth of a second
     signal.signal(signal.SIGTERM, worker.stop)
     signal.signal(signal.SIGINT, worker.stop)
     worker.work()

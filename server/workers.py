@@ -1,4 +1,4 @@
-"""Verbs on workers: signs of life, which /readyz and health checks ask for. One transaction each."""
+"""Signs of life of workers, which /readyz and health checks read. Each verb is one transaction."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from parenting.server.db import Database
 from parenting.server.tables import Worker
 
 SIGN_SECONDS = 2.0
-"""How often a worker gives a sign of life."""
+"""Seconds between two signs of life of a worker."""
 SILENT_SECONDS = 10.0
-"""After so long without one it does not count as alive: some ticks, such as a first look at a large level,
-take seconds."""
+"""A worker counts as alive for this long after a sign of life. Some ticks take seconds, such as the first
+evaluation of a large level."""
 
 
 def sign(db: Database, name: str) -> None:
-    """A sign of life of a worker. Rows of workers that were killed a day ago are removed."""
+    """Give a sign of life of a worker. Rows of workers that were silent for a day are removed."""
     with db.write() as session:
         now = db.clock()
         session.execute(delete(Worker).where(Worker.heartbeat < now - timedelta(days=1)))
@@ -30,13 +30,13 @@ def sign(db: Database, name: str) -> None:
 
 
 def sign_off(db: Database, name: str) -> None:
-    """A worker ends in order."""
+    """Remove a worker that ends in order."""
     with db.write() as session:
         session.execute(delete(Worker).where(Worker.name == name))
 
 
 def alive(db: Database, seconds: float = SILENT_SECONDS) -> Sequence[str]:
-    """The names of the workers that gave a sign of life within `seconds`, in their order."""
+    """Return the names of the workers that gave a sign of life within `seconds`, sorted."""
     with db.read() as session:
         since = db.clock() - timedelta(seconds=seconds)
         rows = select(Worker.name).where(Worker.heartbeat >= since)

@@ -1,4 +1,4 @@
-"""The API under /api/v1: thin routes over the verbs of `server.runs`, `queue`, `record` and `listing`."""
+"""The API under /api/v1: thin routes over `server.runs`, `server.queue` and `server.reads`."""
 
 from __future__ import annotations
 

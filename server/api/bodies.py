@@ -1,4 +1,4 @@
-"""What requests may say: ids, client ids, ticks, choices, and the bodies of the verbs."""
+"""Parameters and bodies of requests."""
 
 from __future__ import annotations
 
@@ -15,46 +15,48 @@ RunId = Annotated[int, Path(ge=1, le=LARGEST_INT, description="The run's id.", e
 QueryId = Annotated[int, Path(ge=1, le=LARGEST_INT, description="The question's id.", examples=[7])]
 After = Annotated[
     int | None,
-    Query(ge=-1, le=LARGEST_INT, description="Tell metrics too: those of the ticks after this one."),
+    Query(ge=-1, le=LARGEST_INT, description="Send metrics too: those of the ticks after this one."),
 ]
 ClientId = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9._:-]+$")]
 Choice = schemas.Choice
 
 
 class Strict(BaseModel):
-    """A body that takes its own fields and no others; nothing is taken for a number that is none."""
+    """A body that refuses unknown fields and converts no types."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
 class LeaseBody(Strict):
-    """Who asks for a question, or lets go of it."""
+    """The client that leases or releases a question."""
 
-    client_id: ClientId = Field(description="Any name of one's own: a browser's, the same in all its tabs.")
+    client_id: ClientId = Field(
+        description="A name of your choice; a browser uses the same one in all its tabs."
+    )
 
 
 class AnswerBody(Strict):
-    """What the parent said, and who."""
+    """The parent's choice, and who decided."""
 
     choice: Choice = Field(description="left and right are the clips; neither: both are unacceptable.")
     client_id: ClientId = Field(description="The name under which the question was leased.")
-    parent: By = Field("human", description="Who decided: a person or a script; kept beside the answer.")
+    parent: By = Field("human", description="Who decided, a person or a script; stored with the answer.")
 
 
 class ChangeBody(Strict):
-    """A changed probability of Sec. 2."""
+    """A new value for a probability of Sec. 2."""
 
     name: Literal["p_guid", "p_rec", "p_pref", "p_train"]
     value: float = Field(ge=0, le=1)
 
 
 class GoalBody(Strict):
-    """When the run rests."""
+    """The goal of a run."""
 
-    goal: Goal | None = Field(description="Answers after which no tick passes; null: never.")
+    goal: Goal | None = Field(description="Number of answers after which the run rests; null: none.")
 
 
 class PaceBody(Strict):
-    """How fast the agent lives."""
+    """The pace of a run."""
 
-    pace: Pace | None = Field(description="Ticks a second at most; null: as fast as it can.")
+    pace: Pace | None = Field(description="At most this many ticks a second; null: no limit.")

@@ -1,4 +1,4 @@
-"""Examples for the API's own description, by operation. A test holds each against the schema beside it."""
+"""Examples for the API's description, by operation. A test checks each against its schema."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def _rows(*shown: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Shown:
-    """What an operation shows: what comes back, and what may be sent, each with a name."""
+    """The examples of an operation: its reply, and named requests."""
 
     reply: Any = None
     sent: dict[str, Any] = field(default_factory=dict)

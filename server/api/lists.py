@@ -1,4 +1,4 @@
-"""What lists give back: rows, and where the next page begins. What may be asked: a cursor and a limit."""
+"""Lists in the API: pages of rows with the cursor of the next page, and the parameters that select one."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class AskedRows(Rows[AskedSchema]):
 
 
 class MetricRows(Rows[MetricSchema]):
-    """What was measured, in the order of the ticks."""
+    """Metrics, in the order of the ticks."""
 
 
 class OperatorEventSchema(Schema):
-    """What the operator did to an agent, and when it took effect."""
+    """An operator event, and the tick at which it took effect."""
 
     id: int
     run: int
@@ -50,50 +50,50 @@ class OperatorEventSchema(Schema):
 
 
 class OperatorEventRows(Rows[OperatorEventSchema]):
-    """The operator's events, in their order."""
+    """Operator events, in their order."""
 
 
 class Part(BaseModel):
-    """Which part of a list is asked for; a misspelt parameter is refused, lest a cursor be passed over."""
+    """The requested part of a list. A misspelt parameter is refused, because an ignored cursor loses rows."""
 
     model_config = ConfigDict(extra="forbid")
 
 
 class RunPart(Part):
-    """Of the runs."""
+    """The requested part of the runs."""
 
     before: Annotated[int, Field(ge=1, le=LARGEST_INT)] | None = Field(
         None, description="Only runs with smaller ids; the `next` of the page before."
     )
-    limit: int = Field(50, ge=1, le=200, description="At most so many rows.")
+    limit: int = Field(50, ge=1, le=200, description="At most this many rows.")
 
 
 class AskedPart(Part):
-    """Of a run's questions."""
+    """The requested part of a run's questions."""
 
     after: Place = Field(
         -1, description="Only questions asked after this tick; the `next` of the page before."
     )
-    limit: int = Field(50, ge=1, le=200, description="At most so many rows.")
+    limit: int = Field(50, ge=1, le=200, description="At most this many rows.")
     status: QueryStatus | None = Field(None, description="Only questions of this status.")
 
 
 class MetricPart(Part):
-    """Of a run's metrics."""
+    """The requested part of a run's metrics."""
 
     after: Place = Field(-1, description="Only ticks after this one; the `next` of the page before.")
-    limit: int = Field(10_000, ge=1, le=10_000, description="At most so many rows.")
+    limit: int = Field(10_000, ge=1, le=10_000, description="At most this many rows.")
 
 
 class EventPart(Part):
-    """Of the operator's events."""
+    """The requested part of a run's operator events."""
 
     after: Place = Field(-1, description="Only events with greater ids; the `next` of the page before.")
-    limit: int = Field(200, ge=1, le=1000, description="At most so many rows.")
+    limit: int = Field(200, ge=1, le=1000, description="At most this many rows.")
 
 
 def operator_event(row: tables.OperatorEvent) -> OperatorEventSchema:
-    """An event as it is stored."""
+    """Return the schema of a stored event."""
     event = {"kind": row.kind, **row.payload}
     return OperatorEventSchema.model_validate(
         {

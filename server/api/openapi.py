@@ -1,6 +1,6 @@
-"""The API's own description (OpenAPI), with an example of everything that is sent and replied.
+"""The OpenAPI description of the API, with an example of each request and reply.
 
-The examples are put in at the end: FastAPI drops every null on its way, also those of an example.
+The examples are added last, because FastAPI drops every null, also those of an example.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ DONE = ("200", "201", "202")
 
 
 class Described(FastAPI):
-    """An application whose description shows `server.api.examples`."""
+    """An application whose OpenAPI description shows `server.api.examples`."""
 
     def openapi(self) -> dict[str, Any]:
-        """The description, made once."""
+        """Return the description, which is made once."""
         if self.openapi_schema is None:
             for path in super().openapi()["paths"].values():
                 for operation in path.values():

@@ -1,4 +1,4 @@
-"""Routes by which the operator acts: pause, resume, stop, goal, pace, and events of the agent's life."""
+"""Routes of the operator: pause, resume, stop, goal, pace, and operator events."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ REPLIES = write_responses(404, 409)
 
 @router.post("/runs/{run_id}/pause", summary="Pause a run", responses=REPLIES)
 def pause_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
-    """Let no tick pass until the run is resumed. Twice is once."""
+    """Pause a run: no tick passes until it is resumed. A second call changes nothing."""
     return _become(request, db, run_id, RunStatus.PAUSED)
 
 
 @router.post("/runs/{run_id}/resume", summary="Resume a run", responses=REPLIES)
 def resume_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
-    """Let a paused run go on. Twice is once."""
+    """Resume a paused run. A second call changes nothing."""
     return _become(request, db, run_id, RunStatus.ACTIVE)
 
 
 @router.post("/runs/{run_id}/stop", summary="Stop a run", responses=REPLIES)
 def stop_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
-    """End a run for good; its open questions are withdrawn. Twice is once."""
+    """End a run for good and withdraw its open questions. A second call changes nothing."""
     return _become(request, db, run_id, RunStatus.STOPPED, "Stopped by the operator.")
 
 
 @router.post("/runs/{run_id}/goal", summary="Set a run's goal", responses=REPLIES)
 def set_goal(request: Request, run_id: RunId, body: GoalBody, db: Db) -> RunSchema:
-    """Let the run rest once so many questions are answered. The agent's life is the same, only shorter."""
+    """Let the run rest once this many questions are answered. The agent learns the same, only less long."""
     runs.set_goal(db, run_id, body.goal)
     notify_worker(request)
     return run_schema(db, run_id)
@@ -46,7 +46,7 @@ def set_goal(request: Request, run_id: RunId, body: GoalBody, db: Db) -> RunSche
 
 @router.post("/runs/{run_id}/pace", summary="Set a run's pace", responses=REPLIES)
 def set_pace(request: Request, run_id: RunId, body: PaceBody, db: Db) -> RunSchema:
-    """Let at most so many ticks pass in a second, for those who watch. The agent's life is the same."""
+    """Limit the ticks in a second, for those who watch. The agent learns the same."""
     runs.set_pace(db, run_id, body.pace)
     notify_worker(request)
     return run_schema(db, run_id)
@@ -60,7 +60,7 @@ def mature_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
 
 @router.post("/runs/{run_id}/end-episode", summary="End the episode", status_code=202, responses=REPLIES)
 def end_episode(request: Request, run_id: RunId, db: Db) -> RunSchema:
-    """End this episode before the next tick: the way out when no action is acceptable."""
+    """End this episode before the next tick, for example when no action is acceptable."""
     return _happen(request, db, run_id, EndEpisode())
 
 
@@ -68,7 +68,7 @@ def end_episode(request: Request, run_id: RunId, db: Db) -> RunSchema:
 def change_run(request: Request, run_id: RunId, body: ChangeBody, db: Db) -> RunSchema:
     """Set `p_guid`, `p_rec`, `p_pref` or `p_train` from the next tick on.
 
-    `config` keeps what the run was started with; the change stands among the operator's events.
+    `config` keeps the value that the run was started with; the change is listed among the operator events.
     """
     return _happen(request, db, run_id, Change(name=body.name, value=body.value))
 

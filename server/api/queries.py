@@ -1,4 +1,4 @@
-"""Routes on questions: list them, look at one, lease the most urgent, answer it, let go of it."""
+"""Routes of questions: list them, read one, lease the most urgent, answer it, release it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ router = APIRouter(tags=["questions"])
 
 @router.get("/runs/{run_id}/queries", summary="List a run's questions", responses=read_responses(404))
 def list_questions(run_id: RunId, db: Db, part: Annotated[AskedPart, Query()]) -> AskedRows:
-    """What the run asked, oldest first, with the answers that stand.
+    """List the questions of a run, oldest first, with the answers that stand.
 
-    The `next` of a page goes back as `after`.
+    Send the `next` of a page as `after` to get the following page.
     """
     page = pagination.asked_after(db, run_id, part.after, part.limit, part.status)
     return AskedRows(rows=[asked_schema(row.query, row.answer) for row in page.rows], next=page.next)
@@ -38,10 +38,10 @@ def list_questions(run_id: RunId, db: Db, part: Annotated[AskedPart, Query()]) -
     responses={204: {"description": "No question waits."}, **write_responses(404)},
 )
 def lease_question(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf) -> Response:
-    """The most urgent open question, guidance first, then the oldest, held for this client for 60 s.
+    """Lease the most urgent open question (guidance first, then the oldest) for this client, for 60 s.
 
-    It comes with all that a parent needs to answer it. Leasing again renews. 204 if nothing waits, or if the
-    run has reached its goal.
+    The reply holds all that a parent needs to answer it. Leasing again renews the lease. The status is 204 if
+    no question waits or if the run has reached its goal.
     """
     get_run(db, run_id)
     query = lease(db, run_id, body.client_id, settings.lease_seconds)
@@ -52,7 +52,7 @@ def lease_question(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf)
 
 @router.get("/queries/{query_id}", summary="Look at a question", responses=read_responses(404))
 def get_question(query_id: QueryId, db: Db) -> AskedSchema:
-    """One question as it is now, with its answer, if one stands. Looking leases nothing."""
+    """Read one question, with its answer if one stands. This leases nothing."""
     found = pagination.asked(db, query_id)
     return asked_schema(found.query, found.answer)
 
@@ -61,8 +61,9 @@ def get_question(query_id: QueryId, db: Db) -> AskedSchema:
 def answer_question(request: Request, query_id: QueryId, body: AnswerBody, db: Db) -> StoredSchema:
     """Store an answer, once.
 
-    The same again by the same client gets the same reply, so whoever lost a reply may send it again. Another
-    choice, or another client's, gets 409 and is not stored. A late answer is taken if none stands.
+    The same answer by the same client gets the same reply, so a client that lost the reply can send it again.
+    Another choice, or another client's answer, gets 409 and is not stored. A late answer is stored if none
+    stands.
     """
     stored = answer(db, query_id, body.choice, body.client_id, body.parent)
     notify_worker(request)
@@ -76,5 +77,5 @@ def answer_question(request: Request, query_id: QueryId, body: AnswerBody, db: D
     responses=write_responses(404),
 )
 def release_question(query_id: QueryId, body: LeaseBody, db: Db) -> None:
-    """Offer a leased question to others at once. Only its holder can: anybody else's word changes nothing."""
+    """Offer a leased question to others at once. Only its holder can; others change nothing."""
     release(db, query_id, body.client_id)

@@ -1,4 +1,4 @@
-"""What routes reply besides what they are asked for: the errors, in their one shape."""
+"""The error responses of routes, in their one shape."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ ERRORS: dict[int, ServerError] = {
     400: UnknownHostError(),
     403: Forbidden(),
     404: NotFound("There is no run 9."),
-    409: Conflict("Run 1 is stopped; nothing can be done to its agent any more."),
+    409: Conflict("Run 1 is stopped; its agent cannot be changed any more."),
     413: TooLargeError(),
     422: InvalidFieldsError([("choice", "Input should be 'left', 'right', 'either' or 'neither'")]),
     500: ServerError(),
     503: BusyError(),
     507: DiskFullError(),
 }
-"""One of each status, as an example. 503 is also said when too many live streams are open."""
+"""An example of each status. 503 also means that too many live streams are open."""
 ALWAYS = (400, 413, 422, 500, 503)
 ACTS = (403, 507)
 
 
 class ErrorField(BaseModel):
-    """One wrong field and what is wrong with it."""
+    """A wrong field, and the error in it."""
 
     field: str
     message: str
 
 
 class ErrorDetail(BaseModel):
-    """What went wrong: a code for programs, a sentence for people."""
+    """An error: a code for programs, a sentence for people."""
 
     code: str
     message: str
@@ -60,17 +60,17 @@ class ErrorSchema(BaseModel):
 
 
 def read_responses(*errors: int) -> Replies:
-    """The replies of a route that changes nothing: the errors of all, and its own."""
+    """Describe the errors of a route that changes nothing: the common ones, and its own."""
     return error_responses(*ALWAYS, *errors)
 
 
 def write_responses(*errors: int) -> Replies:
-    """The replies of a verb."""
+    """Describe the errors of a route that writes: the common ones, and its own."""
     return error_responses(*ALWAYS, *ACTS, *errors)
 
 
 def streams(media: str, description: str, *errors: int) -> Replies:
-    """The replies of a route that is no JSON, but for its errors."""
+    """Describe a route whose reply is not JSON, and its errors."""
     refused = error_responses(*ALWAYS, *errors)
     for reply in refused.values():  # named, since FastAPI would put a model under the route's own media type
         reply["content"]["application/json"]["schema"] = {"$ref": "#/components/schemas/ErrorSchema"}
@@ -79,7 +79,7 @@ def streams(media: str, description: str, *errors: int) -> Replies:
 
 
 def error_responses(*errors: int) -> Replies:
-    """Errors, each with an example."""
+    """Describe errors, each with an example."""
     return {
         status: {
             "model": ErrorSchema,

@@ -1,4 +1,4 @@
-"""Routes that look at runs and start them."""
+"""Routes of runs: list them, start one, read one, its metrics and its operator events."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ router = APIRouter(tags=["runs"])
 
 @router.get("/runs", summary="List the runs", responses=read_responses())
 def list_runs(db: Db, part: Annotated[RunPart, Query()]) -> RunRows:
-    """All runs, newest first. The `next` of a page goes back as `before`."""
+    """List all runs, newest first. Send the `next` of a page as `before` to get the following page."""
     page = pagination.runs_before(db, part.before, part.limit)
     return RunRows(rows=run_schemas(db, page.rows), next=page.next)
 
 
 @router.post("/runs", summary="Start a run", status_code=201, responses=write_responses())
 def start_run(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> RunSchema:
-    """A new agent in a world, which a worker raises at once.
+    """Start a run: a new agent in a world, which a worker raises at once.
 
-    What is left out is as the world, or else the preset, has it.
+    Settings that are left out come from the world, or else from the preset.
     """
     run = start(db, new, settings.weights)
     notify_worker(request)
@@ -45,15 +45,16 @@ def start_run(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> Ru
 
 @router.get("/runs/{run_id}", summary="Look at a run", responses=read_responses(404))
 def get_run(run_id: RunId, db: Db) -> RunSchema:
-    """One run as it is now: whom it waits for, how far it is."""
+    """Read one run: its progress, and who waits for whom."""
     return run_schema(db, run_id)
 
 
 @router.get("/runs/{run_id}/metrics", summary="Read what was measured", responses=read_responses(404))
 def list_metrics(run_id: RunId, db: Db, part: Annotated[MetricPart, Query()]) -> MetricRows:
-    """What the worker measured, by tick: deaths, answers by kind and choice, loss, entropy, return, and more.
+    """List metrics by tick: deaths, answers by kind and choice, loss, entropy, return, and more.
 
-    The `next` of a page goes back as `after`. Whoever waits for more takes the last tick that was seen.
+    Send the `next` of a page as `after` to get the following page. To wait for new rows, send the last tick
+    that you have.
     """
     page = pagination.metrics_after(db, run_id, part.after, part.limit)
     return MetricRows(rows=metric_schemas(page.rows), next=page.next)
@@ -63,10 +64,10 @@ def list_metrics(run_id: RunId, db: Db, part: Annotated[MetricPart, Query()]) ->
     "/runs/{run_id}/operator-events", summary="List the operator's events", responses=read_responses(404)
 )
 def list_operator_events(run_id: RunId, db: Db, part: Annotated[EventPart, Query()]) -> OperatorEventRows:
-    """What the operator did to the agent, each with the tick before which it applied.
+    """List the operator events of a run, each with the tick before which it applied.
 
-    With seed, config and answers they make the run: replayed at these ticks, it comes out with the same bits.
-    The `next` of a page goes back as `after`.
+    Together with seed, config and answers they determine the run: replayed at these ticks, it has the same
+    bits. Send the `next` of a page as `after` to get the following page.
     """
     page = pagination.operator_events_after(db, run_id, part.after, part.limit)
     return OperatorEventRows(rows=[operator_event(row) for row in page.rows], next=page.next)

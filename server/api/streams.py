@@ -1,4 +1,4 @@
-"""What flows: the live stream of a run, and its answers as a file."""
+"""Streamed replies: the live stream of a run, and its answers as JSON lines."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ LINES = "application/x-ndjson"
 
 
 class LinesResponse(StreamingResponse):
-    """JSON, a value a line."""
+    """JSON lines."""
 
     media_type = LINES
 
 
 def known(request: Request, run_id: RunId, db: Db) -> int:
-    """Refuse before the stream begins: afterwards it is too late for a 404."""
+    """Refuse an unknown run before the stream begins: afterwards it is too late for a 404."""
     get_run(db, run_id)
     request.app.state.streams.check_room()
     return run_id
@@ -45,10 +45,10 @@ async def follow_run(
     after: After = None,
     last_event_id: Annotated[str | None, Header(description="As a browser sends it.")] = None,
 ) -> AsyncIterable[ServerSentEvent]:
-    """Server-sent events, each told as it changes, and once at the beginning.
+    """Follow a run by server-sent events: the state at the beginning, then every change.
 
-    `run`: the run, as GET gives it, at most once in 250 ms. `question`: the most urgent open question (id and
-    kind) or null, at once. `metrics`: rows of the ticks after `after`, if it is given.
+    `run` is the run as GET returns it, at most once in 250 ms. `question` is the most urgent open question
+    (id and kind) or null, without delay. `metrics` are rows of the ticks after `after`, if it is given.
     """
     if (
         after is not None
@@ -65,11 +65,13 @@ async def follow_run(
     "/runs/{run_id}/export",
     summary="Export the answers",
     response_class=LinesResponse,
-    responses=streams(LINES, "JSON, a line an answer.", 404),
+    responses=streams(LINES, "JSON lines, one for each answer.", 404),
 )
 def export_run(run_id: RunId, db: Db) -> LinesResponse:
-    """All answers up to now, oldest first, a JSON object a line: what was asked, what was said, when, and by
-    whom; the tick at which the agent heard it; which policy had asked. docs/api.md lists the fields.
+    """Export all answers up to now as JSON lines, oldest first.
+
+    A line holds the question, the choice, who answered and when, the tick at which the agent heard it, and
+    the policy that asked. docs/api.md lists the fields.
     """
     file = f'attachment; filename="run-{run_id}.jsonl"'
     return LinesResponse(lines(db, run_id), headers={"Content-Disposition": file})

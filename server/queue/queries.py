@@ -15,25 +15,25 @@ from parenting.server.tables import Query
 
 @dataclass(frozen=True)
 class Open:
-    """How many queries of a run wait for an answer, by kind."""
+    """The number of open queries of a run, by kind."""
 
     guidance: int
     preference: int
 
 
 def open_counts(db: Database, run_id: int) -> Open:
-    """How many queries are open (not yet answered), by kind."""
+    """Count the open queries of a run, by kind."""
     with db.read() as session:
         return open_in(session, run_id)
 
 
 def open_in(session: Session, run_id: int) -> Open:
-    """`open_counts`, in a transaction that is already open."""
+    """Count as `open_counts` does, in a transaction that is already open."""
     return open_by_run(session, [run_id])[run_id]
 
 
 def open_by_run(session: Session, run_ids: Sequence[int]) -> dict[int, Open]:
-    """`open_in` for many runs at once."""
+    """Count as `open_in` does, for many runs at once."""
     rows = select(Query.run_id, Query.kind, func.count()).where(
         Query.status == QueryStatus.OPEN, Query.run_id.in_(run_ids)
     )
@@ -50,5 +50,5 @@ def withdraw_in(session: Session, run_id: int, kind: str | None = None) -> None:
 
 
 def guidance_first() -> ColumnElement[int]:
-    """The order of urgency by kind: an agent that waits for guidance does not live."""
+    """Return the order of urgency by kind: an agent that waits for guidance does not act."""
     return case((Query.kind == "guidance", 0), else_=1)

@@ -29,7 +29,7 @@ from parenting.server.tables import Answer, OperatorEvent, Query, Run
 
 @dataclass(frozen=True)
 class Watch:
-    """What a worker has to know of a run before it ticks; read at once, cheap enough for a poll."""
+    """The state of a run that a worker needs before a tick, read at once and cheap enough for a poll."""
 
     run_id: int
     status: RunStatus
@@ -46,7 +46,7 @@ class Watch:
 
 @dataclass(frozen=True)
 class Taken:
-    """An answer that is heard at this tick, with the query that it answers."""
+    """An answer that is heard at a tick, with its query."""
 
     answer: Answer
     query: Query
@@ -93,7 +93,7 @@ _WATCH = select(
 
 
 def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
-    """The state of some runs, by id. While nobody commits anything, asking again costs next to nothing."""
+    """Return the state of some runs, by id. Until somebody commits, a second call costs almost nothing."""
 
     def look() -> dict[int, Watch]:
         with db.read() as session:
@@ -105,7 +105,7 @@ def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
 
 
 def high_water(db: Database, run_id: int) -> int:
-    """The largest tick on any posted query, applied answer or applied event; -1 where there is none."""
+    """Return the largest tick of any posted query, applied answer or applied event; -1 without any."""
     with db.read() as session:
         return max(_high(session, run_id))
 
@@ -119,10 +119,16 @@ def post_query(
     clips: dict[str, Any],
     policy: tuple[int, int] | None = None,
 ) -> int:
-    """Ask: insert the query of this tick and return its id.
+    """Insert the query of a tick and return its id. A tick that has one already keeps it.
 
-    A known tick inserts nothing: its id and payload stay. `policy` says which one asks: its stage and its
-    gradient steps there.
+    Args:
+        db: The database.
+        mine: The worker's claim on the run.
+        tick: The tick in which the agent asks.
+        kind: guidance or preference.
+        maturity: The stage that the clips were recorded at.
+        clips: The clips, as `server.codec.encode` writes them.
+        policy: The policy that asks: its stage, and its gradient steps in that stage.
 
     Raises:
         LostClaimError: another worker raises this run now.
@@ -144,16 +150,16 @@ def post_query(
 
 
 def asked_at(db: Database, run_id: int, tick: int) -> Query | None:
-    """What was asked at a tick, if anything: a replayed tick has to ask the same."""
+    """Return the query of a tick, if there is one: a replayed tick has to ask the same."""
     with db.read() as session:
         return session.scalars(select(Query).where(Query.run_id == run_id, Query.tick == tick)).one_or_none()
 
 
 def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
-    """The answer to be heard at this tick, at most one: guidance first, then the oldest query's. Never waits.
+    """Return the answer to be heard at this tick, or None: guidance first, then the oldest query's.
 
-    A new one is marked with the tick in the same transaction; on replay the recorded one comes back, even if
-    it was superseded later.
+    A new answer is marked with the tick in the same transaction. On replay the recorded answer comes back,
+    even if it was superseded later. This never waits.
 
     Raises:
         LostClaimError: another worker raises this run now.
@@ -169,10 +175,10 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
 
 
 def take_operator_events(db: Database, mine: Claim, tick: int) -> Sequence[OperatorEvent]:
-    """The operator's events that apply before this tick, in their order. New ones are marked with it.
+    """Return the operator events that apply before this tick, in their order, and mark new ones with it.
 
-    An *end the episode* also withdraws the open guidance question: nobody waits for that move any more. And
-    the run no longer counts as stuck, so that nobody ends the next episode as well.
+    The event *end the episode* also withdraws the open guidance query, because nobody waits for that move any
+    more, and the run no longer counts as stuck, so that nobody ends the next episode as well.
 
     Raises:
         LostClaimError: another worker raises this run now.

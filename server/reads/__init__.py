@@ -1,1 +1,1 @@
-"""What pages, API and replay read from the database. Nothing here writes."""
+"""Reads of the database for pages, API, export and replay. Nothing here writes."""

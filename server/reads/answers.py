@@ -1,4 +1,4 @@
-"""What was answered, page by page: for the history on the dashboard, the API's list and the export."""
+"""Answers with their queries, page by page, for the history page and the export."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ BATCH = 200
 
 @dataclass(frozen=True)
 class Answered:
-    """An answer with the query that it answers; a superseded answer is kept, and says so by `standing`."""
+    """An answer with its query. A superseded answer is kept; its `standing` is false."""
 
     answer: Answer
     query: Query
 
 
 def after(db: Database, run_id: int, number: int = 0, limit: int = BATCH) -> Sequence[Answered]:
-    """The answers of a run behind the one of this number, oldest first, at most `limit`.
+    """Return the answers of a run after the one of this number, oldest first, at most `limit`.
 
     Raises:
         NotFound: there is no such run.
@@ -43,9 +43,15 @@ def before(
     kind: str | None = None,
     choice: str | None = None,
 ) -> Sequence[Answered]:
-    """The answers of a run before the one of this number, newest first, at most `limit`; None: the last ones.
+    """Return the answers of a run before the one of this number, newest first.
 
-    With `kind` or `choice`, only those to questions of this kind, or those that say this.
+    Args:
+        db: The database.
+        run_id: The run.
+        number: Return answers with smaller numbers; None begins with the newest.
+        limit: At most this many.
+        kind: Only answers to queries of this kind.
+        choice: Only answers with this choice.
 
     Raises:
         NotFound: there is no such run.
@@ -63,9 +69,9 @@ def before(
 
 
 def every(db: Database, run_id: int, batch: int = BATCH) -> Iterator[Answered]:
-    """All answers up to now, oldest first, read in batches: neither memory nor the database is held up.
+    """Yield all answers up to now, oldest first, read in batches, which saves memory and holds no lock.
 
-    Answers are numbered in their own transactions, so none that is stored now is passed over.
+    Answers are numbered in their own transactions, so none that is stored now is missed.
 
     Raises:
         NotFound: there is no such run.

@@ -1,4 +1,4 @@
-"""What was measured of runs: the last, the first of each stage, a sample, or all after a tick."""
+"""Metrics of runs: the last row, the first of each stage, a sample, or all after a tick."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from parenting.server.tables import Metric
 
 
 def list_metrics(db: Database, run_id: int, after: int = -1, limit: int = 10_000) -> Sequence[Metric]:
-    """The metrics of the ticks after `after`, in their order, at most `limit`.
+    """Return the metrics of the ticks after `after`, in their order, at most `limit`.
 
     Raises:
         NotFound: there is no such run.
@@ -25,7 +25,7 @@ def list_metrics(db: Database, run_id: int, after: int = -1, limit: int = 10_000
 
 
 def latest_metrics(db: Database, run_ids: Sequence[int]) -> dict[int, Metric]:
-    """The last metrics of each of some runs; a run that has none yet is absent."""
+    """Return the last metrics of each run; a run that has none yet is absent."""
     last = (
         select(Metric.run_id, func.max(Metric.tick).label("tick"))
         .where(Metric.run_id.in_(run_ids))
@@ -67,7 +67,7 @@ def _next_stage(session: Session, of_run: Select[Metric], first: Metric, last: M
 
 
 def sampled_metrics(db: Database, run_id: int, rows: int = 40) -> Sequence[Metric]:
-    """At most about `rows` metrics, evenly spread over the ticks, the last one among them, newest first."""
+    """Return about `rows` metrics at most, evenly spread over the ticks, newest first, the last included."""
     with db.read() as session:
         count = session.scalar(select(func.count()).select_from(Metric).where(Metric.run_id == run_id)) or 0
         every = max(1, -(-count // rows))

@@ -1,7 +1,7 @@
 """Lists for the API, page by page: runs, questions, operator events, metrics.
 
-The cursor of a page is the place of its last row; the next page begins behind it. So no page is counted
-through, and what is added meanwhile shifts nothing.
+The cursor of a page is the key of its last row, and the next page begins after it. So rows that are added
+meanwhile shift nothing.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Row = TypeVar("Row")
 
 @dataclass(frozen=True)
 class Page(Generic[Row]):
-    """Some rows, and where the next page begins; None: these are the last ones for now."""
+    """Some rows, and the cursor of the next page; None if these are the last ones for now."""
 
     rows: Sequence[Row]
     next: int | None
@@ -33,14 +33,14 @@ class Page(Generic[Row]):
 
 @dataclass(frozen=True)
 class Asked:
-    """A question and the answer that stands for it, if one does."""
+    """A query, and the answer that stands for it, if there is one."""
 
     query: Query
     answer: Answer | None
 
 
 def runs_before(db: Database, before: int | None, limit: int) -> Page[Run]:
-    """The runs with smaller ids than `before`, newest first; None: from the newest on."""
+    """Return the runs with smaller ids than `before`, newest first; None begins with the newest."""
     rows = select(Run).order_by(Run.id.desc()).limit(limit + 1)
     if before is not None:
         rows = rows.where(Run.id < before)
@@ -51,7 +51,7 @@ def runs_before(db: Database, before: int | None, limit: int) -> Page[Run]:
 def asked_after(
     db: Database, run_id: int, tick: int, limit: int, status: QueryStatus | None = None
 ) -> Page[Asked]:
-    """The questions that a run asked after a tick, oldest first, of one status if it is named.
+    """Return the queries that a run posted after a tick, oldest first, only of one status if given.
 
     Raises:
         NotFound: there is no such run.
@@ -67,7 +67,7 @@ def asked_after(
 
 
 def asked(db: Database, query_id: int) -> Asked:
-    """One question, with its answer.
+    """Return one query, with its answer.
 
     Raises:
         NotFound: there is none of this id.
@@ -80,7 +80,7 @@ def asked(db: Database, query_id: int) -> Asked:
 
 
 def operator_events_after(db: Database, run_id: int, event_id: int, limit: int) -> Page[OperatorEvent]:
-    """The operator's events of a run behind the one of this id, in their order.
+    """Return the operator events of a run after the one of this id, in their order.
 
     Raises:
         NotFound: there is no such run.
@@ -93,7 +93,7 @@ def operator_events_after(db: Database, run_id: int, event_id: int, limit: int) 
 
 
 def metrics_after(db: Database, run_id: int, tick: int, limit: int) -> Page[Metric]:
-    """What was measured after a tick, in the order of the ticks.
+    """Return the metrics of the ticks after a tick, in their order.
 
     Raises:
         NotFound: there is no such run.
@@ -102,7 +102,7 @@ def metrics_after(db: Database, run_id: int, tick: int, limit: int) -> Page[Metr
 
 
 def _cut(rows: Sequence[Row], limit: int, place: Callable[[Row], int]) -> Page[Row]:
-    """A page of `limit` rows from up to one more than that: the one more says that another page follows."""
+    """Return a page of `limit` rows; one row more than that says that another page follows."""
     shown = rows[:limit]
     return Page(shown, place(shown[-1]) if len(rows) > limit else None)
 
