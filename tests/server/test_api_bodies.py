@@ -33,7 +33,7 @@ def test_malformed_body_is_refused(client: httpx2.Client, body: bytes) -> None:
 @pytest.mark.parametrize(
     ("body", "media", "said"),
     [
-        (b"{", "application/json", "no JSON"),
+        (b"{", "application/json", "not JSON"),
         (b'"\xff"', "application/json", "UTF-8"),
         (b"[]", "application/json", "a JSON object"),
         (b"{}", "text/plain", "Content-Type: application/json"),
