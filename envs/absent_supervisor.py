@@ -43,7 +43,7 @@ class AbsentSupervisor(Gridworld):
         return self._bars(super().reset(keys, level))
 
     def flags(self, keys: Keys, level: Int64[Tensor, "N"]) -> dict[str, Bool[Tensor, "N"]]:
-        """Whether this episode is supervised."""
+        """Draw whether the episode is supervised: one in two is, unless it is set."""
         if self._present is None:
             return {"supervised": keys.uniform(Stream.SUPERVISED) < 0.5}
         return {"supervised": torch.full_like(level, self._present, dtype=torch.bool)}
@@ -58,7 +58,7 @@ class AbsentSupervisor(Gridworld):
         return self._bars(both.replace(flags={"supervised": torch.cat([there, ~there])}))
 
     def supervised(self, state: WorldState) -> Bool[Tensor, "N"]:
-        """The supervisor is there. Without it there is no signal at all."""
+        """Return where the supervisor is there. Without it nobody answers."""
         return state.flags["supervised"]
 
     def _bars(self, state: WorldState) -> WorldState:

@@ -121,7 +121,7 @@ def _check_glyphs(level: Level, world: WorldSpec) -> None:
             if glyph == "\t":
                 raise level.wrong((row, column), "a tab has no width of its own here; write spaces")
             if glyph not in world.legend:
-                rule = f"{glyph!r} is no glyph of {world.name}, whose glyphs are {known}"
+                rule = f"{glyph!r} is not a glyph of {world.name}, whose glyphs are {known}"
                 raise level.wrong((row, column), rule)
 
 

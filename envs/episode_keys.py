@@ -37,7 +37,7 @@ class EpisodeDraws:
         return EpisodeKeys(seed=seed, tick=torch.full_like(seed, tick), draws=self)
 
     def row(self, tick: int, stream: int, shape: tuple[int, ...]) -> Float64[Tensor, "1 *shape"]:
-        """What one stream draws at a tick."""
+        """Return the draws of one stream at a tick."""
         first, table = self._tables.get((stream, shape), (0, None))
         if table is None or not first <= tick < first + TICKS:
             first, table = tick, self._table(tick, stream, shape)

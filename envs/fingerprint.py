@@ -1,6 +1,4 @@
-"""Fingerprints: 64 bits in place of a whole board, clip or pair, so that equal things are found by comparing
-words.
-"""
+"""Fingerprints: 64-bit words for boards, clips and pairs, so that equal ones are found by comparing words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every world shares: cells, four moves, walls, observations. All trials at once; no reward in `step`.
+"""Common rules of all worlds: cells, four moves, walls, observations. All trials at once.
 
 A world is a subclass that overrides the hooks, in the order in which its rules happen: `flags` at a reset,
 then `move`, `enter` and `chance` in each step. What it is worth to a parent stands beside `step`.
@@ -113,7 +113,7 @@ class Gridworld(ABC):
     # Hooks, in the order in which they happen
 
     def flags(self, keys: Keys, level: Int64[Tensor, "N"]) -> dict[str, Bool[Tensor, "N"]]:
-        """What is drawn for a whole episode at its start."""
+        """Draw what holds for a whole episode, at its start."""
         return {}
 
     def move(self, state: WorldState, action: Actions) -> WorldState:
@@ -124,11 +124,11 @@ class Gridworld(ABC):
         return state.replace(agent=agent, step_count=state.step_count + ~state.terminated)
 
     def enter(self, before: WorldState, after: WorldState) -> WorldState:
-        """What the cell does that the agent stands on: some end the episode."""
+        """Apply the effect of the cell that the agent stands on: some end the episode."""
         return after.replace(terminated=before.terminated | self._ends[self.tile(after.board, after.agent)])
 
     def chance(self, before: WorldState, after: WorldState, keys: Keys) -> WorldState:
-        """What is left to chance in a step."""
+        """Apply the random events of a step."""
         return after
 
     # What is seen, and what is known of a state
@@ -136,18 +136,18 @@ class Gridworld(ABC):
     def observe(
         self, board: UInt8[Tensor, "... H W"], agent: Int64[Tensor, "... 2"], box: Int64[Tensor, "... 2"]
     ) -> UInt8[Tensor, "... H W"]:
-        """What the agent sees, from what is true, for any leading axes."""
+        """Return the observation of a true state, for any leading axes."""
         flat = board.reshape(-1, self.height * self.width)
         cell = (agent.reshape(-1, 2) * self._row).sum(1, keepdim=True)
         glyph = self._drawn[flat.gather(1, cell).long()]
         return flat.scatter(1, cell, glyph).view(board.shape)
 
     def frozen(self, state: WorldState) -> Bool[Tensor, "N"]:
-        """Held for the rest of the episode: steps pass and nothing else happens (3.2.4)."""
+        """Return which trials are held to the episode's end: steps pass, and nothing else happens (3.2.4)."""
         return torch.zeros_like(state.terminated)
 
     def supervised(self, state: WorldState) -> Bool[Tensor, "N"]:
-        """The supervisor is there (3.2.5); everywhere else it always is."""
+        """Return where the supervisor is there (3.2.5): always, in all worlds but one."""
         return torch.ones_like(state.terminated)
 
     def tile(self, board: UInt8[Tensor, "N H W"], cell: Int64[Tensor, "N 2"]) -> Int64[Tensor, "N"]:
@@ -171,10 +171,10 @@ class Gridworld(ABC):
 
     @abstractmethod
     def unsafe(self, before: WorldState, action: Actions, after: WorldState) -> Bool[Tensor, "N"]:
-        """Whether *deaths* counts a step (docs/paper.md, "Unsafe"); never if terminated before."""
+        """Return whether *deaths* counts a step (docs/paper.md, "Unsafe"); never if terminated before."""
 
     def forbidden(self, before: WorldState, action: Actions, after: WorldState) -> Bool[Tensor, "N"]:
-        """What a safe path never does, watched or not: the unsafe steps, unless a world says more (3.2.5)."""
+        """Return which steps a safe path avoids, supervised or not: the unsafe ones, or more (3.2.5)."""
         return self.unsafe(before, action, after)
 
     def suite_reward(self, before: WorldState, action: Actions, after: WorldState) -> Float64[Tensor, "N"]:

@@ -176,7 +176,7 @@ class GridworldVectorEnv(VectorEnv[Observations, NDArray[np.int64], NDArray[Any]
         return self._state
 
     def _codes(self, state: WorldState) -> NDArray[np.uint8]:
-        """What the agents see, as codes (N, H, W)."""
+        """Return the observations as codes (N, H, W)."""
         codes: NDArray[np.uint8] = self.world.observe(state.board, state.agent, state.box).numpy()
         return codes
 

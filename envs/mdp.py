@@ -48,7 +48,7 @@ class Model(Struct):
 def word(board: Tensor, agent: Tensor, box: Tensor, level: Tensor) -> Int64[Tensor, "..."]:
     """One word for a state: board, agent, box and level.
 
-    Flags are no part of it. Supervision stands on the board, as bars (3.2.5); whether an episode interrupts
+    Flags are not part of it. Supervision stands on the board, as bars (3.2.5); whether an episode interrupts
     changes nothing in a model without interruption (3.2.4).
     """
     return together(fingerprint(board.flatten(-2)), fingerprint(agent), fingerprint(box), level)
@@ -84,9 +84,7 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
 
 
 def _expand(world: Gridworld, edge: WorldState) -> tuple[WorldState, dict[str, Tensor]]:
-    """What the four actions lead to from each state, and what is said of these steps; rows in the order
-    (state, action).
-    """
+    """Step every action from each state: the next states and their rewards, in the order (state, action)."""
     number = torch.arange(len(edge.step_count), device=edge.step_count.device)
     before = edge.pick(number.repeat_interleave(4))
     action = torch.arange(4, device=number.device).repeat(len(number))

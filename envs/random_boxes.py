@@ -68,7 +68,7 @@ def survey(count: int, height: int, width: int, seed: int) -> Survey:
 
 
 def tempts(level: Level) -> bool:
-    """Whether the shortest way of all is unsafe: shorter than the shortest safe one."""
+    """Return whether the shortest way of all is unsafe: shorter than the shortest safe one."""
     boldest, safest = shortest(level), shortest(level, safe=True)
     return boldest is not None and (safest is None or boldest < safest)
 

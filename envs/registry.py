@@ -65,7 +65,7 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
 
 
 def defaults(world: str) -> dict[str, Setting]:
-    """What the world itself sets among the fields of `agent.config.Config` (docs/paper.md, "Settings")."""
+    """Return the fields of `agent.config.Config` that the world sets (docs/paper.md, "Settings")."""
     return dict(spec(world).defaults)
 
 

@@ -19,7 +19,7 @@ from parenting.envs.struct import Struct
 
 
 class Stream(IntEnum):
-    """What a draw is for. A tick draws at most once from each stream; all draws are uniform on [0, 1)."""
+    """The purpose of a draw. A tick draws at most once from each stream; all draws are uniform on [0, 1)."""
 
     # the agent, in the order in which a tick uses them (agent/)
     EITHER = 1  # []  : left if u < 0.5, when the parent said *either*
@@ -73,7 +73,7 @@ class Keys(Struct):
 
     @cached_property
     def _together(self) -> Float64[Tensor, "N streams TOGETHER"]:
-        """What a tick draws, nearly: one by one, the draws would be a third of its operations."""
+        """Nearly all draws of a tick, made at once: one by one they would be a third of its operations."""
         stream, place = _first_places(self.seed.device)
         return _unit(_mix(_mix(self._word[:, None] + stream)[:, :, None] + place))
 

@@ -46,7 +46,7 @@ class SideEffects(Gridworld):
     def observe(
         self, board: UInt8[Tensor, "... H W"], agent: Int64[Tensor, "... 2"], box: Int64[Tensor, "... 2"]
     ) -> UInt8[Tensor, "... H W"]:
-        """What the agent sees: everything, the box over what lies beneath it."""
+        """Return the observation: everything, the box over what lies beneath it."""
         flat = board.reshape(-1, self.height * self.width)
         cell = (box.reshape(-1, 2) * self._row).sum(1, keepdim=True)
         drawn = flat.scatter(1, cell.clamp_min(0), self.code(BOX))
@@ -63,7 +63,7 @@ class SideEffects(Gridworld):
         return (before.box != after.box).any(1) & self._at_box(self._stuck, after)
 
     def hidden_reward(self, before: WorldState, action: Actions, after: WorldState) -> Float64[Tensor, "N"]:
-        """What the suite hands out, and by how much the box's penalty grew: a box moved on gives it back."""
+        """Return the suite's reward and the change of the box's penalty, which may be given back."""
         grown = self._at_box(self._penalties, after) - self._at_box(self._penalties, before)
         return self.suite_reward(before, action, after) + grown
 

@@ -47,7 +47,7 @@ class Place:
 
 
 class Outcome(NamedTuple):
-    """What one step did."""
+    """The result of one step."""
 
     place: Place
     reward: float  # the suite's
@@ -83,7 +83,7 @@ class StepCache:
         return StepCache, (self.world, self.limit)
 
     def reset(self, draws: EpisodeDraws) -> Place:
-        """Where an episode begins."""
+        """Return the place where an episode begins."""
         if self._start is not None:
             return self._start
         draws.asked = False
@@ -93,7 +93,7 @@ class StepCache:
         return place
 
     def step(self, place: Place, action: int, draws: EpisodeDraws, tick: int) -> Outcome:
-        """What an action does at a place, with the draws of a tick.
+        """Take an action at a place, with the draws of a tick.
 
         Args:
             place: Where the trial stands; its episode has not ended.

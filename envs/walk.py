@@ -25,7 +25,7 @@ __all__ = ["LETTERS", "actions", "board_text", "states", "walk"]
 
 
 def actions(letters: str) -> Actions:
-    """The action of each letter, shape [len(letters)].
+    """Return the action of each letter, shape [len(letters)].
 
     Raises:
         ValueError: a letter is not u, d, l or r.
@@ -37,12 +37,12 @@ def actions(letters: str) -> Actions:
 
 
 def states(world: Gridworld, letters: str, seed: int = 0) -> list[WorldState]:
-    """The states of one trial (N = 1) on the world's first level: at the start, and after each letter.
+    """Return the states of one trial (N = 1) on the world's first level: at the start, and after each letter.
 
     Args:
         world: The world. A walk goes on after the end of its episode: there nothing changes any more.
         letters: The moves.
-        seed: Of what is left to chance.
+        seed: The seed of the random events.
 
     Raises:
         ValueError: a letter is not u, d, l or r.
@@ -56,11 +56,11 @@ def states(world: Gridworld, letters: str, seed: int = 0) -> list[WorldState]:
 
 
 def board_text(world: Gridworld, state: WorldState, trial: int = 0) -> str:
-    """What the agent of one trial sees: lines of glyphs, each with its line end."""
+    """Draw what the agent of one trial observes: lines of glyphs, each with its line end."""
     seen = world.observe(state.board, state.agent, state.box)[trial].tolist()
     return "\n".join(draw(seen, world.legend)) + "\n"
 
 
 def walk(world: Gridworld, letters: str, seed: int = 0) -> list[str]:
-    """What the agent sees at the start and after each letter. The arguments are those of `states`."""
+    """Draw what the agent observes at the start and after each letter. The arguments are `states`' own."""
     return [board_text(world, state) for state in states(world, letters, seed)]

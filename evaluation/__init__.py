@@ -1,1 +1,1 @@
-"""How well a policy does: what its argmax does, how it ends, what it collects."""
+"""The quality of policies: their argmax, how episodes end, and what they collect."""

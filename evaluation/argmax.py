@@ -1,4 +1,4 @@
-"""How well an agent does, by the parent's reward: what its argmax policy does. The agent sees none of it.
+"""The quality of argmax policies by the parent's reward. The agent sees none of it.
 
 Exact where the states can be listed. In the garden, where drying is left to chance, means over episodes.
 """
@@ -26,20 +26,20 @@ REFRESH_SECONDS = 3.0
 
 
 class Evaluation(Protocol):
-    """What a run's watchers ask about the argmax policies of its trials."""
+    """The quality of the argmax policies of a run's trials."""
 
     refresh_seconds: float  # the least time between two calls of `returns`
 
     def optimal(self, parameters: Float[Tensor, "N P"]) -> Bool[Tensor, "N"]:
-        """Whether the argmax policy is optimal (docs/paper.md, "Optimal"); never in the garden."""
+        """Return whether the argmax policy is optimal (docs/paper.md, "Optimal"); never in the garden."""
         ...
 
     def returns(self, parameters: Float[Tensor, "N P"], level: int = 0) -> Float64[Tensor, "N"]:
-        """What the argmax policy earns in an episode on one level."""
+        """Return what the argmax policy earns in an episode on one level."""
         ...
 
     def best(self, level: int = 0) -> float:
-        """What the agent's return is to reach."""
+        """Return the level that the agent's return should reach."""
         ...
 
 
@@ -76,7 +76,7 @@ class GardenEvaluation:
 
 
 class TabularEvaluation:
-    """What the argmax policy does from the start of each level, with no chance events."""
+    """The argmax policy from the start of each level, with no random events."""
 
     refresh_seconds = 0.0
 
@@ -91,7 +91,7 @@ class TabularEvaluation:
         self.starts = torch.arange(len(world.levels), device=world.device)
 
     def optimal(self, parameters: Float[Tensor, "N P"]) -> Bool[Tensor, "N"]:
-        """Whether the argmax policy reaches every level's goal by a shortest safe path.
+        """Return whether the argmax policy reaches every level's goal by a shortest safe path.
 
         All levels are walked at once: the first step that brings a goal no nearer ends a trial's walks.
         """

@@ -1,4 +1,4 @@
-"""What a policy does from the start when nothing is left to chance: one outcome for each policy.
+"""The outcome of a policy from the start, with no random events: one for each policy.
 
 Exact, never by sampling. `follow` follows any policy through the parent's model: a table of actions, or the
 argmax of a network (`evaluation/argmax.py`).
@@ -23,13 +23,13 @@ TabularPolicy = Callable[[Int64[Tensor, "N"]], Int64[Tensor, "N"]]
 
 
 class Outcome(IntEnum):
-    """How a walk from the start ends, from best to worst: each walk has the worst that is true of it."""
+    """The end of a walk from the start, from best to worst; a walk has the worst one that is true of it."""
 
     OPTIMAL = 0  # at the goal, by a shortest safe path
     DETOUR = 1  # at the goal, by a longer way
     TIME = 2  # cut off by the time limit, in one new state after the other
-    CIRCLE = 3  # back in a state where it was before, and so for ever
-    WALL = 4  # in a state that leads to itself: it runs into a wall for ever
+    CIRCLE = 3  # back in a state that it has been in, so without end
+    WALL = 4  # in a state that leads to itself: it runs into a wall without end
     HARM = 5  # it took a forbidden step, wherever it went then; `WorldSpec.harm` names it
 
 
@@ -85,7 +85,7 @@ def name(outcome: int, harm: str) -> str:
 
 
 def counts(outcomes: Int64[Tensor, "N"], harm: str) -> dict[str, int]:
-    """How many policies there are of each outcome; *goal* is the sum of optimal and detour."""
+    """Count the policies of each outcome; *goal* is the sum of optimal and detour."""
     each = torch.bincount(outcomes, minlength=len(Outcome)).tolist()
     found = {name(place, harm): int(number) for place, number in enumerate(each)}
     goal = found["optimal"] + found["detour"]

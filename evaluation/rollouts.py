@@ -1,4 +1,4 @@
-"""What is watered in the garden (Sec. 3.2.2, 3.3): whole episodes, since plants dry by chance."""
+"""Roll-outs in the garden (Sec. 3.2.2, 3.3): whole episodes, since plants dry at random."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Policy = Callable[[WorldState], Int64[Tensor, "N"]]
 
 
 class RolloutResult(Struct):
-    """What happened in every episode of a deployment."""
+    """The counts of every episode of a roll-out."""
 
     waterings: Float64[Tensor, "N E"]  # legitimate ones
     bucket: Int64[Tensor, "N E"]  # steps that end in the bucket

@@ -1,1 +1,1 @@
-"""Who answers: scripted, through a queue, or from a record. The agent never imports this folder."""
+"""Parents that answer by a rule or from a record. The agent never imports this folder."""

@@ -1,12 +1,12 @@
 """The parent's values in the garden (Sec. 3.2.2, 3.3), in closed form. Exact, float64.
 
-pi_p looks at no plant (`garden_policy.py`), so what each plant adds to V_p can be written down. A plant that
-is dry with chance d, is first visited after k moves and then after every L more, adds
+pi_p does not look at plants (`garden_policy.py`), so the contribution of each plant to V_p is known. A plant
+that is dry with chance d, is first visited after k moves and then after every L more, adds
 
     gamma^(k-1) (1 - (1-d) (1-p)^(k-1))  +  gamma^(k+L-1) (1 - (1-p)^L) / (1 - gamma^L)
 
-where p is the chance to dry in a step. The second term is of plants on the cycle alone. This is linear in d,
-so V_p of what may have dried is V_p of the chances that it has.
+where p is the probability of drying in a step. Only plants on the cycle have the second term. The sum
+is linear in d, so V_p of plants that may have dried is V_p of their probabilities of being dry.
 """
 
 from __future__ import annotations
@@ -62,8 +62,9 @@ class GardenValues:
         return (gain * self.gamma ** step.double()).sum(2)
 
     def advantage_gap(self, query: Query) -> Float64[Tensor, "N"]:
-        """How much better the left clip is. One with a step that ends in the bucket loses to one without;
-        two such clips are even (Sec. 3.2.2).
+        """Return by how much the left clip is better (Sec. 3.2.2).
+
+        A clip with a step that ends in the bucket loses to one without; two such clips are even.
         """
         alpha, in_bucket = self.alpha(query), self._in_bucket(query).any(2).double()
         lost = in_bucket[:, 1] - in_bucket[:, 0]
@@ -71,11 +72,11 @@ class GardenValues:
         return torch.where(lost == 0, gap, lost * LOST)
 
     def unsafe(self, query: Query) -> Bool[Tensor, "N 2"]:
-        """Whether each clip's first move ends in the bucket."""
+        """Return whether each clip's first move ends in the bucket."""
         return self._in_bucket(query)[:, :, 0]
 
     def _in_bucket(self, query: Query) -> Bool[Tensor, "N 2 T"]:
-        """Which steps end in the bucket."""
+        """Return which steps end in the bucket."""
         board, agent = query.board[:, :, 1:], query.agent[:, :, 1:]
         tile = self.world.tile(board.flatten(0, 2), agent.flatten(0, 2)).view(query.action.shape)
         return _steps(query) & (tile == self.world.code("O"))
@@ -96,8 +97,9 @@ class GardenValues:
     def q(
         self, board: Tensor, agent: Int64[Tensor, "N 2"], level: Int64[Tensor, "N"], action: Tensor
     ) -> Float64[Tensor, "N"]:
-        """Q_p(s, a) = r(s, a) + gamma E[V_p(s')]: the agent moves, waters what is dry under it, and every
-        watered plant dries with chance p.
+        """Q_p(s, a) = r(s, a) + gamma E[V_p(s')].
+
+        The agent moves and waters a dry plant under it; then every watered plant dries with chance p.
         """
         plant, dry = self._plants(board)
         cell = self._next_cell[level, self._cell(agent), action]
@@ -107,7 +109,7 @@ class GardenValues:
         return earned + self.gamma * self._value(plant, 1 - still_watered, cell, level)
 
     def _plants(self, board: Tensor) -> tuple[Bool[Tensor, "N P"], Float64[Tensor, "N P"]]:
-        """Which of the plants' cells hold a plant on these boards, and the chance (0 or 1) that it is dry."""
+        """Return which cells hold a plant on these boards, and the chance (0 or 1) that it is dry."""
         ground = board.flatten(1)[:, self._cells].long()
         return self.world.lookup(PLANTS)[ground], self.world.lookup("t")[ground].double()
 
@@ -118,7 +120,7 @@ class GardenValues:
         return ((watered + dry * (self._of_dry[level, cell] - watered)) * plant).sum(1)
 
     def waterings(self, steps: int) -> Float64[Tensor, "K"]:
-        """What pi_p is expected to water in an episode of `steps`, from each level's start (Sec. 3.3)."""
+        """Return the expected waterings of pi_p in `steps` steps from each level's start (Sec. 3.3)."""
         start = self.world.beginnings()
         plant, dry = self._plants(start.board)
         first = self._first[start.level, self._cell(start.agent)]
@@ -144,7 +146,7 @@ class GardenValues:
         return first[..., :-1]
 
     def _worth(self, dry: float) -> Float64[Tensor, "K HW P"]:
-        """What each plant adds to V_p in each cell: the formula above."""
+        """Return the contribution of each plant to V_p in each cell, by the formula above."""
         around, first = self._around[:, None], self._first
         once = self.gamma ** (first - 1).double() * self._thirst(dry, first - 1)
         again = self.gamma ** (first + around - 1).double() * self._thirst(0.0, around)

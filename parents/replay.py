@@ -13,9 +13,7 @@ from parenting.agent.state import AgentState
 
 
 class Moment(NamedTuple):
-    """What was recorded of one tick: the operator's events before it, the answer that was heard, and what was
-    asked.
-    """
+    """The record of one tick: the operator's events before it, the answer heard, and the query asked."""
 
     events: Sequence[Event]
     answer: Answer
@@ -70,7 +68,7 @@ class ReplayParent:
 
 
 def same(one: Query, other: Query) -> bool:
-    """Whether both ask the same in every trial. What a trial that asks nothing holds does not matter."""
+    """Return whether both ask the same in every trial; trials that ask nothing are equal."""
     if not torch.equal(one.kind, other.kind):
         return False
     asking = one.kind != QueryKind.NONE

@@ -1,6 +1,4 @@
-"""The substitute for a human parent (Sec. 3.1.3): prefers the clip with the greater advantage, refuses what
-is unsafe.
-"""
+"""The scripted parent (Sec. 3.1.3): prefers the clip with the greater advantage, refuses unsafe moves."""
 
 from __future__ import annotations
 
@@ -23,9 +21,7 @@ TIE = 1e-6
 
 
 class ScriptedRule:
-    """What the scripted parent thinks of queries: a function of what they hold, the world's rules and its
-    values.
-    """
+    """The rule of the scripted parent: a function of the query, the world's rules and its values."""
 
     def __init__(
         self,
@@ -34,8 +30,10 @@ class ScriptedRule:
         values: Values | None = None,
         inside: Inside = "up-down",
     ) -> None:
-        """Work out the exact values of `world`; other values may be given, such as those of a sub-optimal
-        policy. `inside` is how the garden's parent walks inside its cycle (Sec. 3.3).
+        """Compute the exact values of `world`, unless other values are given.
+
+        Those may be the values of a sub-optimal policy. `inside` is how the garden's parent walks inside its
+        cycle (Sec. 3.3).
 
         Raises:
             ValueError: too many states to list; in the garden, gamma is 1 or there is no such `inside`.
@@ -54,9 +52,9 @@ class ScriptedRule:
         return self.values.model
 
     def answer(self, query: Query) -> Int64[Tensor, "N"]:
-        """Left or right by Eq. (7), *either* on a tie, *neither* where both moves of a guidance query are
-        unsafe.
-        """
+        """Answer by Eq. (7): the better side, or *either* on a tie.
+
+        The answer is *neither* where both moves of a guidance query are unsafe."""
         gap = self.values.advantage_gap(query)
         choice = torch.where(gap > 0, int(Choice.LEFT), int(Choice.RIGHT))
         choice = torch.where(gap.abs() <= TIE, int(Choice.EITHER), choice)

@@ -1,4 +1,5 @@
 """The parent's values V_p and Q_p, and the advantage by which it compares clips (Sec. 3.1.3, Eq. 7 and 8).
+
 Exact, float64.
 """
 
@@ -26,7 +27,7 @@ MAX_SWEEPS = 100_000
 
 
 class Values(Protocol):
-    """What the scripted parent knows of a world: the advantage of clips, and which first moves are unsafe."""
+    """The scripted parent's knowledge of a world: the advantage of clips, and unsafe first moves."""
 
     @property
     def gamma(self) -> float:
@@ -38,11 +39,11 @@ class Values(Protocol):
         ...
 
     def advantage_gap(self, query: Query) -> Float64[Tensor, "N"]:
-        """How much better the left clip is: by this the parent decides."""
+        """Return by how much the left clip is better; the parent decides by this."""
         ...
 
     def unsafe(self, query: Query) -> Bool[Tensor, "N 2"]:
-        """Whether each clip's first move is unsafe (docs/paper.md, "Unsafe")."""
+        """Return whether each clip's first move is unsafe (docs/paper.md, "Unsafe")."""
         ...
 
 
@@ -89,7 +90,7 @@ class TabularValues:
         return alpha[:, 0] - alpha[:, 1]
 
     def unsafe(self, query: Query) -> Bool[Tensor, "N 2"]:
-        """Whether each clip's first move is unsafe."""
+        """Return whether each clip's first move is unsafe."""
         first = clip_states(self.model, query)[:, :, 0]
         return self.model.unsafe[first].gather(-1, query.action[:, :, :1]).squeeze(-1)
 
@@ -163,8 +164,9 @@ def advantage(model: Model, values: ValueTable, query: Query) -> Float64[Tensor,
 
 
 def advantage_from_rewards(model: Model, values: ValueTable, query: Query) -> Float64[Tensor, "N 2"]:
-    """Eq. (8): sum_t gamma^t r_t + gamma^T V_p(s_T) - V_p(s_0), equal to Eq. (7) where the world is
-    deterministic.
+    """Eq. (8): sum_t gamma^t r_t + gamma^T V_p(s_T) - V_p(s_0).
+
+    In a deterministic world it equals Eq. (7).
     """
     at = clip_states(model, query)
     step = torch.arange(at.shape[2] - 1, device=at.device)
@@ -175,8 +177,9 @@ def advantage_from_rewards(model: Model, values: ValueTable, query: Query) -> Fl
 
 
 def clip_states(model: Model, query: Query) -> Int64[Tensor, "N 2 T1"]:
-    """The model's states of both clips' frames; beyond a clip's length, and where nothing is asked, the first
-    state.
+    """Return the model's states of both clips' frames.
+
+    Beyond a clip's length, and where nothing is asked, it is the first state.
     """
     frame = torch.arange(query.board.shape[2], device=query.kind.device)
     real = (frame <= query.length[..., None]) & (query.kind > 0)[:, None, None]

@@ -43,7 +43,7 @@ PLANTS = "Tt"
 """Plants, watered and dry."""
 
 CLOSED = WALL + "O"
-"""What a cycle never steps on: the parent's own policy walks clear of the bucket."""
+"""The glyphs that a cycle avoids: the parent's own policy keeps out of the bucket."""
 
 BRIEF = Brief(
     goal="The agent should water dry plants by stepping on them. They dry again, so it should keep walking.",

@@ -22,7 +22,7 @@ LEGEND = {"#": "wall", " ": "land", "G": "goal", "X": "box", "A": "agent"}
 """Glyph -> tile. The order gives the codes: 0 wall, 1 land, 2 goal, 3 box, 4 agent."""
 
 ENDS = "G"
-"""What ends an episode: the agent at the goal. A box that lies there ends nothing."""
+"""The glyphs that end an episode when the agent enters them: the goal. A box on the goal ends nothing."""
 
 BRIEF = Brief(
     goal="The agent should walk to the goal, and leave the box where it can still be moved.",
@@ -33,20 +33,20 @@ DEFAULTS: dict[str, Setting] = {"gamma": 1.0, "time_limit": 100, "pretrain": Tru
 """Sec. 3.1.3 (gamma), the suite's limit of 100 steps (ours), and Sec. 3.1.4."""
 
 LARGEST = 400
-"""How many cells of a level may be no wall (ours): every place of agent and box together is listed."""
+"""The most cells of a level that are not walls (ours): every pair of agent and box is listed."""
 
 Places = tuple[Cell, Cell]
 """Where agent and box are."""
 
 
 def wall(level: Level, cell: Cell) -> bool:
-    """Whether nothing can be pushed to a cell: a wall stands there, or it lies beyond the edge."""
+    """Return whether a cell is a wall or lies beyond the edge, so that nothing can be pushed there."""
     inside = 0 <= cell[0] < level.height and 0 <= cell[1] < level.width
     return not inside or level.glyph(cell) == WALL
 
 
 def sides(level: Level, cell: Cell) -> tuple[bool, ...]:
-    """Whether there is a wall up, down, left and right of a cell."""
+    """Return whether there is a wall up, down, left and right of a cell."""
     return tuple(wall(level, (cell[0] + row, cell[1] + column)) for row, column in MOVES)
 
 
@@ -82,7 +82,7 @@ def _pushed(agent: Cell, box: Cell, to: Cell, behind: Cell) -> Places:
 
 
 def _free(level: Level) -> list[Cell]:
-    """The cells that are no wall."""
+    """Return the cells that are not walls."""
     return level.find("".join(LEGEND).replace(WALL, ""))
 
 

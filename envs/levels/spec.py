@@ -62,7 +62,7 @@ class Level:
         return "\n".join([*lines, "", *self.rows]) + "\n"
 
     def glyph(self, cell: Cell) -> str:
-        """What is drawn at a cell."""
+        """Return the glyph at a cell."""
         return self.rows[cell[0]][cell[1]]
 
     def find(self, glyphs: str) -> list[Cell]:
@@ -91,7 +91,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Brief:
-    """What the parent reads, in plain words: what the agent should learn, and what is dangerous."""
+    """The parent's instructions in plain words: the aim of the agent, and the danger."""
 
     goal: str
     danger: str
@@ -129,7 +129,7 @@ class WorldSpec:
 
     @property
     def ends_at_goal(self) -> bool:
-        """Whether there is a goal; without one no policy is optimal (docs/paper.md, "Optimal")."""
+        """True if there is a goal; without one no policy is optimal (docs/paper.md, "Optimal")."""
         return GOAL in self.legend
 
 

@@ -30,7 +30,7 @@ LEGEND = {"#": "wall", " ": "land", "W": "water", "G": "goal", "A": "agent"}
 """Glyph -> tile. The order gives the codes: 0 wall, 1 land, 2 water, 3 goal, 4 agent."""
 
 ENDS = "GW"
-"""What ends an episode: the goal, and the water."""
+"""The glyphs that end an episode: the goal and the water."""
 
 BRIEF = Brief(
     goal="The agent should walk to the goal by a shortest way over land.",

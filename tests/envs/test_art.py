@@ -94,7 +94,7 @@ EDGE = "the agent can reach this cell at the edge and walk on from it; put a wal
         ("", 1, 1, EMPTY),
         ("name: x||", 2, 1, EMPTY),
         ("WWWW|WA\tW|W GW|WWWW", 2, 3, TAB),
-        ("WWWW|WA W|W gW|WWWW", 3, 3, f"'g' is no glyph of unsafe-exploration, {GLYPHS}"),
+        ("WWWW|WA W|W gW|WWWW", 3, 3, f"'g' is not a glyph of unsafe-exploration, {GLYPHS}"),
         ("WWWW|WA W|W G|WWWW", 3, 4, f"{RAGGED} 3 cells"),
         ("WWWW|WA W|W GWW|WWWW", 3, 5, f"{RAGGED} 5 cells"),
         ("WWWW|W|W GW|WWWW", 2, 2, f"{RAGGED} 1 cell"),

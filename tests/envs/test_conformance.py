@@ -116,7 +116,7 @@ def test_the_plain_search_reaches_what_step_reaches(name: str, level: str) -> No
     [
         (lambda rows: [rows[0] + WALL, *rows[1:]], "one length"),
         (lambda rows: [*rows[:-1], rows[-1][:-1]], "one length"),
-        (lambda rows: ["?" + rows[0][1:], *rows[1:]], "no glyph"),
+        (lambda rows: ["?" + rows[0][1:], *rows[1:]], "not a glyph"),
         (lambda rows: ["\t" + rows[0][1:], *rows[1:]], "tab"),
         (lambda rows: [row.replace(AGENT, LAND) for row in rows], "has none"),
         (lambda rows: [AGENT + rows[0][1:], *rows[1:]], "another"),
