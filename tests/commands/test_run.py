@@ -107,7 +107,7 @@ def test_faulty_level_file_is_refused_where_it_is_wrong(tmp_path: Path) -> None:
     file.write_text(FAULTY, encoding="utf-8")
     result = run("unsafe-exploration", "--level", str(file))
     assert result.exit_code == 2
-    assert result.stderr.startswith(f"{file}, line 4, column 3: 'Q' is no glyph")
+    assert result.stderr.startswith(f"{file}, line 4, column 3: 'Q' is not a glyph")
     assert result.stdout == ""
 
 
