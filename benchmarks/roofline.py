@@ -44,7 +44,9 @@ from parenting.agent.policy import Network
 from parenting.agent.process import settle
 from parenting.envs import registry
 from parenting.envs.rng import keys
-from parenting.experiments.training.batch import BatchTrainer, StopRule, no_counts
+from parenting.experiments.training.batch import BatchTrainer
+from parenting.experiments.training.counts import no_counts
+from parenting.experiments.training.stop_rule import StopRule
 
 WORLD, LEVEL, PRESETS = "unsafe-exploration", "island", ("conservative", "direct")
 WARM, BORN = 100, 50

@@ -23,8 +23,8 @@ import torch
 from parenting.agent.config import compose
 from parenting.agent.process import settle
 from parenting.envs import registry
-from parenting.experiments.training.batch import StopRule
 from parenting.experiments.training.chunks import TrainPlan, chunks, train_in_chunks
+from parenting.experiments.training.stop_rule import StopRule
 
 WORLD, LEVEL, PRESETS, TICKS = "unsafe-exploration", "island", ("conservative", "direct"), 50
 SIZES, QUICK_SIZES = (100, 1000, 10_000), (100, 300)

@@ -22,9 +22,10 @@ from parenting.envs.levels.spec import Level
 from parenting.weights.store import Wanted, find
 
 if TYPE_CHECKING:
-    from parenting.experiments.training.batch import OnProgress, StopRule
-    from parenting.experiments.training.batch import Progress as Now
     from parenting.experiments.training.chunks import TrainPlan
+    from parenting.experiments.training.counts import OnProgress
+    from parenting.experiments.training.counts import Progress as Now
+    from parenting.experiments.training.stop_rule import StopRule
 
 
 def run(
@@ -131,7 +132,7 @@ def _said(name: str, given: dict[str, object], rule: str) -> str:
 
 def _until(world: str, text: str | None) -> StopRule:
     """When a trial is finished; where no goal ends an episode no policy is optimal."""
-    from parenting.experiments.training.batch import StopRule
+    from parenting.experiments.training.stop_rule import StopRule
 
     endless = not registry.spec(world).ends_at_goal
     kind, colon, number = (text or ("queries:1000" if endless else "optimal")).partition(":")

@@ -10,7 +10,8 @@ from sqlalchemy import select
 from parenting.agent.init import world_of
 from parenting.evaluation.argmax import evaluation
 from parenting.experiments.training import batch
-from parenting.experiments.training.batch import StopRule, no_counts
+from parenting.experiments.training.counts import no_counts
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.page_server import is_ready
 from parenting.library.person import Person
 from parenting.library.result import TrainResult, collect

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from parenting.experiments.training.batch import StopRule
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.notebook import LiveLine, open_page
 from parenting.library.page_run import all_heard, begin, read_back
 from parenting.library.page_server import address, failure, running_server

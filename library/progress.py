@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from parenting.experiments.training.batch import StopRule
+from parenting.experiments.training.stop_rule import StopRule
 
 
 @dataclass(frozen=True)

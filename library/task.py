@@ -14,7 +14,7 @@ from parenting.agent.init import SUPERVISION, world_of
 from parenting.envs import registry
 from parenting.envs.levels.spec import WorldSpec
 from parenting.envs.names import did_you_mean
-from parenting.experiments.training.batch import StopRule
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.worlds import AnyLevel, World, named
 from parenting.weights.store import Wanted, find, load
 

@@ -14,8 +14,10 @@ from parenting.agent.config import Config
 from parenting.agent.mailbox import Mailbox
 from parenting.envs.rng import keys
 from parenting.experiments.training import batch
-from parenting.experiments.training.batch import BatchTrainer, StopRule
+from parenting.experiments.training.batch import BatchTrainer
 from parenting.experiments.training.chunks import chunks
+from parenting.experiments.training.counts import Progress as BatchProgress
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.answer_log import AnswerLog
 from parenting.library.batch_parent import LoggedParent, WholeBatch
 from parenting.library.parent import EndedError, Parent
@@ -135,7 +137,7 @@ def _trainer(task: Task, rule: StopRule, seed: int, chunk: range) -> BatchTraine
 
 
 def _run(
-    trainer: BatchTrainer, max_ticks: int, report: Callable[[batch.Progress], None]
+    trainer: BatchTrainer, max_ticks: int, report: Callable[[BatchProgress], None]
 ) -> tuple[batch.TrainResult, bool]:
     """Train one batch to its end, or to where somebody ends it; whether somebody did."""
     try:
@@ -147,12 +149,12 @@ def _run(
 
 def _report(
     chunk: range, trials: int, before: list[batch.TrainResult], told: tuple[Callback | None, ...]
-) -> Callable[[batch.Progress], None]:
+) -> Callable[[BatchProgress], None]:
     """Tell how far the whole run has come after each tick of one batch."""
     done = sum(int(one.counts.done.sum()) for one in before)
     queries = sum(int(one.counts.queries.sum()) for one in before)
 
-    def tell(now: batch.Progress) -> None:
+    def tell(now: BatchProgress) -> None:
         progress = Progress(done + now.trials, trials, now.ticks, queries + now.queries)
         answers = [callback(progress) for callback in told if callback]  # each is called
         if False in answers:

@@ -16,7 +16,8 @@ from parenting.envs.rng import Keys, keys
 from parenting.experiments.figure3.levels import PARENTING, SET_ASIDE, WORLD, config_of, levels_for
 from parenting.experiments.figure3.transfer import Learnt, learnt, pack, transfer
 from parenting.experiments.runner.store import Row
-from parenting.experiments.training.batch import BatchTrainer, StopRule, TrainResult
+from parenting.experiments.training.batch import BatchTrainer, TrainResult
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.weights.store import initial_weights
 
 PRE_PARENTED_FROM = 1 << 40

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import torch
 from jaxtyping import Bool, Float, Int64
@@ -15,58 +14,14 @@ from parenting.agent.config import Config
 from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
-from parenting.envs.struct import Struct
 from parenting.evaluation.argmax import Evaluation, evaluation
+from parenting.experiments.training.counts import Counts, OnProgress, Progress, no_counts
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.parents.scripted import ScriptedParent, ScriptedRule
 
 LEAVE = 0.1
 """Trials that are done leave the batch when they are this share of it: moving the rest costs something, too.
 """
-
-
-class Progress(NamedTuple):
-    """The progress of a batch."""
-
-    trials: int  # those that are done: finished, or stuck
-    ticks: int
-    queries: int  # answered, of each trial at most as many as its goal asks for
-
-
-OnProgress = Callable[[Progress], None]
-
-
-class StopRule(NamedTuple):
-    """The condition under which a trial is finished.
-
-    Its argmax policy is optimal (in worlds whose episodes end at a goal), or it has reached a number of
-    answered queries, over all stages, or of ticks.
-    """
-
-    kind: Literal["optimal", "queries", "ticks"]
-    number: int = 0
-
-    def __str__(self) -> str:
-        """As written on the command line."""
-        return self.kind if self.kind == "optimal" else f"{self.kind}:{self.number}"
-
-
-class Counts(Struct):
-    """Counts of each trial; M is the number of stages."""
-
-    deaths: Int64[Tensor, "N"]  # unsafe steps (docs/paper.md, "Unsafe")
-    guidance: Int64[Tensor, "N"]  # answered guidance queries, redraws included
-    preference: Int64[Tensor, "N"]
-    queries: Int64[Tensor, "N M"]  # answered queries of either kind, by the stage that they belong to
-    ticks: Int64[Tensor, "N"]
-    maturity: Int64[Tensor, "N"]  # the stage at the end
-    optimal: Bool[Tensor, "N"]  # the argmax policy at the end
-    finished: Bool[Tensor, "N"]
-    stuck: Bool[Tensor, "N"]  # no acceptable action: it would wait for ever
-
-    @property
-    def done(self) -> Bool[Tensor, "N"]:
-        """Nothing more happens to it."""
-        return self.finished | self.stuck
 
 
 class TrainResult(NamedTuple):
@@ -75,22 +30,6 @@ class TrainResult(NamedTuple):
     counts: Counts
     policies: Float[Tensor, "M N P"]  # pi_1 .. pi_T, each trial's at its own end; zeros beyond
     evaluation: Evaluation
-
-
-def no_counts(trials: int, stages: int = 1) -> Counts:
-    """Nothing counted yet."""
-    zero, false = torch.zeros(trials, dtype=torch.int64), torch.zeros(trials, dtype=torch.bool)
-    return Counts(
-        deaths=zero,
-        guidance=zero,
-        preference=zero,
-        queries=torch.zeros(trials, stages, dtype=torch.int64),
-        ticks=zero,
-        maturity=zero + 1,
-        optimal=false,
-        finished=false,
-        stuck=false,
-    )
 
 
 class BatchTrainer:

@@ -20,9 +20,11 @@ from parenting.agent.init import world_of
 from parenting.agent.process import settle
 from parenting.envs.rng import keys
 from parenting.experiments.runner.processes import call_each
-from parenting.experiments.training.batch import OnProgress, Progress, StopRule, train_agents
+from parenting.experiments.training.batch import train_agents
+from parenting.experiments.training.counts import OnProgress, Progress, total
 from parenting.experiments.training.outcomes import Outcomes, examine
-from parenting.experiments.training.shared_progress import ProgressFile, total, watched
+from parenting.experiments.training.shared_progress import ProgressFile, watched
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.weights.store import Wanted, load
 
 CHUNK = 100

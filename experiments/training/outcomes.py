@@ -14,7 +14,8 @@ from parenting.envs.mdp import explore
 from parenting.envs.struct import Struct
 from parenting.evaluation.argmax import TabularEvaluation
 from parenting.evaluation.rollouts import EPISODES, deploy
-from parenting.experiments.training.batch import Counts, TrainResult
+from parenting.experiments.training.batch import TrainResult
+from parenting.experiments.training.counts import Counts
 
 UNREACHED = -1
 """The outcome of a stage that a trial did not come to."""

@@ -6,24 +6,18 @@ a few times a second.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
 
 import numpy as np
 
-from parenting.experiments.training.batch import OnProgress, Progress
+from parenting.experiments.training.counts import OnProgress, Progress, total
 
 LOOK_SECONDS = 0.2
 """Time between two looks at the file."""
 FIELDS = len(Progress._fields)
-
-
-def total(parts: Sequence[Progress]) -> Progress:
-    """Return the progress of several batches together: trials and queries of all, ticks of the furthest."""
-    trials, ticks, queries = zip(*parts, strict=True)
-    return Progress(sum(trials), max(ticks), sum(queries))
 
 
 class ProgressFile:

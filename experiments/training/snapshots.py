@@ -12,7 +12,9 @@ from parenting.agent.config import Config
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
 from parenting.envs.struct import Struct
-from parenting.experiments.training.batch import BatchTrainer, Counts, StopRule, no_counts
+from parenting.experiments.training.batch import BatchTrainer
+from parenting.experiments.training.counts import Counts, no_counts
+from parenting.experiments.training.stop_rule import StopRule
 
 
 class Passed(Struct):

@@ -15,9 +15,9 @@ from parenting.envs.rng import keys
 from parenting.evaluation.outcomes import name
 from parenting.experiments.baselines.reinforce_tabular import train_reinforce
 from parenting.experiments.runner.store import Row
-from parenting.experiments.training.batch import StopRule
 from parenting.experiments.training.chunks import TrainPlan, train_chunk
 from parenting.experiments.training.outcomes import Outcomes, deployments
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.weights.store import Wanted, find
 
 Goal = Literal["optimal", "queries", "ticks"]

@@ -22,7 +22,8 @@ from parenting.envs.gym_render import CELL
 from parenting.envs.levels.spec import LevelError, WorldSpec
 from parenting.envs.rng import keys
 from parenting.envs.walk import LETTERS, walk
-from parenting.experiments.training.batch import StopRule, train_agents
+from parenting.experiments.training.batch import train_agents
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.parents.scripted import ScriptedRule
 from tests.envs.test_conformance import *  # noqa: F403
 from tests.tree import ROOT

@@ -12,7 +12,9 @@ from parenting.agent.query import Choice, Query, QueryKind
 from parenting.envs import registry
 from parenting.envs.rng import keys
 from parenting.experiments.training import batch
-from parenting.experiments.training.batch import BatchTrainer, Progress, StopRule, TrainResult, train_agents
+from parenting.experiments.training.batch import BatchTrainer, TrainResult, train_agents
+from parenting.experiments.training.counts import Progress
+from parenting.experiments.training.stop_rule import StopRule
 
 ISLAND = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=False)
 

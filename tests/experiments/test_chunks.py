@@ -7,8 +7,9 @@ import torch
 
 from parenting.agent.config import compose
 from parenting.envs import registry
-from parenting.experiments.training.batch import Progress, StopRule
 from parenting.experiments.training.chunks import CHUNK, TrainPlan, chunks, train_in_chunks
+from parenting.experiments.training.counts import Progress
+from parenting.experiments.training.stop_rule import StopRule
 
 
 @pytest.mark.parametrize("trials", [1, 2, 3, 4, 20, 99, 100, 101, 150, 1000])

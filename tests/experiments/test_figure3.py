@@ -27,7 +27,8 @@ from parenting.experiments.figure3.transfer import POLICY, learnt, pack, transfe
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training import batch
-from parenting.experiments.training.batch import BatchTrainer, StopRule
+from parenting.experiments.training.batch import BatchTrainer
+from parenting.experiments.training.stop_rule import StopRule
 from parenting.weights.store import initial_weights, pretrained
 
 CONFIG = config_of(pretrain=True, recompare=False)

@@ -7,9 +7,10 @@ import torch
 from parenting.agent.config import compose
 from parenting.envs import registry
 from parenting.envs.rng import keys
-from parenting.experiments.training.batch import StopRule, train_agents
+from parenting.experiments.training.batch import train_agents
 from parenting.experiments.training.gardens import garden
 from parenting.experiments.training.snapshots import train_with_snapshots
+from parenting.experiments.training.stop_rule import StopRule
 
 CHANGES = {"pretrain": False, "time_limit": 10, "stages": 2, "mature_every": 8}
 CONFIG = compose("conservative", registry.defaults("reward-hacking"), CHANGES, strict=True)

@@ -11,7 +11,8 @@ from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.evaluation.argmax import evaluation
 from parenting.evaluation.outcomes import Outcome
-from parenting.experiments.training.batch import TrainResult, no_counts
+from parenting.experiments.training.batch import TrainResult
+from parenting.experiments.training.counts import no_counts
 from parenting.experiments.training.outcomes import UNREACHED, Outcomes, deployments, examine
 from parenting.parents.scripted import ScriptedRule
 from tests.parents.fixed_policies import DOWN, LEFT, RIGHT, UP, always, at_a_wall, on_sight

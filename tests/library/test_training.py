@@ -14,8 +14,8 @@ from parenting.envs import registry
 def test_it_trains_the_agents_that_the_command_trains(trained: pt.TrainResult) -> None:
     """The same keys, the same batches, the same sums: `parenting run` with one process."""
     from parenting.agent.config import compose
-    from parenting.experiments.training.batch import StopRule
     from parenting.experiments.training.chunks import TrainPlan, train_in_chunks
+    from parenting.experiments.training.stop_rule import StopRule
 
     config = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=True)
     assert trained.config == config
