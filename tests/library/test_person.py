@@ -4,72 +4,24 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
-from playwright.sync_api import sync_playwright
 
 import parenting as pt
 from parenting.library import page_training
 from parenting.server.security import NOBODY
-from tests import simulated_person
+from tests.library.person_at_page import PersonAtPage
 
 WORLD = "unsafe-exploration"
 
 
-class Browser(threading.Thread):
-    """A person at the page, in a thread of its own: answers so many questions, then says so."""
-
-    def __init__(self, url: str, path: str, answers: int, then: Callable[[], None]) -> None:
-        super().__init__(daemon=True)
-        self.url, self.path, self.answers, self.then = url, path, answers, then
-        self.keys: list[str] = []
-        self.error: BaseException | None = None
-
-    def run(self) -> None:
-        try:
-            with sync_playwright() as playwright:
-                chromium = playwright.chromium.launch(executable_path=self.path, args=simulated_person.FLAGS)
-                page = chromium.new_page()
-                page.goto(self.url)
-                to_goal = simulated_person.distances()
-                for _ in range(self.answers):
-                    self.keys.append(simulated_person.answer(page, to_goal))
-                self.then()
-                chromium.close()
-        except BaseException as error:
-            self.error = error
-            os.kill(os.getpid(), signal.SIGINT)  # else the test would wait for its end
-
-
-@pytest.fixture
-def person_at_the_page(
-    monkeypatch: pytest.MonkeyPatch, chromium_path: str
-) -> Iterator[Callable[..., list[Browser]]]:
-    """Where `train` would open a browser, a browser is opened that answers."""
-    opened: list[Browser] = []
-
-    def prepare(answers: int, then: Callable[[], None] = lambda: None) -> list[Browser]:
-        def open_page(url: str, _browser: bool) -> None:
-            opened.append(Browser(url, chromium_path, answers, then))
-            opened[-1].start()
-
-        monkeypatch.setattr(page_training, "open_page", open_page)
-        return opened
-
-    yield prepare
-    for one in opened:
-        one.join(30)
-        assert one.error is None, one.error
-
-
 @pytest.mark.timeout(240)
 def test_a_person_on_the_page_raises_an_agent_and_goes_on_after_an_interruption(
-    person_at_the_page: Callable[..., list[Browser]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    person_at_the_page: Callable[..., list[PersonAtPage]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One test for the whole of it: starting the server twice takes seconds.
 

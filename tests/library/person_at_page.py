@@ -1,0 +1,38 @@
+"""A person at the page, played by Chromium in a thread while `train` waits."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+
+from playwright.sync_api import sync_playwright
+
+from tests import simulated_person
+
+
+class PersonAtPage(threading.Thread):
+    """Answers so many questions, then calls `then`."""
+
+    def __init__(self, url: str, chromium: str, answers: int, then: Callable[[], None]) -> None:
+        super().__init__(daemon=True)
+        self.url, self.chromium, self.answers, self.then = url, chromium, answers, then
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            with sync_playwright() as playwright:
+                browser = playwright.chromium.launch(
+                    executable_path=self.chromium, args=simulated_person.FLAGS
+                )
+                page = browser.new_page()
+                page.goto(self.url)
+                to_goal = simulated_person.distances()
+                for _ in range(self.answers):
+                    simulated_person.answer(page, to_goal)
+                self.then()
+                browser.close()
+        except BaseException as error:
+            self.error = error
+            os.kill(os.getpid(), signal.SIGINT)  # else `train` would wait for ever
