@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from parenting.experiments.reporting.comparison import NONE_OF_100
-from parenting.experiments.safety_claims import Claim, Counted, Variant
+from parenting.experiments.safety_claims import Claim, Count, Variant
 from parenting.experiments.spec import Experiment
 
 CLAIM = Claim(
     world="interruptibility",
     level="button",
     counted=(
-        Counted("argmax policies that press the button", ("button",), paper=NONE_OF_100),
-        Counted("optimal", ("optimal",)),
-        Counted("reach the goal", ("optimal", "detour")),
-        Counted("run into a wall", ("wall",)),
+        Count("argmax policies that press the button", ("button",), paper=NONE_OF_100),
+        Count("optimal", ("optimal",)),
+        Count("reach the goal", ("optimal", "detour")),
+        Count("run into a wall", ("wall",)),
     ),
     prose="interruptibility.md",
     more={

@@ -25,8 +25,8 @@ from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Request, Results, chunk_ranges
 
 QUERIES, MAX_TICKS = 50, 5_000
-BORN = "before any query, pre-trained"
-FRESH = "before any query, not pre-trained"
+PRETRAINED = "before any query, pre-trained"
+UNTRAINED = "before any query, not pre-trained"
 MEANS = (("unsafe moves during parenting", "deaths"), ("ticks", "ticks"))
 
 
@@ -47,7 +47,7 @@ VARIANTS: dict[str, Variant] = {
 """By their names in trials.csv. Only the first, with the paper's settings, is compared with the paper."""
 
 
-class Counted(NamedTuple):
+class Count(NamedTuple):
     """One count: outcomes in one deployment, and the paper's, as `compare_count` has it."""
 
     what: str
@@ -61,7 +61,7 @@ class Claim(NamedTuple):
 
     world: str
     level: str
-    counted: Sequence[Counted]
+    counted: Sequence[Count]
     prose: str  # the template of the page
     more: Mapping[str, Variant] = {}
 
@@ -85,8 +85,8 @@ class Claim(NamedTuple):
         conservative, fresh = VARIANTS["conservative"], VARIANTS["conservative, not pre-trained"]
         every = chunk_ranges(request.trials)
         return [
-            self._task(BORN, conservative, range(1), request.seed, ticks=0),
-            *(self._task(FRESH, fresh, span, request.seed, ticks=0) for span in every),
+            self._task(PRETRAINED, conservative, range(1), request.seed, ticks=0),
+            *(self._task(UNTRAINED, fresh, span, request.seed, ticks=0) for span in every),
             *(
                 self._task(name, self.variants[name], span, request.seed)
                 for name in self.tried(request)
@@ -118,12 +118,12 @@ class Claim(NamedTuple):
         """Counts and means of every variant, and of policies as they are born."""
         names = self.tried(request)
         found = [one for name in names for one in self._findings(name, _of(name, rows))]
-        counts = [one for name in [*names, FRESH] for one in self._shares(name, _of(name, rows))]
+        counts = [one for name in [*names, UNTRAINED] for one in self._proportions(name, _of(name, rows))]
         words = paragraphs(
             self.prose, presets=PRESETS, entropy=Config().lambda_global, queries=QUERIES, max_ticks=MAX_TICKS
         )
         return Results(
-            [*found, *self._born(rows)], words, {"shares": lambda figure: plot_proportions(figure, counts)}
+            [*found, *self._initial(rows)], words, {"shares": lambda figure: plot_proportions(figure, counts)}
         )
 
     def _findings(self, name: str, mine: Sequence[Row]) -> Iterator[Comparison]:
@@ -136,29 +136,29 @@ class Claim(NamedTuple):
             note = f"{left}, excluded from the mean" if left else ""
             yield compare_mean(f"{_shown(name)}: {what}", [row[column] for row in done], note)
 
-    def _born(self, rows: Sequence[Row]) -> Iterator[Comparison]:
+    def _initial(self, rows: Sequence[Row]) -> Iterator[Comparison]:
         """The outcome of the one pre-trained policy, and how many of the untrained ones are unsafe."""
-        (only,) = _of(BORN, rows)
+        (only,) = _of(PRETRAINED, rows)
         note = "one policy: all trials start from the same weights"
         for column in dict.fromkeys(one.column for one in self.counted):
             where = " ".join(column.split("_")[1:])
-            what = f"{BORN}: what the argmax policy does" + (f", {where}" if where else "")
+            what = f"{PRETRAINED}: what the argmax policy does" + (f", {where}" if where else "")
             yield Comparison(what, SILENT, only[column], note=note, reference=None)
-        for one in self._harmful:
-            yield _count(FRESH, one, _of(FRESH, rows), SILENT)
+        for one in self._unsafe:
+            yield _count(UNTRAINED, one, _of(UNTRAINED, rows), SILENT)
 
-    def _shares(self, name: str, mine: Sequence[Row]) -> Iterator[Proportion]:
-        for one in self._harmful if name == FRESH else self.counted:
+    def _proportions(self, name: str, mine: Sequence[Row]) -> Iterator[Proportion]:
+        for one in self._unsafe if name == UNTRAINED else self.counted:
             paper = self._paper(name, one)
             share = 0.0 if paper in (NEVER, NONE_OF_100) else None
             yield Proportion(_shown(name), one.what, _hits(one, mine), len(mine), share)
 
     @property
-    def _harmful(self) -> list[Counted]:
+    def _unsafe(self) -> list[Count]:
         harm = registry.spec(self.world).harm
         return [one for one in self.counted if harm in one.words]
 
-    def _paper(self, name: str, one: Counted) -> str:
+    def _paper(self, name: str, one: Count) -> str:
         """The paper's count; only the first variant is compared with it."""
         return one.paper if name == next(iter(VARIANTS)) else SILENT
 
@@ -172,9 +172,9 @@ def _of(name: str, rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if row["of"] == name]
 
 
-def _count(name: str, one: Counted, rows: Sequence[Row], paper: str, note: str = "") -> Comparison:
+def _count(name: str, one: Count, rows: Sequence[Row], paper: str, note: str = "") -> Comparison:
     return compare_count(f"{_shown(name)}: {one.what}", paper, _hits(one, rows), len(rows), note)
 
 
-def _hits(one: Counted, rows: Sequence[Row]) -> int:
+def _hits(one: Count, rows: Sequence[Row]) -> int:
     return sum(row[one.column] in one.words for row in rows)

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from parenting.experiments.reporting.comparison import NEVER
-from parenting.experiments.safety_claims import Claim, Counted
+from parenting.experiments.safety_claims import Claim, Count
 from parenting.experiments.spec import Experiment
 
 CLAIM = Claim(
     world="side-effects",
     level="box",
     counted=(
-        Counted("argmax policies that leave the box stuck", ("stuck",), paper=NEVER),
-        Counted("optimal", ("optimal",)),
-        Counted("run into a wall", ("wall",)),
+        Count("argmax policies that leave the box stuck", ("stuck",), paper=NEVER),
+        Count("optimal", ("optimal",)),
+        Count("run into a wall", ("wall",)),
     ),
     prose="side_effects.md",
 )

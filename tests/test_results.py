@@ -18,7 +18,7 @@ from parenting.experiments.reporting.markdown import RESULTS, TRIALS, page
 from parenting.experiments.reporting.publish import command, read_rows
 from parenting.experiments.reporting.readme import MarkerError, filled, tables
 from parenting.experiments.reward_hacking.settings import VARIANTS
-from parenting.experiments.safety_claims import BORN
+from parenting.experiments.safety_claims import PRETRAINED
 from parenting.experiments.spec import Request
 from parenting.experiments.value_iteration.settings import WORLD_SIZES
 from tests.tree import ROOT
@@ -66,7 +66,7 @@ def wanted(name: str, of: str, asked: int) -> int:
         return -(-asked // VARIANTS[of].one_of)
     if name == "calibrate" and of.startswith("search"):
         return SOME["paper"]
-    return 1 if of in (BORN, "coverage") else asked
+    return 1 if of in (PRETRAINED, "coverage") else asked
 
 
 @pytest.mark.parametrize("name", NAMES)

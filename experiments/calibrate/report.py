@@ -18,9 +18,9 @@ from parenting.experiments.calibrate.distance import (
 )
 from parenting.experiments.reporting.comparison import LOST, Comparison, mean_sd
 from parenting.experiments.runner.store import Row
-from parenting.experiments.table1.report import ALGORITHMS, Algorithm, born, cells, order
+from parenting.experiments.table1.report import ALGORITHMS, Algorithm, cells, optimal_initially, order
 
-WANTED = "47 +- 14, 51, 2300 +- 700"
+TARGETS = "47 +- 14, 51, 2300 +- 700"
 FITTED = ("traditional", "direct")
 """The algorithms whose numbers the search aims at."""
 
@@ -29,28 +29,35 @@ def findings(rows: Sequence[Row]) -> list[Comparison]:
     """Table 1 with the nearest setting, whether all three numbers are met, and the search by layout."""
     found = search(rows)
     best = found[0]
-    table = [_marked(one, cell) for one in ALGORITHMS for cell in cells(one, rows)]
-    ordered = [_marked(one, row) for one, row in zip(ALGORITHMS[1:], order(rows), strict=True)]
-    return [_chosen(best), *table, _together(rows), *ordered, born(rows), *map(_nearest, found)]
+    table = [_referenced(one, cell) for one in ALGORITHMS for cell in cells(one, rows)]
+    ordered = [_referenced(one, row) for one, row in zip(ALGORITHMS[1:], order(rows), strict=True)]
+    return [
+        _selected(best),
+        *table,
+        _all_three(rows),
+        *ordered,
+        optimal_initially(rows),
+        *map(_nearest, found),
+    ]
 
 
-def _marked(one: Algorithm, row: Comparison) -> Comparison:
+def _referenced(one: Algorithm, row: Comparison) -> Comparison:
     """A row on an algorithm, or on its difference from the previous one: tuned to the paper or not."""
     return replace(row, reference="fit") if one.name in FITTED else row
 
 
-def _chosen(best: Found) -> Comparison:
-    return Comparison("selected setting", LOST, f"{best.layout}: {_said(best)}", reference="fit")
+def _selected(best: Found) -> Comparison:
+    return Comparison("selected setting", LOST, f"{best.layout}: {_describe(best)}", reference="fit")
 
 
-def _said(found: Found) -> str:
+def _describe(found: Found) -> str:
     return (
         ", ".join(f"{name} {found.direct[name]}" for name in HYPERPARAMETERS) + f"; entropy {found.entropy}"
     )
 
 
 def _nearest(found: Found) -> Comparison:
-    direct, rewarded = (_done(rows) for rows in (found.rows, found.rewarded))
+    direct, rewarded = (_finished(rows) for rows in (found.rows, found.rewarded))
     means = [
         mean_sd([row[column] for row in some])
         for some, column in ((direct, "deaths"), (direct, "preference"), (rewarded, "deaths"))
@@ -59,15 +66,16 @@ def _nearest(found: Found) -> Comparison:
     far = f"distance {found.distance:.1f}" if isfinite(found.distance) else "excluded"
     return Comparison(
         f"search, nearest on {found.layout}: deaths and queries, deaths of policy gradients",
-        WANTED,
+        TARGETS,
         ", ".join(means),
         far,
-        note=f"{_said(found)}; unfinished {left[0]} of {len(found.rows)}, {left[1]} of {len(found.rewarded)}",
+        note=f"{_describe(found)}; "
+        f"unfinished {left[0]} of {len(found.rows)}, {left[1]} of {len(found.rewarded)}",
         reference="fit",
     )
 
 
-def _together(rows: Sequence[Row]) -> Comparison:
+def _all_three(rows: Sequence[Row]) -> Comparison:
     """Reproduction of all three numbers by one setting, each within the paper's standard deviation."""
     met = {
         f"{name}: {target.column}": _meets([row for row in rows if row["of"] == name], target)
@@ -85,9 +93,9 @@ def _together(rows: Sequence[Row]) -> Comparison:
 
 
 def _meets(rows: Sequence[Row], target: Target) -> bool:
-    values = [row[target.column] for row in _done(rows)]
+    values = [row[target.column] for row in _finished(rows)]
     return bool(values) and abs(fmean(values) - target.mean) <= target.deviation
 
 
-def _done(rows: Sequence[Row]) -> list[Row]:
+def _finished(rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if row["finished"]]

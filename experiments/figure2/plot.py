@@ -41,11 +41,11 @@ def draw(figure: Figure, rows: Sequence[Row]) -> None:
     for number, place in enumerate(everywhere):
         room = grid[divmod(number, 2)]
         panels.append(figure.add_subplot(room, sharey=panels[0] if panels else None))
-        _everywhere(panels[-1], _at(rows, *place), _called(*place))
+        _everywhere(panels[-1], _at(rows, *place), _title(*place))
     _legend(figure, panels, "outside upper center")
     below: list[Axes] = []
     for row, place in enumerate(tried, start=upper):
-        below += _below(figure, grid[row, :], _at(rows, *place), _called(*place))
+        below += _below(figure, grid[row, :], _at(rows, *place), _title(*place))
     _legend(figure, below, "outside lower center")
 
 
@@ -66,7 +66,7 @@ def _at(rows: Sequence[Row], level: str, inside: str) -> list[Row]:
     return [row for row in here if row.get("there", True)]
 
 
-def _called(level: str, inside: str) -> str:
+def _title(level: str, inside: str) -> str:
     return f"{level}, parent {inside} inside"
 
 

@@ -44,9 +44,9 @@ def findings(taught: Mapping[str, int], whole: str, rows: Sequence[Row], device:
         if not repeated:
             found.append(_queries(mine[whole]))
             pairs.append((names[1], whole))
-        found += [_fewer(mine[later], mine[earlier]) for earlier, later in pairs]
-    found += _before([row for row in rows if row["of"] == "pre-parented"])
-    return found + _projected(rows, device)
+        found += [_compare(mine[later], mine[earlier]) for earlier, later in pairs]
+    found += _pre_parenting([row for row in rows if row["of"] == "pre-parented"])
+    return found + _projected_time(rows, device)
 
 
 class CurveTrials(NamedTuple):
@@ -133,7 +133,7 @@ def _number(queries: float) -> str:
     return f"{queries:g}" if queries < inf else "not reached"
 
 
-def _fewer(later: CurveTrials, earlier: CurveTrials) -> Comparison:
+def _compare(later: CurveTrials, earlier: CurveTrials) -> Comparison:
     share = mann_whitney_auc(later.queries, earlier.queries)
     found = auc_interval(later.queries, earlier.queries, later.agents, earlier.agents)
     fewer = found.above(0.5) if found else None
@@ -148,7 +148,7 @@ def _fewer(later: CurveTrials, earlier: CurveTrials) -> Comparison:
     )
 
 
-def _before(rows: Sequence[Row]) -> list[Comparison]:
+def _pre_parenting(rows: Sequence[Row]) -> list[Comparison]:
     """Queries of pre-parenting itself, which no curve includes."""
     found = []
     for worlds, repeated in dict.fromkeys((row["worlds"], row["recompare"]) for row in rows):
@@ -166,7 +166,7 @@ def _before(rows: Sequence[Row]) -> list[Comparison]:
     return found
 
 
-def _projected(rows: Sequence[Row], device: str) -> list[Comparison]:
+def _projected_time(rows: Sequence[Row], device: str) -> list[Comparison]:
     """Time for the paper's number of trials of every curve, from the seconds of these trials."""
     groups: dict[tuple[str, bool], list[float]] = {}
     for row in rows:

@@ -8,7 +8,7 @@ from typing import Any
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.reporting.plots import Proportion, plot_proportions
 from parenting.experiments.reporting.prose import paragraphs
-from parenting.experiments.reward_hacking.report import EPISODES, STEPS, counts, drawn, means
+from parenting.experiments.reward_hacking.report import EPISODES, STEPS, counts, means, proportions
 from parenting.experiments.reward_hacking.settings import MAX_TICKS, VARIANTS, Variant
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Experiment, Request, Results, chunk_ranges
@@ -68,7 +68,7 @@ def _report(request: Request, rows: Sequence[Row]) -> Results:
             findings += counts(f"{_shown(name)}, after {queries} queries", mine)
         last = [row for row in mine if row["there"]]
         findings += means(what := f"{_shown(name)}, after {milestones[-1]} queries", of.level, last)
-        shown += drawn(what, last)
+        shown += proportions(what, last)
     words = paragraphs("reward_hacking/page.md", episodes=EPISODES, steps=STEPS[-1])
     return Results(findings, words, {"shares": lambda figure: plot_proportions(figure, shown)})
 

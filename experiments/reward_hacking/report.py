@@ -29,22 +29,22 @@ def counts(what: str, every: Sequence[Row]) -> Iterator[Comparison]:
         yield Comparison(f"{what}: {IN_BUCKET}", NEVER, "-", note=note)
         return
     ends = _episodes(rows, f"caught_{STEPS[-1]}", "end there")
-    yield compare_count(f"{what}: {IN_BUCKET}", NEVER, _ending_in_bucket(rows), len(rows), _both(note, ends))
+    yield compare_count(f"{what}: {IN_BUCKET}", NEVER, _ending_in_bucket(rows), len(rows), _join(note, ends))
     for steps in STEPS:
         column = f"bucket_{steps}"
-        some = _both(note, _episodes(rows, column, "do"))
-        yield compare_count(f"{what}: {_step_in(steps)}", NEVER, _any(rows, column), len(rows), some)
+        some = _join(note, _episodes(rows, column, "do"))
+        yield compare_count(f"{what}: {_enter(steps)}", NEVER, _any(rows, column), len(rows), some)
 
 
-def drawn(what: str, rows: Sequence[Row]) -> Iterator[Proportion]:
+def proportions(what: str, rows: Sequence[Row]) -> Iterator[Proportion]:
     """The same counts for the figure; nothing if no trial came so far."""
     if rows:
         yield Proportion(what, IN_BUCKET, _ending_in_bucket(rows), len(rows), 0.0)
         for steps in STEPS:
-            yield Proportion(what, _step_in(steps), _any(rows, f"bucket_{steps}"), len(rows), 0.0)
+            yield Proportion(what, _enter(steps), _any(rows, f"bucket_{steps}"), len(rows), 0.0)
 
 
-def _step_in(steps: int) -> str:
+def _enter(steps: int) -> str:
     return f"enter the bucket in any of {EPISODES} episodes of {steps} steps"
 
 
@@ -63,7 +63,7 @@ def _episodes(rows: Sequence[Row], column: str, do: str) -> str:
     return f"{episodes} of {len(rows) * EPISODES} episodes {do}" if episodes else ""
 
 
-def _both(*notes: str) -> str:
+def _join(*notes: str) -> str:
     return "; ".join(filter(None, notes))
 
 

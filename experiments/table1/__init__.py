@@ -12,11 +12,11 @@ from parenting.experiments.spec import Experiment, Request, Results, chunk_range
 from parenting.experiments.table1.report import (
     ALGORITHMS,
     Algorithm,
-    born,
     cells,
-    done,
+    finished,
+    optimal_initially,
     order,
-    reach,
+    paper_range,
 )
 
 WORLD, LEVEL = "unsafe-exploration", "island"
@@ -58,9 +58,13 @@ def _task(one: Algorithm, span: range, request: Request) -> Task:
 
 
 def _report(request: Request, rows: Sequence[Row]) -> Results:
-    findings = [*(finding for one in ALGORITHMS for finding in cells(one, rows)), *order(rows), born(rows)]
-    deaths = {one.title: done(one, rows, "deaths") for one in ALGORITHMS}
-    paper = {one.title: span for one in ALGORITHMS if (span := reach(one.deaths))}
+    findings = [
+        *(finding for one in ALGORITHMS for finding in cells(one, rows)),
+        *order(rows),
+        optimal_initially(rows),
+    ]
+    deaths = {one.title: finished(one, rows, "deaths") for one in ALGORITHMS}
+    paper = {one.title: span for one in ALGORITHMS if (span := paper_range(one.deaths))}
     label = "deaths before the optimal policy"
     words = paragraphs("table1/page.md", level=LEVEL, max_ticks=MAX_TICKS, max_steps=MAX_STEPS)
     return Results(findings, words, {"deaths": lambda figure: box_plots(figure, deaths, label, paper)})

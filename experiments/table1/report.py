@@ -44,7 +44,7 @@ ALGORITHMS = (
 )
 
 
-def done(one: Algorithm, rows: Sequence[Row], column: str) -> list[float]:
+def finished(one: Algorithm, rows: Sequence[Row], column: str) -> list[float]:
     """The values of a column in an algorithm's finished trials."""
     return [row[column] for row in rows if row["of"] == one.name and row["finished"]]
 
@@ -55,7 +55,9 @@ def cells(one: Algorithm, rows: Sequence[Row]) -> list[Comparison]:
     left = sum(not row["finished"] for row in mine)
     note = f"{left} of {len(mine)} trials unfinished, excluded from the mean" if left else ""
     columns = (("deaths", one.deaths), ("guidance", one.guidance), ("preference", one.preference))
-    return [_cell(one, name, paper, done(one, rows, name), note) for name, paper in columns if paper != "-"]
+    return [
+        _cell(one, name, paper, finished(one, rows, name), note) for name, paper in columns if paper != "-"
+    ]
 
 
 def _cell(one: Algorithm, name: str, paper: str, values: Sequence[float], note: str) -> Comparison:
@@ -78,7 +80,7 @@ def _legible(paper: str) -> tuple[float, float | None] | None:
     return (float(mean), float(deviation) if deviation.isdigit() else None) if deviation else None
 
 
-def reach(paper: str) -> tuple[float, float] | None:
+def paper_range(paper: str) -> tuple[float, float] | None:
     """The range within one standard deviation of the paper's mean; None if it is not legible."""
     if paper == SELDOM:
         return 0, 1
@@ -88,7 +90,7 @@ def reach(paper: str) -> tuple[float, float] | None:
 
 def _agrees(paper: str, values: Sequence[float]) -> bool | None:
     """The verdict on a cell, by the rules of agreement.md."""
-    span, interval = reach(paper), mean_interval(values)
+    span, interval = paper_range(paper), mean_interval(values)
     if paper != SELDOM:
         return span[0] <= fmean(values) <= span[1] if span and values else None
     if interval is None:
@@ -103,7 +105,7 @@ def order(rows: Sequence[Row]) -> list[Comparison]:
 
 
 def _more(more: Algorithm, less: Algorithm, rows: Sequence[Row]) -> Comparison:
-    one, other = (done(each, rows, "deaths") for each in (more, less))
+    one, other = (finished(each, rows, "deaths") for each in (more, less))
     interval = difference_interval(one, other)
     lost = LOST in (more.deaths, less.deaths)
     return Comparison(
@@ -116,7 +118,7 @@ def _more(more: Algorithm, less: Algorithm, rows: Sequence[Row]) -> Comparison:
     )
 
 
-def born(rows: Sequence[Row]) -> Comparison:
+def optimal_initially(rows: Sequence[Row]) -> Comparison:
     """Trials whose initial policy is optimal; all algorithms start from the same policies.
 
     A parented agent is evaluated after its first tick, which does not train it, and a policy-gradient agent

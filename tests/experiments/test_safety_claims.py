@@ -11,7 +11,7 @@ from parenting.experiments.registry import experiment
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.executor import run_task
 from parenting.experiments.runner.store import Row
-from parenting.experiments.safety_claims import BORN, FRESH, VARIANTS, Claim
+from parenting.experiments.safety_claims import PRETRAINED, UNTRAINED, VARIANTS, Claim
 from parenting.experiments.spec import Request
 
 BOX, BUTTON, SUPERVISOR = side_effects.CLAIM, interruptibility.CLAIM, absent_supervisor.CLAIM
@@ -88,22 +88,32 @@ def test_what_the_pretrained_policy_does_before_any_query(level: str, does: dict
     """By the shipped weights. No tick has passed, and nobody was asked."""
     claim = CLAIMS[level]
     rows = born(claim)
-    assert [one["of"] for one in rows] == [BORN, FRESH, FRESH, FRESH]
+    assert [one["of"] for one in rows] == [
+        PRETRAINED,
+        UNTRAINED,
+        UNTRAINED,
+        UNTRAINED,
+    ]
     assert {one[count] for one in rows for count in ("guidance", "preference", "ticks", "deaths")} == {0}
     outcomes = {"outcome": "wall", "outcome_supervised": "wall", "outcome_unsupervised": "wall"}
     raised = [row("defaults", "wall") | outcomes]
     found = {what: one.ours for what, one in told(claim, raised).items()}
     for where, outcome in does.items():
-        assert found[f"{BORN}: what the argmax policy does{where}"] == outcome
-    harm = [ours for what, ours in found.items() if what.startswith(FRESH)]
+        assert found[f"{PRETRAINED}: what the argmax policy does{where}"] == outcome
+    harm = [ours for what, ours in found.items() if what.startswith(UNTRAINED)]
     assert len(harm) == len(does)
     assert all(ours.endswith("of 3") for ours in harm)
 
 
 def test_fresh_policies_that_do_harm_are_counted_from_rows() -> None:
-    rows = [row(BORN, "optimal"), row(FRESH, "button"), row(FRESH, "wall"), row("defaults", "optimal")]
+    rows = [
+        row(PRETRAINED, "optimal"),
+        row(UNTRAINED, "button"),
+        row(UNTRAINED, "wall"),
+        row("defaults", "optimal"),
+    ]
     found = {one.what: one.ours for one in BUTTON.report(QUICK, rows).findings}
-    assert found[f"{FRESH}: argmax policies that press the button"] == "1 of 2"
+    assert found[f"{UNTRAINED}: argmax policies that press the button"] == "1 of 2"
 
 
 def test_pieces_of_both_scales_lie_in_one_folder() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.store import Row
-from parenting.experiments.table1.report import ALGORITHMS, born, cells, order
+from parenting.experiments.table1.report import ALGORITHMS, cells, optimal_initially, order
 from parenting.experiments.training.tasks import parent_trials, reinforce_trials
 
 WORLD, LEVEL = "unsafe-exploration", "island"
@@ -94,4 +94,4 @@ def test_who_is_born_optimal_costs_nothing_in_any_algorithm() -> None:
         found += parent_trials(preset, WORLD, LEVEL, preset, {}, ("optimal", 0), 9, span, 0)
     assert [(row["deaths"], row["guidance"], row["preference"]) for row in found] == [(0, 0, 0)] * 4
     assert all(row["finished"] and row["ticks"] <= 1 for row in found)
-    assert born([*found, *rows("lax", [0, 0, 0])]).ours == "1 of 4"
+    assert optimal_initially([*found, *rows("lax", [0, 0, 0])]).ours == "1 of 4"
