@@ -23,7 +23,7 @@ Cells = dict[str, str]
 
 @dataclass(frozen=True)
 class Delusion:
-    """What the agent wrongly believes to see while it stands at one place."""
+    """Tiles that the agent wrongly believes to see while it stands at one place."""
 
     cells: Cells
     at: Point
@@ -32,7 +32,7 @@ class Delusion:
 
     @property
     def glyph(self) -> str:
-        """What it believes in, for the bubble of thought."""
+        """The tile that it believes in, for the bubble of thought."""
         return next(iter(self.cells))
 
 
@@ -80,7 +80,7 @@ class Board:
 
 
 def build_board(clip: Clip, stage: int = 1, bars: Sequence[Cell] = ()) -> Board:
-    """A stored clip as a board. It may be shorter than its `stage`, T; `bars` are the level's."""
+    """Return a stored clip as a board. It may be shorter than its `stage` T; `bars` are the level's."""
     frames, actions = clip["frames"], tuple(clip["actions"])
     grounds = [frame["ground"] for frame in frames]
     agent = [cell(frame["agent"]) for frame in frames]
@@ -158,7 +158,7 @@ def _split(grounds: Sequence[Sequence[str]]) -> tuple[list[Cell], list[Cell]]:
 
 
 def _delusions(frames: Sequence[Frame]) -> list[Delusion]:
-    """Where the agent sees what is not so; frames with the same delusion share one drawing."""
+    """Find where the agent sees what is not so; frames with the same delusion share one drawing."""
     found: list[Delusion] = []
     for number, frame in enumerate(frames):
         now = Delusion(

@@ -1,6 +1,6 @@
-"""What comes of a clip, in plain words: all that a parent has to know of it, whatever the world.
+"""Describe a clip in plain words: all that a parent has to know of it, in any world.
 
-The drawing shows the same. Who cannot see it, or looks at a still board, reads it here.
+The drawing shows the same. These words are for those who cannot see it, or look at a still board.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Caption(NamedTuple):
 def clip_captions(
     clip: Clip, board: Board, legend: Mapping[str, str], longer: int = 0
 ) -> tuple[Caption, ...]:
-    """What happens in the clip, dangers first. `longer` is the length of the clip beside it."""
+    """Return what happens in the clip, dangers first. `longer` is the length of the other clip."""
     names = Counter(cue.name for cue in board.cues)
     found = [Caption(DANGERS[name], "bad") for name in names if name in DANGERS]
     found += map(Caption, _deeds(clip, board, names))
@@ -55,13 +55,13 @@ def clip_captions(
 
 
 def _end(name: str, length: int, longer: int) -> Caption:
-    """How the clip ends, and after how many steps, if the one beside it goes on."""
+    """Return how the clip ends, and after how many steps if the other clip goes on."""
     text, tone = ENDS[name]
     return Caption(f"{text} after {length} of {longer} steps." if length < longer else f"{text}.", tone)
 
 
 def _deeds(clip: Clip, board: Board, names: Mapping[str, int]) -> Iterator[str]:
-    """What is neither a danger nor an end."""
+    """Yield what is neither a danger nor an end."""
     for name, (one, many) in COUNTED.items():
         if count := names.get(name, 0):
             yield one if count == 1 else many.format(count)
@@ -84,5 +84,5 @@ def _walls(bumps: int, steps: int) -> str:
 
 
 def _by_box(frame: Frame, way: str) -> bool:
-    """Whether it is the box that stands in this way, and no wall."""
+    """Return True if the box, and not a wall, stands in this way."""
     return frame["box"] is not None and cell(frame["box"]) == ahead(frame["agent"], way)

@@ -1,4 +1,4 @@
-"""What happens in a clip, and where: the cues that the board draws and that the words below it tell.
+"""Find what happens in a clip, and where: the cues that the board draws and the captions name.
 
 One list for both, so that the drawing and the words cannot come to say different things.
 """
@@ -51,7 +51,7 @@ class Cue(NamedTuple):
 
     @property
     def danger(self) -> bool:
-        """Whether it is one."""
+        """True if it gets the mark of danger."""
         return self.name in DANGERS
 
 
@@ -107,7 +107,7 @@ def _dangers(number: int, before: Frame, after: Frame, known: set[str]) -> Itera
 
 
 def _end(clip: Clip, stage: int) -> Iterator[Cue]:
-    """How the clip ends, if not by its length: in the water, at the goal, or held by the interruption."""
+    """Yield how the clip ends, if not by its length: in the water, at the goal, or held."""
     first, last = clip["frames"][0], clip["frames"][-1]
     number, place, tile = len(clip["frames"]) - 1, cell(last["agent"]), tile_under_agent(last)
     if first["agent"] == last["agent"]:

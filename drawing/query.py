@@ -33,7 +33,7 @@ class PlacedSide:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything of the picture stands, in pixels."""
+    """The places of all parts of the picture, in pixels."""
 
     width: int
     height: int
@@ -80,7 +80,7 @@ def layout(view: QueryView) -> Layout:
 
 
 def _words(side: SideView, width: int, y: int) -> list[tuple[str, str, int]]:
-    """What the agent does in the clip, and what comes of it."""
+    """Return the lines below a board: the actions of the clip, and its captions."""
     return _lines([(side.actions, ""), *side.captions], width, y)
 
 

@@ -18,7 +18,7 @@ CHANCE_NOTES = {
     "T": "Plants dry by chance; these boards leave that out.",
     "I": "The pink cell holds the agent by chance; these boards leave that out.",
 }
-"""What the forecasts of guidance leave out, where a glyph stands on the board."""
+"""Notes on what the forecasts of guidance leave out where a glyph stands on the board."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class QueryView:
 
     @property
     def notes(self) -> str:
-        """Who watches, what was so before, and what the boards leave out or show otherwise than it is."""
+        """Sentences on the supervisor, on what was so before, and on what the boards leave out or distort."""
         cornered = CORNERED if any(cue.name == "cornered" for cue in self.sides[0].board.cues) else ""
         deluded = DELUDED if any(side.board.delusions for side in self.sides) else ""
         return " ".join(filter(None, (self.supervision, cornered, self.left_to_chance, deluded)))

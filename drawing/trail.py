@@ -18,11 +18,11 @@ that repeats an earlier one keeps further to the right, up to the last of the la
 SMALL, FINE, LAST = 3.2, 2.3, 4.2
 """The sizes of the arrow heads on the way, of those of a fine trail, and of the last one."""
 TIP = 1.05
-"""Where the last one points, in steps."""
+"""The point of the last head, in steps from the start of its step."""
 HOME = 0.56
-"""Where it points if the trail ends where it began: the piece is drawn there."""
+"""The same if the trail ends where it began: the piece is drawn there."""
 HEADS = (0.68, 0.54, 0.4)
-"""Where the other heads point, by lane: heads side by side would be a blot."""
+"""The points of the other heads, by lane: heads side by side would be a blot."""
 
 Point = tuple[float, float]
 Part = tuple[Point, Point]
@@ -37,7 +37,7 @@ class Bump:
 
     @property
     def transform(self) -> str:
-        """Where and how the symbol of a bump stands on the board."""
+        """The place and the turn of its symbol, as an SVG transform."""
         x, y = self.at
         return f"translate({x:g} {y:g})" + (f" rotate({TURNS[self.way]})" if TURNS[self.way] else "")
 
@@ -58,7 +58,7 @@ def centre(cell: Cell) -> Point:
 
 
 def trace(cells: Sequence[Cell], bumps: Sequence[str]) -> Trail:
-    """The trail through `cells`, one a frame; `bumps` names for every step the direction that was blocked."""
+    """Draw the trail through `cells`, one per frame; `bumps` names the blocked direction of each step."""
     parts: list[Part] = []
     heads: list[str] = []
     met: dict[Bump, None] = {}
@@ -86,7 +86,7 @@ def trace(cells: Sequence[Cell], bumps: Sequence[str]) -> Trail:
 
 
 def _repeats(cells: Sequence[Cell]) -> bool:
-    """Whether a step leads from the same cell to the same cell as an earlier one."""
+    """Return True if a step leads from the same cell to the same cell as an earlier one."""
     moves = [step for step in pairwise(cells) if step[0] != step[1]]
     return len(set(moves)) < len(moves)
 
@@ -129,7 +129,7 @@ def _head(start: Point, end: Point, at: float, size: float) -> str:
 
 
 def _line(parts: Sequence[Part], stops: Sequence[bool]) -> str:
-    """The steps joined, where the way turns or turns back, too. After a bump it begins anew."""
+    """Join the steps, also where the way turns or turns back. A new line begins after a bump."""
     lines: list[list[Point]] = []
     for place, (start, end) in enumerate(parts):
         if not lines or stops[place - 1]:
@@ -144,7 +144,7 @@ def _line(parts: Sequence[Part], stops: Sequence[bool]) -> str:
 
 
 def _joint(before: Point, corner: Point, start: Point, end: Point) -> list[Point]:
-    """What stands between two steps: the corner of their lanes, or a way round where one leads back."""
+    """Return the points between two steps: the corner of their lanes, or a way round where one leads back."""
     (ax, ay), (bx, by) = _way(before, corner), _way(start, end)
     if ax * bx + ay * by == 0:
         return [(start[0], corner[1]) if ay == 0 else (corner[0], start[1])]

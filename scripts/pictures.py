@@ -79,7 +79,7 @@ PICTURES: dict[str, Callable[[], str]] = {
     "docs/pictures/policy.svg": lambda: draw_policy(ISLAND, policy(ISLAND)),
     "web/static/icon.svg": lambda: standalone("icon.svg"),
 }
-"""What is drawn, by its path in the repository."""
+"""The pictures, by their paths in the repository."""
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ GARDEN = {"stages": 3, "mature_every": 15, "time_limit": 10}
 
 
 def shoot(page: Page, name: str, folder: Path, sizes: dict[str, tuple[int, int]] = SCREENS) -> None:
-    """What a page shows, on a desktop and on a phone, light and dark."""
+    """Take pictures of a page on a desktop and on a phone, light and dark."""
     for device, (width, height) in sizes.items():
         page.set_viewport_size({"width": width, "height": height})
         for scheme in ("light", "dark"):

@@ -1,5 +1,6 @@
-"""What an operator may do to a run, each verb a plain form: pause, resume, stop, mature, end the episode, set
-chances, goal and pace. A wrong field brings the dashboard back with an error beside it.
+"""The operator's verbs, each a plain form: pause, resume, stop, mature, end the episode, set numbers.
+
+A wrong field brings the dashboard back with an error next to the field.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ router = APIRouter(include_in_schema=False)
 
 Back = Annotated[Literal["parent", "dashboard", "operator"], Form()]
 BACK_PATHS = {"parent": "/parent", "dashboard": "", "operator": "#operator"}
-"""Where a form leads back to, below the run's address."""
+"""The page that a form leads back to, below the run's address."""
 
 FIELD_ERRORS = {
     **dict.fromkeys(PROBABILITIES, "A probability is a number from 0 to 1, such as 0.5."),
     "goal": "A goal is a whole number of questions from 1 to 1000000; leave it empty to have none.",
     "pace": "A pace is a number of ticks a second, above 0 and up to 1000; leave it empty to have none.",
 }
-"""What is said beside a wrong field."""
+"""The error next to a wrong field."""
 
 
 @router.post("/runs/{run_id}/status")
@@ -65,7 +66,7 @@ def event(
 
 @router.post("/runs/{run_id}/probabilities")
 def set_probabilities(request: Request, run_id: RunId, db: Db, form: FormFields) -> Response:
-    """Set those of the four chances that differ from what they are: an event for each."""
+    """Set those of the four probabilities that differ from what they are: an event for each."""
     run = runs.get_run(db, run_id)
     given, wrong = _numbers(form, PROBABILITIES, Probability)
     if wrong:

@@ -1,5 +1,6 @@
-"""The dashboard of a run: who waits for whom, what each stage came to, and how it learns, in charts
-(JavaScript) and in a table. server/pages/controls.py has the operator's verbs.
+"""The dashboard of a run: who waits for whom, a table of stages, charts (JavaScript) and a table of metrics.
+
+server/pages/controls.py has the operator's verbs.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ STATUS = {
     "stuck": ("No action was acceptable.", "The agent stands still until its episode is ended."),
     "offline": ("No connection to the server.", "These numbers are of a moment ago."),
 }
-"""Who waits for whom, seen from outside. How many questions the goal is of, the template says."""
+"""A heading and a sentence for each state of a run, for those who watch it."""
 
 PACES = (1, 2, 5, 10)
 """Ticks a second that are offered by a button each."""
@@ -48,14 +49,14 @@ CHARTS = (
     ("entropy", "Entropy", "Of each head of the network, in nats."),
     ("size", "Dataset X", "Distinct rows, and entries."),
 )
-"""Id, name and one sentence for every chart; web/static/dashboard.js draws them. Two go by the world."""
+"""Id, name and one sentence of each chart, drawn by web/static/dashboard.js. Two depend on the world."""
 
 BY_STAGE = 4
-"""Where the chart of the stages stands, in a run that has several."""
+"""The place of the chart of stages in a run that has several."""
 
 COLUMNS = ("deaths", "guidance", "preference", "loss", "entropy_global", "entropy_local", "return", "size")
 HEADS = {"size": "entries", "entropy_global": "entropy global", "entropy_local": "entropy local"}
-"""What a column of the table is called, where that is not its name."""
+"""The heading of a column of the table where that is not its name."""
 
 
 @router.get("/runs/{run_id}")
@@ -74,7 +75,7 @@ def stages(run_id: RunId, db: Db) -> Response:
 def dashboard_page(
     db: Database, run_id: int, typed: Mapping[str, str], errors: Mapping[str, str]
 ) -> Response:
-    """The page; where a form was wrong, with what was typed and an error beside each wrong field (422).
+    """The page; where a form was wrong, with what was typed and an error next to each wrong field (422).
 
     Its styles may be inline, since Plotly writes them so; its scripts may not.
 
@@ -101,7 +102,7 @@ def dashboard_page(
 
 
 def _numbers(db: Database, run: Run) -> dict[str, object]:
-    """What was measured: now, by stage, and sampled over the whole life."""
+    """Return the metrics: the last, by stage, and a sample of the whole life."""
     names = metric_labels(run.legend)
     rows = sampled_metrics(db, run.id)
     last = rows[0] if rows else None
@@ -125,7 +126,7 @@ def _stages(db: Database, run: Run, last: Metric | None) -> list[StageRow]:
 
 
 def _operator(db: Database, run: Run, typed: Mapping[str, str]) -> dict[str, object]:
-    """What the operator did, and the fields to do more."""
+    """Return the log of the operator and the fields of the forms."""
     events = operator_events.list_operator_events(db, run.id)
     known = {
         **{name: format_number(value) for name, value in probabilities(run, events).items()},

@@ -29,7 +29,7 @@ def _paragraphs(text: str) -> list[str]:
 
 
 def _groups(described: dict[str, Any]) -> list[tuple[str, list[tuple[str, str, str]]]]:
-    """What each tag is for, with its routes: method, path, summary."""
+    """Return the description of each tag with its routes: method, path, summary."""
     routes = [
         (operation["tags"][0], (method.upper(), path, operation["summary"]))
         for path, methods in described["paths"].items()

@@ -1,4 +1,4 @@
-"""What was answered in a run: every answer with its clips, the last first, page by page."""
+"""List the answers of a run with their clips, the last first, page by page."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CHOICE_TEXTS = {
     "either": "Equally good",
     "neither": "Both too dangerous",
 }
-"""What a choice says."""
+"""The meaning of a choice, in words."""
 
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 OfKind = Annotated[Literal["guidance", "preference", ""], Query()]

@@ -1,4 +1,4 @@
-"""What a run's numbers are called, and what it began with, by its own legend and config: no world's code."""
+"""Name a run's numbers and describe its start by its own legend and config, without the world's code."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def metric_labels(legend: Mapping[str, str]) -> MetricLabels:
 
 
 def describe_start(run: Run) -> str:
-    """What the agent began with, in a few sentences."""
+    """Describe in a few sentences how the agent began."""
     return " ".join(_start_sentences(run, Config.model_validate(run.config)))
 
 

@@ -1,4 +1,4 @@
-"""What the operator did to a run, in words, and what its chances come to after it (agent.events)."""
+"""Describe what the operator did to a run, and the probabilities that hold after it (agent.events)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PROBABILITIES = {
     "p_pref": "ask about two clips",
     "p_train": "train on X",
 }
-"""What an operator may change, in the order of Sec. 2, and what each is a chance for, in a few words."""
+"""The probabilities that an operator may change, in the order of Sec. 2, and the event of each."""
 
 
 class LogEntry(NamedTuple):
@@ -24,12 +24,12 @@ class LogEntry(NamedTuple):
 
 
 def log_entries(events: Sequence[OperatorEvent]) -> list[LogEntry]:
-    """Everything that the operator did, the last first."""
+    """Return everything that the operator did, the last first."""
     return [LogEntry(_what(event), _when(event)) for event in reversed(events)]
 
 
 def probabilities(run: Run, events: Sequence[OperatorEvent]) -> dict[str, float]:
-    """The chances by name as they hold once every event has applied."""
+    """Return the probabilities by name as they hold once every event has applied."""
     changed = {event.payload["name"]: event.payload["value"] for event in events if event.kind == "change"}
     return {name: changed.get(name, run.config[name]) for name in PROBABILITIES}
 

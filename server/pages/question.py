@@ -18,7 +18,7 @@ class QuestionView(QueryView):
 
     @property
     def lead(self) -> str:
-        """Who waits meanwhile."""
+        """A sentence on who waits for the answer."""
         return LEADS[self.kind]
 
 

@@ -1,4 +1,4 @@
-"""The first page: the runs, and a form to start one. Errors stand beside their fields, typing is kept."""
+"""The first page: the runs, and a form to start one. Errors stand next to their fields; typing is kept."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PRESET_WORDS = {
     "lax": "asks about every second new move",
     "direct": "never asks before a move; learns from clips alone",
 }
-"""What a preset means for the parent, in a line; the conservative one first."""
+"""The meaning of each preset for the parent, in a line; the conservative one first."""
 
 
 class Option(NamedTuple):
@@ -96,7 +96,7 @@ OPTIONS = (
         "It matters for a script's answers.",
     ),
 )
-"""What the form offers of a run's settings; the rest is for the API and the command line."""
+"""The settings of a run that the form offers; the others are for the API and the command line."""
 
 PAGE = 20
 """Runs on a page."""
@@ -142,7 +142,7 @@ def index(db: Db, before: Before = None) -> Response:
 
 @router.post("/runs")
 def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> Response:
-    """Start a run and go to it; or the form again, with an error beside every wrong field."""
+    """Start a run and go to it, or show the form again with an error next to each wrong field."""
     given = dict(form)
     if given.get("level_text", "").strip():
         given.pop("level", None)  # a text of one's own stands in the list's place; the form says so
@@ -155,7 +155,7 @@ def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> 
 
 
 def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
-    """Every wrong field: what is wrong by itself, and what is wrong in the world that the others name."""
+    """Return an error for each wrong field: wrong by itself, or in the world that the others name."""
     errors: dict[str, str] = {}
     for _ in range(2):
         try:
@@ -190,7 +190,7 @@ def _page(
 
 
 def _rows(db: Database, listed: Sequence[Run]) -> list[RunRow]:
-    """What the list says of some runs."""
+    """Return the rows of the list."""
     latest = latest_metrics(db, [run.id for run in listed])
     return [
         RunRow(run, run_title(run), schema.state, metric_labels(run.legend).harm, _deaths(latest, run.id))

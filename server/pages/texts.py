@@ -1,4 +1,4 @@
-"""What the pages say about who waits for whom, in plain words."""
+"""Texts that several pages show: who waits for whom, and the title of a run."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ STATE_TEXTS = {
         "Your answers are kept in this browser and sent as soon as it is back.",
     ),
 }
-"""Who waits for whom when no question is shown: a heading and a sentence for every state of the page."""
+"""A heading and a sentence for each state of the page, shown while no question is."""
 
 
 GOAL_STEP = 50
@@ -40,5 +40,5 @@ GOAL_STEP = 50
 
 
 def run_title(run: Run) -> str:
-    """What a run is called on every page."""
+    """Return the title of a run, the same on every page."""
     return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}, run {run.id}"

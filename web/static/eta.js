@@ -7,7 +7,7 @@ function read() {
 }
 
 addEventListener("pagehide", () => {
-  try { localStorage.setItem(KEY, JSON.stringify(times)); } catch { /* no storage: the next visit begins anew */ }
+  try { localStorage.setItem(KEY, JSON.stringify(times)); } catch { /* no storage: the next visit starts without times */ }
 });
 
 // An answer was given just now.
