@@ -146,10 +146,10 @@ class StepCache:
 
     def _entered(self, states: WorldState) -> list[Place]:
         """The places of some states, new ones where a trial comes for the first time."""
-        seen = self.world.observe(states.board, states.agent, states.box).numpy()
+        observed = self.world.observe(states.board, states.agent, states.box).numpy()
         found = []
         for key, codes, terminated in zip(
-            self._packed(states), seen, states.terminated.tolist(), strict=True
+            self._packed(states), observed, states.terminated.tolist(), strict=True
         ):
             if key not in self._places:
                 self._size += 1

@@ -57,8 +57,8 @@ def states(world: Gridworld, letters: str, seed: int = 0) -> list[WorldState]:
 
 def board_text(world: Gridworld, state: WorldState, trial: int = 0) -> str:
     """Draw what the agent of one trial observes: lines of glyphs, each with its line end."""
-    seen = world.observe(state.board, state.agent, state.box)[trial].tolist()
-    return "\n".join(draw(seen, world.legend)) + "\n"
+    observation = world.observe(state.board, state.agent, state.box)[trial].tolist()
+    return "\n".join(draw(observation, world.legend)) + "\n"
 
 
 def walk(world: Gridworld, letters: str, seed: int = 0) -> list[str]:

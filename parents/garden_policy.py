@@ -1,4 +1,4 @@
-"""pi_p in the garden (Sec. 3.3): clockwise along the wall for ever, whatever the plants look like.
+"""pi_p in the garden (Sec. 3.3): clockwise along the wall without end, whatever the plants look like.
 
 A level's header names the cycle. Off it the parent takes a shortest way to it, clear of the bucket: up before
 down before left before right. So inside the built-in gardens it goes up or down, and out of the bucket down.

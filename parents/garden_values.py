@@ -36,7 +36,7 @@ class GardenValues:
         """
         if gamma >= 1:
             raise ValueError(
-                "gamma must be below 1 in reward-hacking, where watering goes on for ever: set gamma to 0.9."
+                "gamma must be below 1 in reward-hacking, where watering never ends: set gamma to 0.9."
             )
         self.world, self.gamma = world, gamma
         ways = [cycle_policy(level, inside) for level in world.levels]
@@ -110,8 +110,8 @@ class GardenValues:
 
     def _plants(self, board: Tensor) -> tuple[Bool[Tensor, "N P"], Float64[Tensor, "N P"]]:
         """Return which cells hold a plant on these boards, and the chance (0 or 1) that it is dry."""
-        ground = board.flatten(1)[:, self._cells].long()
-        return self.world.lookup(PLANTS)[ground], self.world.lookup("t")[ground].double()
+        tiles = board.flatten(1)[:, self._cells].long()
+        return self.world.lookup(PLANTS)[tiles], self.world.lookup("t")[tiles].double()
 
     def _value(self, plant: Tensor, dry: Tensor, cell: Tensor, level: Tensor) -> Float64[Tensor, "N"]:
         if bool((self.policy[level, cell] < 0).any()):

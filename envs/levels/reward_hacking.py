@@ -61,7 +61,7 @@ def reach(level: Level) -> set[Cell]:
 
 
 def cycle(level: Level) -> tuple[Cell, ...]:
-    """The way around the garden that the parent's own policy walks for ever (Sec. 3.3), from the header.
+    """Read the cycle that the parent's own policy walks without end (Sec. 3.3) from the header.
 
     The header reads `cycle: ROW,COLUMN LETTERS`: the first cell, counted from 1 at the top left of the art,
     and a letter for each step, with blanks between them as one likes. Returned are the cells in walking

@@ -42,7 +42,7 @@ def test_ids_are_registered_once_and_load_nothing() -> None:
 
 
 def test_many_processes() -> None:
-    """By spawn each process imports anew, and finds the worlds by the module. Three processes load torch."""
+    """Each spawned process finds the worlds by the module. Three processes load torch."""
     script = (
         "import gymnasium\n"
         "if __name__ == '__main__':\n"
