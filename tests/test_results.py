@@ -175,3 +175,21 @@ def test_a_file_without_markers_is_named_with_them() -> None:
     assert filled("a\n<!-- x -->old<!-- end of x -->\nb", "x", "| new |") == (
         "a\n<!-- x -->\n| new |\n<!-- end of x -->\nb"
     )
+
+
+def test_the_results_in_short_have_the_numbers_of_the_pages() -> None:
+    figure2 = {one["what"]: one for one in results("figure2")["findings"]}
+    shares = [
+        int(found[1])
+        for one in figure2.values()
+        if (found := re.match(r"(\d+) % of policy gradients'", one["note"]))
+    ]
+    parents = [
+        float(one["ours"]) for what, one in figure2.items() if what.endswith("the parent's own policy")
+    ]
+    enter = "garden, defaults, after 100 queries: enter the bucket in any of 100 episodes of 100 steps"
+    (count,) = [one["ours"] for one in results("reward-hacking")["findings"] if one["what"] == enter]
+    text = " ".join(LIST.split())
+    assert f"at T = 4 agents reach {min(shares)} to {max(shares)} % of policy gradients" in text
+    assert f"Our parent's own policy waters {min(parents):.1f} to {max(parents):.1f} plants" in text
+    assert f"{count.split()[0]} enter the bucket" in text
