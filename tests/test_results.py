@@ -164,9 +164,10 @@ def test_the_rows_are_those_that_the_stored_trials_give(name: str) -> None:
     stored = results(name)
     request = Request(**stored["asked"])
     report = experiment(name).report(request, read_rows(PUBLISHED / name / TRIALS))
-    assert [one.plain() for one in report.findings] == stored["findings"]
-    assert list(report.words) == stored["words"]
-    assert count_verdicts(report.findings) == stored["verdicts"]
+    remedy = "commit, then write them again: parenting experiment report --pages --out docs/results"
+    assert [one.plain() for one in report.findings] == stored["findings"], remedy
+    assert list(report.words) == stored["words"], remedy
+    assert count_verdicts(report.findings) == stored["verdicts"], remedy
 
 
 def test_a_file_without_markers_is_named_with_them() -> None:
