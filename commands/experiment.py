@@ -108,13 +108,13 @@ def _given(context: typer.Context, option: str) -> bool:
 
 
 def _report(out: Path, pages: bool) -> None:
-    from parenting.experiments.reporting.html import BrokenResults, NoResults, report
+    from parenting.experiments.reporting.html import CorruptResultsError, NoResultsError, report
 
     try:
         if pages:
             _pages(out)
         typer.echo(f"Written: {report(out)}")
-    except (BrokenResults, NoResults) as error:
+    except (CorruptResultsError, NoResultsError) as error:
         raise UsageError(str(error)) from None
     except OSError as error:
         raise UsageError(_at(out, error)) from None

@@ -19,7 +19,7 @@ from parenting.parents.scripted import ScriptedRule
 PAIRS = tuple(combinations(range(4), 2))
 
 
-def judged(
+def pair_answers(
     world: RewardHacking, rule: ScriptedRule, states: WorldState, elders: Sequence[Tensor]
 ) -> Float64[Tensor, "S 6 2"]:
     """Eq. (1) for the six pairs in each of some states."""

@@ -26,7 +26,7 @@ from parenting.envs.rng import Keys, Stream
 from parenting.envs.struct import Struct
 from parenting.evaluation.rollouts import argmax, rollout
 from parenting.experiments.baselines.reinforce_rollouts import Moments
-from parenting.experiments.figure2.all_pairs import PAIRS, judged
+from parenting.experiments.figure2.all_pairs import PAIRS, pair_answers
 from parenting.experiments.figure2.settings import Budget
 from parenting.parents.scripted import ScriptedRule
 
@@ -138,7 +138,7 @@ def _stage(
     for _ in range(budget.rounds):
         for epsilon in (0.0, EPSILON):
             visited = visit(world, live, budget.episodes, rng, epsilon)
-            x.add(visited, judged(world, rule, visited.states, elders))
+            x.add(visited, pair_answers(world, rule, visited.states, elders))
         for _ in range(budget.passes):
             rng = rng.next()
             _train(world, config, x, live, moments, rng)

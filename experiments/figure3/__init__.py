@@ -1,4 +1,4 @@
-"""Figure 3: does what is taught in some levels hold in others? Queries until ten are solved (Sec. 3.4)."""
+"""Figure 3: generalisation to other levels, by the queries until ten are solved (Sec. 3.4)."""
 
 from __future__ import annotations
 
@@ -88,10 +88,10 @@ def _parent(one: Curve, recompare: bool, span: range, request: Request) -> Task:
 
 def _report(request: Request, rows: Sequence[Row]) -> Results:
     last = whole(request.scale)
-    taught = {one.name: one.worlds for one in (*curves(request.scale), last)}
-    found = findings(taught, last.name, rows, request.device)
+    before = {one.name: one.worlds for one in (*curves(request.scale), last)}
+    found = findings(before, last.name, rows, request.device)
     words = paragraphs("figure3/page.md", cells=HEIGHT, max_ticks=SIZES[request.scale].max_ticks)
-    return Results(found, words, {"queries": lambda figure: draw(figure, list(taught), rows)})
+    return Results(found, words, {"queries": lambda figure: draw(figure, list(before), rows)})
 
 
 EXPERIMENT = Experiment(

@@ -30,11 +30,11 @@ OLD_FIT = "fitted:"
 """Marks of checks and fits in results of version 0.1, whose rows do not say what they are compared with."""
 
 
-class NoResults(ValueError):
+class NoResultsError(ValueError):
     """No experiment has left results here; the sentence says how to make some."""
 
 
-class BrokenResults(ValueError):
+class CorruptResultsError(ValueError):
     """A file of results is not what an experiment writes; the sentence names it and the remedy."""
 
 
@@ -114,13 +114,13 @@ def report(out: Path) -> Path:
     """Write the page of all results below a folder, and return its path.
 
     Raises:
-        NoResults: there are none.
-        BrokenResults: some cannot be read.
+        NoResultsError: there are none.
+        CorruptResultsError: some cannot be read.
         OSError: a file cannot be read or written.
     """
     parts = list(_parts(out))
     if not parts:
-        raise NoResults(
+        raise NoResultsError(
             f"{out} holds no results. Make some: "
             f"parenting experiment all --scale quick --out {shlex.quote(str(out))}"
         )
@@ -174,7 +174,7 @@ def _results(path: Path) -> StoredResults:
     except ValidationError as error:
         wrong: Any = error.errors()[0]
         where = f"{'.'.join(map(str, wrong['loc']))}: " if wrong["loc"] else ""
-        raise BrokenResults(
+        raise CorruptResultsError(
             f"{path} is not what an experiment writes ({where}{wrong['msg']}). "
             f"Remove it, or make it again: parenting experiment {path.parent.name} "
             f"--out {shlex.quote(str(path.parents[1]))}"

@@ -14,7 +14,7 @@ from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import keys
 from parenting.experiments.figure2 import full_coverage
-from parenting.experiments.figure2.all_pairs import PAIRS, clip, compare, judged
+from parenting.experiments.figure2.all_pairs import PAIRS, clip, compare, pair_answers
 from parenting.experiments.figure2.full_coverage import Dataset, VisitedStates, cover, first_of, visit
 from parenting.experiments.figure2.settings import Budget
 from parenting.experiments.training.gardens import GAMMA, garden
@@ -45,7 +45,7 @@ def test_every_pair_is_judged_by_its_advantage() -> None:
     world = garden("garden-mirrored")
     valued, rule = GardenValues(world, GAMMA), ScriptedRule(world, GAMMA)
     states = visit(world, always(world, LEFT), 60, keys(0, 1), epsilon=0.9).states
-    mu = judged(world, rule, states, [])
+    mu = pair_answers(world, rule, states, [])
     every = [torch.full_like(states.step_count, action) for action in range(4)]
     q = torch.stack([valued.q(states.board, states.agent, states.level, action) for action in every], 1)
     wet = torch.stack([world.unsafe(states, action, world.forecast(states, action)) for action in every], 1)
@@ -90,9 +90,9 @@ def test_x_comes_to_hold_what_it_reaches(monkeypatch: pytest.MonkeyPatch) -> Non
         compared[len(elders)] |= {(*board, *agent) for board, agent in true}
         sight = world.observe(states.board, states.agent, states.box)
         seen[len(elders)] |= set(map(tuple, sight.flatten(1).tolist()))
-        return judged(world, rule, states, elders)
+        return pair_answers(world, rule, states, elders)
 
-    monkeypatch.setattr(full_coverage, "judged", note)
+    monkeypatch.setattr(full_coverage, "pair_answers", note)
     stages = cover(world, CONFIG.model_copy(update={"learning_rate": 0.003}), keys(0, 1), 2, Budget(4, 5, 20))
     for stage, one in enumerate(stages):
         assert one.known > 0.7 * one.reached

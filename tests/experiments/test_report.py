@@ -23,7 +23,7 @@ from parenting.experiments.reporting.comparison import (
     Comparison,
     verdict,
 )
-from parenting.experiments.reporting.html import NoResults, prose, report
+from parenting.experiments.reporting.html import NoResultsError, prose, report
 from parenting.experiments.spec import Request
 
 run = CliRunner().invoke
@@ -196,7 +196,7 @@ def test_the_same_numbers_draw_the_same_file(out: Path) -> None:
 
 
 def test_no_results_are_said(tmp_path: Path) -> None:
-    with pytest.raises(NoResults, match="parenting experiment all --scale quick"):
+    with pytest.raises(NoResultsError, match="parenting experiment all --scale quick"):
         report(tmp_path)
     assert run(app, ["experiment", "report", "--out", str(tmp_path)]).exit_code == 2
 
