@@ -14,7 +14,7 @@ from parenting.agent.init import world_of
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys, keys
 from parenting.experiments.figure3.levels import PARENTING, SET_ASIDE, WORLD, config_of, levels_for
-from parenting.experiments.figure3.transfer import Learnt, learnt, pack, transfer
+from parenting.experiments.figure3.transfer import Transferred, pack, transfer, transferred
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.batch import BatchTrainer, TrainResult
 from parenting.experiments.training.stop_rule import StopRule
@@ -34,13 +34,13 @@ class PreParenting(BatchTrainer):
         self, world: Gridworld, config: Config, keys: Keys, until: StopRule, weights: Tensor | None = None
     ) -> None:
         super().__init__(world, config, keys, until, weights)
-        self.kept: dict[int, Learnt] = {}
+        self.kept: dict[int, Transferred] = {}
 
     def save(self, which: Bool[Tensor, "N"]) -> None:
         """Beside the results, all that was learnt."""
         super().save(which)
         for place in which.nonzero():
-            self.kept[int(self.trial[place])] = learnt(self.state).pick(place)
+            self.kept[int(self.trial[place])] = transferred(self.state).pick(place)
 
 
 def pre_parent(

@@ -22,7 +22,7 @@ from parenting.envs.struct import Struct
 POLICY = "learner.params"
 
 
-class Learnt(Struct):
+class Transferred(Struct):
     """The part of an agent that is transferred."""
 
     learner: Learner
@@ -32,9 +32,9 @@ class Learnt(Struct):
     asked: Asked
 
 
-def learnt(state: AgentState) -> Learnt:
+def transferred(state: AgentState) -> Transferred:
     """Return what the agents of a state have learnt."""
-    return Learnt(
+    return Transferred(
         learner=state.learner,
         rehearsal=state.rehearsal,
         x=state.x,
@@ -43,7 +43,7 @@ def learnt(state: AgentState) -> Learnt:
     )
 
 
-def pack(what: Learnt, everything: bool) -> str:
+def pack(what: Transferred, everything: bool) -> str:
     """As text, bit for bit, to stand in a row of plain data; the policy alone, or everything."""
     kept = {name: part.cpu().clone() for name, part in what.tensors().items() if everything or name == POLICY}
     blob = io.BytesIO()
@@ -63,7 +63,9 @@ def transfer(
     if not everything:
         live = torch.cat([part[POLICY] for part in parts]).index_select(0, agent)
         return state.replace(learner=state.learner.replace(params=live))
-    mine = learnt(state).map(lambda name, _tensor, axis: _together([part[name] for part in parts], axis or 0))
+    mine = transferred(state).map(
+        lambda name, _tensor, axis: _together([part[name] for part in parts], axis or 0)
+    )
     mine = mine.pick(agent)
     return state.replace(
         learner=mine.learner,

@@ -23,7 +23,7 @@ from parenting.experiments.figure3.levels import PARENTING, SET_ASIDE, config_of
 from parenting.experiments.figure3.report import duration, findings
 from parenting.experiments.figure3.settings import SIZES, Size
 from parenting.experiments.figure3.tasks import parent_trials, pre_parent
-from parenting.experiments.figure3.transfer import POLICY, learnt, pack, transfer
+from parenting.experiments.figure3.transfer import POLICY, pack, transfer, transferred
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training import batch
@@ -76,11 +76,11 @@ def lived(ticks: int, count: int = 1) -> BatchTrainer:
 
 def test_what_is_taken_along() -> None:
     """Bit for bit, of two agents by turns: everything, X and the rest too, or the policy alone."""
-    taught = [learnt(lived(ticks).state) for ticks in (8, 60)]
+    taught = [transferred(lived(ticks).state) for ticks in (8, 60)]
     assert taught[0].x.s0.shape[1] < taught[1].x.s0.shape[1]  # room for the fuller of both
     packed, turns = [pack(one, True) for one in taught], torch.tensor([1, 0, 1])
     before = lived(0, 3).state
-    whole, policy = (learnt(transfer(before, packed, turns, everything)) for everything in (True, False))
+    whole, policy = (transferred(transfer(before, packed, turns, everything)) for everything in (True, False))
     whole.check()
     for place, agent in enumerate(turns.tolist()):
         mine = whole.pick(torch.tensor([place])).tensors()
@@ -88,11 +88,11 @@ def test_what_is_taken_along() -> None:
             inside = mine[name][tuple(slice(size) for size in tensor.shape)]
             assert torch.equal(inside, tensor), name
             assert int(mine[name].count_nonzero()) == int(tensor.count_nonzero()), name
-    for name, tensor in learnt(before).tensors().items():
+    for name, tensor in transferred(before).tensors().items():
         assert torch.equal(policy.tensors()[name], whole.tensors()[name] if name == POLICY else tensor)
     light = [pack(one, False) for one in taught]
     assert len(light[0]) < len(packed[0]) / 3
-    again = learnt(transfer(before, light, turns, False))
+    again = transferred(transfer(before, light, turns, False))
     assert torch.equal(again.learner.params, policy.learner.params)
     assert not torch.equal(again.learner.params, before.learner.params)
 
