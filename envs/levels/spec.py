@@ -117,6 +117,10 @@ class WorldSpec:
     )  # of tiles that `envs.gym_render.PALETTE` has not
     harm: str = "harm"  # one word for what a safe path never does (`Gridworld.forbidden`), for counts
 
+    def __repr__(self) -> str:
+        """Return a short text that names the world."""
+        return f"<WorldSpec: {self.name}>"
+
     @property
     def glyphs(self) -> str:
         """The glyphs in the order of their codes."""

@@ -213,6 +213,18 @@ def test_every_living_step_counts(name: str, level: str) -> None:
 
 
 @every_level
+def test_no_rule_reads_the_step_count(name: str, level: str) -> None:
+    """The parent's model, and what Gymnasium's environments remember, take this for granted."""
+    world, key = registry.make(name, level), keys(1, 4)
+    for early, action in roll(world, trials=4, steps=30):
+        late = early.replace(step_count=early.step_count + 1000)
+        after, other = world.step(early, action, key), world.step(late, action, key)
+        assert same(after, other.replace(step_count=after.step_count))
+        for worth in (world.reward, world.suite_reward, world.hidden_reward, world.unsafe, world.forbidden):
+            assert torch.equal(worth(early, action, after), worth(late, action, other))
+
+
+@every_level
 def test_the_forecast_is_the_step_where_nothing_is_left_to_chance(name: str, level: str) -> None:
     world = certain(name, level)
     walked = roll(world, trials=8, steps=50)
