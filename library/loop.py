@@ -44,6 +44,9 @@ def configure(world: str | World, preset: str | Config = "conservative", **chang
         preset: A name in `PRESETS`, or a `Config`.
         **changes: Hyperparameters that differ from it.
 
+    Returns:
+        The hyperparameters.
+
     Raises:
         TypeError, ValueError: as `train`.
 

@@ -1,0 +1,58 @@
+"""`evaluate`: whole episodes, against the exact evaluation and against environments stepped by hand."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+import parenting as pt
+import parenting.envs.gym
+from parenting.envs.gym_ids import gym_id
+
+
+def test_an_optimal_policy_takes_the_shortest_way(policy: pt.Policy) -> None:
+    found = pt.evaluate(policy, episodes=3)
+    assert (found.reward, found.suite_reward, found.hidden_reward) == (1.0, 46.0, 46.0)
+    assert (found.cost, found.length, found.terminated, found.reward_sd) == (0.0, 4.0, 1.0, 0.0)
+
+
+class AlwaysRight:
+    """A policy of somebody else, with the signature of Stable-Baselines3."""
+
+    def predict(self, observation: np.ndarray, deterministic: bool) -> tuple[np.ndarray, None]:
+        assert observation.ndim == 4
+        return np.full(len(observation), 3), None
+
+
+@pytest.mark.parametrize("world", ["unsafe-exploration", "side-effects", "absent-supervisor"])
+def test_sums_are_those_of_the_environment(world: str) -> None:
+    """The same moves in Gymnasium, step by step."""
+    env = gymnasium.make(gym_id(world))
+    env.reset(seed=0)
+    total, hidden, cost, length, over = 0.0, 0.0, 0.0, 0, False
+    while not over:
+        _, reward, terminated, truncated, info = env.step(3)
+        total, hidden, cost = total + float(reward), hidden + info["hidden_reward"], cost + info["cost"]
+        length, over = length + 1, terminated or truncated
+    found = pt.evaluate(AlwaysRight(), world, episodes=2)
+    assert (found.suite_reward, found.cost, found.length) == (total, cost, length)
+    if world != "absent-supervisor":  # there it depends on whether the supervisor is present
+        assert found.hidden_reward == hidden
+
+
+def test_a_world_is_wanted_where_the_policy_has_none() -> None:
+    with pytest.raises(ValueError, match="world: name the world"):
+        pt.evaluate(AlwaysRight())
+
+
+def test_a_wrong_number_of_episodes_is_told(policy: pt.Policy) -> None:
+    with pytest.raises(ValueError, match="episodes: 0 is not a whole number from 1"):
+        pt.evaluate(policy, episodes=0)
+
+
+def test_episodes_of_a_seed_are_the_same_whatever_their_number() -> None:
+    policy = pt.train("reward-hacking", until="queries:5", progress=False).policies[0]
+    few, many = pt.evaluate(policy, episodes=1, seed=4), pt.evaluate(policy, episodes=1, seed=4)
+    assert few == many
+    assert pt.evaluate(policy, episodes=20, seed=4).reward_sd > 0

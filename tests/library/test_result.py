@@ -1,0 +1,83 @@
+"""Results in folders: whole, readable, and the same when they are read back."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+import torch
+
+import parenting as pt
+from parenting.library import result_folder
+
+
+def equal(one: pt.TrainResult, other: pt.TrainResult) -> bool:
+    same = (one.trials, one.answers, one.events) == (other.trials, other.answers, other.events)
+    weights = zip(one.policies, other.policies, strict=True)
+    return same and all(torch.equal(a.parameters, b.parameters) for a, b in weights)
+
+
+@pytest.mark.parametrize("world", pt.worlds())
+def test_every_worlds_result_comes_back(world: str, tmp_path: Path) -> None:
+    result = pt.train(world, trials=2, until="queries:3", progress=False)
+    again = pt.load_result(result.save(tmp_path / "result"))
+    assert equal(result, again)
+    assert (again.config, again.seed, again.until) == (result.config, 0, "queries:3")
+    assert again.world.levels == result.world.levels
+
+
+def test_people_can_read_it(trained: pt.TrainResult, tmp_path: Path) -> None:
+    folder = trained.save(tmp_path / "result")
+    about = json.loads((folder / "result.json").read_text())
+    assert (about["format"], about["kind"], about["world"]) == (1, "result", "unsafe-exploration")
+    with (folder / "trials.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["guidance"]) for row in rows] == [row["guidance"] for row in trained.trials]
+
+
+def test_a_folder_is_not_written_over_unless_told(trained: pt.TrainResult, tmp_path: Path) -> None:
+    folder = trained.save(tmp_path / "result")
+    with pytest.raises(FileExistsError, match=r"folder: .*overwrite=True"):
+        trained.save(folder)
+    assert equal(pt.load_result(trained.save(folder, overwrite=True)), trained)
+    assert [path.name for path in tmp_path.iterdir()] == ["result"]
+
+
+def test_a_folder_with_something_else_is_never_written_over(trained: pt.TrainResult, tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(FileExistsError, match="Name another folder"):
+        trained.save(tmp_path, overwrite=True)
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
+def test_a_write_that_fails_leaves_the_older_result(
+    trained: pt.TrainResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = trained.save(tmp_path / "result")
+
+    def full(*_: object) -> None:
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(result_folder, "write_tensors", full)
+    with pytest.raises(OSError, match="no space"):
+        trained.save(folder, overwrite=True)
+    assert equal(pt.load_result(folder), trained)
+    assert [path.name for path in tmp_path.iterdir()] == ["result"]
+
+
+@pytest.mark.parametrize("missing", ["result.json", "trials.csv", "answers.csv", "policies.safetensors"])
+def test_a_folder_that_lacks_a_file_is_told(missing: str, trained: pt.TrainResult, tmp_path: Path) -> None:
+    folder = trained.save(tmp_path / "result")
+    (folder / missing).unlink()
+    with pytest.raises(pt.FormatError, match="result"):
+        pt.load_result(folder)
+
+
+def test_a_result_of_a_later_version_is_refused(trained: pt.TrainResult, tmp_path: Path) -> None:
+    folder = trained.save(tmp_path / "result")
+    file = folder / "result.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "format": 2}))
+    with pytest.raises(pt.FormatError, match=r"has format 2, and this version reads up to 1"):
+        pt.load_result(folder)
