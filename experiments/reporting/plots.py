@@ -1,4 +1,4 @@
-"""Drawings that several experiments share: how trials spread, and shares with their intervals."""
+"""Plots that several experiments share: box plots of trials, and proportions with their intervals."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COLOUR, GREY, PAPER = "#0072b2", "#b0b0b0", "#d55e00"
 
 
 class Proportion(NamedTuple):
-    """A count of trials of an arm, and the share of them that the paper has, if it has one."""
+    """A count of trials of an arm, and the paper's proportion, if it has one."""
 
     of: str
     what: str
@@ -31,16 +31,19 @@ def box_plots(
     label: str,
     paper: Mapping[str, tuple[float, float]],
 ) -> None:
-    """A box for each group from its first quarter to its third, whiskers over 90 %, a point at the mean.
+    """Box plots of quartiles, with whiskers that span 90 % and a dot at the mean.
 
-    Grey is from where to where the paper has a group. The axis is linear up to 1 and logarithmic beyond, so
-    that 0 and 2000 both have a place; it says so.
+    Args:
+        figure: Where to draw.
+        groups: The values of each group, by its name.
+        label: Of the axis of values, which is linear up to 1 and logarithmic beyond, to show 0 and 2000.
+        paper: The paper's range of a group, drawn in grey.
     """
     axes = figure.subplots()
     for row, name in enumerate(groups, start=1):
         if name in paper:
             low, high = paper[name]
-            said = "the paper: mean +- deviation, or 0 or 1" if name == next(iter(paper)) else None
+            said = "the paper: mean +- standard deviation, or 0 or 1" if name == next(iter(paper)) else None
             axes.barh(row, high - low, left=low, height=0.8, color=GREY, alpha=0.5, label=said)
     axes.boxplot(
         list(groups.values()),
@@ -61,10 +64,7 @@ def box_plots(
 
 
 def plot_proportions(figure: Figure, counts: Sequence[Proportion]) -> None:
-    """A point for each count with its 95 % interval, as a share of the trials; a bar where the paper is.
-
-    The counts of an arm, one after the other, stand below its name.
-    """
+    """A dot for each proportion, with its interval, below the name of its arm; a bar for the paper."""
     lines: list[Proportion | str] = []
     for of, mine in groupby(counts, lambda one: one.of):
         lines += [of, *mine]
@@ -72,17 +72,17 @@ def plot_proportions(figure: Figure, counts: Sequence[Proportion]) -> None:
     axes = figure.subplots()
     for row, one in enumerate(lines):
         if isinstance(one, Proportion):
-            _share(axes, row, one)
+            _proportion(axes, row, one)
     _name(axes, lines)
     axes.set_xlim(-2, 102)
-    axes.set_xlabel("% of the trials, with 95 % intervals")
+    axes.set_xlabel("% of trials, with 95 % confidence intervals")
     axes.grid(axis="x", alpha=0.3)
     drawn, labels = axes.get_legend_handles_labels()
     once = dict(zip(labels, drawn, strict=True))
     figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=2)
 
 
-def _share(axes: Axes, row: int, one: Proportion) -> None:
+def _proportion(axes: Axes, row: int, one: Proportion) -> None:
     low, high = proportion_interval(one.hits, one.trials)
     axes.plot([100 * low, 100 * high], [row, row], color=COLOUR, linewidth=1)
     axes.plot(100 * one.hits / one.trials, row, "o", color=COLOUR, markersize=4, label="ours")
@@ -91,7 +91,7 @@ def _share(axes: Axes, row: int, one: Proportion) -> None:
 
 
 def _name(axes: Axes, lines: Sequence[Proportion | str]) -> None:
-    """From top to bottom, arms in bold."""
+    """Label the rows from top to bottom, arms in bold."""
     axes.set_yticks(range(len(lines)), [one if isinstance(one, str) else one.what for one in lines])
     for label, one in zip(axes.get_yticklabels(), lines, strict=True):
         label.set_fontsize(8)
