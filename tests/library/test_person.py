@@ -13,7 +13,9 @@ import torch
 
 import parenting as pt
 from parenting.library import page_training
+from parenting.library.page_server import is_ready
 from parenting.server.security import NOBODY
+from tests import simulated_person
 from tests.library.person_at_page import PersonAtPage
 
 WORLD = "unsafe-exploration"
@@ -177,3 +179,19 @@ def test_pages_may_be_framed_only_by_whom_the_settings_name(tmp_path: Path) -> N
         upgrade(db)
         with TestClient(create_app(settings, db), base_url="http://localhost") as client:
             assert client.get("/").headers["Content-Security-Policy"].endswith(expected)
+
+
+@pytest.mark.timeout(240)
+def test_a_server_that_runs_already_is_joined_and_left_running(
+    person_at_the_page: Callable[..., list[PersonAtPage]], tmp_path: Path
+) -> None:
+    """Takes long: it starts web, worker and Chromium."""
+    person_at_the_page(3)
+    with simulated_person.up(tmp_path) as url:
+        person = pt.Person(url=url, data=tmp_path)
+        # a worker signs some seconds after the pages are there
+        simulated_person.until(lambda: is_ready(url), 60, "no worker")
+        result = pt.train(WORLD, parent=person, until="queries:3", seed=3, p_guid=1.0, p_pref=0.0)
+        assert is_ready(url)
+    assert (len(result.answers), result.trials[0]["guidance"]) == (3, 3)
+    assert result.trials[0]["finished"] is True
