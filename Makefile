@@ -1,7 +1,10 @@
 # Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
 # A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
 .DEFAULT_GOAL := help
-.PHONY: help run test check docs format coverage pictures weights constraints clean
+.PHONY: help run test mutants torture stress check docs format coverage pictures weights constraints clean
+
+# Tests start many processes; without byte code each of them would compile a thousand modules anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 PYTHON ?= python3
 VENV := .venv
@@ -17,8 +20,19 @@ run: $(VENV)/.installed ## Install, migrate, start the web pages and a worker, o
 
 # The tests run after a failed check too, so that one run tells everything.
 test: $(VENV)/.installed-dev ## Install, then run every check and every test (ARGS="-k queue" for some)
-	@checks=passed; $(MAKE) --no-print-directory check || checks=failed; \
-	$(BIN)/pytest $(ARGS) && test $$checks = passed
+	@checks=passed; start=$$(date +%s); $(MAKE) --no-print-directory check || checks=failed; \
+	middle=$$(date +%s); tests=passed; $(BIN)/pytest $(ARGS) || tests=failed; end=$$(date +%s); \
+	echo "checks: $$checks in $$((middle - start)) s, tests: $$tests in $$((end - middle)) s"; \
+	test $$checks = passed && test $$tests = passed
+
+mutants: $(VENV)/.installed-dev ## Plant faults one by one; each must be caught by its test (10 minutes, nightly)
+	$(BIN)/python -m scripts.mutants $(ARGS)
+
+torture: $(VENV)/.installed-dev ## The long forms of the tests that have two lengths (20 minutes, nightly)
+	PARENTING_TORTURE=1 $(BIN)/pytest -m torture $(ARGS)
+
+stress: $(VENV)/.installed-dev ## Every test, ten times over, with both cores busy (needs stress; ARGS for some)
+	scripts/stress $(ARGS)
 
 check: $(VENV)/.installed-dev ## Lint, formatting, types, layers, documentation
 	$(BIN)/ruff check .

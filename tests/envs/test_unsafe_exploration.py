@@ -133,10 +133,15 @@ def test_the_time_limit_cuts_off_and_is_no_end() -> None:
     assert not world.truncated(states(world, "dddl")[-1]).any()  # the goal in the last step is an end
 
 
-def test_the_parent_is_always_there_and_nothing_freezes(island: Gridworld) -> None:
-    state = states(island, "d")[-1]
-    assert island.supervised(state).tolist() == [True]
-    assert island.frozen(state).tolist() == [False]
+@pytest.mark.parametrize("walked", ["uuuu", "dddl", "llll", "drdlur", "dd"])
+def test_the_parent_is_always_there_and_nothing_freezes(island: Gridworld, walked: str) -> None:
+    """At every step, in the water and at the goal, too; and time goes on until the end."""
+    for state in states(island, walked):
+        assert island.supervised(state).tolist() == [True]
+        assert island.frozen(state).tolist() == [False]
+    *before, last = states(island, walked)
+    for earlier, later in zip(before, [*before[1:], last], strict=True):
+        assert int(later.step_count) > int(earlier.step_count) or bool(earlier.terminated)
 
 
 def names(world: Gridworld, state: WorldState) -> list[str]:

@@ -11,6 +11,8 @@ from playwright.sync_api import Browser
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import answer, distances, start, up
 
+CHOICES = {"ArrowLeft": "left", "ArrowRight": "right", "ArrowUp": "either", "ArrowDown": "neither"}
+
 
 @pytest.mark.timeout(300)
 def test_an_agent_is_raised_by_keyboard(browser: Browser, tmp_path: Path) -> None:
@@ -30,11 +32,21 @@ def test_an_agent_is_raised_by_keyboard(browser: Browser, tmp_path: Path) -> Non
         assert run["status"] == "active"
         assert rows[-1]["values"]["return"] == pytest.approx(rows[-1]["values"]["optimal_return"])
         assert rows[-1]["values"]["deaths"] <= 1
-        # What was answered is what was pressed: every key is stored once.
-        counts = {name: rows[-1]["values"][name] for name in ("left", "right", "either", "neither")}
-        pressed = [keys.count(key) for key in ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown")]
+        # What was answered is what was pressed: every key is stored once, in its order.
         assert run["answers"] == len(keys)
-        assert all(counted <= count for counted, count in zip(counts.values(), pressed, strict=True))
+        asked = httpx2.get(f"{url}/api/v1/runs/1/queries", params={"limit": 200}).json()["rows"]
+        answered = sorted((row["answer"] for row in asked if row["answer"]), key=lambda one: one["number"])
+        assert [one["choice"] for one in answered] == [CHOICES[key] for key in keys]
+        # What the agent heard until its last measurement is counted, each answer as what it was.
+        measured = rows[-1]["values"]
+        heard = [
+            one["choice"]
+            for one in answered
+            if one["applied_tick"] and one["applied_tick"] <= rows[-1]["tick"]
+        ]
+        assert {name: measured[name] for name in CHOICES.values()} == {
+            name: heard.count(name) for name in CHOICES.values()
+        }
         assert "optimal" in dashboard.inner_text("main").lower()
         tabs.close()
         assert tabs.wrong == []
