@@ -14,8 +14,9 @@ from rich.text import Text
 
 from parenting.commands.database import database
 from parenting.commands.errors import friendly_errors
+from parenting.server.reads.schemas import run_schema
 from parenting.server.runs import list_runs
-from parenting.server.schemas import RunSchema, run_schema
+from parenting.server.schemas import RunSchema
 from parenting.server.statuses import STATE_LABELS, RunState
 
 COLUMNS = ("run", "name", "world", "level", "parent", "now", "stage", "tick", "answers", "optimal")

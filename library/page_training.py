@@ -17,7 +17,8 @@ from parenting.library.task import Task
 from parenting.server import runs
 from parenting.server.db import Database, connect
 from parenting.server.migrate import upgrade
-from parenting.server.schemas import RunSchema, run_schema
+from parenting.server.reads.schemas import run_schema
+from parenting.server.schemas import RunSchema
 from parenting.server.settings import Settings
 from parenting.server.statuses import OVER, RunStatus
 

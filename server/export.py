@@ -11,12 +11,10 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import select
-
 from parenting.server.db import Database
-from parenting.server.reads.answers import Answered, every
+from parenting.server.reads.answers import Answered, every, number_of
 from parenting.server.runs import get_run
-from parenting.server.tables import Answer, Run
+from parenting.server.tables import Run
 
 MU = {"left": [1.0, 0.0], "right": [0.0, 1.0], "either": [0.5, 0.5], "neither": None}
 """Eq. (1); *neither* trains nothing."""
@@ -62,16 +60,10 @@ def _row(db: Database, run: Run, answered: Answered) -> dict[str, Any]:
         "asked": _time(query.posted),
         "received": _time(answer.received),
         "standing": answer.standing,
-        "supersedes": None if answer.supersedes is None else _number(db, answer.supersedes),
+        "supersedes": None if answer.supersedes is None else number_of(db, answer.supersedes),
     }
 
 
 def _time(moment: datetime) -> str:
     """Format a time as ISO 8601 in UTC, always of the same length, so that it sorts as text."""
     return moment.replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"
-
-
-def _number(db: Database, answer_id: int) -> int:
-    """Return the number, within its run, of an answer that another supersedes."""
-    with db.read() as session:
-        return session.scalars(select(Answer.number).where(Answer.id == answer_id)).one()

@@ -23,7 +23,7 @@ from parenting.server.errors import ServerError, TooManyStreamsError
 from parenting.server.notify import Notifier
 from parenting.server.queue.leases import waiting
 from parenting.server.reads.metrics import list_metrics
-from parenting.server.schemas import metric_schemas, run_schema
+from parenting.server.reads.schemas import metric_schemas, run_schema
 
 POLL_SECONDS = 0.25
 """Seconds between polls, and at least between two events of the same browser, questions excepted."""

@@ -10,7 +10,8 @@ from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody, RunId
 from parenting.server.api.responses import write_responses
 from parenting.server.deps import Db, notify_worker
 from parenting.server.operator_events import add_operator_event
-from parenting.server.schemas import RunSchema, run_schema
+from parenting.server.reads.schemas import run_schema
+from parenting.server.schemas import RunSchema
 from parenting.server.statuses import RunStatus
 
 router = APIRouter(tags=["operator"])

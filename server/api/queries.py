@@ -15,8 +15,9 @@ from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease, release
 from parenting.server.reads import pagination
+from parenting.server.reads.schemas import asked_schema, leased_schema
 from parenting.server.runs import get_run
-from parenting.server.schemas import AskedSchema, LeasedSchema, StoredSchema, asked_schema, leased_schema
+from parenting.server.schemas import AskedSchema, LeasedSchema, StoredSchema
 
 router = APIRouter(tags=["questions"])
 

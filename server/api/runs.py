@@ -20,7 +20,8 @@ from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.new_run import NewRun, start
 from parenting.server.reads import pagination
-from parenting.server.schemas import RunSchema, metric_schemas, run_schema, run_schemas
+from parenting.server.reads.schemas import metric_schemas, run_schema, run_schemas
+from parenting.server.schemas import RunSchema
 
 router = APIRouter(tags=["runs"])
 

@@ -20,7 +20,7 @@ from parenting.server.pages.render import format_number, page
 from parenting.server.pages.stages import StageRow, stage_rows
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, run_title
 from parenting.server.reads.metrics import first_metrics, latest_metrics, sampled_metrics
-from parenting.server.schemas import run_schema
+from parenting.server.reads.schemas import run_schema
 from parenting.server.security import policy
 from parenting.server.tables import Metric, Run
 

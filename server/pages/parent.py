@@ -28,7 +28,7 @@ from parenting.server.pages.render import page, redirect
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, run_title
 from parenting.server.queue import answers, leases
 from parenting.server.queue.leases import lease_ahead, may_lease
-from parenting.server.schemas import run_schema
+from parenting.server.reads.schemas import run_schema
 from parenting.server.statuses import RunState
 from parenting.server.streams import Streams
 from parenting.server.tables import Run

@@ -19,7 +19,7 @@ from parenting.server.pages.render import page, redirect
 from parenting.server.pages.texts import run_title
 from parenting.server.reads.metrics import latest_metrics
 from parenting.server.reads.pagination import runs_before
-from parenting.server.schemas import run_schemas
+from parenting.server.reads.schemas import run_schemas
 from parenting.server.statuses import STATE_LABELS
 from parenting.server.tables import Metric, Run
 

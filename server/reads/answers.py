@@ -85,3 +85,9 @@ def every(db: Database, run_id: int, batch: int = BATCH) -> Iterator[Answered]:
             return
         yield from rows
         number = rows[-1].answer.number
+
+
+def number_of(db: Database, answer_id: int) -> int:
+    """Return the number, within its run, of an answer."""
+    with db.read() as session:
+        return session.scalars(select(Answer.number).where(Answer.id == answer_id)).one()

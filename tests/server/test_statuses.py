@@ -13,8 +13,8 @@ from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
+from parenting.server.reads.schemas import run_schema
 from parenting.server.runs import Claim
-from parenting.server.schemas import run_schema
 from parenting.server.statuses import (
     QUERY_STATUSES,
     RUN_STATES,

@@ -1,0 +1,115 @@
+"""Rows as the schemas of the API, and who waits for whom in a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import Literal
+
+from parenting.agent.config import Config
+from parenting.server.db import Database
+from parenting.server.queue.queries import Open, open_by_run, open_in
+from parenting.server.runs import find
+from parenting.server.schemas import (
+    AnswerSchema,
+    AskedSchema,
+    LeasedSchema,
+    MetricSchema,
+    OpenSchema,
+    ParentSchema,
+    PolicySchema,
+    ProgressSchema,
+    QuerySchema,
+    RunSchema,
+    WorldSchema,
+)
+from parenting.server.statuses import OVER, RunState, RunStatus, Waiting
+from parenting.server.tables import Answer, Metric, Query, Run
+
+SILENT_AFTER = timedelta(seconds=5)
+"""A run counts as not raised once its worker has been silent for this long."""
+
+
+def run_schema(db: Database, run_id: int) -> RunSchema:
+    """Return the schema of a run.
+
+    Raises:
+        NotFound: there is none of this id.
+    """
+    with db.read() as session:
+        return _run_schema(find(session, run_id), open_in(session, run_id), db.clock())
+
+
+def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema]:
+    """Return the schemas of runs."""
+    with db.read() as session:
+        opened = open_by_run(session, [run.id for run in runs])
+    return [_run_schema(run, opened[run.id], db.clock()) for run in runs]
+
+
+def query_schema(query: Query) -> QuerySchema:
+    """Return the schema of a query."""
+    names = ("id", "tick", "kind", "maturity", "status", "posted", "leased_until")
+    policy = PolicySchema(stage=query.policy_stage, gradient_steps=query.policy_steps)
+    own = {name: getattr(query, name) for name in names}
+    return QuerySchema(run=query.run_id, policy=policy, **own, **query.clips)
+
+
+def asked_schema(query: Query, answer: Answer | None) -> AskedSchema:
+    """Return the schema of a query, with the answer that stands for it."""
+    names = ("number", "choice", "parent", "received", "applied_tick")
+    said = None if answer is None else AnswerSchema(**{name: getattr(answer, name) for name in names})
+    return AskedSchema(**query_schema(query).model_dump(), answer=said)
+
+
+def leased_schema(db: Database, query: Query) -> LeasedSchema:
+    """Return the schema of a leased query: with its world, the parent's settings and progress."""
+    with db.read() as session:
+        run = find(session, query.run_id)
+        opened = open_in(session, run.id)
+    config = Config.model_validate(run.config)
+    world = WorldSchema(
+        name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
+    )
+    return LeasedSchema(
+        **query_schema(query).model_dump(),
+        world=world,
+        parent=ParentSchema(gamma=config.gamma, inside=config.inside),
+        progress=ProgressSchema(answered=run.answers, open=opened.guidance + opened.preference),
+    )
+
+
+def metric_schemas(rows: Sequence[Metric]) -> list[MetricSchema]:
+    """Return the schemas of metrics."""
+    return [MetricSchema(tick=row.tick, values=row.values) for row in rows]
+
+
+def _run_schema(run: Run, opened: Open, now: datetime) -> RunSchema:
+    made = ("open", "worker", "resting", "state")
+    own = {name: getattr(run, name) for name in RunSchema.model_fields if name not in made}
+    shown = OpenSchema(guidance=opened.guidance, preference=opened.preference)
+    resting = run.status not in OVER and run.goal is not None and run.answers >= run.goal
+    state = _run_state(run, opened, resting, now)
+    return RunSchema(**own, open=shown, worker=_worker(run, now), resting=resting, state=state)
+
+
+def _run_state(run: Run, opened: Open, resting: bool, now: datetime) -> RunState:
+    """Say who waits for whom; pages, script and command show this and compute nothing of their own."""
+    if run.status in OVER:
+        return RunState.OVER
+    if run.status is RunStatus.PAUSED:
+        return RunState.PAUSED
+    if resting:
+        return RunState.RESTING
+    if run.parent == "human" and (opened.guidance or opened.preference):
+        return RunState.QUESTION
+    if _worker(run, now) == "silent":
+        return RunState.NO_WORKER
+    return RunState.STUCK if run.waiting is Waiting.STUCK else RunState.EXPLORING
+
+
+def _worker(run: Run, now: datetime) -> Literal["alive", "silent", "done"]:
+    if run.status in OVER:
+        return "done"
+    late = run.heartbeat is None or now - run.heartbeat > SILENT_AFTER
+    return "silent" if run.worker is None or late else "alive"
