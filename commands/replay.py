@@ -60,7 +60,7 @@ def replay(
 
 def _said(found: Relived) -> str:
     counts = (_number(found.tick, "tick"), _number(found.answers, "answer"), _number(found.events, "event"))
-    lived = f"Run {found.run}: {', '.join(counts)} re-lived."
+    lived = f"Run {found.run}: {', '.join(counts)} replayed."
     if found.parted:
         return f"{lived} Not equal. {found.parted}"
     if found.differ:

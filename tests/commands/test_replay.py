@@ -76,7 +76,7 @@ def test_equal_bit_for_bit(db: Database) -> None:
     assert said.exit_code == 0, said.output
     heard, events = len(heard_answers(db, 1)), operator_events.list_operator_events(db, 1)
     assert {event.kind for event in events} == {"end_episode", "change", "mature"}
-    counts = f"{TICKS} ticks, {heard} answers, {len(events)} events re-lived."
+    counts = f"{TICKS} ticks, {heard} answers, {len(events)} events replayed."
     assert said.output == f"Run 1: {counts} Equal bit for bit.\n"
     asked = [row.query for row in heard_answers(db, 1)]
     assert {query.kind for query in asked} == {"guidance", "preference"}
