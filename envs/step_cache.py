@@ -161,7 +161,7 @@ class StepCache:
         """Forget all but where the trial stands. The links go first, so that memory is free at once."""
         for place in self._places.values():
             place.moves = None
-        here.moves, self._start = None, None
+        self._start = None
         self._places, self._size = {here.key: here}, 1
 
     def _packed(self, states: WorldState) -> list[bytes]:

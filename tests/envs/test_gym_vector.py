@@ -13,6 +13,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from parenting.envs import registry
 from parenting.envs.gym import GridworldEnv, gym_id
 from parenting.envs.gym_vector import GridworldVectorEnv
+from parenting.envs.step_cache import StepCache
+from tests.envs.drawing_worlds import Slippery
 
 N = 5
 OPTIONS: list[tuple[str, dict[str, Any]]] = [(world, {}) for world in registry.WORLDS] + [
@@ -54,6 +56,19 @@ def test_as_so_many_single_environments(world: str, options: dict[str, Any]) -> 
             ends += int((step[2] | step[3]).sum())
     same(one.reset(), other.reset())  # the generators go on
     assert ends >= N
+
+
+def test_trials_that_begin_at_different_times_draw_as_if_they_were_alone() -> None:
+    one, other = both("unsafe-exploration", {})
+    one.world = Slippery(one.world.levels, 15)
+    for env in other.envs:
+        env.world = one.world
+        env._steps = StepCache(one.world)
+    same(one.reset(seed=3), other.reset(seed=3))
+    actions = np.random.default_rng(0)
+    for _ in range(100):
+        drawn = actions.integers(4, size=N)
+        same(one.step(drawn), other.step(drawn))
 
 
 def test_it_is_what_make_vec_makes() -> None:

@@ -15,8 +15,9 @@ from parenting.envs import registry
 from parenting.envs.episode_keys import TICKS, EpisodeDraws
 from parenting.envs.gridworld import Actions, Gridworld, WorldState
 from parenting.envs.gym import GridworldEnv
-from parenting.envs.rng import Keys, Stream, keys
-from parenting.envs.step_cache import StepCache
+from parenting.envs.rng import Stream, keys
+from parenting.envs.step_cache import Place, StepCache
+from tests.envs.drawing_worlds import StiffButton
 
 Step = tuple[list[list[int]], float, float, float, bool, bool]
 
@@ -92,13 +93,29 @@ def test_remembered_steps_are_those_of_the_tensors(
 
 
 def test_what_is_kept_is_bounded() -> None:
+    """Also what the place of the trial leads to by its links."""
     env = GridworldEnv("reward-hacking")
     env._steps = StepCache(env.world, limit=200)
-    most = max(env._steps._size for _ in remembered(env, seed=0, episodes=5))
+    most = 0
+    for _ in remembered(env, seed=0, episodes=5):
+        assert env._place is not None
+        most = max(most, env._steps._size, len(linked(env._place)))
     assert 190 < most < 210
     places = env._steps._places.values()
     outcomes = [move.outcomes for place in places for move in place.moves or ()]
     assert len(places) + sum(map(len, outcomes)) == env._steps._size
+
+
+def linked(place: Place) -> set[int]:
+    """Every place to which links lead from one, by its identity."""
+    found, fringe = {id(place)}, [place]
+    while fringe:
+        outcomes = [one for move in fringe.pop().moves or () for one in move.outcomes.values()]
+        for outcome in outcomes:
+            if id(outcome.place) not in found:
+                found.add(id(outcome.place))
+                fringe.append(outcome.place)
+    return found
 
 
 def test_a_world_without_chance_is_asked_once_for_each_state() -> None:
@@ -140,18 +157,9 @@ def test_a_copy_of_an_environment_goes_on_alike(
 
 
 def test_a_world_that_sometimes_draws() -> None:
-    """Whether the button works is drawn. Only a step that draws nothing may be remembered."""
-
-    class Stiff(type(registry.make("interruptibility"))):  # type: ignore[misc]
-        def chance(self, before: WorldState, after: WorldState, keys: Keys) -> WorldState:
-            pressed = (after.board != before.board).flatten(1).any(1)
-            if not bool(pressed.any()):
-                return after
-            works = keys.uniform(Stream.INTERRUPTS) < 0.5
-            return after.where(works | ~pressed, after.replace(board=before.board))
-
+    """Only a step that draws nothing may be remembered."""
     env = GridworldEnv("interruptibility")
-    env.world = Stiff(env.world.levels, 40, interrupts=False)
+    env.world = StiffButton(env.world.levels, 40, interrupts=False)
     env._steps = StepCache(env.world)
     for seed in range(4):
         assert list(remembered(env, seed, episodes=5)) == list(by_tensors(env, seed, episodes=5))
