@@ -61,6 +61,7 @@ class WholeBatch:
         """Place the trials of a chunk among all; `done` says which of those that are left are done."""
         world, config = task.world, task.config
         self.parent, self.chunk, self.done = parent, torch.tensor(chunk), done
+        self.trials = trials
         self.size = config.stages, world.height, world.width, world.device
         self.nothing = queries.empty(trials, *self.size)
 
@@ -70,7 +71,12 @@ class WholeBatch:
     def take(self, state: AgentState) -> Answer:
         if isinstance(self.parent, Parent):
             self.parent.in_training = self.chunk[~self.done()].tolist()
-        return self.parent.take(state).pick(self.chunk)
+        answer = self.parent.take(state)
+        if len(answer.choice) != self.trials:
+            raise ValueError(
+                f"parent: take returned answers for {len(answer.choice)} trials, and there are {self.trials}."
+            )
+        return answer.pick(self.chunk)
 
     def post(self, query: queries.Query) -> None:
         asking = queries.empty(len(self.chunk), *self.size).where(self.done(), query)

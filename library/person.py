@@ -133,6 +133,13 @@ class TerminalParent(Parent):
         self.answers += 1
         return KEYS[said]
 
+    def how_to_go_on(self) -> str:
+        """Return what a person who stopped wants to know."""
+        return (
+            f"Stopped after {self.answers} answers. The result holds them; result.save(folder) keeps them."
+            ' Go on with the same arguments and parent=pt.Person("terminal", after=result).'
+        )
+
     @contextmanager
     def listening(self) -> Iterator[None]:
         """Let Ctrl-C end the training between two ticks, where everything is whole."""

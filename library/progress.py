@@ -8,6 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from parenting.experiments.training.stop_rule import StopRule
+from parenting.library.notebook import LiveLine, in_notebook
+
+TICKS = 25
+"""Ticks between two looks of a notebook's line: a kernel passes on each as a message."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,10 @@ class Progress:
 
 @contextmanager
 def bar(wanted: bool | None, trials: int, until: StopRule) -> Iterator[Callable[[Progress], None] | None]:
-    """Show a progress bar on standard error; None shows one where that is a terminal."""
+    """Show a bar on a terminal, and a line that moves in a notebook; None: only where there is one."""
+    if wanted is not False and in_notebook():
+        yield _in_notebook(LiveLine(wanted))
+        return
     if not (sys.stderr.isatty() if wanted is None else wanted):
         yield None
         return
@@ -52,3 +59,12 @@ def bar(wanted: bool | None, trials: int, until: StopRule) -> Iterator[Callable[
             shown.update(task, completed=now.queries if asking else now.done, tick=now.tick)
 
         yield show
+
+
+def _in_notebook(line: LiveLine) -> Callable[[Progress], None]:
+    def show(now: Progress) -> None:
+        if now.tick % TICKS == 1 or now.done == now.trials:
+            done = f"{now.done} of {now.trials} trials done"
+            line.show(f"{done}, tick {now.tick}, {now.queries} answers")
+
+    return show

@@ -12,7 +12,7 @@ from torch import Tensor
 from parenting.agent.config import Config, compose
 from parenting.agent.init import SUPERVISION, world_of
 from parenting.envs import registry
-from parenting.envs.levels.spec import WorldSpec
+from parenting.envs.levels.spec import Level, WorldSpec
 from parenting.envs.names import did_you_mean
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.worlds import AnyLevel, World, named
@@ -28,7 +28,7 @@ class Task(NamedTuple):
 
 
 def prepare(
-    world: str | World, level: AnyLevel | None, preset: str | Config, changes: Mapping[str, object]
+    world: str | World | Level, level: AnyLevel | None, preset: str | Config, changes: Mapping[str, object]
 ) -> Task:
     """Compose a task: the preset, over it the world's own defaults, over it the changes.
 
@@ -36,10 +36,14 @@ def prepare(
         TypeError: a change is not a hyperparameter; the message names the nearest.
         ValueError: a world, level, preset or hyperparameter is wrong; the message names it.
     """
+    if isinstance(world, Level):
+        return prepare(registry.make(world.world, world), level, preset, changes)
     if isinstance(world, str):
         name, found = named(world, level)
         config = compose_config(registry.spec(name), preset, changes)
         made = world_of(name, found, config)
+    elif not isinstance(world, World):
+        raise TypeError(f"world: a {type(world).__name__} is not a world. Give a name, a World or a text.")
     else:
         if level is not None:
             raise ValueError("level: this world has its levels already. Leave level out, or name the world.")
@@ -60,6 +64,8 @@ def compose_config(world: WorldSpec, preset: str | Config, changes: Mapping[str,
     try:
         if isinstance(preset, Config):
             return Config.model_validate({**preset.model_dump(), **changes}, strict=True)
+        if not isinstance(preset, str):
+            raise TypeError(f"preset: {preset!r} is neither the name of a preset nor a Config.")
         return compose(preset, dict(world.defaults), changes, strict=True)
     except ValidationError as error:
         raise ValueError("\n".join(_sentence(one, changes) for one in error.errors())) from None
@@ -78,7 +84,7 @@ def stop_rule(world: World, until: str) -> StopRule:
             f"until: no policy counts as optimal in {world.name}, which has no goal."
             ' Use until="queries:1000" or until="ticks:5000".'
         )
-    kind, _, number = until.partition(":")
+    kind, _, number = str(until).partition(":")
     if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
         return StopRule(kind, int(number))  # type: ignore[arg-type]
     raise ValueError(f"until: {until!r} is none of 'optimal', 'queries:N' and 'ticks:N' with N at least 1.")

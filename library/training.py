@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from functools import partial
 from typing import Any
 
@@ -12,6 +11,7 @@ from torch import Tensor
 
 from parenting.agent.config import Config
 from parenting.agent.mailbox import Mailbox
+from parenting.envs.levels.spec import Level
 from parenting.envs.rng import keys
 from parenting.experiments.training import batch
 from parenting.experiments.training.batch import BatchTrainer
@@ -33,7 +33,7 @@ Callback = Callable[[Progress], bool | None]
 
 
 def train(
-    world: str | World,
+    world: str | World | Level,
     *,
     level: AnyLevel | None = None,
     preset: str | Config = "conservative",
@@ -49,7 +49,7 @@ def train(
     """Train agents by PARENTING (Sec. 2): they ask, a parent answers, and no reward is read.
 
     Args:
-        world: A world's name, a `World`, or a level's text whose header names its world.
+        world: A world's name, a `World`, a level's text whose header names its world, or a `Level`.
         level: A built-in level's name, a level's text, a file's path, or a `Level`; None takes the default.
         preset: A name in `PRESETS` ("conservative", "lax" or "direct": Table 1), or a `Config`.
         parent: "scripted" (Sec. 3.1.3), a `Parent` such as one's own, or a `Person`.
@@ -90,31 +90,44 @@ def train(
             from parenting.library.page_training import train_on_page  # loads the server
 
             return train_on_page(task, rule, seed, parent, callback, progress)
-        parent, progress = TerminalParent(parent.after), False
-    log, parts = AnswerLog(), list[batch.TrainResult]()
+        terminal = TerminalParent(parent.after)
+        with terminal.listening():
+            result, ended = _train(task, rule, terminal, trials, seed, (callback,), max_ticks)
+        if ended:
+            print(terminal.how_to_go_on())
+        return result
+    with bar(progress, trials, rule) as show:
+        return _train(task, rule, parent, trials, seed, (show, callback), max_ticks)[0]
+
+
+def _train(
+    task: Task,
+    rule: StopRule,
+    parent: str | Mailbox,
+    trials: int,
+    seed: int,
+    told: tuple[Callback | None, ...],
+    max_ticks: int,
+) -> tuple[TrainResult, bool]:
+    """Train in batches, one after the other; whether somebody ended it before its time."""
+    log, parts, ended = AnswerLog(), list[batch.TrainResult](), False
     behind = _parent(parent, task, trials)
-    listening = behind.listening() if isinstance(behind, TerminalParent) else nullcontext()
-    with one_thread(), listening, bar(progress, trials, rule) as show:
+    with one_thread():
         for chunk in chunks(trials):
             trainer = _trainer(task, rule, seed, chunk)
             if behind is not None:
                 trainer.parent = WholeBatch(behind, task, trials, chunk, partial(_done, trainer))  # type: ignore[assignment]
             trainer.parent = LoggedParent(trainer.parent, log, chunk)  # type: ignore[assignment]
-            trained, ended = _run(trainer, max_ticks, _report(chunk, trials, parts, (show, callback)))
+            trained, ended = _run(trainer, max_ticks, _report(chunk, trials, parts, told))
             parts.append(trained)
             if ended:
                 break
-    if isinstance(behind, TerminalParent) and ended:
-        print(
-            f"Stopped after {behind.answers} answers. The result holds them; result.save(folder) keeps them."
-            ' Go on with the same arguments and parent=pt.Person("terminal", after=result).'
-        )
-    return collect(task, parts, log.records(), seed=seed, until=str(rule))
+    return collect(task, parts, log.records(), seed=seed, until=str(rule)), ended
 
 
 def _parent(parent: str | Mailbox, task: Task, trials: int) -> Mailbox | None:
     """Return a parent of the caller's, ready for these trials; None stands for the scripted one."""
-    if parent == "scripted" or isinstance(parent, ScriptedParent):
+    if parent == "scripted" or type(parent) is ScriptedParent:  # a subclass may answer otherwise
         return None
     if isinstance(parent, str) or not all(hasattr(parent, verb) for verb in ("events", "take", "post")):
         raise ValueError(

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+import parenting as pt
 from parenting.library import notebook
 
 
@@ -85,3 +86,13 @@ def test_the_line_moves_on_a_terminal_and_is_silent_in_a_file(capsys: pytest.Cap
         line.show("tick 3")
         line.end()
         assert ("tick 3" in capsys.readouterr().err) is speaks
+
+
+def test_training_shows_one_line_that_ends_with_all_trials(shown: list[Any]) -> None:
+    pt.train("unsafe-exploration", trials=2, until="ticks:60")
+    assert shown[0] == {"text/plain": "0 of 2 trials done, tick 1, 0 answers"}
+    assert shown[-1][1].startswith("2 of 2 trials done, tick 60")
+    assert len(shown) < 12
+    before = len(shown)
+    pt.train("unsafe-exploration", until="ticks:2", progress=False)
+    assert len(shown) == before

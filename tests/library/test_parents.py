@@ -63,6 +63,21 @@ def test_a_parent_who_answers_one_by_one_is_heard_as_one_who_answers_in_tensors(
     assert one_by_one.answers == in_tensors.answers
 
 
+class NeverSure(pt.ScriptedParent):
+    """The scripted parent, in tensors, whose answers are all *either*."""
+
+    def take(self, state: pt.AgentState) -> pt.Answer:
+        answer = super().take(state)
+        said = (answer.choice > 0).long()
+        return answer.replace(choice=said * int(pt.Choice.EITHER))
+
+
+def test_a_subclass_of_the_scripted_parent_is_heard() -> None:
+    result = pt.train(WORLD, trials=3, parent=NeverSure(), until="queries:5", progress=False)
+    assert {row["choice"] for row in result.answers} == {"either"}
+    assert len(result.answers) == 15
+
+
 class Slow(StayDry):
     """Needs three looks at each question."""
 
@@ -102,6 +117,18 @@ def test_any_object_with_the_three_verbs_is_a_parent() -> None:
     result = pt.train(WORLD, parent=Mute(), until="ticks:10", progress=False)
     assert result.answers == []
     assert result.trials[0]["ticks"] == 10
+
+
+class OneForAll(Mute):
+    """Answers for one trial, whatever their number is."""
+
+    def take(self, state: pt.AgentState) -> pt.Answer:
+        return silence(blank(1))
+
+
+def test_answers_for_another_number_of_trials_are_refused() -> None:
+    with pytest.raises(ValueError, match="take returned answers for 1 trials, and there are 2"):
+        pt.train(WORLD, trials=2, parent=OneForAll(), progress=False)
 
 
 class Wrong(pt.Parent):

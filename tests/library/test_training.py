@@ -57,9 +57,10 @@ def test_the_mean_is_over_finished_trials() -> None:
 
 def test_a_world_may_be_a_name_an_object_or_a_text() -> None:
     text = registry.level("unsafe-exploration").text
-    ways: list[Any] = ["unsafe-exploration", pt.make("unsafe-exploration"), text]
+    world = pt.make("unsafe-exploration")
+    ways: list[Any] = ["unsafe-exploration", world, text, world.levels[0]]
     found = [pt.train(way, seed=2, progress=False) for way in ways]
-    assert found[0].trials == found[1].trials == found[2].trials
+    assert all(one.trials == found[0].trials for one in found)
 
 
 def test_a_world_brings_its_own_limit_of_steps() -> None:
@@ -120,6 +121,9 @@ def test_the_number_of_threads_is_left_as_it_was() -> None:
         ({"until": "soon"}, ValueError, ["until", "soon", "queries:N"]),
         ({"until": "queries:0"}, ValueError, ["until", "queries:0", "at least 1"]),
         ({"world": "reward-hacking"}, ValueError, ["until", "no goal", "queries:1000"]),
+        ({"until": 100}, ValueError, ["until", "100", "queries:N"]),
+        ({"world": 3}, TypeError, ["world", "int"]),
+        ({"preset": {"p_guid": 1.0}}, TypeError, ["preset", "p_guid", "Config"]),
         ({"trials": 0}, ValueError, ["trials", "0", "from 1"]),
         ({"seed": -1}, ValueError, ["seed", "-1", "from 0"]),
         ({"parent": "mother"}, ValueError, ["parent", "mother", "parenting.Parent"]),
