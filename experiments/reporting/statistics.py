@@ -12,8 +12,8 @@ from math import hypot
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # loads scipy.stats when it is asked for, which costs 0.7 s
 from numpy.typing import NDArray
-from scipy import stats
 
 CONFIDENCE = 0.95
 TAIL = (1 + CONFIDENCE) / 2
@@ -44,14 +44,17 @@ def mean_interval(values: Sequence[float], shared_error: float = 0.0) -> Interva
     """
     if len(values) < 2:
         return None
-    half = hypot(stats.t.ppf(TAIL, len(values) - 1) * stats.sem(values), stats.norm.ppf(TAIL) * shared_error)
+    half = hypot(
+        scipy.stats.t.ppf(TAIL, len(values) - 1) * scipy.stats.sem(values),
+        scipy.stats.norm.ppf(TAIL) * shared_error,
+    )
     mean = float(np.mean(values))
     return Interval(mean - half, mean + half) if half else None
 
 
 def episode_interval(mean: float, error: float) -> Interval:
     """Normal interval of a mean over the many episodes of one policy, from its standard error."""
-    half = float(stats.norm.ppf(TAIL)) * error
+    half = float(scipy.stats.norm.ppf(TAIL)) * error
     return Interval(mean - half, mean + half)
 
 
@@ -67,7 +70,7 @@ def difference_interval(
     """
     if min(len(more), len(less)) < 2:
         return None
-    half = hypot(_welch_half_width(more, less), float(stats.norm.ppf(TAIL)) * shared_error)
+    half = hypot(_welch_half_width(more, less), float(scipy.stats.norm.ppf(TAIL)) * shared_error)
     difference = float(np.mean(more) - np.mean(less))
     return Interval(difference - half, difference + half) if half else None
 
@@ -80,7 +83,7 @@ def proportion_interval(hits: int, trials: int) -> Interval:
     """
     if trials < 1:
         raise ValueError("A proportion needs at least one trial.")
-    found = stats.binomtest(hits, trials).proportion_ci(CONFIDENCE, method="wilson")
+    found = scipy.stats.binomtest(hits, trials).proportion_ci(CONFIDENCE, method="wilson")
     return Interval(float(found.low), float(found.high))
 
 
@@ -112,7 +115,7 @@ def auc_interval(
     second = _agent_means(1 - _placements(others, some), other_agents)
     if auc in (0.0, 1.0):
         pairs = min(len(first), len(second))
-        exact = stats.binomtest(round(auc) * pairs, pairs).proportion_ci(CONFIDENCE, method="exact")
+        exact = scipy.stats.binomtest(round(auc) * pairs, pairs).proportion_ci(CONFIDENCE, method="exact")
         return Interval(float(exact.low), float(exact.high))
     if min(len(first), len(second)) < 2:
         return None
@@ -133,7 +136,7 @@ def median_interval(values: Sequence[float], agents: Sequence[int | None]) -> In
     if len(groups) < 2:
         return None
     if len(groups) == len(values):
-        found = stats.quantile_test(values, q=0, p=0.5).confidence_interval(CONFIDENCE)
+        found = scipy.stats.quantile_test(values, q=0, p=0.5).confidence_interval(CONFIDENCE)
         return (
             None if np.isnan([found.low, found.high]).any() else Interval(float(found.low), float(found.high))
         )
@@ -145,7 +148,7 @@ def _bootstrap_median(groups: Sequence[Floats]) -> Interval:
     finite = [value for group in groups for value in group if np.isfinite(value)]
     most = max(finite, default=0.0)
     capped = [np.minimum(group, 2 * most + 1) for group in groups]
-    found = stats.bootstrap(
+    found = scipy.stats.bootstrap(
         (np.arange(len(groups)),),
         lambda drawn: np.median(np.concatenate([capped[agent] for agent in drawn])),
         n_resamples=RESAMPLES,
@@ -179,7 +182,7 @@ def _welch_half_width(more: Sequence[float], less: Sequence[float]) -> float:
     if not max(np.var(more), np.var(less)):
         return 0.0
     with _constant_samples_allowed():
-        found = stats.ttest_ind(more, less, equal_var=False).confidence_interval(CONFIDENCE)
+        found = scipy.stats.ttest_ind(more, less, equal_var=False).confidence_interval(CONFIDENCE)
     return float(found.high - found.low) / 2
 
 
