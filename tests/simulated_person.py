@@ -71,9 +71,9 @@ def tell(url: str, run: int, verb: str, **body: Any) -> None:
 def start(page: Page, url: str, seed: int = 3, goal: int | None = None) -> None:
     """Fill in the form on the first page, as a person does, and begin."""
     page.goto(url)
-    page.fill("input[name=seed]", str(seed))
-    page.fill("input[name=goal]", "" if goal is None else str(goal))
-    page.click("main form button[type=submit], main form button.primary")
+    page.fill("form.fields input[name=seed]", str(seed))
+    page.fill("form.fields input[name=goal]", "" if goal is None else str(goal))
+    page.click("form.fields button.primary")
     page.wait_for_selector("#main[data-run]")
 
 

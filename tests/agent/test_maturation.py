@@ -58,6 +58,7 @@ def test_the_frozen_policy_stays_as_it_was() -> None:
     state, _ = run_batch(WORLD, LAX, agreeable, seed=5, trials=2, ticks=80)
     state = mature(LAX, state)
     frozen = state.learner.frozen.clone()
+    assert torch.equal(frozen[0], state.learner.params)
     query = parenting.no_query(WORLD, LAX, state)
     for _ in range(30):
         state, query = parenting.step(WORLD, LAX, state, Answer(query=query, choice=agreeable(query)))
