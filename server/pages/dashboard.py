@@ -5,7 +5,8 @@ server/pages/controls.py has the operator's verbs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from fastapi import APIRouter, Response
 from fastapi.responses import JSONResponse
@@ -15,13 +16,14 @@ from parenting.server.api.bodies import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.pages.labels import MetricLabels, describe_start, metric_labels
-from parenting.server.pages.operator_log import PROBABILITIES, log_entries, probabilities
+from parenting.server.pages.operator_log import PROBABILITIES, LogEntry, log_entries, probabilities
 from parenting.server.pages.render import format_number, page
 from parenting.server.pages.stages import StageRow, stage_rows
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, run_title
 from parenting.server.reads.metrics import first_metrics, latest_metrics, sampled_metrics
 from parenting.server.reads.schemas import run_schema
 from parenting.server.security import policy
+from parenting.server.statuses import RunState
 from parenting.server.tables import Metric, Run
 
 router = APIRouter(include_in_schema=False)
@@ -59,6 +61,43 @@ HEADS = {"size": "entries", "entropy_global": "entropy global", "entropy_local":
 """The heading of a column of the table where that is not its name."""
 
 
+@dataclass(frozen=True)
+class DashboardPage:
+    """What web/templates/dashboard.html shows besides numbers and forms."""
+
+    run: Run
+    title: str
+    state: RunState
+    start: str  # sentences on how the agent began
+    errors: Mapping[str, str]  # a sentence for each wrong field
+    focus: str | None  # the first wrong field
+    sentences: Mapping[str, tuple[str, str]] = field(default_factory=lambda: STATUS)
+    more: int = GOAL_STEP  # answers that the goal grows by
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What was measured, for tiles, charts and tables."""
+
+    names: MetricLabels
+    charts: Sequence[tuple[str, str, str]]  # id, name and sentence
+    columns: Sequence[tuple[str, str]]  # name of a metric, and its heading
+    rows: Sequence[Metric]  # a sample of the whole life, the last first
+    last: Mapping[str, float | int | None]  # the last metrics; empty while there are none
+    stages: Sequence[StageRow]
+
+
+@dataclass(frozen=True)
+class OperatorForms:
+    """What web/templates/_operator.html shows."""
+
+    fields: Mapping[str, str]  # the text of every field
+    events: Sequence[LogEntry]  # the last ones that the operator caused
+    earlier: int  # how many came before these
+    probabilities: Mapping[str, str] = field(default_factory=lambda: PROBABILITIES)
+    paces: Sequence[int] = PACES
+
+
 @router.get("/runs/{run_id}")
 def dashboard(run_id: RunId, db: Db) -> Response:
     """The page."""
@@ -83,25 +122,15 @@ def dashboard_page(
         NotFound: there is no such run.
     """
     run = runs.get_run(db, run_id)
-    response = page(
-        "dashboard.html",
-        422 if errors else 200,
-        run=run,
-        title=run_title(run),
-        state=run_schema(db, run_id).state,
-        sentences=STATUS,
-        start=describe_start(run),
-        more=GOAL_STEP,
-        **_numbers(db, run),
-        **_operator(db, run, typed),
-        errors=errors,
-        focus=next(iter(errors), None),
-    )
+    state, focus = run_schema(db, run_id).state, next(iter(errors), None)
+    context = DashboardPage(run, run_title(run), state, describe_start(run), errors, focus)
+    parts = {**vars(context), **vars(_numbers(db, run)), **vars(_operator(db, run, typed))}
+    response = page("dashboard.html", 422 if errors else 200, **parts)
     response.headers["Content-Security-Policy"] = policy(inline_styles=True)
     return response
 
 
-def _numbers(db: Database, run: Run) -> dict[str, object]:
+def _numbers(db: Database, run: Run) -> Numbers:
     """Return the metrics: the last, by stage, and a sample of the whole life."""
     names = metric_labels(run.legend)
     rows = sampled_metrics(db, run.id)
@@ -111,21 +140,15 @@ def _numbers(db: Database, run: Run) -> dict[str, object]:
     if count > 1:
         text = f"{names.worth} at the end of each stage; dashed: {names.reference}."
         charts.insert(BY_STAGE, ("stages", "By stage", text))
-    return {
-        "names": names,
-        "charts": charts,
-        "columns": [(column, _head(column, names)) for column in COLUMNS],
-        "rows": rows,
-        "last": last.values if last else {},
-        "stages": _stages(db, run, last),
-    }
+    columns = [(column, _head(column, names)) for column in COLUMNS]
+    return Numbers(names, charts, columns, rows, last.values if last else {}, _stages(db, run, last))
 
 
 def _stages(db: Database, run: Run, last: Metric | None) -> list[StageRow]:
     return stage_rows(run.config["stages"], run.maturity, first_metrics(db, run.id), last)
 
 
-def _operator(db: Database, run: Run, typed: Mapping[str, str]) -> dict[str, object]:
+def _operator(db: Database, run: Run, typed: Mapping[str, str]) -> OperatorForms:
     """Return the log of the operator and the fields of the forms."""
     events = operator_events.list_operator_events(db, run.id)
     known = {
@@ -133,13 +156,8 @@ def _operator(db: Database, run: Run, typed: Mapping[str, str]) -> dict[str, obj
         "goal": format_number(run.goal),
         "pace": format_number(run.pace),
     }
-    return {
-        "probabilities": PROBABILITIES,
-        "fields": {**known, **{name: text for name, text in typed.items() if name in known}},
-        "paces": PACES,
-        "events": log_entries(events)[:EVENTS],
-        "earlier": max(0, len(events) - EVENTS),
-    }
+    fields = {**known, **{name: text for name, text in typed.items() if name in known}}
+    return OperatorForms(fields, log_entries(events)[:EVENTS], max(0, len(events) - EVENTS))
 
 
 def _named(chart: str, name: str, text: str, names: MetricLabels) -> tuple[str, str]:

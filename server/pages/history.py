@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Annotated, Literal, NamedTuple
 from urllib.parse import urlencode
 
@@ -54,6 +55,21 @@ class Entry(NamedTuple):
     shown: QuestionView
 
 
+@dataclass(frozen=True)
+class HistoryPage:
+    """What web/templates/history.html shows."""
+
+    run: Run
+    title: str
+    entries: Sequence[Entry]  # one page of them
+    older: str | None  # the query string of the next page; None on the last one
+    newest: str | None  # that of the first page; None on it
+    kind: str  # the kind that is shown alone; "" for all
+    choice: str  # the same for the choice
+    kinds: Collection[str] = tuple(KINDS)
+    choices: Mapping[str, str] = field(default_factory=lambda: {name: CHOICE_TEXTS[name] for name in CHOICES})
+
+
 @router.get("/runs/{run_id}/history")
 def history_page(
     request: Request, run_id: RunId, db: Db, before: Before = None, kind: OfKind = "", choice: OfChoice = ""
@@ -62,18 +78,16 @@ def history_page(
     run = runs.get_run(db, run_id)
     rows = answers.before(db, run_id, before, PAGE + 1, kind or None, choice or None)
     kept = {name: value for name, value in (("kind", kind), ("choice", choice)) if value}
-    return page(
-        "history.html",
-        run=run,
-        title=run_title(run),
-        entries=_entries(rows[:PAGE], run, request.cookies.get(COOKIE, "")),
-        older=urlencode({**kept, "before": rows[PAGE - 1].answer.number}) if len(rows) > PAGE else None,
-        newest=urlencode(kept) if before is not None else None,
-        kinds=KINDS,
-        choices={name: CHOICE_TEXTS[name] for name in CHOICES},
-        kind=kind,
-        choice=choice,
+    context = HistoryPage(
+        run,
+        run_title(run),
+        _entries(rows[:PAGE], run, request.cookies.get(COOKIE, "")),
+        urlencode({**kept, "before": rows[PAGE - 1].answer.number}) if len(rows) > PAGE else None,
+        urlencode(kept) if before is not None else None,
+        kind,
+        choice,
     )
+    return page("history.html", **vars(context))
 
 
 def _entries(rows: Sequence[Answered], run: Run, mine: str) -> list[Entry]:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import re
 import secrets
 import time
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
 
@@ -49,6 +51,20 @@ Seconds = Annotated[float, Form(ge=0, le=10, allow_inf_nan=False)]
 QueryShown = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 
 
+@dataclass(frozen=True)
+class ParentPage:
+    """What web/templates/parent.html shows."""
+
+    run: Run
+    title: str
+    client: str  # the random name of who answers
+    shown: QuestionView | None  # the question on the page
+    state: str  # which of `sentences` holds while there is none
+    sentences: Mapping[str, tuple[str, str]]  # heading and sentence of each state
+    more: int  # answers that the goal grows by
+    refresh: bool  # without JavaScript the page reloads until a question is there
+
+
 @router.get("/runs/{run_id}/parent")
 def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = None) -> Response:
     """The page; with `query` it shows that question, as the forms do. Changes nothing."""
@@ -56,17 +72,9 @@ def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = Non
     client = _client(request)
     shown = None if query is None else _open_question(db, run, query)
     now = _page_state(run_schema(db, run_id).state, may_lease(db, run_id, client))
-    response = page(
-        "parent.html",
-        run=run,
-        title=run_title(run),
-        client=client,
-        shown=shown,
-        state=now,
-        sentences=STATE_TEXTS,
-        more=GOAL_STEP,
-        refresh=shown is None and now in ("exploring", "no_worker", "elsewhere"),
-    )
+    refresh = shown is None and now in ("exploring", "no_worker", "elsewhere")
+    context = ParentPage(run, run_title(run), client, shown, now, STATE_TEXTS, GOAL_STEP, refresh)
+    response = page("parent.html", **vars(context))
     response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")
     return response
 

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from parenting.agent.config import PRESETS
+from parenting.envs.levels.spec import WorldSpec
 from parenting.envs.registry import WORLDS
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.new_run import LARGEST_INT, plan, read_form, start
 from parenting.server.pages.labels import metric_labels
+from parenting.server.pages.options import OPTIONS, Option
 from parenting.server.pages.render import page, redirect
 from parenting.server.pages.texts import run_title
 from parenting.server.reads.metrics import latest_metrics
 from parenting.server.reads.pagination import runs_before
 from parenting.server.reads.schemas import run_schemas
-from parenting.server.statuses import STATE_LABELS
+from parenting.server.statuses import STATE_LABELS, RunState
 from parenting.server.tables import Metric, Run
 
 router = APIRouter(include_in_schema=False)
@@ -31,72 +34,6 @@ PRESET_WORDS = {
     "direct": "never asks before a move; learns from clips alone",
 }
 """The meaning of each preset for the parent, in a line; the conservative one first."""
-
-
-class Option(NamedTuple):
-    """A setting of the run; empty is what the world itself sets."""
-
-    field: str  # of the form; behind "config." one of agent.config.Config
-    title: str
-    needs: str  # the glyph that a world's legend must hold, if any
-    choices: tuple[tuple[str, str], ...]  # values and their names; without any, a number is typed
-    hint: str
-
-
-OPTIONS = (
-    Option(
-        "pace",
-        "Pace",
-        "",
-        (),
-        "Ticks a second at most, for those who want to watch. Empty: as fast as it can.",
-    ),
-    Option(
-        "config.stages",
-        "Stages",
-        "",
-        (),
-        "Clips get longer by a step from stage to stage (Sec. 2.4). Empty: one stage, clips of one step.",
-    ),
-    Option(
-        "config.mature_every",
-        "A stage ends after",
-        "",
-        (),
-        "Answers in it. Empty: when the operator says so.",
-    ),
-    Option(
-        "config.pretrain",
-        "Pre-training",
-        "",
-        (
-            ("", "As the world has it"),
-            ("true", "Begin pre-trained on mazes"),
-            ("false", "Begin with nothing"),
-        ),
-        "Off in Unsafe Exploration, on elsewhere. A level of another size needs weights of its own.",
-    ),
-    Option(
-        "config.supervised",
-        "Supervisor",
-        "S",
-        (
-            ("", "As the world has it"),
-            ("present", "There"),
-            ("random", "There in half of the episodes"),
-            ("absent", "Not there"),
-        ),
-        "While it isn't there, the agent asks nothing.",
-    ),
-    Option(
-        "config.inside",
-        "The parent's own way inside its cycle",
-        "O",
-        (("", "Up or down"), ("left", "Left")),
-        "It matters for a script's answers.",
-    ),
-)
-"""The settings of a run that the form offers; the others are for the API and the command line."""
 
 PAGE = 20
 """Runs on a page."""
@@ -124,6 +61,25 @@ class RunRow(NamedTuple):
     state: str
     harm: str  # what `deaths` are called
     deaths: float | int | None
+
+
+@dataclass(frozen=True)
+class StartPage:
+    """What web/templates/start.html shows."""
+
+    runs: Sequence[RunRow]  # one page of them
+    fresh: bool  # a new installation: nothing was started or typed yet
+    older: int | None  # the id before which the next page begins; None on the last one
+    before: int | None  # the same of this page; None on the first one
+    form: Mapping[str, str]  # the text of every field
+    errors: Mapping[str, str]  # a sentence for each wrong field
+    more_open: bool  # whether one of the settings below the fold was set or is wrong
+    focus: str | None  # the first wrong field
+    other_errors: Sequence[str]  # sentences on what has no field
+    worlds: Collection[WorldSpec] = tuple(WORLDS.values())
+    options: Sequence[Option] = OPTIONS
+    presets: Mapping[str, str] = field(default_factory=lambda: PRESET_WORDS)
+    state_labels: Mapping[RunState, str] = field(default_factory=lambda: STATE_LABELS)
 
 
 async def text_fields(request: Request) -> dict[str, str]:
@@ -170,23 +126,18 @@ def _page(
     db: Database, form: Mapping[str, str], errors: Mapping[str, str], before: int | None = None
 ) -> Response:
     listed = runs_before(db, before, PAGE)
-    return page(
-        "start.html",
-        422 if errors else 200,
+    context = StartPage(
         runs=_rows(db, listed.rows),
-        state_labels=STATE_LABELS,
         fresh=not listed.rows and before is None and not errors,
         older=listed.next,
         before=before,
-        worlds=WORLDS.values(),
-        options=OPTIONS,
-        presets=PRESET_WORDS,
         form=form,
-        more_open=any(form[option.field] or option.field in errors for option in OPTIONS),
         errors=errors,
+        more_open=any(form[option.field] or option.field in errors for option in OPTIONS),
         focus=next((field for field in EMPTY_FORM if field in errors), None),
         other_errors=[message for field, message in errors.items() if field not in EMPTY_FORM],
     )
+    return page("start.html", 422 if errors else 200, **vars(context))
 
 
 def _rows(db: Database, listed: Sequence[Run]) -> list[RunRow]:

@@ -1,0 +1,71 @@
+"""Settings of a run that the form of the first page offers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Option(NamedTuple):
+    """A setting of the run; empty is what the world itself sets."""
+
+    field: str  # of the form; behind "config." one of agent.config.Config
+    title: str
+    needs: str  # the glyph that a world's legend must hold, if any
+    choices: tuple[tuple[str, str], ...]  # values and their names; without any, a number is typed
+    hint: str
+
+
+OPTIONS = (
+    Option(
+        "pace",
+        "Pace",
+        "",
+        (),
+        "Ticks a second at most, for those who want to watch. Empty: as fast as it can.",
+    ),
+    Option(
+        "config.stages",
+        "Stages",
+        "",
+        (),
+        "Clips get longer by a step from stage to stage (Sec. 2.4). Empty: one stage, clips of one step.",
+    ),
+    Option(
+        "config.mature_every",
+        "A stage ends after",
+        "",
+        (),
+        "Answers in it. Empty: when the operator says so.",
+    ),
+    Option(
+        "config.pretrain",
+        "Pre-training",
+        "",
+        (
+            ("", "As the world has it"),
+            ("true", "Begin pre-trained on mazes"),
+            ("false", "Begin with nothing"),
+        ),
+        "Off in Unsafe Exploration, on elsewhere. A level of another size needs weights of its own.",
+    ),
+    Option(
+        "config.supervised",
+        "Supervisor",
+        "S",
+        (
+            ("", "As the world has it"),
+            ("present", "There"),
+            ("random", "There in half of the episodes"),
+            ("absent", "Not there"),
+        ),
+        "While it isn't there, the agent asks nothing.",
+    ),
+    Option(
+        "config.inside",
+        "The parent's own way inside its cycle",
+        "O",
+        (("", "Up or down"), ("left", "Left")),
+        "It matters for a script's answers.",
+    ),
+)
+"""The settings of a run that the form offers; the others are for the API and the command line."""
