@@ -18,7 +18,7 @@ from tests.tree import ROOT, git_files
 
 LINK = re.compile(r"(?:\]\(|srcset=\"|src=\")([^)\"#\s]*)")
 LINES = {
-    "README.md": [f"`parenting {name}`" for name in COMMANDS]
+    "docs/commands.md": [f"`parenting {name}`" for name in COMMANDS]
     + [f"`PARENTING_{name.upper()}`" for name in Settings.model_fields],
     "docs/paper.md": [f"`{name}`" for name in (*Config.model_fields, *registry.WORLDS)],
 }
