@@ -65,6 +65,7 @@ autodoc_typehints_description_target = "documented"
 autodoc_preserve_defaults = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
+napoleon_use_ivar = True  # else an attribute of an Attributes section is described twice
 
 
 def inline_mathml(page: HTML5Translator, node: math) -> None:
