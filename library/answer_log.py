@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from parenting.agent.events import Event
 from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.drawing.query_tensors import ACTIONS
 
@@ -21,6 +22,7 @@ class AnswerLog:
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
+        self.events: list[dict[str, Any]] = []
         self._open: dict[int, list[tuple[int, Asked]]] = {}
 
     def posted(self, query: Query, trials: Sequence[int], tick: int) -> None:
@@ -34,6 +36,10 @@ class AnswerLog:
             trial, asked = trials[row], describe(answer.query, row)
             since = self._since(trial, asked)
             self.rows.append((trial, since, tick, *asked, Choice(int(answer.choice[row])).name.lower()))
+
+    def applied(self, events: Sequence[Event], tick: int) -> None:
+        """Note the operator's events that apply before a tick."""
+        self.events += [event_record(tick, event.model_dump()) for event in events]
 
     def _since(self, trial: int, asked: Asked) -> int:
         """Return the tick at which the oldest open question of these words was asked."""
@@ -64,3 +70,8 @@ def describe(query: Query, row: int) -> Asked:
         agent[0],
         agent[1],
     )
+
+
+def event_record(tick: int | None, event: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an operator's event as a record; each record has the same columns."""
+    return {"tick": tick, "kind": event["kind"], "name": event.get("name"), "value": event.get("value")}

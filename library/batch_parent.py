@@ -31,10 +31,14 @@ class LoggedParent:
 
     def __init__(self, parent: BatchParent, log: AnswerLog, trials: range) -> None:
         self.parent, self.log, self.trials = parent, log, list(trials)
+        self.first = trials.start == 0
         self.tick = 0
 
     def events(self, state: AgentState) -> Sequence[Event]:
-        return self.parent.events(state)
+        events = self.parent.events(state)
+        if self.first:  # the same events apply to the trials of each batch
+            self.log.applied(events, int(state.keys.tick[0]) + 1)
+        return events
 
     def take(self, state: AgentState) -> Answer:
         self.tick = int(state.keys.tick[0]) + 1

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import torch
 from sqlalchemy import select
 
@@ -12,6 +10,7 @@ from parenting.evaluation.argmax import evaluation
 from parenting.experiments.training import batch
 from parenting.experiments.training.counts import no_counts
 from parenting.experiments.training.stop_rule import StopRule
+from parenting.library.answer_log import event_record
 from parenting.library.page_server import is_ready
 from parenting.library.person import Person
 from parenting.library.result import TrainResult, collect
@@ -178,7 +177,7 @@ def _answer(row: answers.Answered) -> Record:
 
 
 def _events(db: Database, number: int) -> list[Record]:
-    found: list[dict[str, Any]] = []
-    for event in operator_events.list_operator_events(db, number):
-        found.append({"tick": event.applied_tick, "kind": event.kind, **event.payload})
-    return found
+    return [
+        event_record(event.applied_tick, {"kind": event.kind, **event.payload})
+        for event in operator_events.list_operator_events(db, number)
+    ]

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from parenting.agent import query as queries
 from parenting.agent.config import Config
+from parenting.agent.events import Event
 from parenting.agent.query import Choice, QueryKind
 from parenting.agent.state import AgentState
 from parenting.library.answer_log import describe
@@ -17,6 +20,9 @@ from parenting.library.worlds import World
 
 QUESTION = ("kind", "stage", "left", "right", "row", "column")
 """The columns of a record that say what was asked."""
+
+
+_EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
 
 
 class ReplayError(ValueError):
@@ -46,6 +52,7 @@ class ReplayParent(Parent):
     def __init__(self, recorded: TrainResult | Sequence[Mapping[str, Any]]) -> None:
         rows = recorded.answers if isinstance(recorded, TrainResult) else recorded
         self.records = [row for row in rows if row["answered"] is not None]
+        self.acts = recorded.events if isinstance(recorded, TrainResult) else []
 
     def begin(self, world: World, config: Config, trials: int) -> None:
         """Begin with the first record."""
@@ -54,6 +61,11 @@ class ReplayParent(Parent):
         self._by_answer = {(row["trial"], row["answered"]): row for row in self.records}
         self._by_question = {(row["trial"], row["asked"]): row for row in self.records}
         self._posted: dict[tuple[int, int], Query] = {}
+
+    def events(self, state: AgentState) -> Sequence[Event]:
+        """Return the operator's events that were applied before this tick."""
+        tick = int(state.keys.tick[0]) + 1
+        return [_event(act) for act in self.acts if act["tick"] == tick]
 
     def answer(self, question: Question) -> None:
         """Say nothing: answers come at their ticks, from the record."""
@@ -90,3 +102,8 @@ class ReplayParent(Parent):
             f"At tick {tick} trial {trial} asks {asked}; recorded is {row['left']!r} or {row['right']!r}. "
             "Use the world, level, config, seed and number of trials of the recording."
         )
+
+
+def _event(act: Mapping[str, Any]) -> Event:
+    """Return an event from its record; columns that belong to other kinds are empty."""
+    return _EVENTS.validate_python({k: v for k, v in act.items() if k != "tick" and v is not None})

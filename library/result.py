@@ -38,7 +38,8 @@ class TrainResult:
             reward-hacking `waterings` (a mean an episode) and `bucket` (steps into it) instead.
         answers: One record for each answer: `trial`, `asked` and `answered` (ticks), `kind`, `stage`, `left`
             and `right` (moves), `row` and `column` (where the clips begin), `choice`.
-        events: One record for each act of an operator: `tick`, `kind`, and what belongs to it.
+        events: One record for each act of an operator: `tick`, `kind`, and of a changed probability `name`
+            and `value`.
     """
 
     world: World

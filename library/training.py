@@ -122,7 +122,7 @@ def _train(
             parts.append(trained)
             if ended:
                 break
-    return collect(task, parts, log.records(), seed=seed, until=str(rule)), ended
+    return collect(task, parts, log.records(), seed=seed, until=str(rule), events=log.events), ended
 
 
 def _parent(parent: str | Mailbox, task: Task, trials: int) -> Mailbox | None:
