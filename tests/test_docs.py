@@ -74,3 +74,17 @@ def test_links_lead_somewhere() -> None:
         if link and "://" not in link and not (page.parent / link).exists()
     ]
     assert dead == []
+
+
+PATH = re.compile(r"`((?:[a-z_0-9]+/)+(?:[a-z_0-9]+\.(?:py|svg|js|html))?)(?:::(\w+))?`")
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/architecture.md"])
+def test_every_path_that_a_map_names_is_there(page: str) -> None:
+    named = PATH.findall((ROOT / page).read_text(encoding="utf-8"))
+    assert len(named) > 10
+    assert [path for path, _name in named if not (ROOT / path).exists()] == []
+    sources = [((ROOT / path).read_text(encoding="utf-8"), name) for path, name in named if name]
+    assert [
+        name for text, name in sources if not re.search(rf"^(?:def|class) {name}\b", text, re.MULTILINE)
+    ] == []
