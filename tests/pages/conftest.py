@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,12 @@ FLAGS = (
     "--disable-component-update",
     "--disable-sync",
 )
+
+
+@pytest.fixture(autouse=True)
+def patient_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker gives its sign of life once in these tests; a slow machine must not make it a silent one."""
+    monkeypatch.setattr("parenting.server.reads.schemas.SILENT_AFTER", timedelta(days=1))
 
 
 @pytest.fixture
