@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from pydantic import ValidationError
-from pydantic_core import ErrorDetails
 from torch import Tensor
 
 from parenting.agent.config import Config, compose
@@ -109,7 +108,7 @@ def _settings(world: World) -> dict[str, object]:
     return found
 
 
-def _sentence(error: ErrorDetails, given: Mapping[str, object]) -> str:
+def _sentence(error: Any, given: Mapping[str, object]) -> str:
     name = str(error["loc"][0])
     return f"{name}={given.get(name)!r}: {error['msg']}. {Config.model_fields[name].description}"
 

@@ -90,3 +90,17 @@ def test_the_page_speaks_of_every_public_name() -> None:
     described |= {"Tick", "TrainResult", "World", "Level", "Policy", "Query"}
     missing = {name for name in pt.__all__ if f"pt.{name}" not in PAGE}
     assert missing <= described, missing - described
+
+
+def test_the_lines_of_the_readme_run(empty_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All but the last, which waits for a person."""
+    (body,) = re.findall(
+        r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(encoding="utf-8"), re.M | re.S
+    )
+    *lines, last = body.splitlines()
+    assert "parent=pt.Person()" in last
+    exec(compile("\n".join(lines), "README.md", "exec"), {"__name__": "__main__"})
+    said = capsys.readouterr().out
+    assert "'finished': 1.0" in said
+    assert "cost=0.0" in said
+    assert (empty_folder / "island.safetensors").is_file()
