@@ -1,3 +1,4 @@
-"""PARENTING, the algorithm of Sec. 2. Start reading at `agent.parenting`. (Imports no torch here: see
-tests/test_layers.py.)
+"""PARENTING, the algorithm of Sec. 2.
+
+Start reading at `agent.parenting`. This file imports no torch: see tests/test_layers.py.
 """

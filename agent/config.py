@@ -1,5 +1,6 @@
-"""Every hyperparameter, one sentence each. The same object serves command line, database and web form. No
-torch here.
+"""Every hyperparameter, one sentence each.
+
+The same object serves the command line, the database and the web form. This file imports no torch.
 """
 
 from __future__ import annotations

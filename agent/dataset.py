@@ -18,8 +18,9 @@ from parenting.envs.struct import Struct
 
 
 class Dataset(Struct):
-    """Distinct states, and rows in the order of their first entry. What lies beyond `states` and `rows` is
-    zero.
+    """Distinct states, and rows in the order of their first entry.
+
+    Elements beyond `states` and `rows` are zero.
     """
 
     s0: UInt8[Tensor, "N S H W"]  # the first states, as observed
@@ -34,7 +35,7 @@ class Dataset(Struct):
 
 
 class Entry(Struct):
-    """What Eq. (2) sees of one answered query."""
+    """The part of one answered query that enters Eq. (2)."""
 
     s0: UInt8[Tensor, "N H W"]
     local_state: UInt8[Tensor, "N 4"]

@@ -1,5 +1,6 @@
-"""What an operator may do to a living agent: each event applies before one tick, is recorded with it, and
-replays.
+"""The operator's events: what an operator may do to a running agent.
+
+Each event applies before one tick, is recorded with that tick, and is repeated in a replay.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""How well the agent knows its surroundings: f(l), the number of guidance queries already made in l(s) (Sec.
-2.1).
-"""
+"""Familiarity f(l): the number of guidance queries already made in the local state l(s) (Sec. 2.1)."""
 
 from __future__ import annotations
 
@@ -10,7 +8,7 @@ from torch import Tensor
 
 
 def n_local_states(codes: int) -> int:
-    """How many local states there are: each of the 4 cells within reach holds one of `codes` things."""
+    """The number of local states: each of the 4 cells within reach holds one of `codes` things."""
     return int(codes**4)
 
 

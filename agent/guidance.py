@@ -19,7 +19,10 @@ NO_ACTION = -1
 
 
 class View(Struct):
-    """What a trial sees and would do now; the policy does not change between asking and acting."""
+    """Each trial's observation and policy at this tick.
+
+    The policy does not change between asking and acting.
+    """
 
     observation: UInt8[Tensor, "N H W"]
     local_state: UInt8[Tensor, "N 4"]
@@ -29,7 +32,7 @@ class View(Struct):
 
 
 class Heard(Struct):
-    """What the answers of this tick mean for the pause."""
+    """The effect of this tick's answers on the pause."""
 
     approved: Int64[Tensor, "N"]  # the action to perform, or NO_ACTION
     redraw: Bool[Tensor, "N"]  # *neither*: ask about other actions in this same tick
@@ -84,8 +87,9 @@ def _resolve(state: AgentState, query: Query, choice: Tensor, guided: Tensor) ->
 def ask(
     world: Gridworld, config: Config, state: AgentState, view: View, heard: Heard, query: Query
 ) -> tuple[AgentState, Query]:
-    """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi; redraw after
-    *neither*.
+    """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi.
+
+    After *neither*, draw two other actions.
     """
     undecided = view.supervised & ~state.waiting & (heard.approved == NO_ACTION)
     if not bool((undecided | heard.redraw).any()):

@@ -120,11 +120,11 @@ class Network:
 
     @cached_property
     def sizes(self) -> list[int]:
-        """How many weights and how many biases the layers have, by turns."""
+        """The numbers of weights and biases of each layer, alternating."""
         return [size for layer in self.layers for size in (layer.fan_in * layer.fan_out, layer.fan_out)]
 
     def init_params(self, keys: Keys, dtype: torch.dtype) -> Float[Tensor, "N P"]:
-        """Glorot uniform weights and zero biases, drawn from the trials' keys (ours, as TensorFlow 1.12)"""
+        """Glorot uniform weights and zero biases, drawn from the trials' keys (ours, as TensorFlow 1.12)."""
         parameters = torch.zeros(keys.seed.shape[0], self.size, dtype=dtype, device=keys.seed.device)
         for number, layer in enumerate(self.layers):
             bound = sqrt(6 / sum(layer.glorot_fans))

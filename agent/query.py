@@ -1,6 +1,4 @@
-"""What the agent asks and what it hears: two clips, and *left*, *right*, *either* or *neither* (Sec. 2.1,
-2.2, Eq. 1).
-"""
+"""Queries and answers: two clips, and *left*, *right*, *either* or *neither* (Sec. 2.1, 2.2, Eq. 1)."""
 
 from __future__ import annotations
 
@@ -14,9 +12,7 @@ from parenting.envs.struct import Struct
 
 
 class QueryKind(IntEnum):
-    """What a query is: none this tick, guidance before a move (Sec. 2.1), or a preference between clips (Sec.
-    2.2).
-    """
+    """The kind of a query: none, guidance before a move (Sec. 2.1), or a preference (Sec. 2.2)."""
 
     NONE = 0
     GUIDANCE = 1
@@ -53,8 +49,9 @@ class Query(Struct):
 
 
 class Answer(Struct):
-    """The parent's answers, each with the query that it answers (a preference may be answered many ticks
-    later).
+    """The parent's answers, each with the query that it answers.
+
+    A preference may be answered many ticks after it was asked.
     """
 
     query: Query
@@ -62,8 +59,9 @@ class Answer(Struct):
 
     @property
     def mu(self) -> Float64[Tensor, "N 2"]:
-        """Eq. (1): [1, 0] for left, [0, 1] for right, [0.5, 0.5] for either; zeros where nothing is to be
-        learnt.
+        """Return mu of Eq. (1): [1, 0] for left, [0, 1] for right, [0.5, 0.5] for either.
+
+        It is zero where there is nothing to learn.
         """
         return _MU.to(self.choice.device)[self.choice]
 

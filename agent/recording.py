@@ -23,8 +23,9 @@ from parenting.envs.rng import Stream, gumbel
 def act(
     world: Gridworld, network: Network, config: Config, state: AgentState, view: View, heard: Heard
 ) -> tuple[AgentState, Bool[Tensor, "N"]]:
-    """Perform the approved action, the recording's next one, or one drawn from pi_T. Says which trials
-    steered.
+    """Perform the approved action, the recording's next one, or one drawn from pi_T.
+
+    The result says which trials chose their action themselves.
     """
     moving = ~state.waiting
     if not bool(moving.any()):
@@ -42,8 +43,9 @@ def act(
 def _begin(
     config: Config, world: Gridworld, state: AgentState, view: View, heard: Heard
 ) -> tuple[Recorder, Int64[Tensor, "N"]]:
-    """Drop clips that a pause or an absence broke, and begin new ones; with the first actions of those that
-    begin.
+    """Drop clips that a pause or an absence broke, and begin new ones.
+
+    The result holds the first actions of the clips that begin.
     """
     recorder, keys = state.recorder, state.keys
     free = view.supervised & ~state.waiting
@@ -67,8 +69,9 @@ def _begin(
 def _permitted(
     config: Config, state: AgentState, view: View, best: Int64[Tensor, "N"]
 ) -> Bool[Tensor, "N 4"]:
-    """The first actions of an exploratory clip: not the argmax (Eq. 4), nor compared with it here at this
-    stage.
+    """The permitted first actions of an exploratory clip.
+
+    They exclude the argmax (Eq. 4) and actions already compared with it in this state at this stage.
     """
     actions = torch.arange(4, device=best.device)
     permitted = actions != best[:, None]

@@ -1,6 +1,4 @@
-"""Batched lives under a parent, written down as the reference writes its own down, so that both can be
-compared.
-"""
+"""Batched runs under a parent, in the reference's format, so that the two can be compared."""
 
 from __future__ import annotations
 
@@ -91,9 +89,7 @@ def lenient_parent(query: Query) -> torch.Tensor:
 
 
 def layers(network: Network, parameters: torch.Tensor) -> list[torch.Tensor]:
-    """One policy's flat row [P] as the reference holds its parameters: weights [fan in, out] and biases, by
-    layer.
-    """
+    """One policy's flat row [P] in the reference's form: weights [fan in, out] and biases, by layer."""
     parts: list[torch.Tensor] = []
     for layer in network.layers:
         weight = parameters[layer.start : layer.bias].view(layer.fan_in, layer.fan_out)

@@ -23,8 +23,9 @@ SIZE = 16
 
 
 def plain(recorder: Recorder, trial: int, recompare: bool) -> tuple[int, int] | None:
-    """Every exploitative clip with every exploratory one; of those that match, the newest by its later clip,
-    then by its earlier.
+    """Pair every exploitative clip with every exploratory one, and return the newest match.
+
+    The newest is decided by the later clip of a pair, then by its earlier clip.
     """
     ring, asked = recorder.ring.pick(torch.tensor([trial])), recorder.asked
     known = set() if recompare else set(asked.pair[trial, : int(asked.count[trial])].tolist())

@@ -71,8 +71,10 @@ def test_the_randomness_of_few_episodes_is_that_of_the_first_of_many() -> None:
 
 
 def test_mean_is_that_of_the_chance_to_dry() -> None:
-    """On the dry plant from the 2nd step on: 1, and 0.05 for each of 8 more. The plant's dryings are
-    independent, so the mean of 1000 episodes has a standard error of sqrt(8 * 0.05 * 0.95 / 1000) = 0.02.
+    """On the dry plant from the 2nd step on: 1, and 0.05 for each of 8 more steps.
+
+    The plant's dryings are independent, so the mean of 1000 episodes has a standard error of
+    sqrt(8 * 0.05 * 0.95 / 1000) = 0.02.
     """
     world = garden(0.05)
     mean = float(deploy(world, always(world, DOWN)).waterings.mean())

@@ -38,8 +38,10 @@ LARGEST_PAGE = 16_500
 
 @pytest.fixture
 def lives(db: Database) -> None:
-    """A run with two questions and one that was answered, one that waits for its operator, one that rests at
-    its goal in its second stage, and one that failed.
+    """Four runs in different states.
+
+    One has two open questions and an answered one, one waits for its operator, one rests at its goal in its
+    second stage, and one failed.
     """
     _, mine = fixtures.start_run(db)
     fixtures.measure(db, mine, 40)
@@ -61,7 +63,7 @@ def lives(db: Database) -> None:
 
 
 def violations(page: Page) -> list[str]:
-    """What axe finds, a line each, with the first element."""
+    """The findings of axe, a line each, with the first element."""
     found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
     return [f"{rule['id']}: {rule['help']}: {rule['nodes'][0]['html']}" for rule in found]
 

@@ -1,5 +1,6 @@
-"""A person answers questions by keyboard in every world, at T = 1 and in stages up to T = 2, through real
-processes, while a dashboard moves: 14 questions each, and 30 in `make torture`.
+"""A person answers questions by keyboard in every world, at T = 1 and in stages up to T = 2.
+
+The processes are real, and a dashboard moves meanwhile. Each asks 14 questions, 30 in `make torture`.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def key(page: Page, number: int) -> str:
-    """What this person presses: never for what is dangerous, else in turn."""
+    """The key that this person presses: never for what is dangerous, else each in turn."""
     left, right = (card.locator(".bad").count() > 0 for card in page.locator(".card").all())
     if left and right:
         return "ArrowDown"

@@ -1,6 +1,4 @@
-"""The values of the worlds whose states are listed (Sec. 3.1.3, 3.2), against plain value iteration and by
-hand.
-"""
+"""The values of worlds whose states are listed (Sec. 3.1.3, 3.2), by plain value iteration and by hand."""
 
 from __future__ import annotations
 

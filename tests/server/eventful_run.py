@@ -1,5 +1,6 @@
-"""A run raised by hand, over HTTP: a person at the browser, an operator at the dashboard, a worker that is
-killed once.
+"""A run over HTTP in which everything happens once.
+
+A person answers in the browser, an operator uses the dashboard, and the worker is killed once.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class PersonAndOperator:
 
 
 def raise_eventful_run(db: Database, web: httpx2.Client) -> int:
-    """What can happen to a run, at odd moments."""
+    """The events that can happen to a run, at odd moments."""
     people = PersonAndOperator(db, web)
     people.live_to(9)
     people.operate("goal", goal=1000)

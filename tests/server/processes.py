@@ -1,5 +1,7 @@
-"""Commands as processes that start at once: a server of forks loads torch once, and each command is a fork of
-it that runs `parenting ...` as a shell would. All of them stop when the test's process is gone.
+"""Commands as processes that start at once.
+
+A server of forks loads torch once, and each command is a fork of it that runs `parenting ...` as a shell
+would. All of them stop when the test's process is gone.
 """
 
 from __future__ import annotations
@@ -65,7 +67,7 @@ class Command:
         return int(self.process.exitcode)
 
     def said(self) -> str:
-        """What it has printed."""
+        """The text that it has printed."""
         return self.output.read_text(encoding="utf-8") if self.output.exists() else ""
 
     @property

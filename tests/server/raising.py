@@ -35,7 +35,7 @@ SEED = 11
 
 
 class Begun(NamedTuple):
-    """What a run is started with, worked out here and not by the server."""
+    """The settings that a run is started with, worked out here and not by the server."""
 
     world: str
     level: str
@@ -75,8 +75,9 @@ ISLAND = Begun("unsafe-exploration", "island", CONFIG)
 
 
 class Inline:
-    """The run without a database, under the scripted parent in tensors or under another. It ends hopeless
-    episodes.
+    """The run without a database, under the scripted parent in tensors or under another.
+
+    It ends hopeless episodes.
     """
 
     def __init__(self, begun: Begun = ISLAND, seed: int | None = None, judge: Judge | None = None) -> None:

@@ -1,5 +1,6 @@
-"""Checkpoints at chosen moments: the run goes on with the same bits, and would not if any piece were left
-out.
+"""Checkpoints at chosen moments: the run goes on with the same bits.
+
+It would not if any piece of the checkpoint were left out.
 """
 
 from __future__ import annotations
@@ -140,9 +141,7 @@ CONSTANT = {
 
 @pytest.mark.parametrize("piece", pieces())
 def test_no_piece_can_be_left_out(piece: str) -> None:
-    """Put the piece's value at birth (of another seed) in its place: at some moment the run must come out
-    otherwise.
-    """
+    """Replace the piece by its initial value (of another seed): at some moment the run must then differ."""
     part, name = piece.split("/")
     caught, varied = False, False
     for then in map(moment, MOMENTS):

@@ -1,6 +1,7 @@
-"""A run in each world and built-in level, from its start to a checkpoint: raised by a script behind the
-database, and by a parent who knows nothing but the lease reply. Each equals the run in tensors. (Those at
-T = 1, and each world's first level through HTTP, are in test_same_bits.py.)
+"""A run in each world and built-in level, from its start to a checkpoint.
+
+It is trained by a script behind the database, and by a parent who knows nothing but the lease reply. Each
+equals the run in tensors. Runs at T = 1, and each world's first level through HTTP, are in test_same_bits.py.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""SIGKILL of web, worker and the answering scripts while they raise a run in every world: no answer is lost,
-none is counted twice, and the bits are those of runs that nobody disturbed.
+"""SIGKILL of web, worker and the answering scripts while they train a run in every world.
+
+No answer is lost, none is counted twice, and the bits are those of runs that nobody disturbed.
 
 Every CI run kills 24 times; `make torture` kills 240 times, in ten rounds with other moments each. By hand, a
 hundred rounds, 2,400 kills in about an hour:
@@ -86,7 +87,7 @@ class House:
         self.killed[kind] += 1
 
     def receipts(self) -> Iterator[dict[str, Any]]:
-        """What the server has told: a line was written after its reply was read to the end."""
+        """The lines that the server has sent: a line was written after its reply was read to the end."""
         for file in self.receipt_files.values():
             if file.exists():
                 yield from map(json.loads, file.read_text(encoding="utf-8").splitlines())

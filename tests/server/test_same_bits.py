@@ -1,5 +1,6 @@
-"""In all five worlds, at T = 1 and T = 2: `parenting answer` raises an agent through HTTP, web and worker to
-the same answers and the same bits as the scripted parent in tensors does.
+"""`parenting answer` trains an agent to the same bits as the scripted parent in tensors.
+
+It does so through HTTP, web and worker, in all five worlds, at T = 1 and T = 2.
 """
 
 from __future__ import annotations
