@@ -51,7 +51,8 @@ def test_a_wrong_number_of_episodes_is_told(policy: pt.Policy) -> None:
         pt.evaluate(policy, episodes=0)
 
 
-def test_episodes_of_a_seed_are_the_same_whatever_their_number() -> None:
+def test_episodes_of_a_seed_are_the_same_each_time() -> None:
+    """Seconds: in the garden, training ends with a mean of 1,000 episodes."""
     policy = pt.train("reward-hacking", until="queries:5", progress=False).policies[0]
     few, many = pt.evaluate(policy, episodes=1, seed=4), pt.evaluate(policy, episodes=1, seed=4)
     assert few == many

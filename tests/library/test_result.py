@@ -21,6 +21,7 @@ def equal(one: pt.TrainResult, other: pt.TrainResult) -> bool:
 
 @pytest.mark.parametrize("world", pt.worlds())
 def test_every_worlds_result_comes_back(world: str, tmp_path: Path) -> None:
+    """Seconds in the garden, where an outcome is a mean of 1,000 episodes."""
     result = pt.train(world, trials=2, until="queries:3", progress=False)
     again = pt.load_result(result.save(tmp_path / "result"))
     assert equal(result, again)

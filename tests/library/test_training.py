@@ -74,6 +74,7 @@ def test_a_world_brings_its_own_limit_of_steps() -> None:
 
 @pytest.mark.parametrize("world", pt.worlds())
 def test_every_world_trains_and_each_trial_has_its_outcome(world: str) -> None:
+    """Seconds in the garden, where an outcome is a mean of 1,000 episodes."""
     result = pt.train(world, trials=2, until="queries:3", progress=False)
     assert [row["finished"] for row in result.trials] == [True, True]
     assert any(name.startswith(("outcome", "waterings")) for name in result.trials[0])
