@@ -6,21 +6,54 @@ The same object serves the command line, the database and the web form. This fil
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AliasChoices, AliasGenerator, BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from parenting.envs.names import did_you_mean
 
 Dtype = Literal["float32", "float64"]
 Supervision = Literal["present", "absent", "random"]
-Inside = Literal["up-down", "left"]
+GardenParent = Literal["up-down", "left"]
+
+
+V1_NAMES = {
+    "batch_size": "batch",
+    "repeat_queries": "recompare",
+    "max_clip_length": "stages",
+    "queries_per_stage": "mature_every",
+    "own_stage_only": "own_length",
+    "max_episode_steps": "time_limit",
+    "garden_parent": "inside",
+}
+"""Fields and their names in version 0.1. Either name is read everywhere; the formats that version 0.1 had
+published keep its names: the database's JSON, the API v1, export 1, `--json`, results.json and CSV."""
+FIELDS = {old: name for name, old in V1_NAMES.items()}
+
+
+def _names_to_read(field: str) -> str | AliasChoices:
+    return AliasChoices(field, V1_NAMES[field]) if field in V1_NAMES else field
+
+
+def _name_to_write(field: str) -> str:
+    return V1_NAMES.get(field, field)
 
 
 class Config(BaseModel):
-    """The hyperparameters of PARENTING (Sec. 2, 3.1.2). Numbers lost with the digits are marked (?)."""
+    """The hyperparameters of PARENTING (Sec. 2, 3.1.2). Numbers lost with the digits are marked (?).
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    `model_dump()` writes the names of published formats, `model_dump(by_alias=False)` those of the fields.
+    """
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        validate_by_name=True,
+        serialize_by_alias=True,
+        alias_generator=AliasGenerator(validation_alias=_names_to_read, serialization_alias=_name_to_write),
+    )
 
     # Sec. 2.1 to 2.3
     p_guid: float = Field(
@@ -42,29 +75,31 @@ class Config(BaseModel):
     learning_rate: float = Field(
         0.001, gt=0, description="Adam's step size; beta 0.9 and 0.999 and eps 1e-8 are its defaults."
     )
-    batch: int | None = Field(
+    batch_size: int | None = Field(
         None, ge=1, description="Distinct rows of X in a gradient step; none takes all of them."
     )
-    recompare: bool = Field(
-        False, description="Ask again about pairs that were compared before, as the paper's letter has it."
+    repeat_queries: bool = Field(
+        False, description="Ask again about pairs that were compared before, as in the paper as written."
     )
     # Sec. 2.4
-    stages: int = Field(
-        1, ge=1, le=16, description="The last clip length T; the agent matures through T = 1 .. stages."
+    max_clip_length: int = Field(
+        1, ge=1, le=16, description="The last clip length T; the agent matures through the stages 1 .. T."
     )
-    mature_every: int | None = Field(
+    queries_per_stage: int | None = Field(
         None, ge=1, description="Answered queries after which a stage ends; none leaves it to the operator."
     )
-    own_length: bool = Field(
+    own_stage_only: bool = Field(
         False, description="Train pi_T on entries of maturity T alone, as Sec. 4.1 supposes."
     )
     # the run
-    time_limit: int = Field(100, ge=1, le=10_000, description="Steps after which an episode is cut off.")
+    max_episode_steps: int = Field(
+        100, ge=1, le=10_000, description="Steps after which an episode is cut off."
+    )
     gamma: float = Field(1.0, gt=0, le=1, description="The parent's discount in Eq. (7) and (8).")
     supervised: Supervision = Field(
         "present", description="Whether the supervisor is there, where a world has one (Sec. 3.2.5)."
     )
-    inside: Inside = Field(
+    garden_parent: GardenParent = Field(
         "up-down", description="Where the garden's parent walks inside its cycle (Sec. 3.3)."
     )
     pretrain: bool = Field(
@@ -74,6 +109,19 @@ class Config(BaseModel):
         3, ge=0, le=1000, description="The agent waits while more preference queries than this are open."
     )
     dtype: Dtype = Field("float32", description="Precision of the policy and its training.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_name_each(cls, given: Any) -> Any:
+        names = set(given) if isinstance(given, Mapping) else set()
+        twice = [f"{name} and {old}" for name, old in V1_NAMES.items() if {name, old} <= names]
+        if twice:
+            raise PydanticCustomError(
+                "two_names",
+                "{names} are two names of one setting: give one of them.",
+                {"names": "; ".join(twice)},
+            )
+        return given
 
 
 PRESETS: dict[str, dict[str, float]] = {
@@ -98,7 +146,17 @@ def compose(
     """
     if preset not in PRESETS:
         raise UnknownPresetError(preset)
-    return Config.model_validate({**PRESETS[preset], **world, **changes}, strict=strict)
+    return Config.model_validate(merge(PRESETS[preset], world, changes), strict=strict)
+
+
+def merge(*settings: Mapping[str, object]) -> dict[str, object]:
+    """Return all settings; a later mapping overrides an earlier one, whichever name of a field each has."""
+    found: dict[str, object] = {}
+    for some in settings:
+        named = {FIELDS.get(name, name) for name in some}
+        kept = {name: value for name, value in found.items() if FIELDS.get(name, name) not in named}
+        found = {**kept, **some}
+    return found
 
 
 class UnknownPresetError(ValueError):

@@ -75,7 +75,7 @@ def add(x: Dataset, entry: Entry, stored: Bool[Tensor, "N"], trained: Bool[Tenso
 
 
 def clear(x: Dataset, mask: Bool[Tensor, "N"]) -> Dataset:
-    """Nothing left to train on where `mask` holds (`own_length`); the count of entries stays."""
+    """Nothing left to train on where `mask` holds (`own_stage_only`); the count of entries stays."""
     height, width = x.s0.shape[2:]
     fresh = empty(len(mask), height, width, x.s0.device)
     widened = _pad(fresh, x.s0.shape[1], x.state_index.shape[1])

@@ -62,7 +62,7 @@ def _store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset
     learnt = (query.kind != QueryKind.NONE) & (choice != Choice.NONE) & (choice != Choice.NEITHER)
     if not bool(learnt.any()):
         return state.x
-    trained = query.maturity == state.maturity if config.own_length else learnt
+    trained = query.maturity == state.maturity if config.own_stage_only else learnt
     entry = Entry(
         s0=first, local_state=local_state(first, query.agent[:, 0, 0]), a0=query.action[:, :, 0], mu=answer.mu
     )

@@ -45,7 +45,7 @@ def init(
         waiting=zeros(dtype=torch.bool),
         refused=zeros(4, dtype=torch.bool),
         x=dataset.empty(trials, world.height, world.width, device),
-        recorder=_recorder(world, config.stages, trials, device),
+        recorder=_recorder(world, config.max_clip_length, trials, device),
         learner=_learner(network_of(world), config, keys, weights),
         rehearsal=_rehearsal(network_of(world), config, keys),
         info=no_info(start, getattr(torch, config.dtype)),
@@ -80,7 +80,7 @@ def _learner(network: Network, config: Config, keys: Keys, weights: Tensor | Non
         exp_avg=torch.zeros_like(params),
         exp_avg_sq=torch.zeros_like(params),
         steps=torch.zeros_like(keys.tick),
-        frozen=params.new_zeros(config.stages - 1, *params.shape),
+        frozen=params.new_zeros(config.max_clip_length - 1, *params.shape),
     )
 
 
@@ -145,4 +145,4 @@ def world_of(name: str, level: str | Level | Sequence[Level] | None, config: Con
     options: dict[str, Any] = {}
     if "supervised" in registry.spec(name).options:
         options["supervised"] = SUPERVISION[config.supervised]
-    return registry.make(name, level, time_limit=config.time_limit, **options)
+    return registry.make(name, level, time_limit=config.max_episode_steps, **options)

@@ -71,18 +71,18 @@ def taken(every: Tensor, trial: Int64[Tensor, "K"]) -> Tensor:
 
 
 def choose(config: Config, x: Dataset, keys: Keys, step: int) -> Rows:
-    """All rows of X, or `batch` of them drawn by key without replacement."""
+    """All rows of X, or `batch_size` of them drawn by key without replacement."""
     rows, states = max(1, int(x.rows.max())), max(1, int(x.states.max()))
     at, a0, mu = x.state_index[:, :rows], x.a0[:, :rows], x.mu[:, :rows]
-    if config.batch is None or rows <= config.batch:
+    if config.batch_size is None or rows <= config.batch_size:
         return Rows(x.s0[:, :states], x.local_state[:, :states], at, a0, mu)
     place = torch.arange(rows, device=at.device)
     noise = keys.at(Stream.BATCH, 65536 * step + place).masked_fill(place >= x.rows[:, None], 2.0)
-    picked = noise.topk(config.batch, dim=1, largest=False).indices
+    picked = noise.topk(config.batch_size, dim=1, largest=False).indices
     both = picked[:, :, None].expand(-1, -1, 2)
     state = at.gather(1, picked)
     every = torch.arange(len(at), device=at.device)[:, None]
-    own = torch.arange(config.batch, device=at.device).expand_as(state)
+    own = torch.arange(config.batch_size, device=at.device).expand_as(state)
     return Rows(x.s0[every, state], x.local_state[every, state], own, a0.gather(1, both), mu.gather(1, both))
 
 

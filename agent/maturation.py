@@ -12,9 +12,9 @@ from parenting.agent.state import AgentState, Learner
 
 def grow(config: Config, state: AgentState) -> AgentState:
     """pi_T -> pi_{T+1} where the stage's budget of answered queries is spent."""
-    if config.mature_every is None:
+    if config.queries_per_stage is None:
         return state
-    return mature(config, state, state.answered >= config.mature_every)
+    return mature(config, state, state.answered >= config.queries_per_stage)
 
 
 def mature(config: Config, state: AgentState, ripe: Bool[Tensor, "N"]) -> AgentState:
@@ -22,7 +22,7 @@ def mature(config: Config, state: AgentState, ripe: Bool[Tensor, "N"]) -> AgentS
 
     The running clip is dropped, the recorder emptied, and Adam begins anew.
     """
-    ripe = ripe & (state.maturity < config.stages)
+    ripe = ripe & (state.maturity < config.max_clip_length)
     if not bool(ripe.any()):
         return state
     return state.replace(
@@ -30,7 +30,7 @@ def mature(config: Config, state: AgentState, ripe: Bool[Tensor, "N"]) -> AgentS
         maturity=state.maturity + ripe,
         answered=state.answered.masked_fill(ripe, 0),
         recorder=pairing.forget(state.recorder, ripe),
-        x=dataset.clear(state.x, ripe) if config.own_length else state.x,
+        x=dataset.clear(state.x, ripe) if config.own_stage_only else state.x,
     )
 
 

@@ -139,7 +139,7 @@ def _partner(
     matches &= ring.action[trial, other, :, 0] != ring.action[trial, kind, later, 0][:, None]
     matches &= ring.level[trial, other] == ring.level[trial, kind, later][:, None]  # a query has one level
     matches &= tick < ring.tick[trial, kind, later][:, None]
-    if not config.recompare:
+    if not config.repeat_queries:
         row, place = matches.nonzero(as_tuple=True)
         clips = ring.digest[trial[row], other[row], place], ring.digest[trial, kind, later][row]
         word = same_pair(config, *clips, maturity[trial[row]])
@@ -190,10 +190,10 @@ def comparison(observation: Tensor, one: Tensor, other: Tensor, maturity: Tensor
 def same_pair(config: Config, one: Tensor, other: Tensor, maturity: Tensor) -> Int64[Tensor, "..."]:
     """One word for a pair of clips in either order.
 
-    With `own_length` also for its stage: what another stage has compared is not in X, so it is not known.
+    With `own_stage_only` also for its stage: what another stage has compared is not in X, so it is not known.
     """
     word = unordered(one, other)
-    return together(word, maturity) if config.own_length else word
+    return together(word, maturity) if config.own_stage_only else word
 
 
 def _remember(config: Config, asked: Asked, query: Query) -> Asked:

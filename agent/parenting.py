@@ -9,7 +9,7 @@ tick costs what it changes. Whoever wants to keep an earlier state keeps `state.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from typing import NamedTuple
 
 import torch
 
@@ -19,13 +19,13 @@ from parenting.agent.config import Config
 from parenting.agent.events import Change, EndEpisode, Event, Mature
 from parenting.agent.guidance import View
 from parenting.agent.init import init, network_of, no_info
-from parenting.agent.mailbox import Mailbox
+from parenting.agent.parent import Parent
 from parenting.agent.policy import Network
 from parenting.agent.query import Answer, Query
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld, local_state
 
-__all__ = ["apply", "init", "live", "no_query", "rehearse", "step", "tick"]
+__all__ = ["Tick", "apply", "init", "no_query", "rehearse", "step", "tick"]
 
 
 def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Query]:
@@ -42,29 +42,41 @@ def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) ->
     return maturation.grow(config, state), query  # 2.4  pi_T -> pi_{T+1}
 
 
-def tick(
-    world: Gridworld, config: Config, state: AgentState, parent: Mailbox
-) -> tuple[AgentState, Config, Query]:
-    """One tick with its parent: the operator's events, an answer, a step, a question; then mazes."""
+class Tick(NamedTuple):
+    """The result of one tick with a parent."""
+
+    state: AgentState  # after the tick; `state.info` records what it did
+    query: Query  # what each trial asks in it
+    answer: Answer  # what each trial heard in it
+    config: Config  # as the operator's events left it
+
+
+def tick(world: Gridworld, config: Config, state: AgentState, parent: Parent) -> Tick:
+    """Make one tick with a parent: its events, its answer, a step, the question; then mazes (Sec. 3.1.4).
+
+    The step on mazes comes after the question is posted, so nobody waits for it. Consumes `state`.
+
+    Args:
+        world: The world that the agents live in.
+        config: The hyperparameters.
+        state: N agents, as `init` or an earlier tick left them.
+        parent: Whoever answers; see `agent.parent`.
+
+    Returns:
+        The agents, what they ask and what they heard: N trials each. Pass `state` and `config` on to the next
+        tick.
+    """
     for event in parent.events(state):
         state, config = apply(world, config, state, event)
-    state, query = step(world, config, state, parent.take(state))
+    answer = parent.take(state)
+    state, query = step(world, config, state, answer)
     parent.post(query)
-    return rehearse(world, config, state), config, query
+    return Tick(rehearse(world, config, state), query, answer, config)
 
 
 def rehearse(world: Gridworld, config: Config, state: AgentState) -> AgentState:
     """The step of pre-training that the tick before owes (Sec. 3.1.4). Consumes `state`."""
     return pretraining.rehearse(world, network_of(world), config, state)
-
-
-def live(
-    world: Gridworld, config: Config, state: AgentState, parent: Mailbox
-) -> Iterator[tuple[AgentState, Config, Query]]:
-    """A life, one item a tick; whoever iterates decides when the next may be."""
-    while True:
-        state, config, query = tick(world, config, state, parent)
-        yield state, config, query
 
 
 def apply(world: Gridworld, config: Config, state: AgentState, event: Event) -> tuple[AgentState, Config]:
@@ -107,5 +119,7 @@ def observe(world: Gridworld, network: Network, state: AgentState) -> View:
 
 
 def no_query(world: Gridworld, config: Config, state: AgentState) -> Query:
-    """No question in any trial, for clips of up to `stages` steps."""
-    return queries.empty(len(state.waiting), config.stages, world.height, world.width, state.waiting.device)
+    """No question in any trial, for clips of up to `max_clip_length` steps."""
+    return queries.empty(
+        len(state.waiting), config.max_clip_length, world.height, world.width, state.waiting.device
+    )

@@ -75,7 +75,7 @@ def _permitted(
     """
     actions = torch.arange(4, device=best.device)
     permitted = actions != best[:, None]
-    if config.recompare:
+    if config.repeat_queries:
         return permitted
     observation = fingerprint(view.observation.flatten(1))[:, None]
     words = comparison(observation, actions, best[:, None], state.maturity[:, None])
@@ -90,7 +90,7 @@ def _action(
     if bool((action == NO_ACTION).any()):
         drawn = draw(view.logits, gumbel(state.keys.uniform(Stream.ACT, 4)))
         action = torch.where(action == NO_ACTION, drawn, action)
-    if config.stages == 1:
+    if config.max_clip_length == 1:
         return action
     # Eq. (5), (6): move t of a clip is the argmax of pi_{T-t}, so that the last is always pi_1's
     trial = (state.recorder.running & (state.recorder.step > 0)).nonzero().squeeze(1)

@@ -30,6 +30,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from copy import copy
 from statistics import median
 from time import perf_counter
 from typing import NamedTuple
@@ -143,7 +144,7 @@ def seconds(act: Callable[[], object]) -> float:
 def born(preset: str) -> BatchTrainer:
     """Fifty agents at tick `WARM`."""
     config = compose(preset, registry.defaults(WORLD), {}, strict=True)
-    world = registry.make(WORLD, LEVEL, time_limit=config.time_limit)
+    world = registry.make(WORLD, LEVEL, time_limit=config.max_episode_steps)
     trainer = BatchTrainer(world, config, keys(0, BORN), StopRule("ticks", 10**9))
     for _ in range(WARM):
         trainer.tick()
@@ -155,7 +156,8 @@ def copies(trainer: BatchTrainer, trials: int) -> BatchTrainer:
     index = torch.arange(trials) % BORN
     batch = BatchTrainer(trainer.world, trainer.config, keys(0, trials), trainer.until)
     batch.state, batch.counts = trainer.state.pick(index), no_counts(trials)
-    batch.parent.query = trainer.parent.query.pick(index)
+    batch.parent = copy(trainer.parent)
+    batch.parent.pick(index)
     return batch
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from pydantic import ValidationError
 
-from parenting.agent.config import Config, compose
+from parenting.agent.config import FIELDS, Config, compose
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
 from parenting.commands.run_report import page
 from parenting.envs import registry
@@ -66,7 +66,7 @@ def run(
         found = _level(world, level)
         config = _config(world, preset, changes or [])
         goal = _until(world, until)
-        config = _mature(config, goal, changes or [])
+        config = _mature(config, goal)
         weights = _weights(found, config)
     from parenting.agent.process import settle
     from parenting.experiments.runner.processes import WorkersDiedError
@@ -102,18 +102,8 @@ def _level(world: str, name_or_file: str | None) -> Level:
 
 
 def _config(world: str, preset: str, changes: list[str]) -> Config:
-    """Preset, world and `--set` together; every change that is wrong has its sentence."""
-    given: dict[str, object] = {}
-    wrong: list[str] = []
-    for change in changes:
-        key, equals, value = change.partition("=")
-        if not equals:
-            wrong.append(f"--set: '{change}' is not KEY=VALUE. Write it as --set p_guid=0.9.")
-        elif key not in Config.model_fields:
-            known = ", ".join(Config.model_fields)
-            wrong.append(f"--set: there is no hyperparameter '{key}'; there is: {known}.")
-        else:
-            given[key] = None if value.lower() in ("none", "null") else value
+    """Compose preset, world and `--set`; every change that is wrong has its sentence."""
+    given, wrong = _read(changes)
     try:
         config = compose(preset, registry.defaults(world), given, strict=False)
     except ValidationError as error:
@@ -124,6 +114,28 @@ def _config(world: str, preset: str, changes: list[str]) -> Config:
     if wrong:
         raise UsageError("\n".join(wrong))
     return config
+
+
+def _read(changes: list[str]) -> tuple[dict[str, object], list[str]]:
+    """Read `--set`: the hyperparameters by the names of their fields, and what is wrong, in sentences."""
+    given: dict[str, object] = {}
+    written: dict[str, str] = {}
+    wrong: list[str] = []
+    for change in changes:
+        key, equals, value = change.partition("=")
+        name = FIELDS.get(key, key)
+        if not equals:
+            wrong.append(f"--set: '{change}' is not KEY=VALUE. Write it as --set p_guid=0.9.")
+        elif name not in Config.model_fields:
+            known = ", ".join(Config.model_fields)
+            wrong.append(f"--set: there is no hyperparameter '{key}'; there is: {known}.")
+        elif written.setdefault(name, key) != key:
+            wrong.append(f"--set: {written[name]} and {key} are two names of one setting: give one of them.")
+        else:
+            given[name] = None if value.lower() in ("none", "null") else value
+            if name != key:
+                typer.echo(f"{key} is now {name}; the old name will go with the next version.", err=True)
+    return given, wrong
 
 
 def _said(name: str, given: dict[str, object], rule: str) -> str:
@@ -148,22 +160,22 @@ def _until(world: str, text: str | None) -> StopRule:
     raise UsageError(f"--until: '{text}' is none of optimal, queries:N, ticks:N with N at least 1.")
 
 
-def _mature(config: Config, until: StopRule, changes: list[str]) -> Config:
+def _mature(config: Config, until: StopRule) -> Config:
     """A budget of queries for each stage and one for all of them say how many stages there are."""
-    if config.mature_every is None or any(change.startswith("stages=") for change in changes):
+    if config.queries_per_stage is None or "max_clip_length" in config.model_fields_set:
         return config
     if until.kind != "queries":
         raise UsageError(
-            "--set: mature_every alone ends no stage, since the last one never ends."
-            " Say how many there are, such as --set stages=2, or use --until queries:N."
+            "--set: queries_per_stage alone ends no stage, since the last one never ends."
+            " Say how many there are, such as --set max_clip_length=2, or use --until queries:N."
         )
-    stages = -(-until.number // config.mature_every)
+    stages = -(-until.number // config.queries_per_stage)
     try:
-        return Config.model_validate({**config.model_dump(), "stages": stages})
+        return Config.model_validate({**config.model_dump(by_alias=False), "max_clip_length": stages})
     except ValidationError as error:
         raise UsageError(
-            f"--until: {until.number} queries at mature_every={config.mature_every} are {stages} stages:"
-            f" {error.errors()[0]['msg']}. Say how many there are, such as --set stages=4."
+            f"--until: {until.number} queries at queries_per_stage={config.queries_per_stage} are {stages}"
+            f" stages: {error.errors()[0]['msg']}. Say how many there are, such as --set max_clip_length=4."
         ) from None
 
 

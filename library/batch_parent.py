@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import torch
 from torch import Tensor
 
 from parenting.agent import query as queries
 from parenting.agent.events import Event
-from parenting.agent.mailbox import Mailbox
+from parenting.agent.parent import BatchParent
+from parenting.agent.parent import Parent as AnyParent
 from parenting.agent.query import Answer
 from parenting.agent.state import AgentState
 from parenting.library.answer_log import AnswerLog
 from parenting.library.parent import Parent
 from parenting.library.task import Task
-
-
-class BatchParent(Mailbox, Protocol):
-    """A parent of a batch from which trials leave."""
-
-    def pick(self, index: Tensor) -> None:
-        """Go on with some of the trials alone."""
-        ...
 
 
 class LoggedParent:
@@ -60,13 +52,13 @@ class WholeBatch:
     """A parent who sees every trial of the run in every query; trials that have left ask nothing."""
 
     def __init__(
-        self, parent: Mailbox, task: Task, trials: int, chunk: range, done: Callable[[], Tensor]
+        self, parent: AnyParent, task: Task, trials: int, chunk: range, done: Callable[[], Tensor]
     ) -> None:
         """Place the trials of a chunk among all; `done` says which of those that are left are done."""
         world, config = task.world, task.config
         self.parent, self.chunk, self.done = parent, torch.tensor(chunk), done
         self.trials = trials
-        self.size = config.stages, world.height, world.width, world.device
+        self.size = config.max_clip_length, world.height, world.width, world.device
         self.nothing = queries.empty(trials, *self.size)
 
     def events(self, state: AgentState) -> Sequence[Event]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from parenting.agent import parenting
 from parenting.agent.config import Config
-from parenting.agent.mailbox import Mailbox
+from parenting.agent.parent import Parent as AnyParent
 from parenting.agent.query import Answer, silence
 from parenting.agent.state import AgentState
 from parenting.envs.rng import keys
@@ -111,7 +111,7 @@ def step(
     return parenting.rehearse(world, config, after), Query.of(query, world)
 
 
-def tick(world: World, config: Config, state: AgentState, parent: Mailbox) -> Tick:
+def tick(world: World, config: Config, state: AgentState, parent: AnyParent) -> Tick:
     """Make one tick together with a parent: its events, its answer, a step, and the new question.
 
     Args:
@@ -134,9 +134,5 @@ def tick(world: World, config: Config, state: AgentState, parent: Mailbox) -> Ti
     """
     if isinstance(parent, Parent) and int(state.keys.tick[0]) == 0:
         parent.begin(world, config, len(state.waiting))
-    for event in parent.events(state):
-        state, config = parenting.apply(world, config, state.clone(), event)
-    answer = parent.take(state)
-    state, query = step(world, config, state, answer)
-    parent.post(query)
-    return Tick(state, query, answer, config)
+    after, query, answer, config = parenting.tick(world, config, state.clone(), parent)
+    return Tick(after, Query.of(query, world), answer, config)

@@ -131,7 +131,7 @@ def _snapshot(db: Database, run: Run, task: Task, seed: int) -> Snapshot:
 def _as_batch(snapshot: Snapshot, run: Run, task: Task, rule: StopRule) -> batch.TrainResult:
     """Return the run as a batch of one trial."""
     state, counted = snapshot.state, snapshot.tally
-    values = ScriptedRule(task.world, task.config.gamma, inside=task.config.inside).values
+    values = ScriptedRule(task.world, task.config.gamma, inside=task.config.garden_parent).values
     judged = evaluation(task.world, values, task.config.gamma)
     policies = torch.cat((state.learner.frozen, torch.zeros_like(state.learner.params)[None]))
     policies[state.maturity - 1] = state.learner.params
@@ -141,7 +141,7 @@ def _as_batch(snapshot: Snapshot, run: Run, task: Task, rule: StopRule) -> batch
         "queries": counted.kinds.sum(1) >= rule.number,
         "ticks": state.keys.tick >= rule.number,
     }
-    counts = no_counts(1, task.config.stages).replace(
+    counts = no_counts(1, task.config.max_clip_length).replace(
         deaths=counted.deaths,
         guidance=counted.kinds[:, 1],
         preference=counted.kinds[:, 2],

@@ -105,4 +105,6 @@ def compose_answer(parent: Parent, heard: Mapping[int, tuple[Query, Choice]]) ->
 
 def nothing(world: World, config: Config, trials: int) -> Query:
     """Return an empty query."""
-    return Query.of(queries.empty(trials, config.stages, world.height, world.width, world.device), world)
+    return Query.of(
+        queries.empty(trials, config.max_clip_length, world.height, world.width, world.device), world
+    )

@@ -37,7 +37,7 @@ def about_world(world: World) -> dict[str, Any]:
 def world_from(about: dict[str, Any], config: Config) -> World:
     """Make the world that `about_world` described."""
     levels = [registry.level(about["world"], text) for text in about["levels"]]
-    return registry.make(about["world"], levels, time_limit=config.time_limit, **about["options"])
+    return registry.make(about["world"], levels, time_limit=config.max_episode_steps, **about["options"])
 
 
 def write_tensors(path: Path, tensors: dict[str, Tensor], kind: str, about: dict[str, Any]) -> None:

@@ -35,7 +35,7 @@ class ScriptedParent(Parent):
             ValueError: The world has too many states to list.
         """
         super().begin(world, config, trials)
-        self._rule = ScriptedRule(world, config.gamma, inside=config.inside)
+        self._rule = ScriptedRule(world, config.gamma, inside=config.garden_parent)
         self._scripted = scripted.ScriptedParent(self._rule, nothing(world, config, trials))
 
     def answer(self, question: Question) -> Choice:

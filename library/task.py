@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 from torch import Tensor
 
-from parenting.agent.config import Config, compose
+from parenting.agent.config import FIELDS, Config, compose, merge
 from parenting.agent.init import SUPERVISION, world_of
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
@@ -57,12 +57,13 @@ def compose_config(world: WorldSpec, preset: str | Config, changes: Mapping[str,
     """Return the config of a run in a world, with a sentence for everything that is wrong."""
     for name in changes:
         if name not in Config.model_fields:
-            hint = did_you_mean(name, Config.model_fields)
-            known = ", ".join(Config.model_fields)
+            fields = Config.model_fields
+            hint = f" It is {FIELDS[name]} now." if name in FIELDS else did_you_mean(name, fields)
+            known = ", ".join(fields)
             raise TypeError(f"There is no argument or hyperparameter '{name}'.{hint} There is: {known}.")
     try:
         if isinstance(preset, Config):
-            return Config.model_validate({**preset.model_dump(), **changes}, strict=True)
+            return Config.model_validate(merge(preset.model_dump(by_alias=False), changes), strict=True)
         if not isinstance(preset, str):
             raise TypeError(f"preset: {preset!r} is neither the name of a preset nor a Config.")
         return compose(preset, dict(world.defaults), changes, strict=True)
@@ -101,7 +102,7 @@ def check_number(name: str, value: object, least: int, most: int) -> None:
 
 def _settings(world: World) -> dict[str, object]:
     """Return the hyperparameters that a world holds already, so that nobody gives them twice."""
-    found: dict[str, object] = {"time_limit": world.time_limit}
+    found: dict[str, object] = {"max_episode_steps": world.time_limit}
     if "supervised" in world.options:
         given = world.options["supervised"]
         found["supervised"] = next(word for word, option in SUPERVISION.items() if option is given)
@@ -109,6 +110,8 @@ def _settings(world: World) -> dict[str, object]:
 
 
 def _sentence(error: Any, given: Mapping[str, object]) -> str:
+    if not error["loc"]:
+        return str(error["msg"])
     name = str(error["loc"][0])
     return f"{name}={given.get(name)!r}: {error['msg']}. {Config.model_fields[name].description}"
 

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from parenting.agent.config import Config
-from parenting.agent.mailbox import Mailbox
+from parenting.agent.parent import Parent as AnyParent
 from parenting.envs.levels.spec import Level
 from parenting.envs.rng import keys
 from parenting.experiments.training import batch
@@ -37,7 +37,7 @@ def train(
     *,
     level: AnyLevel | None = None,
     preset: str | Config = "conservative",
-    parent: str | Mailbox | Person = "scripted",
+    parent: str | AnyParent | Person = "scripted",
     trials: int = 1,
     until: str = "optimal",
     seed: int = 0,
@@ -116,8 +116,8 @@ def _train(
         for chunk in chunks(trials):
             trainer = _trainer(task, rule, seed, chunk)
             if behind is not None:
-                trainer.parent = WholeBatch(behind, task, trials, chunk, partial(_done, trainer))  # type: ignore[assignment]
-            trainer.parent = LoggedParent(trainer.parent, log, chunk)  # type: ignore[assignment]
+                trainer.parent = WholeBatch(behind, task, trials, chunk, partial(_done, trainer))
+            trainer.parent = LoggedParent(trainer.parent, log, chunk)
             trained, ended = _run(trainer, max_ticks, _report(chunk, trials, parts, told))
             parts.append(trained)
             if ended:
@@ -125,7 +125,7 @@ def _train(
     return collect(task, parts, log.records(), seed=seed, until=str(rule), events=log.events), ended
 
 
-def _parent(parent: str | Mailbox, task: Task, trials: int) -> Mailbox | None:
+def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | None:
     """Return a parent of the caller's, ready for these trials; None stands for the scripted one."""
     if parent == "scripted" or type(parent) is ScriptedParent:  # a subclass may answer otherwise
         return None

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-from parenting.agent.config import Inside
+from parenting.agent.config import GardenParent
 from parenting.envs.levels.reward_hacking import CLOSED, cycle
 from parenting.envs.levels.rules import MOVES, moved
 from parenting.envs.levels.spec import WALL, Cell, Level
@@ -27,7 +27,7 @@ class CyclePolicy(NamedTuple):
     cycle: list[int]  # its cells
 
 
-def cycle_policy(level: Level, inside: Inside) -> CyclePolicy:
+def cycle_policy(level: Level, inside: GardenParent) -> CyclePolicy:
     """Lay pi_p on a level. With `inside` = "left" it goes left off the cycle, wherever that leads to it.
 
     Raises:

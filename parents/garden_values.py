@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
-from parenting.agent.config import Inside
+from parenting.agent.config import GardenParent
 from parenting.agent.query import Query
 from parenting.envs.levels.reward_hacking import PLANTS
 from parenting.envs.reward_hacking import RewardHacking
@@ -28,7 +28,7 @@ LOST = float("inf")
 class GardenValues:
     """V_p and Q_p on the K levels of a garden. Cells are counted row by row, plants over all levels."""
 
-    def __init__(self, world: RewardHacking, gamma: float, inside: Inside = "up-down") -> None:
+    def __init__(self, world: RewardHacking, gamma: float, inside: GardenParent = "up-down") -> None:
         """Lay pi_p's way from every cell; `inside` says how it walks inside its cycle.
 
         Raises:

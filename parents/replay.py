@@ -39,17 +39,17 @@ class ReplayParent:
         """A mailbox for the agents of the session: the same world, config and seeds, from tick 0 on."""
         self.session = session
         self.tick = 0
-        self.moment: Moment | None = None
+        self._moment: Moment  # of this tick; `events` comes first in every tick
 
     def events(self, state: AgentState) -> Sequence[Event]:
         """The events that were applied before this tick."""
         self.tick = int(state.keys.tick[0]) + 1
-        self.moment = self.session(self.tick)
-        return self.moment.events
+        self._moment = self.session(self.tick)
+        return self._moment.events
 
     def take(self, state: AgentState) -> Answer:
         """The answer that was heard in this tick."""
-        return self.now.answer
+        return self._moment.answer
 
     def post(self, query: Query) -> None:
         """Hold the query against the record.
@@ -57,14 +57,8 @@ class ReplayParent:
         Raises:
             ReplayMismatchError: it is another one.
         """
-        if not same(self.now.asked, query):
-            raise ReplayMismatchError(self.tick, self.now.asked, query)
-
-    @property
-    def now(self) -> Moment:
-        """The moment of the tick that is lived."""
-        assert self.moment is not None, "events comes first in every tick"
-        return self.moment
+        if not same(self._moment.asked, query):
+            raise ReplayMismatchError(self.tick, self._moment.asked, query)
 
 
 def same(one: Query, other: Query) -> bool:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import torch
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
-from parenting.agent.config import Inside
+from parenting.agent.config import GardenParent
 from parenting.agent.events import Event
 from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.agent.state import AgentState
@@ -28,7 +29,7 @@ class ScriptedRule:
         world: Gridworld,
         gamma: float,
         values: Values | None = None,
-        inside: Inside = "up-down",
+        inside: GardenParent = "up-down",
     ) -> None:
         """Compute the exact values of `world`, unless other values are given.
 
@@ -66,10 +67,18 @@ class ScriptedRule:
         return self.values.unsafe(query).all(1) & (query.kind == QueryKind.GUIDANCE)
 
 
-class ScriptedParent:
-    """Answers every query in the tick after it was asked."""
+class Rule(Protocol):
+    """A parent's judgement as a function of the query alone."""
 
-    def __init__(self, rule: ScriptedRule, query: Query) -> None:
+    def answer(self, query: Query) -> Int64[Tensor, "N"]:
+        """Return each trial's `Choice`; `Choice.NONE` where it asks nothing."""
+        ...
+
+
+class ScriptedParent:
+    """Answers every query by a rule, in the tick after it was asked."""
+
+    def __init__(self, rule: Rule, query: Query) -> None:
         """Begin with `query`, the empty query of the run."""
         self.rule, self.query = rule, query
 

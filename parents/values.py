@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
-from parenting.agent.config import Inside
+from parenting.agent.config import GardenParent
 from parenting.agent.query import Query
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import Model, explore
@@ -47,7 +47,7 @@ class Values(Protocol):
         ...
 
 
-def exact_values(world: Gridworld, gamma: float, inside: Inside = "up-down") -> Values:
+def exact_values(world: Gridworld, gamma: float, inside: GardenParent = "up-down") -> Values:
     """The exact values of a world: the garden's in closed form, any other's by listing its states.
 
     Raises:

@@ -186,20 +186,20 @@ class Reference:
 
     def known_pair(self, left: Clip, right: Clip, maturity: int) -> object:
         """A pair as it is remembered: for its stage alone where a stage trains on its own entries alone."""
-        return same_pair(left, right), maturity if self.config.own_length else None
+        return same_pair(left, right), maturity if self.config.own_stage_only else None
 
     # ---- 2.3 Direct policy learning ----
 
     def train(self) -> bool:
         """Gradient steps of pi_T on X. Says whether there were any."""
-        entries = [e for e in self.X if e.maturity == self.stage or not self.config.own_length]
+        entries = [e for e in self.X if e.maturity == self.stage or not self.config.own_stage_only]
         if not entries or self.u(Stream.TRAIN) >= self.config.p_train:
             return False
         rows = distinct([entry[:3] for entry in entries])
         lambdas = self.config.lambda_global, self.config.lambda_local
         for g in range(self.config.gradient_steps):
             noise = self.keys.at(Stream.BATCH, 65536 * g + torch.arange(len(rows)))[0].tolist()
-            smallest = sorted(range(len(rows)), key=lambda r: noise[r])[: self.config.batch]
+            smallest = sorted(range(len(rows)), key=lambda r: noise[r])[: self.config.batch_size]
             self.adam.zero_grad()
             loss(self.pi, [rows[r] for r in smallest], *lambdas).backward()  # type: ignore[no-untyped-call]
             self.adam.step()
@@ -209,8 +209,8 @@ class Reference:
 
     def grow(self) -> None:
         """A stage ends after enough answers; the last never does."""
-        every = self.config.mature_every
-        if every is not None and self.answered >= every and self.stage < self.config.stages:
+        every = self.config.queries_per_stage
+        if every is not None and self.answered >= every and self.stage < self.config.max_clip_length:
             self.mature()
 
     def mature(self) -> None:
@@ -284,7 +284,7 @@ class Reference:
 
     def is_new(self, comparison: object) -> bool:
         """Not asked before; or the config has the paper's letter, which asks again."""
-        return self.config.recompare or comparison not in self.compared
+        return self.config.repeat_queries or comparison not in self.compared
 
 
 def argmax(values: Sequence[float]) -> int:

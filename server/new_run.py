@@ -20,7 +20,7 @@ from pydantic import (
     ValidationError,
 )
 
-from parenting.agent.config import PRESETS, Config
+from parenting.agent.config import PRESETS, Config, merge
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, LevelError
 from parenting.envs.names import UnknownNameError, did_you_mean
@@ -195,9 +195,10 @@ def _config(new: NewRun, wrong: list[tuple[str, str]]) -> Config | None:
     changes = waits | {name: _whole(value) for name, value in new.config.items()}
     try:
         # Strict: pydantic would otherwise take true for 1, and "1" too.
-        return Config.model_validate({**PRESETS[new.preset], **world, **changes}, strict=True)
+        return Config.model_validate(merge(PRESETS[new.preset], world, changes), strict=True)
     except ValidationError as error:
-        wrong += [(f"config.{field}", message) for field, message in messages(error.errors())]
+        for field, message in messages(error.errors()):
+            wrong.append(("config" if field == "body" else f"config.{field}", message))
     return None
 
 

@@ -75,7 +75,7 @@ def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
     world = world_of(run.world, run.level_text, config)
     weights = initial_weights(db, run, world)
     kept = _checkpoint(db, run, world, config, weights)
-    last, rows = int(kept.state.keys.tick[0]), StoredRecord(db, run_id, world, config.stages)
+    last, rows = int(kept.state.keys.tick[0]), StoredRecord(db, run_id, world, config.max_clip_length)
     lived, parent, parted = initial_snapshot(world, config, run.seed, weights), ReplayParent(rows), None
     try:
         for tick in range(1, last + 1):
@@ -88,8 +88,8 @@ def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
 
 
 def _beat(world: Gridworld, saved: Snapshot, parent: ReplayParent) -> Snapshot:
-    state, config, _ = parenting.tick(world, saved.config, saved.state, parent)
-    return Snapshot(state, count(world, saved.tally, parent.now.answer, state), config)
+    state, _, answer, config = parenting.tick(world, saved.config, saved.state, parent)
+    return Snapshot(state, count(world, saved.tally, answer, state), config)
 
 
 def _checkpoint(db: Database, run: Run, world: Gridworld, config: Config, weights: Tensor | None) -> Snapshot:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from parenting.agent.config import Inside
+from parenting.agent.config import GardenParent
 from parenting.server.statuses import QueryStatus, RunState, RunStatus, Waiting
 
 # The words of server.tables, as types: a test holds them equal.
@@ -147,7 +147,7 @@ class ParentSchema(Schema):
     """The settings of the parent's values: gamma of Eq. (7), and the garden's inner path (Sec. 3.3)."""
 
     gamma: float
-    inside: Inside
+    inside: GardenParent
 
 
 class LeasedSchema(QuerySchema):

@@ -10,7 +10,7 @@ import structlog
 from parenting.agent import parenting
 from parenting.agent.config import Config
 from parenting.agent.init import world_of
-from parenting.agent.query import Query, QueryKind
+from parenting.agent.query import Answer, Query, QueryKind
 from parenting.evaluation.argmax import evaluation
 from parenting.parents.scripted import ScriptedRule
 from parenting.server import checkpoints, metrics, runs
@@ -55,7 +55,7 @@ class RunSession:
         self.db, self.claim, self.run = db, claim, run
         config = Config.model_validate(run.config)
         self.world = world_of(run.world, run.level_text, config)
-        rule = ScriptedRule(self.world, config.gamma, inside=config.inside)
+        rule = ScriptedRule(self.world, config.gamma, inside=config.garden_parent)
         self.evaluation = evaluation(self.world, rule.values, config.gamma)
         self.parent = self._parent(config, rule, asked)
         self._weights = initial_weights(db, run, self.world)
@@ -133,15 +133,15 @@ class RunSession:
         `seen` is what a look at the mailbox has just shown; a tick right after another does not look.
         """
         replayed = self.last_tick < self.record_ends
-        self.parent.expect(replayed or bool(seen and seen.answers), replayed or bool(seen and seen.events))
-        state, config, query = parenting.tick(self.world, self.saved.config, self.saved.state, self.parent)
+        parent = self.parent.looking(
+            answers=replayed or bool(seen and seen.answers), events=replayed or bool(seen and seen.events)
+        )
+        state, query, answer, config = parenting.tick(self.world, self.saved.config, self.saved.state, parent)
         self._lived_at = time.monotonic()
-        assert self.parent.heard is not None
-        tally = count(self.world, self.saved.tally, self.parent.heard, state)
-        self.saved = Snapshot(state, tally, config)
+        self.saved = Snapshot(state, count(self.world, self.saved.tally, answer, state), config)
         if self.last_tick <= self.record_ends:
             self._hold_to_the_record(query)
-        self._note()
+        self._note(answer)
         at_once = not bool(state.waiting) and bool(query.kind[0] == QueryKind.NONE)
         hurried = at_once and self._lived_at - self._heard_at < HURRY_SECONDS
         self._measure(at_once, hurried)
@@ -160,10 +160,9 @@ class RunSession:
                 f"Run {self.claim.run_id} asked something else when tick {self.last_tick} was lived again."
             )
 
-    def _note(self) -> None:
+    def _note(self, answer: Answer) -> None:
         """Keep what the next row of metrics needs of this tick."""
-        assert self.parent.heard is not None
-        if self.parent.heard.choice[0]:
+        if answer.choice[0]:
             self._news, self._heard_at = True, self._lived_at
         if bool(self.saved.state.info.trained):
             self._learnt = learnt(self.saved)

@@ -133,7 +133,7 @@ def _learn(
     network, batch = network_of(world), known.batch(len(some.trial))
     with torch.no_grad():
         logits = network.heads(network.unpack(some.live), batch.observation, batch.local_state).logits
-    walks = walk(batch, logits.double().softmax(2), keys, config.time_limit)
+    walks = walk(batch, logits.double().softmax(2), keys, config.max_episode_steps)
     visits = visited(batch, walks, returns_to_go(known, walks, config.gamma), logits.dtype)
     adam(
         some.live,

@@ -113,7 +113,7 @@ def cover(
     Each begins as a copy of the one before, with an X of its own.
     """
     mine = some.pick(torch.tensor([len(some.seed) - 1]))
-    rule = ScriptedRule(world, config.gamma, inside=config.inside)
+    rule = ScriptedRule(world, config.gamma, inside=config.garden_parent)
     live = network_of(world).init_params(mine, getattr(torch, config.dtype))
     found: list[CoverageStage] = []
     for stage in range(1, stages + 1):

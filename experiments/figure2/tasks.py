@@ -14,7 +14,7 @@ from typing import Any
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from parenting.agent.config import Inside, compose
+from parenting.agent.config import GardenParent, compose
 from parenting.envs import registry
 from parenting.envs.gridworld import WorldState
 from parenting.envs.reward_hacking import RewardHacking
@@ -37,7 +37,7 @@ FRESH = ENV_SEED + 1
 def arm_trials(
     label: str,
     level: str,
-    inside: Inside,
+    inside: GardenParent,
     changes: Mapping[str, Any],
     every: int,
     milestones: Sequence[int],
@@ -98,7 +98,7 @@ def reinforce_trials(level: str, evaluation_points: Sequence[int], trials: int, 
     ]
 
 
-def lookahead_waterings(level: str, inside: Inside, depth: int, episodes: int) -> list[Row]:
+def lookahead_waterings(level: str, inside: GardenParent, depth: int, episodes: int) -> list[Row]:
     """The exact look-ahead, and with depth 0 the parent's own policy."""
     world, valued = garden(level), GardenValues(garden(level), GAMMA, inside)
     said = {"of": "look-ahead", "level": level, "inside": inside, "stage": depth}
@@ -110,7 +110,13 @@ def lookahead_waterings(level: str, inside: Inside, depth: int, episodes: int) -
 
 
 def full_coverage_stages(
-    level: str, inside: Inside, changes: Mapping[str, Any], stages: int, budget: Budget, trial: int, seed: int
+    level: str,
+    inside: GardenParent,
+    changes: Mapping[str, Any],
+    stages: int,
+    budget: Budget,
+    trial: int,
+    seed: int,
 ) -> list[Row]:
     """Train the full-coverage agent through its stages; a row for each.
 

@@ -23,7 +23,7 @@ def snapshot_trials(variant: str, milestones: Sequence[int], span: tuple[int, in
     """Raise the trials of a span past all milestones; a row for each trial and milestone."""
     of = VARIANTS[variant]
     config = compose(of.preset, registry.defaults(WORLD), of.changes, strict=True)
-    world = garden(of.level, config.time_limit)
+    world = garden(of.level, config.max_episode_steps)
     mine = keys(seed, span[1]).pick(torch.arange(*span))
     passed = train_with_snapshots(world, config, mine, milestones, MAX_TICKS, initial_weights(world, config))
     found = zip(milestones, passed, strict=True)

@@ -11,6 +11,7 @@ from torch.nn.functional import one_hot
 
 from parenting.agent import parenting
 from parenting.agent.config import Config
+from parenting.agent.parent import BatchParent
 from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
@@ -39,23 +40,21 @@ class BatchTrainer:
         self, world: Gridworld, config: Config, keys: Keys, until: StopRule, weights: Tensor | None = None
     ) -> None:
         """Begin one trial for each of `keys`; `weights` are the pre-trained ones, where the config asks."""
-        rule = ScriptedRule(world, config.gamma, inside=config.inside)
+        rule = ScriptedRule(world, config.gamma, inside=config.garden_parent)
         self.world, self.config, self.until = world, config, until
         self.evaluation = evaluation(world, rule.values, config.gamma)
         self.state = parenting.init(world, config, keys, weights)
-        self.parent = ScriptedParent(rule, parenting.no_query(world, config, self.state))
+        self.parent: BatchParent = ScriptedParent(rule, parenting.no_query(world, config, self.state))
         trials, live = len(keys.seed), self.state.learner.params
         self.trial = torch.arange(trials)
-        self.counts, self.result = no_counts(trials, config.stages), no_counts(trials, config.stages)
-        self.policies = live.new_zeros(config.stages, *live.shape)
+        stages = config.max_clip_length
+        self.counts, self.result = no_counts(trials, stages), no_counts(trials, stages)
+        self.policies = live.new_zeros(config.max_clip_length, *live.shape)
 
     def tick(self) -> None:
         """One tick of every trial that is left."""
         stage, owed = self.state.maturity, self.state.rehearsal.owed
-        answer = self.parent.take(self.state)
-        state, query = parenting.step(self.world, self.config, self.state, answer)
-        self.parent.post(query)
-        self.state = parenting.rehearse(self.world, self.config, state)
+        self.state, _, answer, self.config = parenting.tick(self.world, self.config, self.state, self.parent)
         self._count(answer, stage)
         self._finish(self.state.info.trained | owed | (self.counts.ticks == 1))
 
@@ -69,7 +68,7 @@ class BatchTrainer:
             deaths=counts.deaths + died,
             guidance=counts.guidance + (answered & (kind == QueryKind.GUIDANCE)),
             preference=counts.preference + (answered & (kind == QueryKind.PREFERENCE)),
-            queries=counts.queries + one_hot(of - 1, self.config.stages) * answered[:, None],
+            queries=counts.queries + one_hot(of - 1, self.config.max_clip_length) * answered[:, None],
             ticks=counts.ticks + 1,
             maturity=self.state.maturity,
         )

@@ -38,7 +38,7 @@ def deployments(spec: WorldSpec) -> tuple[str, ...]:
 def examine(world: Gridworld, config: Config, result: TrainResult) -> Outcomes:
     """Try every policy that raising left, from the start: one outcome each, or the mean of many episodes."""
     counts, policies = result.counts, result.policies
-    reached = torch.arange(1, config.stages + 1) <= counts.maturity[:, None]
+    reached = torch.arange(1, config.max_clip_length + 1) <= counts.maturity[:, None]
     if isinstance(result.evaluation, TabularEvaluation):
         outcome = _outcomes(_deployed(world, config, result.evaluation), policies, reached)
         nothing = reached.new_zeros(len(reached), 0)

@@ -54,7 +54,7 @@ def train_with_snapshots(
 
 def _none(trainer: BatchTrainer) -> Passed:
     live = torch.zeros_like(trainer.state.learner.params)
-    counts = no_counts(len(live), trainer.config.stages)
+    counts = no_counts(len(live), trainer.config.max_clip_length)
     return Passed(there=torch.zeros(len(live), dtype=torch.bool), counts=counts, live=live)
 
 

@@ -46,8 +46,8 @@ def summarise(plan: TrainPlan, level: str, outcomes: Outcomes, seconds: float) -
         "sd": {one: sd(values) for one, values in finished.items()},
         "evaluation": report.evaluation(torch.arange(len(counts.ticks)), counts.maturity - 1),
     }
-    if plan.config.stages > 1 or isinstance(report, GardenReport):
-        found["stages"] = [_stage(outcomes, report, stage) for stage in range(plan.config.stages)]
+    if plan.config.max_clip_length > 1 or isinstance(report, GardenReport):
+        found["stages"] = [_stage(outcomes, report, stage) for stage in range(plan.config.max_clip_length)]
     return {**found, "seconds": round(seconds, 2)}
 
 
@@ -87,7 +87,7 @@ class GardenReport:
     def __init__(self, plan: TrainPlan, outcomes: Outcomes) -> None:
         """The parent's own waterings stand beside the agent's; over several levels a mean."""
         world = world_of(plan.world, plan.level, plan.config)
-        rule = ScriptedRule(world, plan.config.gamma, inside=plan.config.inside)
+        rule = ScriptedRule(world, plan.config.gamma, inside=plan.config.garden_parent)
         best = evaluation(world, rule.values, plan.config.gamma).best
         self.parent = sum(map(best, range(len(world.levels)))) / len(world.levels)
         self.steps, self.outcomes = world.time_limit, outcomes

@@ -15,11 +15,10 @@ from torch import Tensor
 from parenting.agent import learning, parenting
 from parenting.agent.config import Config
 from parenting.agent.init import network_of
-from parenting.agent.query import Answer
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld, local_state
 from parenting.envs.mdp import Model
-from parenting.parents.scripted import ScriptedRule
+from parenting.parents.scripted import ScriptedParent, ScriptedRule
 from parenting.parents.values import ValueTable
 
 AGREED = 0.1
@@ -38,8 +37,8 @@ CONFIG = Config(
     learning_rate=0.003,
     lambda_global=0,
     lambda_local=0,
-    stages=STAGES,
-    own_length=True,
+    max_clip_length=STAGES,
+    own_stage_only=True,
     dtype="float64",
 )
 
@@ -67,12 +66,11 @@ class StartStates:
 
 def run_stage(world: Gridworld, judge: ScriptedRule, state: AgentState, starts: StartStates) -> AgentState:
     """Run a stage until it has converged or is given up; each query is answered in the next tick."""
-    query = parenting.no_query(world, CONFIG, state)
+    parent = ScriptedParent(judge, parenting.no_query(world, CONFIG, state))
     stage = int(state.maturity[0])
     for _ in range(ROUNDS):
         for _ in range(2 * stage * starts.most):
-            answer = Answer(query=query, choice=judge.answer(query))
-            state, query = parenting.step(world, CONFIG, starts.put(state), answer)
+            state = parenting.tick(world, CONFIG, starts.put(state), parent).state
         for _ in range(CONVERGING):
             state = learning.train(network_of(world), CONFIG, state, torch.ones_like(state.waiting))
         if bool(converged(world, state, starts).all()):

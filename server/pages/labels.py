@@ -58,4 +58,4 @@ def _start_sentences(run: Run, config: Config) -> Iterator[str]:
     if SUPERVISOR in run.legend:
         yield SUPERVISED[config.supervised]
     if PLANT in run.legend:
-        yield INSIDE[config.inside]
+        yield INSIDE[config.garden_parent]

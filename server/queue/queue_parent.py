@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from copy import copy
+from typing import Self
 
 import torch
 from pydantic import TypeAdapter
@@ -33,15 +35,16 @@ class QueueParent:
     ) -> None:
         """A mailbox for the run of a claim; `asked` is called once a query is stored: pages wake."""
         self.db, self.mine, self.world, self.asked = db, mine, world, asked
-        self.stages = config.stages
+        self.stages = config.max_clip_length
         self.tick = 0
         self.policy = (1, 0)
-        self.heard: Answer | None = None
         self.answers = self.events_wait = True
 
-    def expect(self, answers: bool, events: bool) -> None:
-        """Whether the next tick has to look for answers and events; who has just looked spares it the way."""
-        self.answers, self.events_wait = answers, events
+    def looking(self, answers: bool, events: bool) -> Self:
+        """Return the same mailbox for one tick; it reads no rows where there are known to be none."""
+        mailbox = copy(self)
+        mailbox.answers, mailbox.events_wait = answers, events
+        return mailbox
 
     def events(self, state: AgentState) -> Sequence[Event]:
         """The operator's events that apply before the tick that comes."""
@@ -54,14 +57,10 @@ class QueueParent:
         self.policy = int(state.maturity[0]), int(state.learner.steps[0])
         taken = worker_side.take_answer(self.db, self.mine, self.tick) if self.answers else None
         if taken is None:
-            nothing = queries.empty(1, self.stages, self.world.height, self.world.width)
-            self.heard = queries.silence(nothing)
-        else:
-            row = taken.query
-            query = decode(self.world, self.stages, row.kind, row.maturity, row.clips)
-            choice = torch.full_like(query.kind, int(CHOICES[taken.answer.choice]))
-            self.heard = Answer(query=query, choice=choice)
-        return self.heard
+            return queries.silence(queries.empty(1, self.stages, self.world.height, self.world.width))
+        row = taken.query
+        query = decode(self.world, self.stages, row.kind, row.maturity, row.clips)
+        return Answer(query=query, choice=torch.full_like(query.kind, int(CHOICES[taken.answer.choice])))
 
     def post(self, query: Query) -> None:
         """Store what the agent asks in this tick; a tick that was lived before asks nothing twice."""

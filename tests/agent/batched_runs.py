@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import torch
 
 from parenting.agent import parenting
 from parenting.agent.config import Config
 from parenting.agent.policy import Network
-from parenting.agent.query import Answer, Choice, Query, QueryKind, empty
+from parenting.agent.query import Choice, Query, QueryKind, empty
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
+from parenting.parents.scripted import ScriptedParent
 from reference.clips import Clip, Frame, board
 
 Judge = Callable[[Query], torch.Tensor]
 LogEntry = tuple[int, str, Clip, Clip]
+
+
+class Judged(NamedTuple):
+    """A function of the query as a parent's rule."""
+
+    answer: Judge
 
 
 def run_batch(
@@ -30,15 +38,13 @@ def run_batch(
 ) -> tuple[AgentState, list[list[LogEntry]]]:
     """`trials` lives of `ticks` ticks; the state they end in, and what each asked."""
     state = parenting.init(world, config, keys(seed, trials), weights)
-    query = parenting.no_query(world, config, state)
+    parent = ScriptedParent(Judged(judge), parenting.no_query(world, config, state))
     logs: list[list[LogEntry]] = [[] for _ in range(trials)]
     for tick in range(1, ticks + 1):
-        answer = Answer(query=query, choice=judge(query))
-        state, query = parenting.step(world, config, state, answer)
+        state, query, _, _ = parenting.tick(world, config, state, parent)
         for trial in (query.kind != QueryKind.NONE).nonzero().squeeze(1).tolist():
             kind = QueryKind(int(query.kind[trial])).name.lower()
             logs[trial].append((tick, kind, clip(query, trial, 0), clip(query, trial, 1)))
-        state = parenting.rehearse(world, config, state)
     state.check()
     return state, logs
 

@@ -54,7 +54,7 @@ def lived(
     config = scenario.config()
 
     def choose(left: Clip, right: Clip, kind: str) -> str:
-        query: Query = as_query(world, config.stages, left, right, kind)
+        query: Query = as_query(world, config.max_clip_length, left, right, kind)
         choice = CHOICE_NAMES[int(judge(query)[0])]
         happened[choice] += 1
         return choice

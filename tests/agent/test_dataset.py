@@ -99,7 +99,7 @@ def test_clear_empties_the_trials_of_the_mask() -> None:
 
 @pytest.mark.parametrize("own_length", [True, False])
 def test_own_length_leaves_older_entries_behind(own_length: bool) -> None:
-    config = Config(p_guid=1, p_pref=0, stages=2, own_length=own_length, time_limit=25)
+    config = Config(p_guid=1, p_pref=0, max_clip_length=2, own_stage_only=own_length, max_episode_steps=25)
     state = parenting.init(WORLD, config, keys(6, 2))
     state, query = approve(config, state, parenting.no_query(WORLD, config, state), ticks=20)
     heard, rows = state.x.size.clone(), state.x.rows.clone()

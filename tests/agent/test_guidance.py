@@ -16,7 +16,7 @@ from parenting.envs.rng import Stream, keys
 from tests.agent.batched_runs import random_parent, run_batch
 
 WORLD = registry.make("unsafe-exploration", time_limit=25)
-ALWAYS = Config(p_guid=1, p_rec=0, p_pref=0, p_train=0, time_limit=25)
+ALWAYS = Config(p_guid=1, p_rec=0, p_pref=0, p_train=0, max_episode_steps=25)
 TRIALS = 8
 
 
@@ -54,7 +54,7 @@ def test_chance_by_hand() -> None:
 @pytest.mark.parametrize("f", [0, 1, 3])
 def test_the_agent_asks_with_that_chance(f: int) -> None:
     trials = 500
-    config = Config(p_guid=0.5, time_limit=25)
+    config = Config(p_guid=0.5, max_episode_steps=25)
     state = parenting.init(WORLD, config, keys(2, trials))
     state.familiarity.fill_(f)
     expected = state.keys.next().uniform(Stream.ASK) < 0.5**f

@@ -68,14 +68,16 @@ def test_the_frozen_policy_stays_as_it_was() -> None:
 
 
 def test_the_last_stage_never_ends() -> None:
-    state, _ = run_batch(WORLD, LAX.model_copy(update={"stages": 1}), agreeable, seed=5, trials=2, ticks=60)
-    after = mature(LAX.model_copy(update={"stages": 1}), state)
+    state, _ = run_batch(
+        WORLD, LAX.model_copy(update={"max_clip_length": 1}), agreeable, seed=5, trials=2, ticks=60
+    )
+    after = mature(LAX.model_copy(update={"max_clip_length": 1}), state)
     for (name, ours), theirs in zip(state.tensors().items(), after.tensors().values(), strict=True):
         assert torch.equal(ours, theirs), name
 
 
 def test_the_budget_of_answers_ends_a_stage() -> None:
-    config = LAX.model_copy(update={"stages": 3, "mature_every": 5})
+    config = LAX.model_copy(update={"max_clip_length": 3, "queries_per_stage": 5})
     state = parenting.init(WORLD, config, keys(1, 3))
     for answered, stage, left in [(4, 1, 4), (5, 2, 0), (4, 2, 4), (9, 3, 0), (100, 3, 100)]:
         state.answered.fill_(answered)
@@ -93,7 +95,7 @@ def prefers(state: AgentState, action: int) -> None:
 
 
 def test_the_second_action_of_a_clip_of_two_is_pi_1s() -> None:
-    config = Config(p_guid=0, p_rec=1, p_pref=0, p_train=0, stages=2, time_limit=25)
+    config = Config(p_guid=0, p_rec=1, p_pref=0, p_train=0, max_clip_length=2, max_episode_steps=25)
     state = parenting.init(WORLD, config, keys(3, 4))
     prefers(state, 3)
     state = mature(config, state)

@@ -76,7 +76,7 @@ def take(recorder: Recorder, found: Pair) -> None:
 def test_search_finds_what_a_plain_search_finds(seed: int, recompare: bool) -> None:
     """Over random lives of a recorder: clips come, overwrite and leave between the searches."""
     trials, rng = 3, torch.Generator().manual_seed(seed)
-    config = Config(recompare=recompare)
+    config = Config(repeat_queries=recompare)
     recorder = parenting.init(WORLD, config, keys(0, trials)).recorder
     recorder = recorder.replace(asked=recorder.asked.map(lambda _name, part, axis: _wide(part)))
     first = torch.ones(trials, dtype=torch.int64)  # the stage
@@ -117,7 +117,7 @@ def test_the_clips_of_an_asked_pair_leave() -> None:
 
 
 def test_the_newest_overwrite_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
-    config = Config(p_guid=0, p_rec=1, p_pref=0, p_train=0, time_limit=25)
+    config = Config(p_guid=0, p_rec=1, p_pref=0, p_train=0, max_episode_steps=25)
     unbounded, _ = run_batch(WORLD, config, random_parent, seed=2, trials=2, ticks=100)
     monkeypatch.setattr(pairing, "CAPACITY", 32)
     state, _ = run_batch(WORLD, config, random_parent, seed=2, trials=2, ticks=100)
@@ -149,7 +149,7 @@ def test_every_clip_is_closed_at_most_once(monkeypatch: pytest.MonkeyPatch) -> N
         return found
 
     monkeypatch.setattr(pairing, "_partner", counting)
-    config = Config(p_guid=0, p_rec=1, p_pref=1, p_train=0, time_limit=25)
+    config = Config(p_guid=0, p_rec=1, p_pref=1, p_train=0, max_episode_steps=25)
     state = parenting.init(WORLD, config, keys(8, 3))
     query = parenting.no_query(WORLD, config, state)
     for _ in range(200):

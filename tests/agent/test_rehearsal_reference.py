@@ -47,13 +47,13 @@ def test_same_query_log_and_parameters(name: str) -> None:
     for trial in range(TRIALS):
 
         def choose(left: Clip, right: Clip, kind: str) -> str:
-            return CHOICE_NAMES[int(judge(as_query(world, config.stages, left, right, kind))[0])]
+            return CHOICE_NAMES[int(judge(as_query(world, config.max_clip_length, left, right, kind))[0])]
 
         reference = Rehearsing(world, config, SEED, trial, choose, WEIGHTS)
         for _ in range(TICKS):
             reference.tick()
         assert logs[trial] == reference.log
-        assert reference.stage == int(state.maturity[trial]) == config.stages
+        assert reference.stage == int(state.maturity[trial]) == config.max_clip_length
         assert int(state.rehearsal.steps[trial]) == len(reference.rehearsed) > 5
         assert bool(state.rehearsal.owed[trial]) == reference.owed
         if name == "pauses":  # what is owed is paid even in a tick that only asks

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
+from parenting.agent.config import FIELDS
 from parenting.commands.main import app
 
 COUNTS = ("deaths", "guidance", "preference", "ticks")
@@ -74,7 +75,7 @@ def test_order_of_options_is_free() -> None:
         (["unsafe-exploration", "--set", "bogus=1"], "bogus"),
         (["unsafe-exploration", "--set", "p_guid"], "p_guid"),
         (["unsafe-exploration", "--set", "p_guid=2"], "p_guid=2"),
-        (["unsafe-exploration", "--set", "recompare=perhaps"], "recompare=perhaps"),
+        (["unsafe-exploration", "--set", "repeat_queries=perhaps"], "repeat_queries=perhaps"),
         (["unsafe-exploration", "--set", "gradient_steps=1.5"], "gradient_steps=1.5"),
         (["unsafe-exploration", "--until", "never"], "never"),
         (["unsafe-exploration", "--until", "ticks:0"], "ticks:0"),
@@ -100,6 +101,25 @@ def test_every_wrong_setting_is_named() -> None:
     named = ("no hyperparameter 'bogus'", "'p_rec' is not KEY=VALUE", "p_guid=2: ", "gradient_steps=1.5: ")
     for line, wanted in zip(result.stderr.splitlines(), named, strict=True):
         assert wanted in line
+
+
+@pytest.mark.parametrize("old", list(FIELDS))
+def test_an_old_name_is_set_and_the_new_one_is_said(old: str) -> None:
+    value = {"inside": "left", "recompare": "true", "own_length": "true"}.get(old, "2")
+    options = ("unsafe-exploration", "--trials", "1", "--until", "ticks:1", "--workers", "1", "--json")
+    stages = ("--set", "max_clip_length=3") if old == "mature_every" else ()
+    said = run(*options, "--set", f"{old}={value}", *stages)
+    assert said.exit_code == 0
+    assert said.stderr == f"{old} is now {FIELDS[old]}; the old name will go with the next version.\n"
+    config = json.loads(said.stdout)["config"]
+    assert str(config[old]).lower() == value
+    assert FIELDS[old] not in config
+
+
+def test_two_names_of_one_setting_are_both_named() -> None:
+    said = run("unsafe-exploration", "--set", "stages=2", "--set", "max_clip_length=2", "--json")
+    assert (said.exit_code, said.stdout) == (2, "")
+    assert "--set: stages and max_clip_length are two names of one setting: give one of them." in said.stderr
 
 
 def test_faulty_level_file_is_refused_where_it_is_wrong(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from parenting.envs import registry
 from tests.commands.test_run import results_of, run
 
-PLAIN = ("--set", "pretrain=false", "--set", "time_limit=8")
+PLAIN = ("--set", "pretrain=false", "--set", "max_episode_steps=8")
 WALKED = ("unsafe-exploration", "interruptibility", "side-effects")
 OUTCOMES = ("optimal", "detour", "time", "circle", "wall")
 
@@ -43,7 +43,7 @@ def test_both_deployments_of_the_supervisor() -> None:
 
 
 def test_stages_of_a_world_with_a_goal() -> None:
-    budget = ("--set", "stages=3", "--set", "mature_every=4", "--until", "queries:8")
+    budget = ("--set", "max_clip_length=3", "--set", "queries_per_stage=4", "--until", "queries:8")
     found = results_of("side-effects", *PLAIN, *budget, "--trials", "4")
     one, two, three = found["stages"]
     assert [row["stage"] for row in found["stages"]] == [1, 2, 3]
@@ -62,7 +62,7 @@ def garden(*arguments: str) -> dict[str, Any]:
 
 
 def test_stages_of_the_garden() -> None:
-    budget = ("--set", "stages=2", "--set", "mature_every=5", "--until", "queries:10")
+    budget = ("--set", "max_clip_length=2", "--set", "queries_per_stage=5", "--until", "queries:10")
     found = garden(*budget, "--trials", "3")
     first, last = found["stages"]
     assert (first["stage"], last["stage"]) == (1, 2)
@@ -86,15 +86,15 @@ def test_the_garden_stops_after_queries_unless_told_otherwise() -> None:
 
 def test_two_budgets_say_how_many_stages_there_are() -> None:
     """Nine queries, four a stage: two whole stages, and one that is cut off. Whoever says stages is heard."""
-    budget = (*PLAIN, "--set", "mature_every=4", "--until", "queries:9", "--max-ticks", "1")
+    budget = (*PLAIN, "--set", "queries_per_stage=4", "--until", "queries:9", "--max-ticks", "1")
     assert results_of("side-effects", *budget)["config"]["stages"] == 3
-    assert results_of("side-effects", *budget, "--set", "stages=1")["config"]["stages"] == 1
-    many = run("side-effects", *PLAIN, "--set", "mature_every=1", "--until", "queries:17")
+    assert results_of("side-effects", *budget, "--set", "max_clip_length=1")["config"]["stages"] == 1
+    many = run("side-effects", *PLAIN, "--set", "queries_per_stage=1", "--until", "queries:17")
     assert many.exit_code == 2
     assert "are 17 stages" in many.stderr
-    refused = run("side-effects", *PLAIN, "--set", "mature_every=4", "--until", "ticks:1")
+    refused = run("side-effects", *PLAIN, "--set", "queries_per_stage=4", "--until", "ticks:1")
     assert (refused.exit_code, refused.stdout) == (2, "")
-    assert "stages=2" in refused.stderr
+    assert "max_clip_length=2" in refused.stderr
 
 
 def lines(*arguments: str) -> dict[str, str]:
@@ -110,7 +110,7 @@ def test_page_in_plain_words() -> None:
     assert page["ticks"] == "3.00 +- 0.00"
     page = lines("absent-supervisor", "--until", "ticks:3")
     assert page["at the end"].startswith("unsupervised: ")  # the line below that of the supervised
-    page = lines("side-effects", "--until", "queries:9", "--max-ticks", "2", "--set", "stages=2")
+    page = lines("side-effects", "--until", "queries:9", "--max-ticks", "2", "--set", "max_clip_length=2")
     assert page["unfinished"].startswith("1 after 2 ticks")
     assert page["stage 2"] == "no trial came to it"
 

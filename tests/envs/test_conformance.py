@@ -82,7 +82,7 @@ def test_the_kind_says_what_the_parent_must_know(name: str) -> None:
 @every_world
 def test_its_defaults_are_fields_of_the_config(name: str) -> None:
     config = Config(**registry.defaults(name))  # type: ignore[arg-type]
-    assert config.time_limit == registry.make(name).time_limit
+    assert config.max_episode_steps == registry.make(name).time_limit
 
 
 @every_world

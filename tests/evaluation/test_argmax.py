@@ -51,8 +51,7 @@ def trained(level: str, trials: int = 20) -> Tensor:
     state = parenting.init(world, config, keys(0, trials))
     parent = ScriptedParent(ScriptedRule(world, GAMMA), parenting.no_query(world, config, state))
     for _ in range(TICKS[level]):
-        state, query = parenting.step(world, config, state, parent.take(state))
-        parent.post(query)
+        state = parenting.tick(world, config, state, parent).state
     return state.learner.params
 
 

@@ -15,6 +15,7 @@ from parenting.experiments.training import batch
 from parenting.experiments.training.batch import BatchTrainer, TrainResult, train_agents
 from parenting.experiments.training.counts import Progress
 from parenting.experiments.training.stop_rule import StopRule
+from parenting.parents.scripted import ScriptedParent
 
 ISLAND = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=False)
 
@@ -22,6 +23,11 @@ ISLAND = compose("conservative", registry.defaults("unsafe-exploration"), {}, st
 def trainer(until: StopRule, number: int = 10, config: Config = ISLAND) -> BatchTrainer:
     world = world_of("unsafe-exploration", "island", config)
     return BatchTrainer(world, config, keys(0, number), until)
+
+
+def scripted(batch: BatchTrainer) -> ScriptedParent:
+    assert isinstance(batch.parent, ScriptedParent)
+    return batch.parent
 
 
 def raised(until: StopRule, number: int = 10, max_ticks: int = 1000, **changes: object) -> TrainResult:
@@ -45,7 +51,7 @@ class Refusing:
 def test_stuck_trials_leave_at_once_and_are_unfinished(until: StopRule) -> None:
     """A pause asks twice: after the second *neither*, heard in the third tick, nothing can happen."""
     batch = trainer(until, 10)
-    batch.parent.rule = Refusing(torch.ones(10, dtype=torch.bool))  # type: ignore[assignment]
+    scripted(batch).rule = Refusing(torch.ones(10, dtype=torch.bool))
     for _ in range(3):
         assert not bool(batch.counts.done.any())
         batch.tick()
@@ -60,11 +66,11 @@ def test_stuck_trials_leave_at_once_and_are_unfinished(until: StopRule) -> None:
 def test_the_others_live_on_without_those_that_are_stuck() -> None:
     batch = trainer(StopRule("ticks", 20), 10)
     refused = torch.arange(10) < 2
-    batch.parent.rule = Refusing(refused)  # type: ignore[assignment]
+    scripted(batch).rule = Refusing(refused)
     for _ in range(3):
         batch.tick()
     assert len(batch.state.waiting) == 8
-    batch.parent.rule = Refusing(torch.zeros(8, dtype=torch.bool))  # type: ignore[assignment]
+    scripted(batch).rule = Refusing(torch.zeros(8, dtype=torch.bool))
     for _ in range(17):
         batch.tick()
     assert torch.equal(batch.result.stuck, refused)
@@ -74,7 +80,7 @@ def test_the_others_live_on_without_those_that_are_stuck() -> None:
 
 def test_a_goal_that_is_reached_comes_before_being_stuck() -> None:
     batch = trainer(StopRule("queries", 2), 4)
-    batch.parent.rule = Refusing(torch.ones(4, dtype=torch.bool))  # type: ignore[assignment]
+    scripted(batch).rule = Refusing(torch.ones(4, dtype=torch.bool))
     for _ in range(3):
         batch.tick()
     assert bool(batch.result.finished.all())
@@ -83,7 +89,7 @@ def test_a_goal_that_is_reached_comes_before_being_stuck() -> None:
 
 def test_queries_are_counted_by_their_stage() -> None:
     """A stage ends with its 5th answer; a question that was out by then still belongs to it."""
-    found = raised(StopRule("queries", 14), stages=3, mature_every=5, p_guid=0.5).counts.check()
+    found = raised(StopRule("queries", 14), max_clip_length=3, queries_per_stage=5, p_guid=0.5).counts.check()
     assert torch.equal(found.queries.sum(1), found.guidance + found.preference)
     assert found.queries.sum(1).tolist() == [14] * 10
     assert bool((found.maturity == 3).all())
@@ -104,7 +110,7 @@ def test_policies_are_those_of_each_trials_own_end(monkeypatch: pytest.MonkeyPat
 
 
 def test_policies_of_earlier_stages_are_the_frozen_ones() -> None:
-    config = ISLAND.model_copy(update={"stages": 3, "mature_every": 10})
+    config = ISLAND.model_copy(update={"max_clip_length": 3, "queries_per_stage": 10})
     batch = trainer(StopRule("ticks", 40), 6, config)
     before = batch.state.learner.params.clone()
     frozen: dict[tuple[int, int], Tensor] = {}

@@ -45,7 +45,7 @@ def test_episodes_in_tables_are_those_of_the_world() -> None:
     world, config = island()
     table, mine = known(world), keys(3, 2)
     even = torch.full((2, len(table.near), 4), 0.25, dtype=torch.float64)
-    walks = walk(table.batch(2), even, mine, config.time_limit)
+    walks = walk(table.batch(2), even, mine, config.max_episode_steps)
     end = len(table.near)
     for trial, episode in ((0, 0), (1, 5), (1, 15)):
         state = world.reset(keys(0, 1), torch.zeros(1, dtype=torch.int64))

@@ -20,7 +20,7 @@ from tests.parents.fixed_policies import DOWN, LEFT, RIGHT, UP, always, at_a_wal
 
 def ended(world: Gridworld, config: Config, stages: list[list[Tensor]], maturity: list[int]) -> Outcomes:
     """The ending of trials whose policies are given, stage by stage."""
-    counts = no_counts(len(maturity), config.stages).replace(maturity=torch.tensor(maturity))
+    counts = no_counts(len(maturity), config.max_clip_length).replace(maturity=torch.tensor(maturity))
     policies = torch.stack([torch.cat(stage) for stage in stages])
     judged = evaluation(world, ScriptedRule(world, config.gamma).values, config.gamma)
     return examine(world, config, TrainResult(counts, policies, judged)).check()
@@ -38,7 +38,7 @@ def test_with_the_supervisor_and_without() -> None:
 
 
 def test_a_stage_that_was_not_reached_has_no_outcome() -> None:
-    config = Config(stages=2)
+    config = Config(max_clip_length=2)
     world = world_of("unsafe-exploration", None, config)
     up, left = always(world, UP), always(world, LEFT)
     found = ended(world, config, [[up, left], [left, up]], [2, 1])
@@ -58,7 +58,7 @@ def test_worst_of_several_levels() -> None:
 
 
 def test_the_garden_at_every_stage() -> None:
-    config = Config(stages=2, time_limit=10, gamma=0.9)
+    config = Config(max_clip_length=2, max_episode_steps=10, gamma=0.9)
     world = world_of("reward-hacking", "garden-mirrored", config)
     into_the_bucket = at_a_wall(world, LEFT, UP)
     down = always(world, DOWN)

@@ -50,7 +50,7 @@ def test_silence_is_the_answer_where_none_is_given() -> None:
 
 def test_the_config_of_a_loop_is_the_config_of_train(trained: pt.TrainResult) -> None:
     assert pt.configure(WORLD) == trained.config
-    assert pt.configure(pt.make(WORLD, max_episode_steps=9)).time_limit == 9
+    assert pt.configure(pt.make(WORLD, max_episode_steps=9)).max_episode_steps == 9
 
 
 def test_states_and_queries_have_short_names() -> None:

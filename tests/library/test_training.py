@@ -68,7 +68,7 @@ def test_a_world_brings_its_own_limit_of_steps() -> None:
     result = pt.train(world, until="ticks:3", progress=False)
     assert result.world is world
     assert result.config == pt.train(
-        "unsafe-exploration", until="ticks:3", progress=False, time_limit=7
+        "unsafe-exploration", until="ticks:3", progress=False, max_episode_steps=7
     ).config  # fmt: skip
 
 

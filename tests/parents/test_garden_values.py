@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from parenting.agent.config import Inside
+from parenting.agent.config import GardenParent
 from parenting.agent.query import QueryKind
 from parenting.envs import registry
 from parenting.envs.gridworld import WorldState
@@ -17,7 +17,7 @@ from tests.parents.walked_queries import begun, garden, query, walked
 
 UP, DOWN, LEFT, RIGHT = range(4)
 GAMMA = 0.9
-FIG_2: list[tuple[str, Inside, float]] = [
+FIG_2: list[tuple[str, GardenParent, float]] = [
     ("garden", "up-down", 4.48),
     ("garden-mirrored", "up-down", 2.97),
     ("garden", "left", 2.73),
@@ -53,14 +53,14 @@ def test_a_way_to_the_cycle_keeps_clear_of_the_bucket() -> None:
 
 
 @pytest.mark.parametrize(("level", "inside", "mean"), FIG_2)
-def test_mean_waterings_in_ten_steps(level: str, inside: Inside, mean: float) -> None:
+def test_mean_waterings_in_ten_steps(level: str, inside: GardenParent, mean: float) -> None:
     found = float(GardenValues(garden(level), GAMMA, inside).waterings(10))
     assert found == pytest.approx(mean, abs=0.006)
 
 
 @pytest.mark.parametrize("steps", [10, 60])
 @pytest.mark.parametrize(("level", "inside", "_mean"), FIG_2)
-def test_mean_waterings_against_the_world(level: str, inside: Inside, _mean: float, steps: int) -> None:
+def test_mean_waterings_against_the_world(level: str, inside: GardenParent, _mean: float, steps: int) -> None:
     world = garden(level)
     parent = GardenValues(world, GAMMA, inside)
     start = world.reset(keys(1, 4000), torch.zeros(4000, dtype=torch.int64))

@@ -10,17 +10,17 @@ import torch
 from parenting.agent import parenting
 from parenting.agent.config import Config
 from parenting.agent.events import Change, EndEpisode, Event, Mature
+from parenting.agent.parent import Parent
 from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
-from parenting.parents.parent import Parent
 from parenting.parents.replay import Moment, ReplayMismatchError, ReplayParent, same
 from parenting.parents.scripted import ScriptedParent, ScriptedRule
 from tests.parents.walked_queries import island
 
 TRIALS, TICKS = 3, 60
-CONFIG = Config(stages=2, time_limit=12, p_guid=0.5, p_rec=0.6, p_pref=0.9)
+CONFIG = Config(max_clip_length=2, max_episode_steps=12, p_guid=0.5, p_rec=0.6, p_pref=0.9)
 EVENTS: dict[int, Event] = {
     9: EndEpisode(),
     20: Mature(),
@@ -62,7 +62,7 @@ def birth(world: Gridworld) -> AgentState:
 def lived(world: Gridworld, parent: Parent) -> AgentState:
     state, config = birth(world), CONFIG
     for _ in range(TICKS):
-        state, config, _ = parenting.tick(world, config, state, parent)
+        state, _, _, config = parenting.tick(world, config, state, parent)
     return state
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import httpx2
@@ -10,15 +10,16 @@ import torch
 
 from parenting.agent import parenting
 from parenting.agent.config import Config, compose
-from parenting.agent.events import EndEpisode
+from parenting.agent.events import EndEpisode, Event
 from parenting.agent.init import world_of
-from parenting.agent.query import Answer, Choice
+from parenting.agent.query import Choice
+from parenting.agent.state import AgentState
 from parenting.commands.answering import Answering, Order
 from parenting.commands.client import Client
 from parenting.commands.judge import Judge as Script
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
-from parenting.parents.scripted import ScriptedRule
+from parenting.parents.scripted import ScriptedParent, ScriptedRule
 from parenting.server.checkpoints import load_checkpoints
 from parenting.server.codec import CHOICE_NAMES
 from parenting.server.counters import count
@@ -27,7 +28,7 @@ from parenting.server.new_run import NewRun
 from parenting.server.replay import differences
 from parenting.server.snapshot import Snapshot, initial_snapshot, unpack
 from parenting.weights.store import Wanted, find, load
-from tests.agent.batched_runs import Judge
+from tests.agent.batched_runs import Judge, Judged
 
 CONFIG: dict[str, Any] = {"stages": 3, "mature_every": 12, "max_open_preferences": 0, "time_limit": 12}
 """Clips of up to three steps, early ends, truncations and two maturations within some sixty answers."""
@@ -74,29 +75,29 @@ class Begun(NamedTuple):
 ISLAND = Begun("unsafe-exploration", "island", CONFIG)
 
 
-class Inline:
-    """The run without a database, under the scripted parent in tensors or under another.
+class Inline(ScriptedParent):
+    """The run without a database, and its parent: the scripted one, or another function of the query.
 
     It ends hopeless episodes.
     """
 
     def __init__(self, begun: Begun = ISLAND, seed: int | None = None, judge: Judge | None = None) -> None:
         self.world, self.config = begun.make(), begun.config
-        self.judge = judge or ScriptedRule(self.world, self.config.gamma, inside=self.config.inside).answer
+        scripted = ScriptedRule(self.world, self.config.gamma, inside=self.config.garden_parent)
         self.saved = begun.initial_snapshot(seed)
-        self.query = parenting.no_query(self.world, self.config, self.saved.state)
+        nothing = parenting.no_query(self.world, self.config, self.saved.state)
+        super().__init__(Judged(judge) if judge else scripted, nothing)
         self.heard: list[tuple[int, str]] = []  # the tick at which an answer was heard, and what it was
+
+    def events(self, state: AgentState) -> Sequence[Event]:
+        return [EndEpisode()] if bool(state.all_refused) else []
 
     def tick(self) -> None:
         state, tally, config = self.saved
-        if bool(state.all_refused):
-            state, config = parenting.apply(self.world, config, state, EndEpisode())
-        answer = Answer(query=self.query, choice=self.judge(self.query))
-        state, self.query = parenting.step(self.world, config, state, answer)
+        state, _, answer, config = parenting.tick(self.world, config, state, self)
         if bool(answer.choice != Choice.NONE):
             self.heard.append((int(state.keys.tick), CHOICE_NAMES[int(answer.choice)]))
-        tally = count(self.world, tally, answer, state)
-        self.saved = Snapshot(parenting.rehearse(self.world, config, state), tally, config)
+        self.saved = Snapshot(state, count(self.world, tally, answer, state), config)
 
 
 def inline(ticks: int, begun: Begun = ISLAND) -> Snapshot:

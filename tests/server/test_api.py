@@ -40,7 +40,7 @@ def test_start_a_run(client: httpx2.Client, db: Database) -> None:
     assert (shown["name"], shown["parent"], shown["worker"]) == ("first", "scripted", "silent")
     stored = get_run(db, shown["id"])
     config = Config(**stored.config)
-    assert (config.p_guid, config.p_rec, config.stages) == (0.5, 0.25, 2)
+    assert (config.p_guid, config.p_rec, config.max_clip_length) == (0.5, 0.25, 2)
     assert config.gamma == registry.defaults(WORLD)["gamma"]
     assert stored.legend == dict(registry.spec(WORLD).legend)
     assert registry.level(WORLD, stored.level_text).rows == registry.level(WORLD, "island").rows
@@ -97,6 +97,8 @@ def test_level_of_ones_own(client: httpx2.Client, db: Database, text: str) -> No
         ({"config": {"p_guid": True}}, {"config.p_guid": "valid number"}),
         ({"config": {"p_guid": "0.5"}}, {"config.p_guid": "valid number"}),
         ({"config": {"stages": 1.5}}, {"config.stages": "valid integer"}),
+        ({"config": {"max_clip_length": 1.5}}, {"config.max_clip_length": "valid integer"}),
+        ({"config": {"max_clip_length": 2, "stages": 2}}, {"config": "max_clip_length and stages are two"}),
         ({"config": {"p_gide": 1}}, {"config.p_gide": "not permitted"}),
         ({"config": {"p_guid": [1]}}, {"config.p_guid": ""}),
         ({"config": 3}, {"config": "valid dictionary"}),

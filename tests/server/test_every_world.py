@@ -46,7 +46,7 @@ ELSEWHERE = [begun for begun in LONGER if begun.level not in FIRST or begun.chan
 
 def name(begun: Begun) -> str:
     changes = set(begun.changes.values()) & {"random", "left"}
-    return "-".join([begun.level, f"T={begun.config.stages}", *changes])
+    return "-".join([begun.level, f"T={begun.config.max_clip_length}", *changes])
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def test_a_script_raises_it(db: Database, begun: Begun) -> None:
     live_to(second, TICKS)
     second.save()
     saved = last(db, run, begun)
-    assert int(saved.state.maturity) == begun.config.stages  # so it has heard answers, if it has two
+    assert int(saved.state.maturity) == begun.config.max_clip_length  # so it has heard answers, if it has two
     assert same_bits(saved, inline(TICKS, begun)) == []
     assert list_metrics(db, run)
 

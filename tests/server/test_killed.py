@@ -121,7 +121,7 @@ def disturb(db: Database, house: House, moments: Iterator[float], rng: random.Ra
 @pytest.mark.parametrize("seed", range(ROUNDS))
 def test_killed_at_random_moments(tmp_path: Path, db: Database, seed: int, stages: int) -> None:
     rng = random.Random(10 * seed + stages)
-    runs = begin(db, [begun for begun in RUNS if begun.config.stages == stages])
+    runs = begin(db, [begun for begun in RUNS if begun.config.max_clip_length == stages])
     moments = sorted(rng.uniform(0, len(runs) * (GOAL - 2)) for _ in range(KILLS))
     with House(tmp_path, runs) as house:
         disturb(db, house, iter(moments), rng)

@@ -63,14 +63,14 @@ def check(db: Database, run: int, begun: Begun) -> None:
     assert {taken.answer.parent for taken in heard_answers(db, run)} == {"scripted"}
     assert same_bits(saved, expected.saved) == []
     assert (saved.tally.kinds[0, 1:] > 0).all(), "it asked one kind of questions only: that shows too little"
-    assert int(saved.state.maturity) == begun.config.stages
+    assert int(saved.state.maturity) == begun.config.max_clip_length
 
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("stages", STAGES)
 def test_raised_through_http(tmp_path: Path, db: Database, stages: int) -> None:
     runs, url = (
-        begin(db, [begun for begun in RUNS if begun.config.stages == stages]),
+        begin(db, [begun for begun in RUNS if begun.config.max_clip_length == stages]),
         f"http://127.0.0.1:{free_port()}",
     )
     with ExitStack() as stack:
