@@ -103,7 +103,7 @@ def train(
 def _train(
     task: Task,
     rule: StopRule,
-    parent: str | Mailbox,
+    parent: str | AnyParent,
     trials: int,
     seed: int,
     told: tuple[Callback | None, ...],

@@ -74,7 +74,7 @@ def leased_schema(db: Database, query: Query) -> LeasedSchema:
     return LeasedSchema(
         **query_schema(query).model_dump(),
         world=world,
-        parent=ParentSchema(gamma=config.gamma, inside=config.inside),
+        parent=ParentSchema(gamma=config.gamma, inside=config.garden_parent),
         progress=ProgressSchema(answered=run.answers, open=opened.guidance + opened.preference),
     )
 
