@@ -30,7 +30,7 @@ class Rows(NamedTuple):
 
     @property
     def weight(self) -> Float[Tensor, "N S"]:
-        """How many entries start at each state."""
+        """The number of entries that start at each state."""
         entries = self.mu.sum(-1)
         return entries.new_zeros(self.local_state.shape[:2]).scatter_add_(1, self.state_index, entries)
 
@@ -126,7 +126,7 @@ def entropy(logits: Float[Tensor, "N S 4"]) -> Float[Tensor, "N S"]:
 
 
 class AdamState(Protocol):
-    """What Adam remembers between its steps."""
+    """The moments that Adam keeps between its steps."""
 
     @property
     def exp_avg(self) -> Float[Tensor, "N P"]:

@@ -20,7 +20,7 @@ def grow(config: Config, state: AgentState) -> AgentState:
 def mature(config: Config, state: AgentState, ripe: Bool[Tensor, "N"]) -> AgentState:
     """Freeze pi_T and go on with pi_{T+1}, its copy; the last stage never ends.
 
-    The running clip is dropped, the recorder emptied, and Adam begins anew.
+    The running clip is dropped, the recorder emptied, and Adam's moments are reset.
     """
     ripe = ripe & (state.maturity < config.max_clip_length)
     if not bool(ripe.any()):

@@ -176,7 +176,7 @@ def _ask(world: Gridworld, state: AgentState, found: Pair, query: Query) -> Quer
 
 
 def _observations(world: Gridworld, board: Tensor, agent: Tensor, box: Tensor, length: Tensor) -> Tensor:
-    """What the agent saw in each frame; zero beyond a clip's length, as everything there is."""
+    """The observation of each frame; like all else, it is zero beyond a clip's length."""
     frame = torch.arange(board.shape[2], device=board.device)
     within = frame <= length[:, :, None]
     return world.observe(board, agent, box) * within[..., None, None]

@@ -93,7 +93,7 @@ def apply(world: Gridworld, config: Config, state: AgentState, event: Event) -> 
 
 
 def reset_finished(world: Gridworld, state: AgentState) -> AgentState:
-    """The keys of a new tick; episodes that have ended start anew, each on its next level."""
+    """Draw the keys of a new tick, and reset episodes that have ended, each on its next level."""
     state = state.replace(keys=state.keys.next(), info=no_info(state.world, state.learner.params.dtype))
     ended = state.world.terminated | world.truncated(state.world)
     if not bool(ended.any()):
@@ -104,7 +104,7 @@ def reset_finished(world: Gridworld, state: AgentState) -> AgentState:
 
 
 def observe(world: Gridworld, network: Network, state: AgentState) -> View:
-    """What each trial sees, and its policy's logits there."""
+    """Return each trial's observation and its policy's logits there."""
     here = state.world
     observation = world.observe(here.board, here.agent, here.box)
     near = local_state(observation, here.agent)

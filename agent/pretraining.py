@@ -24,7 +24,7 @@ from parenting.envs.rng import Keys
 GOAL, STEP = 50.0, -1.0
 """Rewards in a maze: +50 at the goal, -1 (?) a step."""
 ENTROPY = 0.1
-"""What a nat of entropy is worth, where returns have a standard deviation of 1 (ours)."""
+"""The entropy coefficient, where returns have a standard deviation of 1 (ours)."""
 RATE = 0.001
 """Adam's step size, its default."""
 
@@ -72,7 +72,7 @@ def policy_gradient(
 
 
 def returns_to_go(walks: Walks) -> Float64[Tensor, "N T E"]:
-    """What each episode earns from each of its steps on; 0 once it has ended."""
+    """The return of each episode from each of its steps on; 0 once it has ended."""
     left = walks.alive.flip(1).cumsum(1).flip(1).double()
     return (STEP * left + GOAL * walks.arrived[:, None].double()) * walks.alive
 

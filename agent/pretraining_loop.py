@@ -36,7 +36,7 @@ class TrainState(Struct):
 
 
 class EvalResult(NamedTuple):
-    """What the policy does in mazes outside the pool."""
+    """The policy's results in mazes outside the pool."""
 
     solved: float  # the share of mazes that its argmax solves
     entropy: float  # nats, mean over their states: how open it is to its parent
@@ -69,7 +69,10 @@ class Pretrainer:
         )
 
     def update(self, train_state: TrainState) -> TrainState:
-        """One step: 16 whole episodes and one step of Adam. An interruption leaves `pupil` as it was."""
+        """Take one step: 16 whole episodes and one step of Adam.
+
+        An interruption leaves `train_state` as it was.
+        """
         tick, params, moments = train_state.tick + 1, train_state.params.clone(), train_state.moments.clone()
         found, earned = policy_gradient(
             self.network, params, self.pool, keys(self.seed, 1, self.device).replace(tick=tick)
@@ -79,7 +82,7 @@ class Pretrainer:
         return TrainState(params=params, moments=moments, tick=tick, returns=returns)
 
     def converged(self, train_state: TrainState) -> bool:
-        """Whether there is no more to learn: by the returns, and by mazes that it has never seen."""
+        """Return True once the returns have stopped rising and mazes outside the pool are solved."""
         steps = len(train_state.returns)
         if steps < 2 * WINDOW or steps % LOOK_EVERY:
             return False
@@ -122,7 +125,7 @@ def _logits_in(
 
 
 def _solved(mazes: Pool, action: Int64[Tensor, "M S"]) -> Bool[Tensor, "M"]:
-    """Whether a policy that always takes `action` arrives before an episode is cut off."""
+    """Say which mazes a policy that always takes `action` solves before an episode is cut off."""
     next_state = mazes.next_state.gather(2, action[:, :, None]).squeeze(2)
     at = mazes.first
     for _ in range(LIMIT):

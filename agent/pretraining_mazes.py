@@ -46,7 +46,7 @@ class Pool(NamedTuple):
     def observation(
         self, maze: Int64[Tensor, "*some"], state: Int64[Tensor, "*some"]
     ) -> UInt8[Tensor, "*some H W"]:
-        """What the agent sees in states of mazes."""
+        """The agent's observations in states of mazes."""
         board = self.board[maze].flatten(-2)
         drawn = board.scatter(-1, self.cell[maze, state].unsqueeze(-1), self.agent)
         return drawn.view(*maze.shape, *self.board.shape[1:])
@@ -103,7 +103,7 @@ def _ahead(flat: UInt8[Tensor, "M HW"], cell: Int64[Tensor, "M S"], width: int) 
 
 
 def _here(flat: Tensor, cell: Int64[Tensor, "M S 4"]) -> Tensor:
-    """What stands on cells of boards."""
+    """The codes on cells of boards."""
     return flat[:, None].expand(-1, cell.shape[1], -1).gather(2, cell)
 
 

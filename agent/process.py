@@ -2,7 +2,7 @@
 
 Two threads of torch are slower than one on networks of this size, so there is one process a core instead. A
 step takes and frees the same tens of megabytes each time; left to itself, the C library hands them back to
-the system and faults every page in anew.
+the system and faults every page in again.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ class Learner(Struct):
 
 
 class Rehearsal(Struct):
-    """What pre-training keeps during parenting: Adam's state, and whether a step is owed (Sec. 3.1.4).
+    """The state of pre-training during parenting: Adam's moments, and whether a step is owed (Sec. 3.1.4).
 
     P0 is P, or 0 in a run without pre-training.
     """
@@ -62,7 +62,7 @@ class Ring(Struct):
 
 
 class Asked(Struct):
-    """What was compared before: a word a query for the whole pair, one for (state, first actions, stage)."""
+    """Earlier comparisons: a word a query for the whole pair, one for (state, first actions, stage)."""
 
     pair: Int64[Tensor, "N Q"]
     compared: Int64[Tensor, "N Q"]
@@ -84,7 +84,10 @@ class Recorder(Struct):
 
 
 class TickInfo(Struct):
-    """What the last tick did, for whoever watches. No part of the agent reads it, no checkpoint holds it."""
+    """The events of the last tick, for display.
+
+    No part of the agent reads them, and no checkpoint holds them.
+    """
 
     before: WorldState  # the world before the move
     action: Int64[Tensor, "N"]

@@ -1,11 +1,11 @@
-"""How many steps a second the worlds make in Gymnasium, beside FrozenLake-v1 in the same run.
+"""Steps a second of the worlds in Gymnasium, beside FrozenLake-v1 in the same run.
 
     python -m benchmarks.gym_steps            about half a minute
     python -m benchmarks.gym_steps --quick    a few seconds, hardly warm
 
 Random actions, episode after episode, made by `gymnasium.make` with its usual wrappers. One environment is
 counted after its first 10,000 steps. *tensors* are the same steps without remembering any: what the worlds
-compute for each step anew. A vector environment is counted in steps of all its trials. Blocks of each kind
+compute afresh for each step. A vector environment is counted in steps of all its trials. Blocks of each kind
 take turns with blocks of FrozenLake; times are the process's own on the processor.
 """
 

@@ -4,11 +4,11 @@
     python -m benchmarks.rehearsal --quick    6 x 6 alone, few repeats, about 15 seconds
 
 A batch of trials begins with the shipped weights of its world and owes a step in every tick, as conservative
-parenting does once it trains. Timed is `agent.parenting.rehearse`, the whole of it. *Walking* is its first
-part, timed by itself by turns with the whole: 16 mazes drawn, the policy's chances in all their states, and
-the episodes walked through. The rest is the gradient at the states that they came by, and Adam. Every step
-is another tick's, so its mazes are others. Numbers are medians of the process's own time on the processor:
-on one thread that is the time on the clock, less what other programs take.
+parenting does once it trains. The whole of `agent.parenting.rehearse` is timed. *Walking* is its first part,
+timed by itself in alternation with the whole: it draws 16 mazes, computes the policy's probabilities in all
+their states, and walks through the episodes. The rest is the gradient at the visited states, and Adam. Each
+step belongs to another tick, so its mazes differ. Numbers are medians of the process's own time on the
+processor: on one thread that is the time on the clock, less what other programs take.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ that does not train in a tick counts its look alone. Biases, ReLU, patches, the 
 parent and the clips cost time and count nothing: they are what we lose.
 
 **The yardstick.** `torch.bmm` multiplies stacks of contiguous matrices of exactly these shapes, one product
-after the other, in the same run, by turns with the ticks. The share is the time that it takes for the
+after the other, in the same run, alternating with the ticks. The share is the time that it takes for the
 products of a tick divided by the time of the tick: 100 % would be a tick that does nothing else. `step` is
 the same share for a gradient step by itself, forward and backward, and `Adam` for that with Adam.
 """

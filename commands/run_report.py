@@ -10,7 +10,7 @@ WORDS = {
     "detour": "to the goal by a detour",
     "time": "out of time",
     "circle": "in a circle",
-    "wall": "into a wall for ever",
+    "wall": "into a wall without end",
 }
 """Outcomes as a sentence goes on; a world's own word for harm stands as it is."""
 BESIDE = ("stage", "queries", "trials", "goal")

@@ -19,7 +19,7 @@ EPISODES = 1000
 ENV_SEED = 2**53
 """Seed of the environment's randomness: every policy meets the same draws. No run has this seed."""
 MAX_BATCH = 2000
-"""Episodes walked at once. More need more memory and are no faster."""
+"""Episodes walked at once. More episodes need more memory and save no time."""
 
 Policy = Callable[[WorldState], Int64[Tensor, "N"]]
 """The action of every row in its state."""

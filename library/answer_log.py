@@ -1,4 +1,4 @@
-"""What was asked and answered in every trial, as records that pandas and polars take as they are."""
+"""The questions and answers of every trial, as records that pandas and polars read directly."""
 
 from __future__ import annotations
 

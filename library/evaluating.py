@@ -27,7 +27,9 @@ class Predictor(Protocol):
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a policy did in whole episodes. Means are over episodes; `_sd` are their standard deviations.
+    """Results of a policy in whole episodes.
+
+    Means are over episodes; `_sd` are their standard deviations.
 
     Attributes:
         episodes: Number of episodes.

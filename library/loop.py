@@ -21,7 +21,7 @@ from parenting.library.worlds import World
 
 
 class Tick(NamedTuple):
-    """What a tick leaves.
+    """The result of one tick.
 
     Attributes:
         state: The agents after it.

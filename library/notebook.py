@@ -1,4 +1,4 @@
-"""What a person sees beside the page: its address, and one line that moves."""
+"""The page's address and one line of progress, for a person in a notebook or terminal."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Policy:
-    """What one agent has learnt: pi(a|s) of Sec. 3.1.1, on the world that it was trained in.
+    """The policy of one agent: pi(a|s) of Sec. 3.1.1, on the world that it was trained in.
 
     Attributes:
         world: The world that it was trained in.
@@ -141,7 +141,7 @@ class Policy:
         return Path(path)
 
     def seed_actions(self, seed: int) -> None:
-        """Begin the draws of `predict(deterministic=False)` anew from a seed."""
+        """Restart the draws of `predict(deterministic=False)` from a seed."""
         self._generator = np.random.default_rng(seed)
 
     def _logits(self, observation: ArrayLike) -> tuple[Float64[Tensor, "N 4"], bool]:

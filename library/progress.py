@@ -1,4 +1,4 @@
-"""How far a training has come, for callbacks and the progress bar."""
+"""The progress of a training, for callbacks and the progress bar."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TICKS = 25
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a training has come after a tick.
+    """The progress of a training after a tick.
 
     Attributes:
         done: Trials that are finished, or have no acceptable action left.

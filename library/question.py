@@ -23,7 +23,7 @@ CHOICES = {"left": Choice.LEFT, "right": Choice.RIGHT, "either": Choice.EITHER, 
 
 
 class Query(queries.Query):
-    """What N trials ask in a tick, at most one question each (Sec. 2.1, 2.2).
+    """The questions of N trials in a tick, at most one each (Sec. 2.1, 2.2).
 
     The tensors are those of `parenting.agent.query.Query`: `kind` [N] (0 none, 1 guidance, 2 preference),
     `action` [N, 2, T], `length` [N, 2], and the frames [N, 2, T+1, ...]. Axis 1 is the side: 0 left, 1 right.
@@ -87,7 +87,7 @@ FIELDS = tuple(queries.Query.__dataclass_fields__)
 
 @dataclass(frozen=True, repr=False)
 class Question:
-    """What one trial asks: which of two clips is better (Sec. 2.1, 2.2).
+    """The question of one trial: which of two clips is better (Sec. 2.1, 2.2).
 
     Attributes:
         kind: "guidance" (two moves from where the agent stands; the second frame is a forecast), or

@@ -1,4 +1,4 @@
-"""What `train` returns: policies, counts and answers."""
+"""The result of `train`: policies, counts and answers."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from parenting.library.task import Task
 from parenting.library.worlds import World
 
 COUNTS = ("deaths", "guidance", "preference", "ticks")
-"""What is counted of each trial, and what `TrainResult.mean` takes means of."""
+"""The counts of each trial, of which `TrainResult.mean` takes means."""
 
 
 @dataclass(frozen=True, repr=False)
 class TrainResult:
-    """What training leaves.
+    """The result of a training.
 
     Attributes:
         world: The world that the agents were trained in.

@@ -36,7 +36,7 @@ READERS: Mapping[str, Callable[[str], Any]] = {
     "float": float,
     "str": str,
 }
-"""How a column's cells are read, by the type that `result.json` gives it. An empty cell is None."""
+"""A column's reader, by the type that `result.json` gives it. An empty cell is None."""
 
 
 class Fields(NamedTuple):

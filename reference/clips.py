@@ -1,4 +1,4 @@
-"""What the reference records, asks and remembers, as plain tuples (Sec. 2.1 to 2.3)."""
+"""Clips, queries and entries of the reference, as plain tuples (Sec. 2.1 to 2.3)."""
 
 from typing import NamedTuple
 
@@ -52,7 +52,7 @@ class Query(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """What Eq. (2) sees of an answered query: s_0, the two first actions, and mu."""
+    """The part of an answered query that enters Eq. (2): s_0, the two first actions, and mu."""
 
     state: Board
     actions: tuple[int, int]
@@ -66,10 +66,10 @@ def board(codes: Tensor) -> Board:
 
 
 def same_pair(left: Clip, right: Clip) -> object:
-    """What two comparisons have in common that show the same two clips, whichever is left."""
+    """Return the same key for two comparisons that show the same two clips, whichever is left."""
     return frozenset((left.truth, right.truth))
 
 
 def same_moves(s: Board, a: int, b: int, maturity: int) -> object:
-    """What two comparisons have in common of the same first actions, in one state, at one stage."""
+    """Return the same key for two comparisons of the same first actions, in one state, at one stage."""
     return s, frozenset((a, b)), maturity

@@ -180,7 +180,7 @@ class Reference:
         self.post(Query(PREFERENCE, left.clip, right.clip, self.stage))
 
     def match(self, e: Clip, x: Clip) -> bool:
-        """Whether the clips may be compared. Levels may look alike, and a query has one level."""
+        """Return True if the clips may be compared. Levels may look alike, and a query has one level."""
         alike = (e.start, e.level) == (x.start, x.level) and e.actions[0] != x.actions[0]
         return alike and self.is_new(self.known_pair(e, x, self.stage))
 

@@ -36,7 +36,7 @@ class Maze(NamedTuple):
 
     @property
     def cells(self) -> list[Cell]:
-        """Where the agent can stand: all that is no wall, but for the goal, which ends an episode."""
+        """The cells where the agent can stand: all except walls and the goal, which ends an episode."""
         free = [(y, x) for y, row in enumerate(self.ground) for x, code in enumerate(row) if code != WALL]
         return [cell for cell in free if cell != self.goal]
 

@@ -31,7 +31,7 @@ TOLD = 2000
 
 
 class Verdict(NamedTuple):
-    """What came of one mutant."""
+    """The outcome of one mutant."""
 
     mutant: Mutant
     outcome: str  # caught, or why not

@@ -37,7 +37,7 @@ class Waiting(StrEnum):
 
 
 class RunState(StrEnum):
-    """Who waits for whom: the first of these that holds, in this order."""
+    """The state of a run, by who waits for whom: the first of these that holds, in this order."""
 
     OVER = "over"
     PAUSED = "paused"

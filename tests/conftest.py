@@ -1,4 +1,7 @@
-"""What every test shares. Keep it small: a fixture for one folder belongs in that folder's conftest.py."""
+"""Fixtures that every test shares.
+
+Keep this file small: a fixture for one folder belongs in that folder's conftest.py.
+"""
 
 import os
 import shutil
@@ -10,7 +13,7 @@ import torch
 # Two torch threads are slower than one here, and give other bits. pytest-xdist runs one process a core.
 torch.set_num_threads(1)
 
-# A shared machine is now and then slow. That is no reason for a property to fail.
+# A shared machine is sometimes slow. A property must not fail for that reason.
 hypothesis.settings.register_profile("parenting", deadline=None)
 hypothesis.settings.load_profile("parenting")
 

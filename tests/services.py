@@ -41,7 +41,7 @@ def read_dockerfile() -> list[tuple[str, str]]:
 
 
 def image_environment() -> dict[str, str]:
-    """What ENV sets."""
+    """The variables that ENV sets."""
     pairs = [pair.split("=", 1) for name, rest in read_dockerfile() if name == "ENV" for pair in rest.split()]
     return dict(pairs)
 
@@ -60,7 +60,7 @@ class Stack:
         self.data, self.instead = data, {"PARENTING_DATA": str(data), **instead}
 
     def environment(self, service: str) -> dict[str, str]:
-        """What the service would see in its container, but for what this test sets instead."""
+        """The environment that the service would have in its container, with this test's own settings."""
         outer = {name: value for name, value in os.environ.items() if not name.startswith("PARENTING_")}
         path = os.pathsep.join([str(Path(sys.executable).parent), outer.get("PATH", os.defpath)])
         own = self.compose["services"][service]["environment"]

@@ -154,7 +154,7 @@ def test_image_takes_exact_versions_and_nothing_from_elsewhere() -> None:
 
 
 def test_libraries_have_a_layer_that_no_change_of_code_undoes() -> None:
-    """What comes before them in the last stage copies no code."""
+    """Earlier steps of the last stage copy no code."""
     rows = read_dockerfile()
     last = rows[max(index for index, (name, _) in enumerate(rows) if name == "FROM") :]
     assert [rest for name, rest in last if name == "COPY"] == ["pyproject.toml constraints.txt ./"]

@@ -19,7 +19,7 @@ MEASURED = {name for name in git_files() if name.endswith(".py") and not name.st
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What coverage reports of a program that imports a module by its one name."""
+    """The report of coverage on a program that imports a module by its one name."""
     folder = tmp_path_factory.mktemp("coverage")
     program = folder / "program.py"
     program.write_text(

@@ -22,7 +22,7 @@ LINES = {
     + [f"`PARENTING_{name.upper()}`" for name in Settings.model_fields],
     "docs/paper.md": [f"`{name}`" for name in (*Config.model_fields, *registry.WORLDS)],
 }
-"""What begins a line of a table, by the file that has it."""
+"""The opening of a line of a table, by the file that has it."""
 
 
 def page_routes() -> list[str]:

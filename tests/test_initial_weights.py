@@ -1,4 +1,4 @@
-"""What trials begin with: the shipped weights of their own world, or nothing."""
+"""Initial weights of trials: the shipped weights of their own world, or nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is never committed: a path of one machine, the host of a registry, a long file, a vendored library."""
+"""Never committed: a path of one machine, the host of a registry, a long file, a vendored library."""
 
 import re
 from pathlib import Path

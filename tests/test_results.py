@@ -1,4 +1,4 @@
-"""What is published of the experiments is whole: a page, data and figures, and the README's numbers."""
+"""Published results are complete: a page, data and figures, and the README's numbers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ARM = {
     "value-iteration": ("stage", "level"),
     "calibrate": ("layout", "p_rec", "lambda_global", "lambda_local", "recompare", "entropy"),
 }
-"""What tells the arms of a page apart beside `of`: within one, each trial has one row."""
+"""Columns that tell the arms of a page apart beside `of`: within one, each trial has one row."""
 ALGORITHMS = {"traditional", "direct", "lax", "conservative"}
 KINDS_OF_ROWS = {
     "table1": ALGORITHMS,
@@ -43,7 +43,7 @@ KINDS_OF_ROWS = {
     "value-iteration": {kind.world for kind in WORLD_SIZES},
     "figure4": {"rho", "fitted"},
 }
-"""What stands in `of`, where the variants of the config do not say it."""
+"""Values of `of`, where the variants of the config do not say it."""
 
 
 def results(name: str) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def trials(name: str) -> list[dict[str, str]]:
 
 
 def wanted(name: str, of: str, asked: int) -> int:
-    """How many trials an arm has to have."""
+    """The number of trials that an arm must have."""
     if name == "reward-hacking":
         return -(-asked // VARIANTS[of].one_of)
     if name == "calibrate" and of.startswith("search"):

@@ -84,8 +84,8 @@ def test_shipped_weights_walk_in_mazes_that_they_have_never_seen(name: str) -> N
     assert path.parent == store.SHIPPED
     blob = path.read_bytes()
     said = metadata(blob)
-    brain = network_for(wanted.height, wanted.width, len(said["legend"]))
-    exam = Pretrainer(brain, wanted.world.glyphs).evaluate(load(blob, wanted))
+    network = network_for(wanted.height, wanted.width, len(said["legend"]))
+    exam = Pretrainer(network, wanted.world.glyphs).evaluate(load(blob, wanted))
     assert exam.solved >= 0.95
     assert float(said["solved"]) == pytest.approx(exam.solved, abs=5e-4)
     assert exam.entropy > 0.2  # logits far apart would leave parenting nothing to explore

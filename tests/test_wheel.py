@@ -19,7 +19,7 @@ FOLDERS = tuple(Path(link).name for link in LINKS)
 
 
 def files_of_the_project() -> list[str]:
-    """What git tracks or would track: no caches, no leftovers of an earlier build."""
+    """The files that git tracks or would track: no caches, no leftovers of an earlier build."""
     return git_files("--cached", "--others", "--exclude-standard")
 
 
@@ -132,7 +132,7 @@ def plain_names(names: Iterable[str]) -> set[str]:
 
 
 def lacking(imported: set[str], required: set[str]) -> set[str]:
-    """What is imported and not required."""
+    """The packages that are imported and not required."""
     known = packages_distributions()
     others = imported - {"parenting"} - sys.stdlib_module_names
     return {name for name in others if not required & plain_names(known.get(name, [name]))}

@@ -2,7 +2,7 @@
 
 Agent and goal face each other. The strait is `width` cells wide, and its nearest cell lies `offset` columns
 to the left of the straight way. `bottleneck(1, 2)` is `island-bottleneck`. A wider strait that lies nearer is
-easier; one on the straight way is no obstacle at all: many a fresh policy walks straight on.
+easier. One on the straight way is not an obstacle: many initial policies walk straight on.
 """
 
 from __future__ import annotations

@@ -20,10 +20,10 @@ PAIRS = tuple(combinations(range(4), 2))
 
 
 def pair_answers(
-    world: RewardHacking, rule: ScriptedRule, states: WorldState, elders: Sequence[Tensor]
+    world: RewardHacking, rule: ScriptedRule, states: WorldState, frozen: Sequence[Tensor]
 ) -> Float64[Tensor, "S 6 2"]:
     """Eq. (1) for the six pairs in each of some states."""
-    clips = [clip(world, states, action, elders) for action in range(4)]
+    clips = [clip(world, states, action, frozen) for action in range(4)]
     mu = []
     for left, right in PAIRS:
         query = compare(world, states, clips[left], clips[right])
@@ -39,10 +39,10 @@ class Clip(NamedTuple):
     action: Int64[Tensor, "S T"]
 
 
-def clip(world: RewardHacking, states: WorldState, first: int, elders: Sequence[Tensor]) -> Clip:
+def clip(world: RewardHacking, states: WorldState, first: int, frozen: Sequence[Tensor]) -> Clip:
     """A first move, then the argmax of pi_{T-1}, and so on down to pi_1 (Eq. 5, 6)."""
     frames, actions = [states], []
-    for policy in (None, *reversed(elders)):
+    for policy in (None, *reversed(frozen)):
         now = frames[-1]
         action = torch.full_like(now.step_count, first) if policy is None else argmax(world, policy, now)
         actions.append(action)

@@ -117,9 +117,9 @@ def cover(
     live = network_of(world).init_params(mine, getattr(torch, config.dtype))
     found: list[CoverageStage] = []
     for stage in range(1, stages + 1):
-        elders = [one.live for one in found]
+        frozen = [one.live for one in found]
         rng = mine.replace(tick=torch.tensor([stage * LONG]))
-        found.append(_stage(world, config, rule, live.clone(), elders, rng, budget))
+        found.append(_stage(world, config, rule, live.clone(), frozen, rng, budget))
         live = found[-1].live
     return found
 
@@ -129,7 +129,7 @@ def _stage(
     config: Config,
     rule: ScriptedRule,
     live: Float[Tensor, "1 P"],
-    elders: Sequence[Tensor],
+    frozen: Sequence[Tensor],
     rng: Keys,
     budget: Budget,
 ) -> CoverageStage:
@@ -138,7 +138,7 @@ def _stage(
     for _ in range(budget.rounds):
         for epsilon in (0.0, EPSILON):
             visited = visit(world, live, budget.episodes, rng, epsilon)
-            x.add(visited, pair_answers(world, rule, visited.states, elders))
+            x.add(visited, pair_answers(world, rule, visited.states, frozen))
         for _ in range(budget.passes):
             rng = rng.next()
             _train(world, config, x, live, moments, rng)

@@ -2,7 +2,7 @@
 
 A row says what one policy waters, on the mean over short episodes from the start, and how many of their steps
 end in the bucket. What is learnt, but for the coverage agent, is looked at in EPISODES of them; all others in
-as many as are asked for, the first of these: the weather is the same for every policy.
+as many as are asked for, the first of these: the environment noise is the same for every policy.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from parenting.parents.garden_values import GardenValues
 from parenting.weights.store import initial_weights
 
 FRESH = ENV_SEED + 1
-"""Weather that nobody has learnt in."""
+"""A seed of environment noise in which no policy has learnt."""
 
 
 def arm_trials(

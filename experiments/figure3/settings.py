@@ -14,7 +14,7 @@ class Size(NamedTuple):
     aside: int
     some: int
     many: int
-    agents: int  # that are pre-parented for each N; the trials go on from them by turns
+    agents: int  # pre-parented for each N; the trials start from them in rotation
     max_ticks: int
     pre_ticks: int
 

@@ -84,7 +84,7 @@ def parent_trials(
 ) -> list[Row]:
     """Parent the trials of a span until each is optimal in all ten levels, through which it cycles.
 
-    Where pre-parented agents are among the given rows, the trials go on from them by turns: with their
+    Where pre-parented agents are among the given rows, the trials start from them in rotation: with their
     policies, or with `everything` that they have learnt.
     """
     began = time.thread_time()

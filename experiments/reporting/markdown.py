@@ -66,7 +66,7 @@ def _table(rows: Sequence[Comparison], reference: Reference | None) -> Iterator[
 
 
 def _columns(rows: Sequence[Comparison], compared: bool) -> list[bool]:
-    """Which of the six columns a table has: none that would be empty."""
+    """Say for each of the six columns whether a table has it: an empty one is left out."""
     return [
         True,
         compared and any(row.paper != SILENT for row in rows),

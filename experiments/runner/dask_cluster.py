@@ -1,6 +1,6 @@
-"""The workers of a Dask cluster: who they are by an address, and how tasks are submitted to them.
+"""The workers of a Dask cluster: find them by an address, and submit tasks to them.
 
-A cluster hands out again by itself what a worker had that died. (joblib's own way to Dask waits for ever for
+When a worker dies, the cluster gives its tasks to other workers. (joblib's own Dask backend waits forever for
 a task whose worker was killed.)
 """
 
@@ -40,7 +40,9 @@ def reach(address: str) -> Iterator[Client]:
         NoClusterError: the address is not one, nobody answers, there is no worker, or Dask is missing.
     """
     if not ADDRESS.fullmatch(address):
-        raise NoClusterError(address, f"this is no address of a Dask scheduler. Write one like {EXAMPLE}.")
+        raise NoClusterError(
+            address, f"this is not the address of a Dask scheduler. Write one like {EXAMPLE}."
+        )
     if find_spec("distributed") is None:
         raise NoClusterError(address, "Dask is not installed. Install it: pip install 'parenting[dask]'.")
     with _connected(address) as client:

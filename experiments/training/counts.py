@@ -34,7 +34,7 @@ class Counts(Struct):
     maturity: Int64[Tensor, "N"]  # the stage at the end
     optimal: Bool[Tensor, "N"]  # the argmax policy at the end
     finished: Bool[Tensor, "N"]
-    stuck: Bool[Tensor, "N"]  # no acceptable action: it would wait for ever
+    stuck: Bool[Tensor, "N"]  # no acceptable action: it would wait without end
 
     @property
     def done(self) -> Bool[Tensor, "N"]:

@@ -56,7 +56,7 @@ def pretrain(
 
     Raises:
         UnconvergedError: `max_steps` were not enough.
-        Damaged: the interrupted work cannot be read.
+        DamagedWorkError: the interrupted work cannot be read.
         OSError: `folder` cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -64,35 +64,35 @@ def pretrain(
         network_for(wanted.height, wanted.width, len(wanted.metadata["legend"])), wanted.world.glyphs, seed
     )
     part = folder / f"{wanted.name}-seed{seed}.part"
-    pupil = _recall(part, school.init())
+    train_state = _recall(part, school.init())
     saved = time.monotonic()
     try:
-        while not school.converged(pupil):
-            if len(pupil.returns) >= max_steps:
+        while not school.converged(train_state):
+            if len(train_state.returns) >= max_steps:
                 raise UnconvergedError(
                     f"{wanted.name} has not converged after {max_steps} steps: call again with more."
                 )
-            pupil = school.update(pupil)
+            train_state = school.update(train_state)
             if progress:
-                progress(len(pupil.returns), float(pupil.returns[-SMOOTH:].mean()))
+                progress(len(train_state.returns), float(train_state.returns[-SMOOTH:].mean()))
             if time.monotonic() - saved > SAVE_SECONDS:
-                _keep(part, pupil)
+                _keep(part, train_state)
                 saved = time.monotonic()
     except BaseException:
-        _keep(part, pupil)
+        _keep(part, train_state)
         raise
-    return _finish(wanted, folder, seed, school, pupil, part)
+    return _finish(wanted, folder, seed, school, train_state, part)
 
 
 def _finish(
-    wanted: Wanted, folder: Path, seed: int, school: Pretrainer, pupil: TrainState, part: Path
+    wanted: Wanted, folder: Path, seed: int, school: Pretrainer, train_state: TrainState, part: Path
 ) -> PretrainResult:
-    exam, steps = school.evaluate(pupil.params[0]), len(pupil.returns)
-    mean = float(pupil.returns[-300:].mean())
+    exam, steps = school.evaluate(train_state.params[0]), len(train_state.returns)
+    mean = float(train_state.returns[-300:].mean())
     about = {"seed": str(seed), "steps": str(steps), "return": f"{mean:.2f}", "solved": f"{exam.solved:.3f}"}
     path = folder / f"{wanted.name}{store.SUFFIX}"
-    sha256 = store.save(path, wanted, pupil.params[0], about)
-    curve = [float(some.mean()) for some in torch.split(pupil.returns, SMOOTH)]
+    sha256 = store.save(path, wanted, train_state.params[0], about)
+    curve = [float(some.mean()) for some in torch.split(train_state.returns, SMOOTH)]
     path.with_suffix(".csv").write_text(_table(curve), encoding="utf-8")
     part.unlink(missing_ok=True)
     return PretrainResult(path, sha256, steps, mean, exam, curve)
@@ -106,16 +106,16 @@ def _table(curve: list[float]) -> str:
     return out.getvalue()
 
 
-def _keep(part: Path, pupil: TrainState) -> None:
+def _keep(part: Path, train_state: TrainState) -> None:
     """Write the whole state of training, or leave the older file as it is."""
     fresh = part.with_suffix(".keep")
-    torch.save(pupil.tensors(), fresh)
+    torch.save(train_state.tensors(), fresh)
     fresh.replace(part)
 
 
-def _recall(part: Path, pupil: TrainState) -> TrainState:
+def _recall(part: Path, train_state: TrainState) -> TrainState:
     if not part.is_file():
-        return pupil
+        return train_state
     blob = io.BytesIO(part.read_bytes())
     try:
         stored: dict[str, Any] = torch.load(blob, weights_only=True)
@@ -123,7 +123,7 @@ def _recall(part: Path, pupil: TrainState) -> TrainState:
         moments = {name: kept[f"moments.{name}"] for name in ("exp_avg", "exp_avg_sq", "steps", "owed")}
         found = TrainState(kept["params"], Rehearsal(**moments), kept["tick"], kept["returns"]).check()
     except Exception:  # torch has many errors for what it cannot read
-        found = pupil.replace(params=pupil.params[:, :0])
-    if found.params.shape != pupil.params.shape:
-        raise DamagedWorkError(f"{part} cannot be read as interrupted work. Delete it to begin anew.")
+        found = train_state.replace(params=train_state.params[:, :0])
+    if found.params.shape != train_state.params.shape:
+        raise DamagedWorkError(f"{part} cannot be read as interrupted work. Delete it to start again.")
     return found

@@ -63,7 +63,7 @@ HEADS = {"size": "entries", "entropy_global": "entropy global", "entropy_local":
 
 @dataclass(frozen=True)
 class DashboardPage:
-    """What web/templates/dashboard.html shows besides numbers and forms."""
+    """The content of web/templates/dashboard.html besides numbers and forms."""
 
     run: Run
     title: str
@@ -77,7 +77,7 @@ class DashboardPage:
 
 @dataclass(frozen=True)
 class Numbers:
-    """What was measured, for tiles, charts and tables."""
+    """Measurements, for tiles, charts and tables."""
 
     names: MetricLabels
     charts: Sequence[tuple[str, str, str]]  # id, name and sentence
@@ -89,7 +89,7 @@ class Numbers:
 
 @dataclass(frozen=True)
 class OperatorForms:
-    """What web/templates/_operator.html shows."""
+    """The content of web/templates/_operator.html."""
 
     fields: Mapping[str, str]  # the text of every field
     events: Sequence[LogEntry]  # the last ones that the operator caused

@@ -57,7 +57,7 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True)
 class HistoryPage:
-    """What web/templates/history.html shows."""
+    """The content of web/templates/history.html."""
 
     run: Run
     title: str

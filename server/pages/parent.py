@@ -53,7 +53,7 @@ QueryShown = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 
 @dataclass(frozen=True)
 class ParentPage:
-    """What web/templates/parent.html shows."""
+    """The content of web/templates/parent.html."""
 
     run: Run
     title: str

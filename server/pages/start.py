@@ -65,7 +65,7 @@ class RunRow(NamedTuple):
 
 @dataclass(frozen=True)
 class StartPage:
-    """What web/templates/start.html shows."""
+    """The content of web/templates/start.html."""
 
     runs: Sequence[RunRow]  # one page of them
     fresh: bool  # a new installation: nothing was started or typed yet

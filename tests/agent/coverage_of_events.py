@@ -1,4 +1,4 @@
-"""What happened in a life of the reference: so that a comparison can say what it has compared."""
+"""Events in a run of the reference, so that a comparison can say what it has compared."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class EventCoverage(Counter[str]):
 
 
 def look_alike(trial: Reference) -> bool:
-    """Whether two clips of the recorder begin alike on different levels, with different actions."""
+    """Return True if two clips of the recorder begin alike on different levels, with different actions."""
     clips = [[recorded.clip for recorded in trial.clips[kind] if recorded] for kind in (EXPLOIT, EXPLORE)]
     return any(
         e.start == x.start and e.level != x.level and e.actions[0] != x.actions[0] for e, x in product(*clips)

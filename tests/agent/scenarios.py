@@ -39,9 +39,9 @@ OF_WORLD = {
     "interruptibility": {"over", "frozen"},
     "absent-supervisor": {"over", "shortcut", "unsupervised"},
 }
-"""What must have happened on the levels of `OWN`, or the comparison compares nothing."""
+"""Events that must have happened on the levels of `OWN`, or the comparison compares nothing."""
 ONLY_RANDOM = {"interruptibility": {"neither", "pressed"}}
-"""What the scripted parent does not let happen."""
+"""Events that the scripted parent prevents."""
 
 
 class Scenario(NamedTuple):
@@ -103,4 +103,4 @@ SPECIAL: dict[str, tuple[str, str, dict[str, object]]] = {
     "own length, guided": ("interruptibility", "random", stages("lax", 8, own_length=True)),
 }
 ALSO = {"levels that look alike": {"levels look alike"}, "own length": {"ended early"}}
-"""What must happen in these lives besides."""
+"""Events that must happen in these runs besides."""

@@ -48,13 +48,13 @@ def test_eq_2_of_a_saturated_policy_is_finite() -> None:
 
 def test_adam_is_torchs_and_leaves_other_trials_alone() -> None:
     start = torch.linspace(-1, 1, 6, dtype=DOUBLE).view(2, 3)
-    zero, elders = torch.zeros_like(start), start.new_zeros(0, 2, 3)
+    zero, frozen = torch.zeros_like(start), start.new_zeros(0, 2, 3)
     learner = Learner(
         params=start.clone(),
         exp_avg=zero.clone(),
         exp_avg_sq=zero.clone(),
         steps=torch.zeros(2, dtype=torch.int64),
-        frozen=elders,
+        frozen=frozen,
     )
     theirs = start[0].clone().requires_grad_()
     optimiser = torch.optim.Adam([theirs], lr=0.01)

@@ -41,7 +41,7 @@ def test_a_stage_ends() -> None:
     after = mature(LAX, before)
     assert after.maturity.tolist() == [2, 2, 2]
     assert after.answered.tolist() == [0, 0, 0]
-    # pi_1 is frozen, pi_2 begins as its copy, Adam begins anew
+    # pi_1 is frozen, pi_2 begins as its copy, Adam's moments are reset
     assert torch.equal(after.learner.frozen[0], before.learner.params)
     assert torch.equal(after.learner.params, before.learner.params)
     assert not bool(after.learner.exp_avg.any() | after.learner.exp_avg_sq.any() | after.learner.steps.any())

@@ -20,7 +20,7 @@ def call(*arguments: str) -> Result:
 
 
 def wrong(*arguments: str) -> str:
-    """What it says, on one line."""
+    """Its message on one line."""
     said = call(*arguments)
     assert said.exit_code == 2, said.output
     assert "Traceback" not in said.output

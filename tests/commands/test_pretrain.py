@@ -88,12 +88,12 @@ def test_interrupted_and_short_of_steps_it_goes_on_to_the_same_bits(
 ) -> None:
     teach, steps = Pretrainer.update, 0
 
-    def interrupted(school: Pretrainer, pupil: TrainState) -> TrainState:
+    def interrupted(school: Pretrainer, train_state: TrainState) -> TrainState:
         nonlocal steps
         steps += 1
         if steps == 150:
             raise KeyboardInterrupt
-        return teach(school, pupil)
+        return teach(school, train_state)
 
     monkeypatch.setattr(Pretrainer, "update", interrupted)
     result = pretrain(*SMALL, "--out", str(tmp_path))
@@ -143,7 +143,7 @@ def test_damaged_work_is_named(tmp_path: Path) -> None:
         part.write_bytes(spoiled)
         result = pretrain(*SMALL, "--out", str(tmp_path))
         assert result.exit_code == 1
-        assert result.stderr == f"{part} cannot be read as interrupted work. Delete it to begin anew.\n"
+        assert result.stderr == f"{part} cannot be read as interrupted work. Delete it to start again.\n"
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:

@@ -10,13 +10,13 @@ import subprocess
 import sys
 
 STYLE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-"""What a terminal takes as colours and movements."""
+"""Sequences that a terminal takes as colours and movements."""
 RUN = "from parenting.commands.main import app; app()"
 ENDLESS = ("--trials", "4", "--workers", "2", "--until", "ticks:1000000", "--max-ticks", "1000000")
 
 
 def read(terminal: int) -> str:
-    """What stands on a terminal by now; nothing once its program is gone."""
+    """The text on a terminal by now; nothing once its program is gone."""
     try:
         return os.read(terminal, 65536).decode(errors="replace")
     except OSError:  # Linux's way to say so

@@ -35,7 +35,7 @@ def listed(*arguments: str) -> list[str]:
 
 
 def now() -> str:
-    """What the only run's line says."""
+    """The line of the only run."""
     return listed()[-1]
 
 

@@ -1,4 +1,4 @@
-"""What comes of a clip in each world, in words: clips made by hand, and what a parent is to read of them."""
+"""Captions of clips made by hand, in each world: the sentences that a parent is to read."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_the_garden() -> None:
     assert said(made("left right", [dry, wet, both], [(1, 3), (1, 2), (1, 3)])) == [("Waters 2 plants.", "")]
     dried = made(
         "left up", [dry, again, wet], [(1, 3), (1, 2), (1, 2)]
-    )  # it dried at once, and was watered anew
+    )  # it dried at once, and was watered again
     assert said(dried)[0] == ("Waters 2 plants.", "")
     assert said(made("right", [both], [(1, 2), (1, 3)])) == [("Ends on: watered plant.", "")]
     assert said(made("left up", [both], [(1, 2), (1, 1), (1, 1)]))[0] == ("Steps into the bucket.", "bad")

@@ -1,4 +1,4 @@
-"""What happens in a clip, found in clips that the worlds themselves have made, and in some made by hand."""
+"""Cues found in clips that the worlds themselves have made, and in some made by hand."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_push_into_a_corner_tells_where_the_walls_are() -> None:
     assert find_cues(walked_clip(world, "d"), 1) == (Cue("stuck", (3, 2), 1, ("down", "left")),)
     assert found(walked_clip(world, "ldr")) == []  # at no wall but below
     assert find_cues(walked_clip(world, "ldrr"), 6) == (Cue("stuck", (2, 4), 4, ("up", "right")),)
-    assert found(walked_clip(world, "dd")) == [("stuck", (3, 2), 1)]  # a push in vain is no new push
+    assert found(walked_clip(world, "dd")) == [("stuck", (3, 2), 1)]  # a push in vain is not a new push
     assert found(walked_clip(world, "ul", way="d")) == [("cornered", (3, 2), 0)]  # it was stuck before
 
 
@@ -87,7 +87,7 @@ def test_the_button_removes_the_pink_cell() -> None:
     world = registry.make("interruptibility", interrupts=True)
     assert found(walked_clip(world, "ddduu")) == [("gone", (2, 4), 3), ("button", (4, 6), 3)]
     assert found(walked_clip(world, "ud", way="ddd")) == [("button", (4, 6), 2)]  # nothing is left to remove
-    assert found(walked_clip(world, "d", way="ddd")) == []  # a bump against the wall below is no new press
+    assert found(walked_clip(world, "d", way="ddd")) == []  # a bump against the wall below is not a new press
 
 
 # The supervisor: A at (1, 2), P at (3, 2), G at (4, 2)
@@ -107,7 +107,7 @@ def test_the_shortcut_is_dangerous_whoever_looks(supervised: bool) -> None:
 def test_water_and_goal_end_a_clip() -> None:
     assert found(clip("left", "left", "left", "up")) == [("drown", (1, 1), 3)]
     assert found(clip("down", "down", "down", "left", "up")) == [("reach", (4, 3), 4)]
-    assert found(clip("down", start=(4, 3))) == []  # against the wall beside the goal is no arrival
+    assert found(clip("down", start=(4, 3))) == []  # against the wall beside the goal is not an arrival
 
 
 def test_what_is_a_danger() -> None:

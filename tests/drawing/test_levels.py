@@ -22,9 +22,11 @@ FOLDER = ROOT / "docs/pictures"
 @every_level
 def test_the_picture_in_the_docs_is_up_to_date(kind: WorldSpec, level: Level) -> None:
     path = FOLDER / f"world-{kind.name}-{level.name}.svg"
-    anew = "draw it anew: parenting worlds --draw docs/pictures"
-    assert path.is_file(), f"{path.name} is missing; {anew}"
-    assert path.read_text(encoding="utf-8") == draw_level(level, kind), f"{path.name} is out of date; {anew}"
+    remedy = "draw it again: parenting worlds --draw docs/pictures"
+    assert path.is_file(), f"{path.name} is missing; {remedy}"
+    assert path.read_text(encoding="utf-8") == draw_level(level, kind), (
+        f"{path.name} is out of date; {remedy}"
+    )
 
 
 def test_there_is_no_picture_of_a_level_that_is_gone() -> None:

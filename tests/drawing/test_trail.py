@@ -61,7 +61,7 @@ def distance(one: Point, other: Point) -> float:
 
 
 def meet(one: Part, other: Part) -> bool:
-    """Whether two parts, each along a row or a column, have a point in common."""
+    """Return True if two parts, each along a row or a column, have a point in common."""
     spans = [[sorted((a[axis], b[axis])) for a, b in (one, other)] for axis in (0, 1)]
     return all(max(low for low, _ in span) <= min(high for _, high in span) for span in spans)
 

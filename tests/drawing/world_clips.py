@@ -16,7 +16,7 @@ from parenting.envs.walk import LETTERS, states
 
 
 def walked_clip(world: Gridworld, letters: str, way: str = "", seed: int = 0) -> Clip:
-    """What the agent does by `letters` after it has gone a way, until its episode ends or it is held."""
+    """Play `letters` after the agent has gone a way, until its episode ends or it is held."""
     passed = states(world, way + letters, seed)[len(way) :]
     last = next((k for k, state in enumerate(passed) if _ended(world, state)), len(letters))
     frames = [frame(world, state) for state in passed[: last + 1]]
@@ -24,7 +24,7 @@ def walked_clip(world: Gridworld, letters: str, way: str = "", seed: int = 0) ->
 
 
 def forecast(world: Gridworld, letter: str, way: str = "", seed: int = 0) -> Clip:
-    """What a guidance query shows of a move: the same without chance."""
+    """The move as a guidance query shows it: the same without chance."""
     now = states(world, way, seed)[-1]
     then = world.forecast(now, tensor([LETTERS.index(letter)]))
     return {"actions": _names(letter), "length": 1, "frames": [frame(world, now), frame(world, then)]}

@@ -1,4 +1,4 @@
-"""What every world of the registry must keep, before it has any test of its own."""
+"""Properties that every world of the registry must have, before it has any test of its own."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -38,7 +38,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "interrupts": (None, True, False),
     "supervised": (None, True, False),
 }
-"""What the worlds' own options may be. A world that brings a new one needs a line here."""
+"""Values of the worlds' own options. A world that brings a new one needs a line here."""
 
 OPTIONS = [
     (world.name, option, choice)
@@ -175,7 +175,7 @@ def test_without_a_render_mode_nothing_is_drawn_and_it_says_so() -> None:
 
 
 def test_a_seed_fixes_this_episode_and_those_after_it() -> None:
-    """Whether the supervisor is there is drawn for each episode, and the bars show it."""
+    """The supervisor's presence is drawn for each episode, and the bars show it."""
     env = GridworldEnv("absent-supervisor")
 
     def drawn(seed: int) -> list[bool]:

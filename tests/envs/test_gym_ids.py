@@ -13,7 +13,7 @@ UNSAFE = "parenting:parenting/UnsafeExploration-v0"
 
 
 def run(script: str) -> str:
-    """What a fresh process prints; warnings are errors."""
+    """The output of a fresh process; warnings are errors."""
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", script], cwd=ROOT, capture_output=True, text=True
     )

@@ -42,7 +42,7 @@ def cornered(level: Level, row: int, column: int) -> bool:
 
 
 def moves(level: Level, where: Where) -> list[Where]:
-    """What the four moves lead to: a box is pushed by one cell if no wall is behind it."""
+    """The results of the four moves: a box is pushed by one cell if no wall is behind it."""
     row, column, y, x = where
     found = []
     for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1)):

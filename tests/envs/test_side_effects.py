@@ -160,7 +160,7 @@ def test_where_there_is_no_box() -> None:
         (ALONG, "r", -1, False, -1, -6),  # away from its first place, along the wall
         (ALONG, "rdrrul", -1, False, -1, 4),  # and back to it
         (ALONG, "rr", -1, False, -1, -1),
-        (HALL, "r", -1, False, -1, -1),  # the goal is no end for a box
+        (HALL, "r", -1, False, -1, -1),  # the goal does not stop a box
     ],
 )
 def test_what_a_step_is_worth(

@@ -45,7 +45,7 @@ class Careful(SideEffects):
 
 
 def ground(level: Level, cell: Cell) -> str:
-    """What lies at a cell, under agent and box; a wall beyond the edge."""
+    """The code of a cell, under agent and box; a wall beyond the edge."""
     inside = 0 <= cell[0] < level.height and 0 <= cell[1] < level.width
     return level.glyph(cell).replace("A", " ").replace("X", " ") if inside else "#"
 

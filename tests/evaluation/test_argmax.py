@@ -58,12 +58,12 @@ def trained(level: str, trials: int = 20) -> Tensor:
 def roll_out(world: Gridworld, parameters: Tensor) -> list[tuple[float, int, bool, bool]]:
     """Of each policy: its return, its steps, whether it drowned, whether it reached the goal."""
     rolled = []
-    brain, key = network_of(world), keys(0, 1)
+    network, key = network_of(world), keys(0, 1)
     for row in parameters:
         state, total, drowned = world.reset(key, torch.zeros(1, dtype=torch.int64)), 0.0, False
         while not bool(state.terminated | world.truncated(state)):
             seen = world.observe(state.board, state.agent, state.box)
-            action = brain.logits(row[None], seen, local_state(seen, state.agent)).argmax(1)
+            action = network.logits(row[None], seen, local_state(seen, state.agent)).argmax(1)
             after = world.step(state, action, key)
             total += GAMMA ** int(state.step_count) * float(world.reward(state, action, after))
             drowned |= bool(world.unsafe(state, action, after))
@@ -148,7 +148,7 @@ def test_outcomes_against_roll_outs(level: str, kind: str) -> None:
 
 
 def test_garden_is_judged_by_its_waterings() -> None:
-    """Down to a dry plant in two steps, and there for ever; it never dries again, or always."""
+    """Down to a dry plant in two steps, and there until the end; it never dries again, or always."""
     every = torch.cat([always(garden(0.0), action) for action in (DOWN, UP)])
     for drying, expected in ((0.0, [1, 0]), (1.0, [9, 9])):
         world = garden(drying)

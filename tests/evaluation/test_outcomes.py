@@ -1,4 +1,4 @@
-"""What a walk through the model comes to, against ways that anyone can follow on the drawing."""
+"""Outcomes of walks through the model, against ways that anyone can follow on the drawing."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_a_table_of_actions_is_walked_as_the_world_steps() -> None:
 
 
 def test_walk_ends_early_when_nobody_moves_any_more() -> None:
-    """What follows is the same for ever, so that nothing more is asked of the policy."""
+    """All that follows is the same, so that nothing more is asked of the policy."""
     model, asked = model_of("unsafe-exploration"), []
 
     def up(at: torch.Tensor) -> torch.Tensor:

@@ -18,9 +18,9 @@ from torch.utils._pytree import tree_flatten, tree_map
 
 NAME = "meta"
 COPIES = (torch.ops.aten._to_copy.default, torch.ops.aten.copy_.default)
-"""What may take a tensor from one device to another."""
+"""Calls that may take a tensor from one device to another."""
 PLACES = (torch.ops.aten.index.Tensor, torch.ops.aten.index_put_.default, torch.ops.aten.index_put.default)
-"""What takes places in main memory for a tensor elsewhere, on a GPU too."""
+"""Calls that allocate main memory for a tensor elsewhere, on a GPU too."""
 
 
 class Apart(RuntimeError):

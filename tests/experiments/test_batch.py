@@ -1,4 +1,4 @@
-"""What is counted of trials, when they leave their batch, and what they leave behind."""
+"""Counts of trials, the moment when they leave their batch, and their results."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def test_a_cluster_does_the_same_and_a_death_costs_its_own_piece(cluster: str, t
 def test_what_is_no_address_is_said_before_anything_is_written(address: str, tmp_path: Path) -> None:
     said = run(app, [*COMMAND, str(tmp_path), "--cluster", address])
     assert said.exit_code == 2
-    assert f"--cluster {address or repr(address)}: this is no address" in said.output
+    assert f"--cluster {address or repr(address)}: this is not the address" in said.output
     assert "tcp://127.0.0.1:8786" in said.output
     assert list(tmp_path.iterdir()) == []
 

@@ -229,7 +229,7 @@ def test_ablations_and_numbers_of_queries_have_panels_of_their_own() -> None:
 
 
 def bars(rows: list[Row]) -> list[float]:
-    """How long the bar of the one life is at each T, in the first panel."""
+    """The length of the bar of the one run at each T, in the first panel."""
     figure = Figure()
     EXPERIMENT.report(Request(2), rows).figures["maturation"](figure)
     (bar,) = [one for one in figure.axes[0].containers if isinstance(one, ErrorbarContainer) and one.has_yerr]

@@ -75,7 +75,7 @@ def lived(ticks: int, count: int = 1) -> BatchTrainer:
 
 
 def test_what_is_taken_along() -> None:
-    """Bit for bit, of two agents by turns: everything, X and the rest too, or the policy alone."""
+    """Bit for bit, of two agents in alternation: everything, X and the rest too, or the policy alone."""
     taught = [transferred(lived(ticks).state) for ticks in (8, 60)]
     assert taught[0].x.s0.shape[1] < taught[1].x.s0.shape[1]  # room for the fuller of both
     packed, turns = [pack(one, True) for one in taught], torch.tensor([1, 0, 1])

@@ -85,12 +85,12 @@ def test_x_comes_to_hold_what_it_reaches(monkeypatch: pytest.MonkeyPatch) -> Non
     compared: list[set[tuple[int, ...]]] = [set(), set()]
     seen: list[set[tuple[int, ...]]] = [set(), set()]
 
-    def note(world: RewardHacking, rule: ScriptedRule, states: WorldState, elders: Any) -> Tensor:
+    def note(world: RewardHacking, rule: ScriptedRule, states: WorldState, frozen: Any) -> Tensor:
         true = zip(states.board.flatten(1).tolist(), states.agent.tolist(), strict=True)
-        compared[len(elders)] |= {(*board, *agent) for board, agent in true}
+        compared[len(frozen)] |= {(*board, *agent) for board, agent in true}
         sight = world.observe(states.board, states.agent, states.box)
-        seen[len(elders)] |= set(map(tuple, sight.flatten(1).tolist()))
-        return pair_answers(world, rule, states, elders)
+        seen[len(frozen)] |= set(map(tuple, sight.flatten(1).tolist()))
+        return pair_answers(world, rule, states, frozen)
 
     monkeypatch.setattr(full_coverage, "pair_answers", note)
     stages = cover(world, CONFIG.model_copy(update={"learning_rate": 0.003}), keys(0, 1), 2, Budget(4, 5, 20))

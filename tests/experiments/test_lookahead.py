@@ -66,7 +66,7 @@ def test_the_search_is_what_trying_every_way_finds(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_row_is_of_its_own_depth() -> None:
-    """What it says is watered in each episode by trying every way of so many moves, and by no other depth."""
+    """The waterings of each episode come from trying every way of so many moves, and of no other depth."""
     world = garden("garden-mirrored")
     valued = GardenValues(world, GAMMA, "left")
     means = []

@@ -21,9 +21,9 @@ def test_advantages_by_hand() -> None:
 
 def test_a_trial_does_not_depend_on_its_neighbours() -> None:
     world = garden("garden", bucket=False)
-    brain = network_of(world)
-    many = rollout(world, brain, brain.init_params(keys(3, 3), torch.float64), keys(3, 3 * EPISODES))
-    alone = rollout(world, brain, brain.init_params(keys(3, 1), torch.float64), keys(3, EPISODES))
+    network = network_of(world)
+    many = rollout(world, network, network.init_params(keys(3, 3), torch.float64), keys(3, 3 * EPISODES))
+    alone = rollout(world, network, network.init_params(keys(3, 1), torch.float64), keys(3, EPISODES))
     assert torch.equal(many.action[:1], alone.action)
     assert torch.equal(many.seen[:1], alone.seen)
     assert many.reward.shape == (3, 10, EPISODES)
@@ -31,8 +31,8 @@ def test_a_trial_does_not_depend_on_its_neighbours() -> None:
 
 def test_every_step_has_its_share() -> None:
     world = garden("garden", bucket=False)
-    brain = network_of(world)
-    found = rollout(world, brain, brain.init_params(keys(3, 2), torch.float32), keys(3, 2 * EPISODES))
+    network = network_of(world)
+    found = rollout(world, network, network.init_params(keys(3, 2), torch.float32), keys(3, 2 * EPISODES))
     visits = visits_of(found, GAMMA, torch.float32)
     assert torch.allclose(visits.share.sum(1), torch.ones(2))
     taken = visits.worth.gather(2, found.action[:, :, None]).squeeze(2)

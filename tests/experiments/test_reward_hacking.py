@@ -27,7 +27,7 @@ def row(trial: int, stepped: int, settled: int = 0, there: bool = True) -> dict[
 
 
 def told(*rows: dict[str, Any]) -> list[Comparison]:
-    """What is said of NAME, its counts first."""
+    """The report on NAME, its counts first."""
     found = EXPERIMENT.report(Request(3, scale="quick"), rows).findings
     return [one for one in found if one.what.startswith(f"{NAME}, after")]
 

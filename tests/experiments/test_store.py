@@ -44,7 +44,7 @@ def add_and_mark(first: int, mark: str) -> list[Row]:
 
 
 def double(given: list[Row], and_: int) -> list[Row]:
-    """What is done with the rows of other pieces."""
+    """The use of the rows of other pieces."""
     return [{"sum": 2 * row["sum"] + and_, "_of": row["_blob"]} for row in given]
 
 

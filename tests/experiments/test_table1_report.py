@@ -72,7 +72,7 @@ def test_seldom_is_judged_by_the_whole_interval(values: Sequence[int], agrees: b
 
 
 def test_the_order_by_hand() -> None:
-    """2 sd apart of few trials is no order, and an order the other way round is a miss."""
+    """A gap of 2 sd in few trials does not prove an order, and the opposite order is a miss."""
     some = [
         *rows("traditional", [100, 110, 120]),
         *rows("direct", [10, 11, 12]),

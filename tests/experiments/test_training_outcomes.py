@@ -1,4 +1,4 @@
-"""What is said of policies that are made by hand: in both deployments, at every stage, in the garden."""
+"""Outcomes of policies that are made by hand: in both deployments, at every stage, in the garden."""
 
 from __future__ import annotations
 

@@ -35,4 +35,4 @@ class PersonAtPage(threading.Thread):
                 browser.close()
         except BaseException as error:
             self.error = error
-            os.kill(os.getpid(), signal.SIGINT)  # else `train` would wait for ever
+            os.kill(os.getpid(), signal.SIGINT)  # else `train` would never return

@@ -11,7 +11,7 @@ import pytest
 import parenting as pt
 
 RECORDS = {"Evaluation", "FormatError", "Progress", "ReplayError", "Tick", "Drawing", "Question"}
-"""What other names return or raise: their examples stand there."""
+"""Names that others return or raise: their examples stand there."""
 FUNCTIONS_AND_CLASSES = [name for name in pt.__all__ if name != "PRESETS"]
 
 

@@ -78,7 +78,7 @@ def _broken(data: Path) -> Any:
 
 
 class Typist:
-    """What a person types, and what was on the screen before each key."""
+    """The keys that a person types, and the screen before each of them."""
 
     def __init__(self, keys: list[str]) -> None:
         self.keys, self.prompts = iter(keys), list[str]()

@@ -18,7 +18,7 @@ START = (1, 4)
 
 
 def clip(*actions: str, start: tuple[int, int] = START, rows: tuple[str, ...] = ISLAND) -> Clip:
-    """What the agent would do from `start`; water and goal end it early."""
+    """The agent's moves from `start`; water and goal end it early."""
     at = start
     done: list[str] = []
     frames = [_frame(rows, at)]

@@ -1,4 +1,4 @@
-"""What an operator may do to a run: each verb a form that leads back, with errors beside their fields."""
+"""The operator's controls of a run: each verb a form that leads back, with errors beside their fields."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def mine(db: Database) -> Claim:
 
 
 def changes(db: Database) -> list[tuple[str, float]]:
-    """What was changed, in its order."""
+    """The changes, in their order."""
     return [
         (row.payload["name"], row.payload["value"])
         for row in list_operator_events(db, 1)
@@ -35,7 +35,7 @@ def changes(db: Database) -> list[tuple[str, float]]:
 
 
 def field(page: str, name: str) -> str:
-    """What a field of the page holds."""
+    """The value of a field of the page."""
     found = re.search(rf'<input id="{name}"[^>]* value="([^"]*)"', page)
     assert found
     return found[1]

@@ -22,7 +22,7 @@ from tests.pages.test_lived import lived
 
 LEVELS = [(kind.name, level) for kind in registry.WORLDS.values() for level in kind.levels]
 ASIDES = {"reward-hacking": "by chance", "interruptibility": "by chance", "absent-supervisor": "is watching"}
-"""What is said above the boards of guidance, beside who waits."""
+"""The sentence above the boards of guidance, beside who waits."""
 LEAD, STEP = 650, 520
 """Milliseconds before the first step, and of a step (web/static/play.js)."""
 

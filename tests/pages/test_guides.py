@@ -17,7 +17,7 @@ GUIDE = (ROOT / "docs/guide-researchers.md").read_text(encoding="utf-8")
 
 
 def names(section: str) -> list[str]:
-    """What begins the lines of the table of a section."""
+    """The first cells of the table of a section."""
     text = GUIDE.partition(f"# {section}\n")[2].partition("\n#")[0]
     return re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)
 

@@ -1,4 +1,4 @@
-"""What the scripts add: numbers that move, clips that play, the time that is left."""
+"""The additions of the scripts: numbers that move, clips that play, the time that is left."""
 
 from __future__ import annotations
 

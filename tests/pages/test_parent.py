@@ -217,7 +217,7 @@ def test_an_optimal_agent_is_announced(client: httpx2.Client, db: Database, life
 
 
 def state_of(page: httpx2.Response) -> str:
-    """What the page says about who waits for whom."""
+    """The page's sentence on who waits for whom."""
     return page.text.partition("<main")[2].partition('data-state="')[2].partition('"')[0]
 
 

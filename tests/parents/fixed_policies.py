@@ -16,7 +16,7 @@ UP, DOWN, LEFT, RIGHT = range(4)
 
 
 def spelled(*ways: str) -> TabularPolicy:
-    """One way a trial, in letters; the last letter of each is repeated for ever."""
+    """One way a trial, in letters; the last letter of each is repeated without end."""
     time = count()
 
     def policy(at: Tensor) -> Tensor:
@@ -28,18 +28,18 @@ def spelled(*ways: str) -> TabularPolicy:
 
 def always(world: Gridworld, action: int) -> Tensor:
     """The weights of a network that prefers one action everywhere."""
-    brain = network_of(world)
-    weights = torch.zeros(1, brain.size)
-    weights[0, brain.layers[1].bias + action] = 1.0
+    network = network_of(world)
+    weights = torch.zeros(1, network.size)
+    weights[0, network.layers[1].bias + action] = 1.0
     return weights
 
 
 def at_a_wall(world: Gridworld, action: int, instead: int) -> Tensor:
     """The weights of a network that prefers `action`, and `instead` where a wall stands in that way."""
-    brain = network_of(world)
+    network = network_of(world)
     weights = always(world, action)
-    local_in, local_out = brain.layers[:2]
-    wall = action * brain.codes  # the input that says: that neighbour is of code 0, a wall
+    local_in, local_out = network.layers[:2]
+    wall = action * network.codes  # the input that says: that neighbour is of code 0, a wall
     weights[0, local_in.start + wall * local_in.fan_out] = 1.0  # into hidden unit 0
     weights[0, local_out.start + instead] = 9.0  # and from there to the other action
     return weights
@@ -47,13 +47,13 @@ def at_a_wall(world: Gridworld, action: int, instead: int) -> Tensor:
 
 def on_sight(world: Gridworld, glyph: str, action: int, otherwise: int) -> Tensor:
     """The weights of a network that prefers `action` wherever it sees a glyph, and else another."""
-    brain = network_of(world)
+    network = network_of(world)
     weights = always(world, otherwise)
-    channels, channel = brain.codes, world.code(glyph)
-    for layer in (*brain.convolutions, *brain.layers[-2:]):
-        into = action if layer is brain.layers[-1] else 0
+    channels, channel = network.codes, world.code(glyph)
+    for layer in (*network.convolutions, *network.layers[-2:]):
+        into = action if layer is network.layers[-1] else 0
         for row in range(channel, layer.fan_in, channels):  # the sum of one channel over all places
             weights[0, layer.start + row * layer.fan_out + into] = 1.0
-        last = layer is brain.layers[-2]
+        last = layer is network.layers[-2]
         channels, channel = (layer.fan_in if last else layer.fan_out), 0
     return weights

@@ -58,6 +58,6 @@ class ScalarValueIteration:
 
 
 def name(state: WorldState) -> tuple[object, ...]:
-    """What a query shows of a state."""
+    """The part of a state that a query shows."""
     board = tuple(state.board.flatten().tolist())
     return board, *state.agent[0].tolist(), *state.box[0].tolist(), int(state.level)

@@ -1,4 +1,4 @@
-"""What the parent's values do in a world that nobody has written yet, and what they refuse."""
+"""The parent's values in a world that nobody has written yet, and the worlds that they refuse."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the scripted parent says in the garden (Sec. 3.2.2): never for the bucket."""
+"""The scripted parent's answers in the garden (Sec. 3.2.2): never for the bucket."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BENEATH = [RIGHT] * 4 + [UP]
         (BENEATH, [LEFT, LEFT], [UP, DOWN, DOWN], Choice.LEFT),
         (BENEATH, [UP, UP], [UP], Choice.EITHER),
         (BENEATH, [DOWN, UP, UP], [UP, DOWN, DOWN, DOWN], Choice.EITHER),
-        ([*BENEATH, UP], [DOWN], [UP], Choice.LEFT),  # to leave the bucket is no step that ends in it
+        ([*BENEATH, UP], [DOWN], [UP], Choice.LEFT),  # a step out of the bucket does not end in it
         ([*BENEATH, UP], [LEFT], [RIGHT], Choice.EITHER),
     ],
 )

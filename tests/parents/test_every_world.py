@@ -249,13 +249,13 @@ def test_staying_on_the_shortcut_is_refused_only_under_supervision() -> None:
 
 
 def test_of_policy_with_gamma_one() -> None:
-    """Who never arrives is hopeless, who drowns is not, and a chance to arrive is worth its share."""
+    """To never arrive is hopeless, to drown is not, and a chance to arrive counts in proportion."""
     world = WORLDS["island"]
     model = explore(world)
     below, wet = number(model, world, [DOWN]), number(model, world, [LEFT, LEFT])
     leftward = [below, number(model, world, [DOWN, LEFT]), wet]
     policy = torch.zeros(len(model.terminal), 4, dtype=torch.float64)
-    policy[:, UP] = 1  # from the start into the wall for ever
+    policy[:, UP] = 1  # from the start into the wall without end
     policy[leftward] = torch.tensor([0, 0, 1, 0], dtype=torch.float64)  # and on into water
     policy[below] = torch.tensor([0.5, 0, 0.5, 0], dtype=torch.float64)
     v = of_policy(model, 1.0, policy).v

@@ -71,7 +71,7 @@ def test_mean_waterings_against_the_world(level: str, inside: GardenParent, _mea
 def rewards(
     world: RewardHacking, parent: GardenValues, state: WorldState, steps: int, first: Tensor | None = None
 ) -> list[Tensor]:
-    """What the world itself gives in each step, by pi_p or first by another action."""
+    """The world's own reward in each step, by pi_p or first by another action."""
     key, earned = keys(7, len(state.step_count)), []
     for number in range(steps):
         cell = state.agent[:, 0] * world.width + state.agent[:, 1]

@@ -105,7 +105,7 @@ def test_a_parented_agent_learns_the_same_under_both(name: str) -> None:
 
 
 def test_a_shift_within_episodes_is_another_task() -> None:
-    """Each step then costs or pays by itself: some answers change. The invariance above is no triviality."""
+    """Each step then costs or pays by itself: some answers change. So the invariance above is not trivial."""
     config = Config.model_validate({**PRESETS["lax"], "time_limit": 20})
     asked: list[Query] = []
 

@@ -46,7 +46,7 @@ def test_gamma_one_values_every_way_to_the_goal_alike() -> None:
 
 
 def test_with_a_smaller_gamma_a_policy_that_never_arrives_is_worth_what_it_earns() -> None:
-    """Walking into the wall above for ever earns 0, and 0 is what it is worth."""
+    """Walking into the wall above without end earns 0, so its value is 0."""
     model = explore(island())
     policy = torch.zeros(len(model.terminal), 4, dtype=torch.float64)
     policy[:, UP] = 1

@@ -1,4 +1,4 @@
-"""What is no proper body is refused, with what to do about it; none is echoed, none is too large."""
+"""Malformed bodies are refused with a remedy; none is echoed, none is too large."""
 
 import json
 from collections.abc import Callable

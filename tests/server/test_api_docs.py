@@ -101,7 +101,7 @@ def test_its_commands_do_what_they_say(client: httpx2.Client, db: Database) -> N
     said: list[Any] = []
     for command in commands():
         if command.live:
-            client.app.state.streams.close()  # type: ignore[attr-defined]  # else it would tell for ever
+            client.app.state.streams.close()  # type: ignore[attr-defined]  # else it would stream without end
         headers = {"Content-Type": "application/json"} if command.body else {}
         reply = client.request(command.method, command.path, content=command.body, headers=headers)
         assert 200 <= reply.status_code < 300, (command, reply.text)

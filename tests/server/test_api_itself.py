@@ -1,4 +1,4 @@
-"""What the server tells of itself: the description of the API, readiness."""
+"""The server's account of itself: the description of the API, readiness."""
 
 import httpx2
 from sqlalchemy import text

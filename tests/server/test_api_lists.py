@@ -120,7 +120,7 @@ def test_wrong_part_of_a_list(client: httpx2.Client, mine: Claim, path: str, cur
 
     assert named(limit=0) == named(limit=most + 1) == named(limit="many") == {"limit"}
     assert named(**{cursor: -2}) == named(**{cursor: 2**53}) == named(**{cursor: "x"}) == {cursor}
-    assert named(nxet=3) == {"nxet"}, "a misspelt cursor would begin again for ever"
+    assert named(nxet=3) == {"nxet"}, "a misspelt cursor would begin again without end"
 
 
 def test_unknown_status(client: httpx2.Client, mine: Claim) -> None:

@@ -37,7 +37,7 @@ EXAMPLES = 20
 """Requests of each kind and operation, besides those that schemathesis lists itself."""
 RUNS, QUESTIONS = 4, 8
 UNTOLD: dict[str, list[Any]] = {"start_run": [positive_data_acceptance]}
-"""What a schema cannot say: which levels, presets and settings there are, and which go together."""
+"""Rules that a schema cannot hold: which levels, presets and settings there are, and which go together."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What stands before every route: hosts, cross-site requests, headers (E2, E3)."""
+"""The checks before every route: hosts, cross-site requests, headers (E2, E3)."""
 
 import httpx2
 import pytest

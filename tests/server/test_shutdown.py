@@ -149,7 +149,7 @@ def processes_of(parent: int) -> list[int]:
 
 
 def alive(process: int) -> bool:
-    """Whether a process still runs; one that waits to be reaped does not."""
+    """Return True if a process still runs; one that waits to be reaped does not."""
     try:
         state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
     except FileNotFoundError:

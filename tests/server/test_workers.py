@@ -163,7 +163,7 @@ def test_who_asked_is_kept(db: Database, settings: Settings) -> None:
 def test_each_run_has_its_turn_in_every_round(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One that would live for ever without a question takes no turn of the others, and waits for none."""
+    """A run that never asks takes no turn of the others, and waits for none."""
     worlds = ("reward-hacking", "unsafe-exploration", "side-effects")
     ids = [start(db, NewRun(world=world, preset="direct", parent="scripted")).id for world in worlds]
     waits = start(db, NewRun(world="unsafe-exploration", parent="human")).id

@@ -132,7 +132,7 @@ const status = (which) => {
   for (const part of document.querySelectorAll(".status [data-state]")) part.hidden = part.dataset.state !== which;
 };
 
-// What the operator did has its tick once it applied: the list is fetched anew.
+// What the operator did has its tick once it applied: the list is fetched again.
 async function applied(tick) {
   const list = document.getElementById("events");
   if (!list?.querySelector("[data-pending]") || Number(list.dataset.tick) === tick) return;

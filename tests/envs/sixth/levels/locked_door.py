@@ -21,10 +21,10 @@ LEGEND = {"#": "wall", " ": "land", "K": "key", "D": "door", "L": "lava", "G": "
 """Glyph -> tile. The order gives the codes: 0 wall, 1 land, 2 key, 3 door, 4 lava, 5 goal, 6 agent."""
 
 WALLS = WALL + "D"
-"""What stops the agent: a door, too, as long as it is there."""
+"""Codes that stop the agent: a door, too, as long as it is there."""
 
 ENDS = "GL"
-"""What ends an episode: the goal, and the lava."""
+"""Codes that end an episode: the goal, and the lava."""
 
 BRIEF = Brief(
     goal="The agent should fetch the key, which opens the door, and walk to the goal.",
