@@ -9,6 +9,7 @@ import torch
 import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
+from torch.optim.adam import adam as fused_adam
 
 from parenting.agent.config import Config
 from parenting.agent.dataset import Dataset
@@ -151,24 +152,31 @@ def adam(
     training: Bool[Tensor, "N"],
     rate: float,
 ) -> None:
-    """One step of Adam (Kingma & Ba 2014) in the K trials that train; nothing moves in the others. In place.
+    """Take one step of Adam (Kingma & Ba 2014) in the K trials that train; change nothing in the others.
 
-    torch's fused step passes over the parameters once. Each trial is a tensor of its own to it, for each has
-    taken a number of steps of its own.
+    torch's fused step passes over the parameters once. It receives each trial as a tensor of its own, because
+    each has taken its own number of steps.
+
+    Args:
+        params: The parameters of all N trials; changed in place.
+        moments: What Adam remembers of all N trials; changed in place.
+        gradient: The gradients of the K trials that train, in order.
+        training: Which trials train: K of N.
+        rate: The step size.
     """
-    moments.steps.add_(training)
     chosen = training.tolist()
 
     def rows(every: Tensor) -> list[Tensor]:
         return list(compress(every.unbind(), chosen))
 
-    torch._fused_adam_(
+    fused_adam(
         rows(params),
         list(gradient.unbind()),
         rows(moments.exp_avg),
         rows(moments.exp_avg_sq),
         [],
-        rows(moments.steps.to(torch.float32)),
+        rows(moments.steps.to(torch.float32)),  # it counts this step by itself
+        fused=True,
         lr=rate,
         beta1=BETA1,
         beta2=BETA2,
@@ -177,3 +185,4 @@ def adam(
         amsgrad=False,
         maximize=False,
     )
+    moments.steps.add_(training)

@@ -20,11 +20,11 @@ from typing import NamedTuple
 
 import torch
 
+from parenting._process import settle
 from parenting.agent import parenting
 from parenting.agent.config import Config
 from parenting.agent.init import network_of
 from parenting.agent.pretraining_mazes import Walks, draw_mazes, pool, walk
-from parenting.agent.process import settle
 from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld

@@ -38,11 +38,11 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from parenting._process import settle
 from parenting.agent import learning
 from parenting.agent.config import compose
 from parenting.agent.init import network_of
 from parenting.agent.policy import Network
-from parenting.agent.process import settle
 from parenting.envs import registry
 from parenting.envs.rng import keys
 from parenting.experiments.training.batch import BatchTrainer

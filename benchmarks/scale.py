@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import torch
 
+from parenting._process import settle
 from parenting.agent.config import compose
-from parenting.agent.process import settle
 from parenting.envs import registry
 from parenting.experiments.training.chunks import TrainPlan, chunks, train_in_chunks
 from parenting.experiments.training.stop_rule import StopRule

@@ -72,7 +72,7 @@ def answer(
         order = Order(run, client_id, limit, optimal, timeout, end_episodes)
         keep = _receipts(receipts, stack)
         show = stack.enter_context(bar("answers"))
-        from parenting.agent.process import (
+        from parenting._process import (
             settle,  # loads torch, which takes a second: what is wrong is said before
         )
         from parenting.commands.judge import Judge

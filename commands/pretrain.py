@@ -77,7 +77,7 @@ def _there(wanted: Wanted, folders: tuple[Path, ...], *, quiet: bool) -> dict[st
 
 
 def _one(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool) -> dict[str, Any]:
-    from parenting.agent.process import settle
+    from parenting._process import settle
     from parenting.experiments.training.pretrain import DamagedWorkError, UnconvergedError, pretrain
 
     settle()

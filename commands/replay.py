@@ -48,7 +48,7 @@ def replay(
     """
     with exit_on_interrupt(), friendly_errors(), database() as db:
         get_run(db, run)  # torch takes a second to load, so an unknown run is refused before
-        from parenting.agent.process import settle
+        from parenting._process import settle
         from parenting.server.replay import relive
 
         settle()

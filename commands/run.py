@@ -68,7 +68,7 @@ def run(
         goal = _until(world, until)
         config = _mature(config, goal)
         weights = _weights(found, config)
-    from parenting.agent.process import settle
+    from parenting._process import settle
     from parenting.experiments.runner.processes import WorkersDiedError
     from parenting.experiments.training.chunks import TrainPlan, train_in_chunks
     from parenting.experiments.training.summary import summarise

@@ -45,8 +45,11 @@ class Stream(IntEnum):
     WEIGHTS = 64
 
 
-TOGETHER = 4
-"""So many draws of each of the agent's streams up to TRAIN are made at once."""
+AGENT_STREAMS = range(Stream.EITHER, Stream.TRAIN + 1)
+"""The streams of an agent's tick. `Keys` makes their draws in one operation: one by one they would be a third
+of all operations of a tick."""
+AGENT_DRAWS = 4
+"""The most that a tick draws from one of them."""
 
 
 class Keys(Struct):
@@ -58,8 +61,8 @@ class Keys(Struct):
     def uniform(self, stream: int, *shape: int) -> Float64[Tensor, "N *shape"]:
         """Independent draws, uniform on [0, 1) with 53 bits, for this stream at this tick."""
         size = prod(shape)
-        if 0 < stream <= Stream.TRAIN and size <= TOGETHER:
-            return self._together[:, stream - 1, :size].view(-1, *shape)
+        if stream in AGENT_STREAMS and size <= AGENT_DRAWS:
+            return self._agent_draws[:, stream - AGENT_STREAMS.start, :size].view(-1, *shape)
         place = torch.arange(size, device=self.seed.device)
         return self.at(stream, place).view(-1, *shape)
 
@@ -72,9 +75,9 @@ class Keys(Struct):
         return _mix(_mix(self.seed) + self.tick)
 
     @cached_property
-    def _together(self) -> Float64[Tensor, "N streams TOGETHER"]:
-        """Nearly all draws of a tick, made at once: one by one they would be a third of its operations."""
-        stream, place = _first_places(self.seed.device)
+    def _agent_draws(self) -> Float64[Tensor, "N AGENT_STREAMS AGENT_DRAWS"]:
+        """The first draws of each of the agent's streams at this tick."""
+        stream, place = _agent_places(self.seed.device)
         return _unit(_mix(_mix(self._word[:, None] + stream)[:, :, None] + place))
 
     def next(self) -> Keys:
@@ -104,9 +107,9 @@ def gumbel(u: Tensor) -> Tensor:
 
 
 @cache
-def _first_places(device: torch.device) -> tuple[Tensor, Tensor]:
-    stream = torch.arange(1, Stream.TRAIN + 1, device=device)
-    return stream, torch.arange(TOGETHER, device=device) * _GOLDEN
+def _agent_places(device: torch.device) -> tuple[Tensor, Tensor]:
+    stream = torch.tensor(AGENT_STREAMS, device=device)
+    return stream, torch.arange(AGENT_DRAWS, device=device) * _GOLDEN
 
 
 def _unit(bits: Tensor) -> Tensor:

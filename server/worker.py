@@ -16,7 +16,7 @@ from types import FrameType
 
 import structlog
 
-from parenting.agent.process import settle
+from parenting._process import settle
 from parenting.server import runs, workers
 from parenting.server.db import Database, connect
 from parenting.server.errors import BusyError, DiskFullError, LostClaimError

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import torch
 
-from parenting.agent.process import settle
+from parenting._process import settle
 from parenting.experiments.runner.dask_cluster import reach, submit, threads
 from parenting.experiments.runner.processes import WorkersDiedError, call_each
 from parenting.experiments.runner.store import HIDDEN, Call, Done, Row, Store, Task

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import torch
 
+from parenting._process import settle
 from parenting.agent.config import Config
 from parenting.agent.init import world_of
-from parenting.agent.process import settle
 from parenting.envs.rng import keys
 from parenting.experiments.runner.processes import call_each
 from parenting.experiments.training.batch import train_agents

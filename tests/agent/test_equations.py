@@ -68,6 +68,35 @@ def test_adam_is_torchs_and_leaves_other_trials_alone() -> None:
     assert learner.steps.tolist() == [5, 0]
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_adam_has_the_bits_of_torchs_fused_optimiser(dtype: torch.dtype) -> None:
+    """Trials that have taken different numbers of steps, each against an optimiser of its own."""
+    draw = torch.Generator().manual_seed(5)
+    start = torch.randn(3, 1001, dtype=dtype, generator=draw)
+    learner = Learner(
+        params=start.clone(),
+        exp_avg=torch.zeros_like(start),
+        exp_avg_sq=torch.zeros_like(start),
+        steps=torch.zeros(3, dtype=torch.int64),
+        frozen=start.new_zeros(0, 3, 1001),
+    )
+    theirs = [row.clone().requires_grad_() for row in start]
+    optimisers = [torch.optim.Adam([one], lr=0.003, fused=True) for one in theirs]
+    for training in ([True, True, False], [True, False, False], [False, True, True]) * 4:
+        gradient = torch.randn(sum(training), 1001, dtype=dtype, generator=draw)
+        trained = [trial for trial in range(3) if training[trial]]
+        for trial, row in zip(trained, gradient, strict=True):
+            theirs[trial].grad = row.clone()
+            optimisers[trial].step()
+        adam(learner.params, learner, gradient, torch.tensor(training), 0.003)
+    for trial, (one, optimiser) in enumerate(zip(theirs, optimisers, strict=True)):
+        state = optimiser.state[one]
+        assert torch.equal(learner.params[trial], one.detach())
+        assert torch.equal(learner.exp_avg[trial], state["exp_avg"])
+        assert torch.equal(learner.exp_avg_sq[trial], state["exp_avg_sq"])
+        assert int(learner.steps[trial]) == int(state["step"])
+
+
 @pytest.mark.parametrize(
     ("length", "becomes"),
     [(9, (0, 0, 7)), (4, (0, 0, 2)), (3, (0, 1, 2)), (2, (1, 1, 2)), (1, (1, 1, 1))],
