@@ -1,7 +1,7 @@
 # Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
 # A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
 .DEFAULT_GOAL := help
-.PHONY: help run test mutants torture stress check docs format coverage pictures weights constraints clean
+.PHONY: help run test mutants torture stress check docs format coverage pictures weights constraints clean wheel
 
 # Tests start many processes; without byte code each of them would compile a thousand modules anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -59,6 +59,9 @@ docs: $(VENV)/.installed-dev ## Build the documentation as a site in build/docs;
 
 weights: $(VENV)/.installed ## Pre-train the weights of the built-in levels anew (20 minutes)
 	$(BIN)/parenting pretrain --out weights --force
+
+wheel: $(VENV)/.installed-dev ## Build the wheel of this version into dist/
+	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir dist .
 
 # torch stays at the version that constraints.txt names: a newer one may pull gigabytes. TORCH=... changes it.
 TORCH = $(shell sed -n 's/^torch==//p' constraints.txt)

@@ -18,8 +18,6 @@ SAME = {
     "dataset": "X",
     "events": "operator",
     "init": "agent",
-    "mailbox": "parent",
-    "process": "worker",
     "learning": "direct policy learning",
     "parenting": "tick",
     "pretraining": "pre-training",
