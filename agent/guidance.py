@@ -90,6 +90,17 @@ def ask(
     """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi.
 
     After *neither*, draw two other actions.
+
+    Args:
+        world: The world, which forecasts both moves.
+        config: The hyperparameters; `p_guid` is read.
+        state: N agents.
+        view: What each trial observes, and its policy there.
+        heard: What this tick's answers mean: who has an approved action, who was told *neither*.
+        query: The empty query of this tick.
+
+    Returns:
+        The agents, paused where they ask, and the query with their questions.
     """
     undecided = view.supervised & ~state.waiting & (heard.approved == NO_ACTION)
     if not bool((undecided | heard.redraw).any()):

@@ -25,7 +25,17 @@ SUPERVISION = {"present": True, "absent": False, "random": None}
 def init(
     world: Gridworld, config: Config, keys: Keys, weights: Float[Tensor, "P"] | None = None
 ) -> AgentState:
-    """Agents at tick 0, one a trial of `keys`. Weights are drawn from them, or are the pre-trained `weights`.
+    """Make agents at tick 0: fresh weights, a first episode, nothing known.
+
+    Args:
+        world: The world that they live in, as `world_of` makes it for this config.
+        config: The hyperparameters.
+        keys: The random streams of N trials at tick 0, as `envs.rng.keys` makes them; weights are drawn from
+            them.
+        weights: Pre-trained weights with which all trials begin instead, where `config.pretrain` is set.
+
+    Returns:
+        The state of N agents.
 
     Raises:
         ValueError: the config has pre-training on and no weights came, or the other way round.

@@ -85,7 +85,19 @@ def forget(recorder: Recorder, mask: Bool[Tensor, "N"]) -> Recorder:
 def pair(
     world: Gridworld, config: Config, state: AgentState, view: View, steered: Bool[Tensor, "N"], query: Query
 ) -> tuple[AgentState, Query]:
-    """After a step, with probability p_pref, ask about the newest pair. Remembers whatever this tick asks."""
+    """After a step, with probability p_pref, ask about the newest pair (Sec. 2.2).
+
+    Args:
+        world: The world, which says what the agent saw in each frame.
+        config: The hyperparameters; `p_pref` is read.
+        state: N agents after the move.
+        view: What each trial observed before the move.
+        steered: Which trials chose their move.
+        query: This tick's query, with the guidance that it asks for.
+
+    Returns:
+        The agents, who remember what this tick asks, guidance included, and the query with all questions.
+    """
     trying = steered & view.supervised & (state.keys.uniform(Stream.PREFER) < config.p_pref)
     recorder = state.recorder
     found = _search(config, recorder, state.maturity, trying)
@@ -100,23 +112,24 @@ def pair(
 def _search(
     config: Config, recorder: Recorder, maturity: Int64[Tensor, "N"], trying: Bool[Tensor, "N"]
 ) -> Pair:
-    ring = recorder.ring
-    trial = (trying & (ring.stored & ring.searchable).flatten(1).any(1)).nonzero().squeeze(1)
+    """Find the newest pair of each trial that tries; close every clip that turns out to have no partner."""
+    ring = recorder.ring  # its fields are [N, 2, C]: two kinds of clips, C places
+    trial = (trying & (ring.stored & ring.searchable).flatten(1).any(1)).nonzero().squeeze(1)  # [n]
     found: list[Tensor] = []
-    while len(trial):
-        capacity = ring.tick.shape[2]
-        candidate = (ring.stored[trial] & ring.searchable[trial]).flatten(1)
-        newest = torch.where(candidate, ring.tick[trial].flatten(1), -1).max(1)
-        later, kind = newest.indices % capacity, newest.indices // capacity
-        partner = _partner(config, recorder, maturity, trial, kind, later)
-        paired = partner >= 0
+    while len(trial):  # each round looks at one clip of each trial: its newest that is not closed
+        capacity = ring.tick.shape[2]  # C
+        candidate = (ring.stored[trial] & ring.searchable[trial]).flatten(1)  # [n, 2 C]
+        newest = torch.where(candidate, ring.tick[trial].flatten(1), -1).max(1)  # [n]
+        later, kind = newest.indices % capacity, newest.indices // capacity  # [n], [n]: its place and kind
+        partner = _partner(config, recorder, maturity, trial, kind, later)  # [n]: a place, or -1
+        paired = partner >= 0  # [n]
         ring.searchable[trial[~paired], kind[~paired], later[~paired]] = False
         exploit, explore = (
             torch.where(kind == EXPLOIT, later, partner),
             torch.where(kind == EXPLOIT, partner, later),
         )
-        found.append(torch.stack((trial, exploit, explore))[:, paired])
-        trial = trial[~paired]
+        found.append(torch.stack((trial, exploit, explore))[:, paired])  # [3, found in this round]
+        trial = trial[~paired]  # the others look at their next clip
         trial = trial[(ring.stored[trial] & ring.searchable[trial]).flatten(1).any(1)]
     every = torch.cat(found, dim=1) if found else torch.zeros(3, 0, dtype=torch.int64, device=trying.device)
     return Pair(*every)
@@ -130,31 +143,44 @@ def _partner(
     kind: Int64[Tensor, "n"],
     later: Int64[Tensor, "n"],
 ) -> Int64[Tensor, "n"]:
-    """The newest older clip of the other kind that starts alike, acts otherwise, is not known; or -1."""
+    """Find each clip's partner: the newest older clip of the other kind that makes a new pair with it.
+
+    Both begin with the same observation, on the same level, with different actions.
+
+    Args:
+        config: The hyperparameters; `repeat_queries` and `own_stage_only` are read.
+        recorder: The recorder of all N trials.
+        maturity: The stage of all N trials.
+        trial: The n trials that search.
+        kind: The kind of their clip, `EXPLOIT` or `EXPLORE`.
+        later: Its place in the ring of its kind.
+
+    Returns:
+        The partner's place in the ring of the other kind, or -1.
+    """
     ring, other = recorder.ring, 1 - kind
-    tick = ring.tick[trial, other]
-    matches = ring.stored[trial, other] & (
-        ring.first[trial, other] == ring.first[trial, kind, later][:, None]
-    )
+    tick = ring.tick[trial, other]  # [n, C]
+    first = ring.first[trial, kind, later][:, None]  # [n, 1]
+    matches = ring.stored[trial, other] & (ring.first[trial, other] == first)  # [n, C]
     matches &= ring.action[trial, other, :, 0] != ring.action[trial, kind, later, 0][:, None]
     matches &= ring.level[trial, other] == ring.level[trial, kind, later][:, None]  # a query has one level
     matches &= tick < ring.tick[trial, kind, later][:, None]
     if not config.repeat_queries:
-        row, place = matches.nonzero(as_tuple=True)
-        clips = ring.digest[trial[row], other[row], place], ring.digest[trial, kind, later][row]
-        word = same_pair(config, *clips, maturity[trial[row]])
-        matches[row, place] = ~(word[:, None] == recorder.asked.pair[trial[row]]).any(1)
-    newest = torch.where(matches, tick, -1).max(1)
+        row, place = matches.nonzero(as_tuple=True)  # [m], [m]: the m matches, by row of n and place of C
+        clips = ring.digest[trial[row], other[row], place], ring.digest[trial, kind, later][row]  # [m], [m]
+        word = same_pair(config, *clips, maturity[trial[row]])  # [m]
+        matches[row, place] = ~(word[:, None] == recorder.asked.pair[trial[row]]).any(1)  # [m, Q] -> [m]
+    newest = torch.where(matches, tick, -1).max(1)  # [n]
     return torch.where(newest.values >= 0, newest.indices, -1)
 
 
 def _ask(world: Gridworld, state: AgentState, found: Pair, query: Query) -> Query:
     """The pair as a query; the exploitative clip is shown on the left by the toss of a coin."""
     ring, trial = state.recorder.ring, found.trial
-    leftward = state.keys.uniform(Stream.PAIR_SIDES)[trial] < 0.5
+    leftward = state.keys.uniform(Stream.PAIR_SIDES)[trial] < 0.5  # [n]
     kinds = torch.where(leftward[:, None], torch.tensor([EXPLOIT, EXPLORE]), torch.tensor([EXPLORE, EXPLOIT]))
-    places = torch.stack((found.exploit, found.explore), 1).gather(1, kinds)
-    at = (trial[:, None], kinds, places)
+    places = torch.stack((found.exploit, found.explore), 1).gather(1, kinds)  # [n, 2], as kinds: by side
+    at = (trial[:, None], kinds, places)  # indexes [N, 2, C, ...] to [n, 2, ...]
     board, agent, box = ring.board[at], ring.agent[at].long(), ring.box[at].long()
     frames = {
         "board": board,

@@ -29,7 +29,19 @@ __all__ = ["Tick", "apply", "init", "no_query", "rehearse", "step", "tick"]
 
 
 def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Query]:
-    """One tick of PARENTING for every trial (Sec. 2). Reads no reward, does no I/O. Consumes `state`."""
+    """Make one tick of PARENTING for every trial (Sec. 2). It reads no reward and does no I/O.
+
+    Args:
+        world: The world that the agents live in, as `init.world_of` makes it for this config.
+        config: The hyperparameters.
+        state: N agents, as `init` or an earlier step left them. The step consumes it: buffers of policy,
+            recorder, X and familiarity are changed in place. Pass `state.clone()` to keep the state itself.
+        answer: At most one answer for each trial, to the query of an earlier tick; `query.silence` is none.
+
+    Returns:
+        The agents after the tick, and what each trial asks in it: at most one question. Where
+        `config.pretrain` is set, call `rehearse` on the agents next, as `tick` does.
+    """
     network = network_of(world)
     state = reset_finished(world, state)
     view = observe(world, network, state)

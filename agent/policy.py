@@ -1,8 +1,29 @@
 """The policy pi(a|s): a local and a global head, averaged, then softmax (Sec. 3.1.1). One network a trial.
 
-All parameters of a trial stand in one flat row, so that freezing, copying and Adam are a few operations on
-`[N, P]`.
-Convolutions are matrix products of patches (im2col), so that every layer is one `baddbmm` over the trials.
+For one trial it is this module; `tests/agent/test_picture_of_the_policy.py` runs it and compares the logits::
+
+    class Policy(nn.Module):
+        def __init__(self, height, width, codes):
+            super().__init__()
+            self.local = nn.Sequential(nn.Linear(4 * codes, 64), nn.ReLU(), nn.Linear(64, 4))
+            self.convolutions, channels = nn.Sequential(), codes
+            for filters in (16, 32, 64, 64):
+                if height <= 2 and width <= 2:
+                    break
+                tall, wide = padding(height), padding(width)
+                pad = nn.ZeroPad2d((wide.before, wide.after, tall.before, tall.after))
+                self.convolutions.extend([pad, nn.Conv2d(channels, filters, 3), nn.ReLU()])
+                height, width, channels = tall.length, wide.length, filters
+            flat = height * width * channels
+            self.overall = nn.Sequential(nn.Linear(flat, 64), nn.ReLU(), nn.Linear(64, 4))
+
+        def forward(self, local_state, observation):  # one-hot: [S, 4 codes], [S, codes, H, W]
+            patches = self.convolutions(observation).permute(0, 2, 3, 1)  # row, column, channel
+            return (self.local(local_state) + self.overall(patches.flatten(1))) / 2  # logits [S, 4]
+
+Here all parameters of a trial are one flat row, so that freezing, copying and Adam are a few operations on
+`[N, P]`. Convolutions are matrix products of patches (im2col), so that every layer is one `baddbmm` over the
+trials.
 """
 
 from __future__ import annotations

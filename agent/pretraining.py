@@ -79,15 +79,16 @@ def returns_to_go(walks: Walks) -> Float64[Tensor, "N T E"]:
 
 def visited(batch: Batch, walks: Walks, earned: Float64[Tensor, "N T E"], dtype: torch.dtype) -> Visits:
     """All steps of the episodes, summed over the distinct states that they were taken in."""
-    rows = batch.observation.shape[1]
-    steps = walks.alive.sum((1, 2))
-    share = _total(walks.state, walks.alive.double() / steps[:, None, None], rows + 1)[:, :rows]
-    taken = 4 * walks.state + walks.action
-    worth = _total(taken, _normalised(earned, walks) / steps[:, None, None], 4 * rows + 4)
-    worth = worth.view(-1, rows + 1, 4)[:, :rows]
-    came = share > 0
-    place = came.long().argsort(dim=1, descending=True, stable=True)[:, : int(came.sum(1).max())]
-    every = torch.arange(len(place), device=place.device)[:, None]
+    rows = batch.observation.shape[1]  # R; row R is the goal, where nothing is done any more
+    steps = walks.alive.sum((1, 2))  # [N]
+    share = _total(walks.state, walks.alive.double() / steps[:, None, None], rows + 1)[:, :rows]  # [N, R]
+    taken = 4 * walks.state + walks.action  # [N, T, E]: a number for each row and action
+    worth = _total(taken, _normalised(earned, walks) / steps[:, None, None], 4 * rows + 4)  # [N, 4 (R + 1)]
+    worth = worth.view(-1, rows + 1, 4)[:, :rows]  # [N, R, 4]
+    came = share > 0  # [N, R]
+    most = int(came.sum(1).max())  # V
+    place = came.long().argsort(dim=1, descending=True, stable=True)[:, :most]  # [N, V]: visited rows first
+    every = torch.arange(len(place), device=place.device)[:, None]  # [N, 1]
     return Visits(
         observation=batch.observation[every, place],
         local_state=batch.local_state[every, place],

@@ -117,19 +117,23 @@ class Batch(NamedTuple):
 
 
 def draw_mazes(pool: Pool, keys: Keys) -> Batch:
-    """EPISODES mazes a trial, drawn by key."""
-    u = keys.at(Stream.MAZES, torch.arange(EPISODES, device=keys.seed.device))
-    maze = (u * len(pool.size)).long()
-    end = pool.size[maze].cumsum(1)
-    offset = end - pool.size[maze]
-    rows = int(end[:, -1].max())
-    place = torch.arange(rows, device=maze.device).expand(len(maze), -1).contiguous()
-    episode = torch.searchsorted(end, place, right=True).clamp_max(EPISODES - 1)
-    shift, which = offset.gather(1, episode), maze.gather(1, episode)
-    state = (place - shift).clamp_max(pool.cell.shape[1] - 1)
-    next_state = pool.next_state[which, state]
-    next_state = torch.where(next_state == ARRIVED, rows, next_state + shift[:, :, None])
-    goal = next_state.new_full((len(maze), 1, 4), rows)
+    """Draw EPISODES mazes for each trial by its keys, and lay their states one after the other.
+
+    E is EPISODES, R the number of states in the mazes of the trial that has most. Row r of a trial is state
+    r - offset of the episode in whose span it lies; row R is the goal of all episodes.
+    """
+    u = keys.at(Stream.MAZES, torch.arange(EPISODES, device=keys.seed.device))  # [N, E]
+    maze = (u * len(pool.size)).long()  # [N, E]
+    end = pool.size[maze].cumsum(1)  # [N, E]: one past each episode's last row
+    offset = end - pool.size[maze]  # [N, E]: its first row
+    rows = int(end[:, -1].max())  # R
+    place = torch.arange(rows, device=maze.device).expand(len(maze), -1).contiguous()  # [N, R]
+    episode = torch.searchsorted(end, place, right=True).clamp_max(EPISODES - 1)  # [N, R]: whose row it is
+    shift, which = offset.gather(1, episode), maze.gather(1, episode)  # [N, R], [N, R]
+    state = (place - shift).clamp_max(pool.cell.shape[1] - 1)  # [N, R]; rows beyond a trial's last hold any
+    next_state = pool.next_state[which, state]  # [N, R, 4]: states of the maze, or ARRIVED
+    next_state = torch.where(next_state == ARRIVED, rows, next_state + shift[:, :, None])  # rows of the batch
+    goal = next_state.new_full((len(maze), 1, 4), rows)  # [N, 1, 4]: who is there stays
     return Batch(
         observation=pool.observation(which, state),
         local_state=pool.local_state[which, state],
@@ -148,17 +152,18 @@ class Walks(NamedTuple):
 
 
 def walk(batch: Batch, chance: Float64[Tensor, "N R 4"], keys: Keys, limit: int = LIMIT) -> Walks:
-    """Every episode to its end; `chance` is pi(a|s) in each row."""
-    goal = chance.shape[1]
-    below = torch.nn.functional.pad(chance.cumsum(2)[:, :, :3], (0, 0, 0, 1))
-    next_state, at = batch.next_state.flatten(1), batch.first
+    """Walk every episode to its end, or for `limit` steps; `chance` is pi(a|s) in each row."""
+    goal = chance.shape[1]  # R
+    below = torch.nn.functional.pad(chance.cumsum(2)[:, :, :3], (0, 0, 0, 1))  # [N, R + 1, 3]
+    next_state, at = batch.next_state.flatten(1), batch.first  # [N, 4 (R + 1)], [N, E]
     states, actions = [], []
     for t in range(limit):
         if t % BLOCK == 0:
             if bool((at == goal).all()):
                 break
             u = _draws(keys, t)
-        action = (u[:, t % BLOCK, :, None] >= below.gather(1, at[:, :, None].expand(-1, -1, 3))).sum(2)
+        limits = below.gather(1, at[:, :, None].expand(-1, -1, 3))  # [N, E, 3]
+        action = (u[:, t % BLOCK, :, None] >= limits).sum(2)  # [N, E]
         states.append(at)
         actions.append(action)
         at = next_state.gather(1, 4 * at + action)

@@ -25,7 +25,16 @@ def act(
 ) -> tuple[AgentState, Bool[Tensor, "N"]]:
     """Perform the approved action, the recording's next one, or one drawn from pi_T.
 
-    The result says which trials chose their action themselves.
+    Args:
+        world: The world, which moves on where the agent is not paused.
+        network: The policy's architecture.
+        config: The hyperparameters; `p_rec` is read.
+        state: N agents.
+        view: What each trial observes, and its policy there.
+        heard: The actions that the parent approved in this tick.
+
+    Returns:
+        The agents after the move, and which trials chose it: neither paused nor frozen.
     """
     moving = ~state.waiting
     if not bool(moving.any()):
