@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import AliasChoices, AliasGenerator, BaseModel, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from parenting.envs.names import did_you_mean
 
@@ -116,11 +115,7 @@ class Config(BaseModel):
         names = set(given) if isinstance(given, Mapping) else set()
         twice = [f"{name} and {old}" for name, old in V1_NAMES.items() if {name, old} <= names]
         if twice:
-            raise PydanticCustomError(
-                "two_names",
-                "{names} are two names of one setting: give one of them.",
-                {"names": "; ".join(twice)},
-            )
+            raise ValueError(f"{'; '.join(twice)} are two names of one setting: give one of them.")
         return given
 
 

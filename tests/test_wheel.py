@@ -65,7 +65,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
 
 def test_wheel_carries_exactly_the_files_of_our_folders(wheel: zipfile.ZipFile) -> None:
     ours = {f"parenting/{name}" for name in files_of_the_project() if name.split("/")[0] in FOLDERS}
-    ours |= {"parenting/__init__.py", "parenting/py.typed"}
+    ours |= {name for name in files_of_the_project() if name.startswith("parenting/")}
     carried = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert carried == ours
     assert all(name.startswith("parenting/") for name in carried)
