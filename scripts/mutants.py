@@ -1,4 +1,4 @@
-"""`make mutants`: apply each fault of tests/mutants.py in a copy of the tree; its test has to fail.
+"""`make mutants`: apply each fault of tests/mutants in a copy of the tree; its test has to fail.
 
 Fails if a text is not found once, if a test fails without its mutant, or if a mutant is not caught.
 """

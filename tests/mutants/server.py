@@ -1,0 +1,105 @@
+"""Faults in the queue of questions, in the claims of workers and in what other sites may do."""
+
+from __future__ import annotations
+
+from tests.mutants.mutant import Mutant
+
+ANSWERS, WORKER = "tests/server/test_answers.py", "tests/server/test_worker_side.py"
+RUNS, SECURITY = "tests/server/test_runs.py", "tests/server/test_security.py"
+
+QUEUE = [
+    Mutant(
+        "a worker that slept past its claim may write (fencing)",
+        "server/runs.py",
+        "if (run.worker, run.fencing_token) != (mine.worker, mine.fencing_token):",
+        "if run.worker is None:",
+        f"{RUNS}::test_finish_is_fenced",
+    ),
+    Mutant(
+        "a claim does not raise the fencing token",
+        "server/runs.py",
+        "run.fencing_token + 1, db.clock()",
+        "run.fencing_token, db.clock()",
+        f"{RUNS}::test_one_worker_a_run",
+    ),
+    Mutant(
+        "a run is taken from a worker that lives",
+        "server/runs.py",
+        "Run.heartbeat < late",
+        "Run.heartbeat <= db.clock()",
+        f"{RUNS}::test_sign_of_life_keeps_the_claim",
+    ),
+    Mutant(
+        "a lease never ends",
+        "server/queue/leases.py",
+        '_FREE = or_(Query.leased_until.is_(None), Query.leased_until <= bindparam("now"))',
+        "_FREE = Query.leased_until.is_(None)",
+        f"{ANSWERS}::test_leased_question_is_offered_again_when_its_lease_ends",
+    ),
+    Mutant(
+        "two clients get the same question",
+        "server/queue/leases.py",
+        "or_(_MINE, _FREE))",
+        "Query.id > 0)",
+        f"{ANSWERS}::test_many_clients_lease_different_questions",
+    ),
+    Mutant(
+        "anybody can let go of a lease",
+        "server/queue/leases.py",
+        "if query.leased_by == client_id:",
+        "if query.leased_by is not None:",
+        f"{ANSWERS}::test_release_offers_it_at_once_and_only_by_its_holder",
+    ),
+    Mutant(
+        "an answer that is sent again is refused (idempotence)",
+        "server/queue/answers.py",
+        "if before is not None:\n            return _again(before, said)",
+        'if before is not None:\n            raise Conflict("It was answered already.")',
+        f"{ANSWERS}::test_same_answer_again_gets_the_same_reply",
+    ),
+    Mutant(
+        "a second answer that differs is taken for the first",
+        "server/queue/answers.py",
+        "if before.choice != said.choice:",
+        "if not before.choice:",
+        f"{ANSWERS}::test_another_answer_is_refused",
+    ),
+    Mutant(
+        "a replayed tick hears what comes next, not what was recorded",
+        "server/queue/worker_side.py",
+        "if _closed(session, mine.run_id, tick):",
+        "if tick < 0:",
+        f"{WORKER}::test_replay_gives_back_what_was_recorded",
+    ),
+    Mutant(
+        "a replayed tick asks a second time",
+        "server/queue/worker_side.py",
+        "if known is not None:",
+        "if known is not None and tick < 0:",
+        f"{WORKER}::test_known_tick_is_not_asked_twice",
+    ),
+]
+
+WEB = [
+    Mutant(
+        "another site may act (CSRF, by Sec-Fetch-Site)",
+        "server/security.py",
+        'in ("same-origin", "none")',
+        'in ("same-origin", "same-site", "cross-site", "none")',
+        f"{SECURITY}::test_other_sites_may_not",
+    ),
+    Mutant(
+        "another site may act (CSRF, by Origin)",
+        "server/security.py",
+        'return None if origin.partition("://")[2] == host else Forbidden()',
+        "return None",
+        f"{SECURITY}::test_other_sites_may_not",
+    ),
+    Mutant(
+        "any host name is served",
+        "server/security.py",
+        "if _without_port(host) not in self.hosts:",
+        "if not host:",
+        f"{SECURITY}::test_unknown_hosts_are_refused",
+    ),
+]
