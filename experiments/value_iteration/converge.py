@@ -19,7 +19,7 @@ from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld, local_state
 from parenting.envs.mdp import Model
 from parenting.parents.scripted import ScriptedParent, ScriptedRule
-from parenting.parents.values import ValueTable
+from parenting.parents.value_iteration import ValueTable
 
 AGREED = 0.1
 """Minimal difference between the logits of a decided pair."""

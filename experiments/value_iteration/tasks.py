@@ -22,7 +22,8 @@ from parenting.experiments.value_iteration.converge import (
 from parenting.experiments.value_iteration.levels import random_levels
 from parenting.experiments.value_iteration.settings import LEVELS, WORLD_SIZES
 from parenting.parents.scripted import ScriptedRule
-from parenting.parents.values import TabularValues, of_policy
+from parenting.parents.value_iteration import of_policy
+from parenting.parents.values import TabularValues
 
 
 def mature_trials(kind: str, trial: int, seed: int) -> list[Row]:

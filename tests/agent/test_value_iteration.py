@@ -22,7 +22,7 @@ from parenting.experiments.value_iteration.converge import (
 from parenting.experiments.value_iteration.levels import random_levels
 from parenting.experiments.value_iteration.settings import WORLD_SIZES
 from parenting.experiments.value_iteration.tasks import mature_trials
-from parenting.parents.values import of_policy
+from parenting.parents.value_iteration import of_policy
 
 
 @pytest.mark.parametrize(("trial", "kind"), list(enumerate(kind.world for kind in WORLD_SIZES)))

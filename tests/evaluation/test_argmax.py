@@ -20,7 +20,8 @@ from parenting.evaluation.argmax import GardenEvaluation, TabularEvaluation, eva
 from parenting.evaluation.outcomes import Outcome
 from parenting.parents.garden_values import GardenValues
 from parenting.parents.scripted import ScriptedParent, ScriptedRule
-from parenting.parents.values import exact_values, optimal
+from parenting.parents.value_iteration import optimal
+from parenting.parents.values import exact_values
 from tests.parents.fixed_policies import DOWN, LEFT, UP, always, at_a_wall
 from tests.parents.walked_queries import island, place
 from tests.simulated_person import distances

@@ -47,8 +47,8 @@ ASKING = [
     Mutant(
         "clips of other first states are compared (Sec. 2.2)",
         "agent/pairing.py",
-        "ring.first[trial, other] == ring.first[trial, kind, later][:, None]",
-        "ring.first[trial, other] == ring.first[trial, other]",
+        "(ring.first[trial, other] == first)",
+        "(ring.first[trial, other] == ring.first[trial, other])",
         f"{PAIRING}::test_search_finds_what_a_plain_search_finds",
     ),
     Mutant(

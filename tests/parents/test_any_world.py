@@ -13,7 +13,6 @@ from parenting.envs.gridworld import Actions, WorldState
 from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
 from parenting.envs.unsafe_exploration import UnsafeExploration
-from parenting.parents import values
 from parenting.parents.garden_values import GardenValues
 from parenting.parents.scripted import ScriptedRule
 from parenting.parents.values import TabularValues, exact_values
@@ -60,7 +59,7 @@ def test_a_world_without_an_end_has_no_hopeless_state() -> None:
 
 
 def test_a_world_without_an_end_needs_a_smaller_gamma(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(values, "MAX_SWEEPS", 50)
+    monkeypatch.setattr("parenting.parents.value_iteration.MAX_SWEEPS", 50)
     with pytest.raises(ArithmeticError, match=r"at gamma = 1\.0; a smaller gamma"):
         exact_values(Endless(ISLAND, time_limit=100), 1.0)
 

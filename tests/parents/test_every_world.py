@@ -11,15 +11,10 @@ from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.mdp import Model, explore
 from parenting.envs.rng import keys
+from parenting.parents.advantage import advantage_from_rewards
 from parenting.parents.scripted import ScriptedRule
-from parenting.parents.values import (
-    HOPELESS,
-    TabularValues,
-    advantage_from_rewards,
-    exact_values,
-    of_policy,
-    optimal,
-)
+from parenting.parents.value_iteration import HOPELESS, of_policy, optimal
+from parenting.parents.values import TabularValues, exact_values
 from tests.parents.scalar_value_iteration import ScalarValueIteration
 from tests.parents.walked_queries import begun, query, random_queries, said, walked
 

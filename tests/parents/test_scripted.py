@@ -10,7 +10,8 @@ import torch
 from parenting.agent.query import Choice, QueryKind, empty
 from parenting.envs.mdp import explore
 from parenting.parents.scripted import TIE, ScriptedRule
-from parenting.parents.values import TabularValues, optimal
+from parenting.parents.value_iteration import optimal
+from parenting.parents.values import TabularValues
 from tests.parents.walked_queries import at, island, place, query, random_queries, said, stacked
 
 UP, DOWN, LEFT, RIGHT = range(4)

@@ -25,8 +25,10 @@ from parenting.envs.mdp import explore
 from parenting.experiments.figure4.reward_model import follow, plan
 from parenting.experiments.figure4.settings import HORIZON, SAFE, UNSAFE
 from parenting.experiments.figure4.tasks import rho
+from parenting.parents.advantage import clip_states
 from parenting.parents.scripted import ScriptedRule
-from parenting.parents.values import TabularValues, clip_states, optimal
+from parenting.parents.value_iteration import optimal
+from parenting.parents.values import TabularValues
 from tests.agent.batched_runs import Judge, run_batch
 
 WORLD = registry.make("side-effects", time_limit=20)

@@ -7,7 +7,8 @@ import torch
 
 from parenting.agent.query import QueryKind
 from parenting.envs.mdp import explore
-from parenting.parents.values import HOPELESS, advantage, advantage_from_rewards, of_policy, optimal
+from parenting.parents.advantage import advantage, advantage_from_rewards
+from parenting.parents.value_iteration import HOPELESS, of_policy, optimal
 from tests.parents.walked_queries import at, island, place, query, random_queries
 from tests.simulated_person import distances
 
