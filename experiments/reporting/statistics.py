@@ -1,19 +1,19 @@
-"""95 % confidence intervals of means, proportions, differences, medians and orders, all by scipy.
+"""95 % confidence intervals of means, proportions, differences, medians and orders.
+
+Quantiles are those of `scipy.special`; `scipy.stats` loads only for a bootstrap, since it costs 0.7 s.
 
 An interval is None where the trials determine none: fewer than two of them, or all alike.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from math import hypot
+from collections.abc import Sequence
+from math import hypot, sqrt
 from typing import NamedTuple
 
 import numpy as np
-import scipy  # loads scipy.stats when it is asked for, which costs 0.7 s
 from numpy.typing import NDArray
+from scipy import special
 
 CONFIDENCE = 0.95
 TAIL = (1 + CONFIDENCE) / 2
@@ -44,17 +44,15 @@ def mean_interval(values: Sequence[float], shared_error: float = 0.0) -> Interva
     """
     if len(values) < 2:
         return None
-    half = hypot(
-        scipy.stats.t.ppf(TAIL, len(values) - 1) * scipy.stats.sem(values),
-        scipy.stats.norm.ppf(TAIL) * shared_error,
-    )
+    own_error = float(np.std(values, ddof=1)) / sqrt(len(values))
+    half = hypot(_student_quantile(len(values) - 1) * own_error, _normal_quantile() * shared_error)
     mean = float(np.mean(values))
     return Interval(mean - half, mean + half) if half else None
 
 
 def episode_interval(mean: float, error: float) -> Interval:
     """Normal interval of a mean over the many episodes of one policy, from its standard error."""
-    half = float(scipy.stats.norm.ppf(TAIL)) * error
+    half = _normal_quantile() * error
     return Interval(mean - half, mean + half)
 
 
@@ -70,7 +68,7 @@ def difference_interval(
     """
     if min(len(more), len(less)) < 2:
         return None
-    half = hypot(_welch_half_width(more, less), float(scipy.stats.norm.ppf(TAIL)) * shared_error)
+    half = hypot(_welch_half_width(more, less), _normal_quantile() * shared_error)
     difference = float(np.mean(more) - np.mean(less))
     return Interval(difference - half, difference + half) if half else None
 
@@ -83,8 +81,11 @@ def proportion_interval(hits: int, trials: int) -> Interval:
     """
     if trials < 1:
         raise ValueError("A proportion needs at least one trial.")
-    found = scipy.stats.binomtest(hits, trials).proportion_ci(CONFIDENCE, method="wilson")
-    return Interval(float(found.low), float(found.high))
+    z, rate = _normal_quantile(), hits / trials
+    size = 2 * (trials + z**2)
+    centre = (2 * hits + z**2) / size
+    half = z / size * sqrt(4 * trials * rate * (1 - rate) + z**2)
+    return Interval(centre - half if hits else 0.0, centre + half if hits < trials else 1.0)
 
 
 def mann_whitney_auc(some: Sequence[float], others: Sequence[float]) -> float:
@@ -115,8 +116,8 @@ def auc_interval(
     second = _agent_means(1 - _placements(others, some), other_agents)
     if auc in (0.0, 1.0):
         pairs = min(len(first), len(second))
-        exact = scipy.stats.binomtest(round(auc) * pairs, pairs).proportion_ci(CONFIDENCE, method="exact")
-        return Interval(float(exact.low), float(exact.high))
+        least = (1 - TAIL) ** (1 / pairs)  # the proportion at which all pairs agree in 1 - TAIL of the cases
+        return Interval(least, 1.0) if auc else Interval(0.0, 1 - least)
     if min(len(first), len(second)) < 2:
         return None
     half = _welch_half_width(first, second)
@@ -136,19 +137,25 @@ def median_interval(values: Sequence[float], agents: Sequence[int | None]) -> In
     if len(groups) < 2:
         return None
     if len(groups) == len(values):
-        found = scipy.stats.quantile_test(values, q=0, p=0.5).confidence_interval(CONFIDENCE)
-        return (
-            None if np.isnan([found.low, found.high]).any() else Interval(float(found.low), float(found.high))
-        )
+        return _median_of_order(values)
     return _bootstrap_median(groups)
+
+
+def _median_of_order(values: Sequence[float]) -> Interval | None:
+    """Order statistics around the median, by the binomial distribution of the number of values below it."""
+    order, trials = sorted(values), len(values)
+    beyond = int(np.searchsorted(special.bdtr(np.arange(trials + 1), trials, 0.5), 1 - TAIL))
+    return Interval(order[beyond - 1], order[trials - beyond]) if beyond else None
 
 
 def _bootstrap_median(groups: Sequence[Floats]) -> Interval:
     """Percentile bootstrap of agents; an infinite value stands in as a large finite one."""
+    from scipy import stats
+
     finite = [value for group in groups for value in group if np.isfinite(value)]
     most = max(finite, default=0.0)
     capped = [np.minimum(group, 2 * most + 1) for group in groups]
-    found = scipy.stats.bootstrap(
+    found = stats.bootstrap(
         (np.arange(len(groups)),),
         lambda drawn: np.median(np.concatenate([capped[agent] for agent in drawn])),
         n_resamples=RESAMPLES,
@@ -179,16 +186,17 @@ def _agent_means(values: Floats, agents: Sequence[int | None]) -> list[float]:
 
 
 def _welch_half_width(more: Sequence[float], less: Sequence[float]) -> float:
-    if not max(np.var(more), np.var(less)):
+    """Half the width of Welch's t interval, its degrees of freedom by Satterthwaite."""
+    one, other = (float(np.var(values, ddof=1)) / len(values) for values in (more, less))
+    if not max(one, other):
         return 0.0
-    with _constant_samples_allowed():
-        found = scipy.stats.ttest_ind(more, less, equal_var=False).confidence_interval(CONFIDENCE)
-    return float(found.high - found.low) / 2
+    freedom = (one + other) ** 2 / (one**2 / (len(more) - 1) + other**2 / (len(less) - 1))
+    return _student_quantile(freedom) * sqrt(one + other)
 
 
-@contextmanager
-def _constant_samples_allowed() -> Iterator[None]:
-    """Silence scipy's warning of a sample whose values are all alike: it adds nothing to the variance."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Precision loss occurred", RuntimeWarning)
-        yield
+def _student_quantile(freedom: float) -> float:
+    return float(special.stdtrit(freedom, TAIL))
+
+
+def _normal_quantile() -> float:
+    return float(special.ndtri(TAIL))

@@ -141,6 +141,22 @@ def test_a_median_of_trials_that_share_agents_has_a_wider_interval() -> None:
     assert half.low < inf
 
 
+def test_only_a_bootstrap_loads_scipy_stats() -> None:
+    names = "mean_interval, difference_interval, proportion_interval, median_interval, auc_interval"
+    code = f"""
+import sys
+from parenting.experiments.reporting.statistics import {names}
+few, many = [1.0, 2.0, 4.0], [float(n) for n in range(9)]
+alone, shared = [None] * 9, [0, 1, 2] * 3
+found = [mean_interval(many), difference_interval(few, many), proportion_interval(1, 9)]
+found += [median_interval(many, alone), auc_interval(few, many, alone[:3], alone)]
+before = "scipy.stats" in sys.modules
+found += [median_interval(many, shared)]
+sys.exit(before or None in found or "scipy.stats" not in sys.modules)
+"""
+    assert run([sys.executable, "-c", code], check=False).returncode == 0
+
+
 def test_a_command_that_prints_no_interval_does_not_load_scipy() -> None:
     code = "import sys; import parenting.commands.experiment; sys.exit('scipy' in sys.modules)"
     assert run([sys.executable, "-c", code], check=False).returncode == 0
