@@ -1,4 +1,4 @@
-"""The worlds that the checks of test_conformance.py run over, wherever they are imported."""
+"""The worlds that the checks of test_conformance*.py run over, wherever they are imported."""
 
 import pytest
 

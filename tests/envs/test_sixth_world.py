@@ -26,6 +26,7 @@ from parenting.experiments.training.batch import train_agents
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.parents.scripted import ScriptedRule
 from tests.envs.test_conformance import *  # noqa: F403
+from tests.envs.test_conformance_steps import *  # noqa: F403
 from tests.tree import ROOT
 
 SIXTH = ROOT / "tests/envs/sixth"
