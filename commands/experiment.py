@@ -27,7 +27,9 @@ MOST = 100_000
 def experiment(
     name: Annotated[
         str,
-        typer.Argument(help=f"{', '.join(NAMES)}; all of them; or report: one HTML page of what is done."),
+        typer.Argument(
+            help=f"{', '.join(NAMES)}; all: every experiment; or report: one HTML page of results."
+        ),
     ],
     context: typer.Context,
     scale: Annotated[
@@ -35,7 +37,7 @@ def experiment(
         typer.Option(
             parser=among(get_args(Scale)),
             metavar="quick|paper",
-            help="The paper's number of trials, or a few.",
+            help="The paper's number of trials (paper), or a few (quick).",
         ),
     ] = "paper",
     trials: Annotated[
@@ -43,39 +45,42 @@ def experiment(
         typer.Option(
             parser=whole(1, MOST),
             metavar="N",
-            help="Trials, in place of the scale's. More go on from fewer.",
+            help="Number of trials, instead of the scale's. A larger number keeps the trials that are done.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(parser=whole(0, 2**53 - 1), metavar="N")] = 0,
+    seed: Annotated[
+        int, typer.Option(parser=whole(0, 2**53 - 1), metavar="N", help="Seed of all random numbers.")
+    ] = 0,
     workers: Annotated[
         int | None,
-        typer.Option(parser=whole(1, 1000), metavar="N", help="Processes.", show_default="one a core"),
+        typer.Option(
+            parser=whole(1, 1000), metavar="N", help="Number of processes.", show_default="one a core"
+        ),
     ] = None,
     device: Annotated[
         Device,
         typer.Option(
             parser=among(get_args(Device)),
             metavar="cpu|cuda",
-            help="Where tensors are: in main memory, or on a GPU.",
+            help="Device of the tensors: the CPU or a GPU.",
         ),
     ] = "cpu",
     cluster: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://127.0.0.1:8786.")
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Address of a Dask scheduler, such as tcp://127.0.0.1:8786."),
     ] = None,
     out: Annotated[
         Path,
-        typer.Option(
-            parser=folder, metavar="FOLDER", help="Folder for results; what is done already lies there."
-        ),
+        typer.Option(parser=folder, metavar="FOLDER", help="Folder of the results, old and new."),
     ] = Path("results"),
     pages: Annotated[
         bool,
-        typer.Option("--pages", help="With report: write the Markdown pages again from the stored trials."),
+        typer.Option("--pages", help="With report: write the Markdown pages from the stored trials again."),
     ] = False,
 ) -> None:
-    """Run an experiment of the paper, or go on with it, and write its page, figures and data.
+    """Run an experiment of the paper, or continue it, and write its page, figures and data.
 
-    Every finished chunk of trials is stored, so a run that was stopped goes on where it was.
+    Every finished chunk of trials is stored, so an experiment that was stopped continues from there.
     `parenting experiment report` builds one HTML page of all results below --out.
 
     Example: parenting experiment table1 --scale quick
@@ -97,9 +102,7 @@ def _only_out(context: typer.Context) -> None:
     given = [one for one in context.params if _given(context, one)]
     idle = [f"--{one}" for one in given if one not in ("name", "out", "pages")]
     if idle:
-        raise UsageError(
-            f"report makes a page of what is done, and takes --out alone. Leave out {', '.join(idle)}."
-        )
+        raise UsageError(f"`experiment report` accepts only --out and --pages; remove {', '.join(idle)}.")
 
 
 def _given(context: typer.Context, option: str) -> bool:

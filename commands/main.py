@@ -25,7 +25,7 @@ COMMANDS = {
     "export": "Write the answers of a run as JSON lines.",
     "replay": "Replay a stored run and compare it bit for bit.",
     "web": "Serve the pages and the API.",
-    "worker": "Raise the agents of the database's runs.",
+    "worker": "Train the agents of the runs in the database.",
     "migrate": "Bring the database's tables up to date.",
 }
 """Each command with its help text. The command `up` is the function `up` in commands/up.py, and so on."""

@@ -27,25 +27,29 @@ BARS = "▁▂▃▄▅▆▇█"
 
 def pretrain(
     world: Annotated[
-        str | None, typer.Option(help="Whose legend; none takes every world that pre-trains.")
+        str | None, typer.Option(help="World whose legend to use; without it, every world that pre-trains.")
     ] = None,
     level: Annotated[
-        str | None, typer.Option(help="A built-in level's name, for its size; none takes all of them.")
+        str | None, typer.Option(help="Built-in level whose size to use; without it, all of them.")
     ] = None,
     size: Annotated[
-        str | None, typer.Option(metavar="HxW", help="Rows and columns, in place of a level.")
+        str | None, typer.Option(metavar="HxW", help="Rows and columns, instead of a level's.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**53 - 1, help="Weights and episodes follow from it.")] = 0,
-    max_steps: Annotated[int, typer.Option(min=1, help="Steps after which it gives up for now.")] = 50_000,
+    seed: Annotated[int, typer.Option(min=0, max=2**53 - 1, help="Seed of the weights and episodes.")] = 0,
+    max_steps: Annotated[
+        int, typer.Option(min=1, help="Stop after this many steps; the next call continues.")
+    ] = 50_000,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the files.", show_default="weights in the data folder")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Make weights again that exist already.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Train again where weights exist already.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
     ] = False,
 ) -> None:
-    """Pre-train a policy on random mazes until it has converged; Ctrl-C loses nothing, call it again.
+    """Pre-train a policy on random mazes until it has converged.
+
+    Ctrl-C loses no work: the next call continues.
 
     Example: parenting pretrain --world side-effects --level box
     """
@@ -72,7 +76,7 @@ def _there(wanted: Wanted, folders: tuple[Path, ...], *, quiet: bool) -> dict[st
     """The file that a run would take; nothing is made."""
     path = _files(wanted, folders)[0]
     if not quiet:
-        typer.echo(f"{path} is there already; --force makes it again.")
+        typer.echo(f"{path} exists already; --force trains it again.")
     return {"path": str(path), "sha256": store.digest(path.read_bytes())}
 
 

@@ -38,9 +38,10 @@ def replay(
 ) -> None:
     """Replay a stored run from its first tick, by its recorded answers and operator events.
 
-    Each tick has to ask what it asked the first time. At the run's last checkpoint, everything is compared
-    bit for bit: the policies, Adam's state, dataset X and all else that a checkpoint holds. The command only
-    reads, so a run that a worker is raising can be replayed too.
+    Each tick must ask the same question as the first time. At the run's last checkpoint the command compares
+    the policies, Adam's state, dataset X and the rest of the checkpoint bit for bit.
+
+    The command only reads, so a run that a worker is training can be replayed too.
 
     Exit codes: 0 equal; 1 not equal; 2 the run cannot be replayed here; 130 stopped by Ctrl-C.
 

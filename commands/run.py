@@ -30,35 +30,39 @@ if TYPE_CHECKING:
 
 def run(
     world: Annotated[str, typer.Argument(help="A world; `parenting worlds` lists them.")],
-    level: Annotated[str | None, typer.Option(help="A built-in level's name, or a level's file.")] = None,
+    level: Annotated[
+        str | None, typer.Option(help="Name of a built-in level, or a file with a level.")
+    ] = None,
     preset: Annotated[str, typer.Option(help="conservative, lax or direct.")] = "conservative",
     changes: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Set a hyperparameter; may be repeated."),
     ] = None,
-    trials: Annotated[int, typer.Option(min=1, help="Agents to raise.")] = 1,
+    trials: Annotated[int, typer.Option(min=1, help="Number of agents.")] = 1,
     seed: Annotated[
-        int, typer.Option(min=0, max=2**53 - 1, help="Trial i of a seed is always the same agent.")
+        int, typer.Option(min=0, max=2**53 - 1, help="Seed; trial i of a seed is always the same agent.")
     ] = 0,
     max_ticks: Annotated[
-        int, typer.Option(min=1, help="Ticks after which a trial is left unfinished.")
+        int, typer.Option(min=1, help="Give a trial up as unfinished after this many ticks.")
     ] = 20_000,
     until: Annotated[
         str | None,
         typer.Option(
             metavar="optimal|queries:N|ticks:N",
-            help="When a trial is finished.",
+            help="Condition that ends a trial.",
             show_default="optimal; queries:1000 in reward-hacking",
         ),
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="one a core")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes.", show_default="one a core")
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
     ] = False,
 ) -> None:
-    """Raise agents by the scripted parent (Sec. 3.1.3), all at once, and count deaths and queries.
+    """Train agents with the scripted parent (Sec. 3.1.3), all at once, and count deaths and queries.
 
-    At the end it says what their argmax policies do.
+    The last lines report the outcomes of their argmax policies.
 
     Example: parenting run unsafe-exploration --preset conservative --trials 100
     """
@@ -143,7 +147,7 @@ def _said(name: str, given: dict[str, object], rule: str) -> str:
 
 
 def _until(world: str, text: str | None) -> StopRule:
-    """When a trial is finished; where no goal ends an episode no policy is optimal."""
+    """The condition that ends a trial; in a world without a goal no policy is optimal."""
     from parenting.experiments.training.stop_rule import StopRule
 
     endless = not registry.spec(world).ends_at_goal
@@ -157,7 +161,7 @@ def _until(world: str, text: str | None) -> StopRule:
         return StopRule("optimal")
     if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
         return StopRule(kind, int(number))  # type: ignore[arg-type]
-    raise UsageError(f"--until: '{text}' is none of optimal, queries:N, ticks:N with N at least 1.")
+    raise UsageError(f"--until: '{text}' is not one of optimal, queries:N and ticks:N, with N at least 1.")
 
 
 def _mature(config: Config, until: StopRule) -> Config:
@@ -166,8 +170,8 @@ def _mature(config: Config, until: StopRule) -> Config:
         return config
     if until.kind != "queries":
         raise UsageError(
-            "--set: queries_per_stage alone ends no stage, since the last one never ends."
-            " Say how many there are, such as --set max_clip_length=2, or use --until queries:N."
+            "--set: queries_per_stage has no effect in a run of one stage, since the last stage never ends."
+            " Set the number of stages, such as --set max_clip_length=2, or use --until queries:N."
         )
     stages = -(-until.number // config.queries_per_stage)
     try:
@@ -175,7 +179,7 @@ def _mature(config: Config, until: StopRule) -> Config:
     except ValidationError as error:
         raise UsageError(
             f"--until: {until.number} queries at queries_per_stage={config.queries_per_stage} are {stages}"
-            f" stages: {error.errors()[0]['msg']}. Say how many there are, such as --set max_clip_length=4."
+            f" stages: {error.errors()[0]['msg']}. Set the number of stages, such as --set max_clip_length=4."
         ) from None
 
 

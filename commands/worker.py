@@ -1,4 +1,4 @@
-"""`parenting worker`: raise the agents of the database's runs."""
+"""`parenting worker`: train the agents of the runs in the database."""
 
 from __future__ import annotations
 
@@ -20,11 +20,13 @@ def worker(
     check: Annotated[
         bool,
         typer.Option(
-            "--check", help="Only check that a worker of this machine is alive: exit code 0, or else 1."
+            "--check", help="Only check whether a worker of this machine is alive: exit code 0 if so, else 1."
         ),
     ] = False,
 ) -> None:
-    """Raise the agents of the database's runs until Ctrl-C, from exactly where an earlier worker stopped.
+    """Train the agents of the runs in the database until Ctrl-C.
+
+    Each run continues exactly where the last worker stopped.
 
     Example: parenting worker
     """

@@ -26,16 +26,19 @@ def worlds(
         typer.Option(metavar="WORLD", help=f"Print random levels of a world; {RANDOM} has them (Sec. 3.4)."),
     ] = None,
     size: Annotated[str, typer.Option(metavar="HxW", help="Rows and columns of the random levels.")] = "6x6",
-    count: Annotated[int, typer.Option(min=1, help="How many random levels; all of them differ.")] = 1,
+    count: Annotated[int, typer.Option(min=1, help="Number of random levels; all of them differ.")] = 1,
     seed: Annotated[
-        int, typer.Option(min=0, max=2**53 - 1, help="Fewer levels of a seed are the first of more.")
+        int,
+        typer.Option(
+            min=0, max=2**53 - 1, help="Seed; a smaller count gives the first levels of a larger one."
+        ),
     ] = 0,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Folder for a file with each random level.")
+        Path | None, typer.Option(metavar="FOLDER", help="Write each random level to a file in this folder.")
     ] = None,
     draw: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Folder to draw each level to, a picture (SVG) each."),
+        typer.Option(metavar="FOLDER", help="Draw each level as an SVG picture in this folder."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:

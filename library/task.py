@@ -87,7 +87,9 @@ def stop_rule(world: World, until: str) -> StopRule:
     kind, _, number = str(until).partition(":")
     if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
         return StopRule(kind, int(number))  # type: ignore[arg-type]
-    raise ValueError(f"until: {until!r} is none of 'optimal', 'queries:N' and 'ticks:N' with N at least 1.")
+    raise ValueError(
+        f"until: {until!r} is not one of 'optimal', 'queries:N' and 'ticks:N', with N at least 1."
+    )
 
 
 def check_number(name: str, value: object, least: int, most: int) -> None:

@@ -31,7 +31,7 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
     A second checkpoint of the same tick replaces the first.
 
     Raises:
-        LostClaimError: another worker raises this run now.
+        LostClaimError: another worker trains this run now.
     """
     digest = hashlib.sha256(blob).hexdigest()
     with db.write(durable=False) as session:

@@ -117,6 +117,6 @@ class SetupError(ServerError):
 
 
 class LostClaimError(ServerError):
-    """Another worker raises this run now; this one must let go of it without writing."""
+    """Another worker trains this run now; this one must release it without writing."""
 
     status, code = 409, "lost_claim"

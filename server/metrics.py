@@ -19,7 +19,7 @@ def write_metrics(db: Database, mine: Claim, rows: Mapping[int, Mapping[str, flo
     A replayed tick replaces its row; a number that is not finite becomes null.
 
     Raises:
-        LostClaimError: another worker raises this run now.
+        LostClaimError: another worker trains this run now.
     """
     with db.write(durable=False) as session:
         run = held(session, mine)

@@ -31,7 +31,7 @@ def upgrade(db: Database) -> bool:
         if before == _head():
             return False
         if before is None and inspect(connection).has_table("run"):
-            raise SetupError(f"{_place(db)} holds tables that are not ours. Name another database.")
+            raise SetupError(f"{_place(db)} holds tables of another program. Name another database.")
         config = _config()
         config.attributes["connection"] = connection
         command.upgrade(config, "head")

@@ -47,7 +47,7 @@ class Relived:
     """The result of a replay, up to the last intact checkpoint or to the first difference."""
 
     run: int
-    tick: int  # the last one that was lived again
+    tick: int  # the last one that was replayed
     answers: int
     events: int
     checkpoint: int  # the tick of the checkpoint
@@ -112,8 +112,8 @@ def _same_build(run: Run) -> None:
     here, there = versions(), run.versions or versions()
     if here != there:
         raise DivergedError(
-            f"Run {run.id} was raised with torch {there['torch']} and {_threads(there['threads'])}; here are "
-            f"torch {here['torch']} and {_threads(here['threads'])}, which give other bits. "
+            f"Run {run.id} was trained with torch {there['torch']} and {_threads(there['threads'])}; "
+            f"here are torch {here['torch']} and {_threads(here['threads'])}, which give other bits. "
             f"Install torch {there['torch']} to replay it."
         )
 

@@ -155,7 +155,7 @@ def report_progress(db: Database, mine: Claim, **fields: Any) -> Run:
     """Store the progress of an agent: any of `PROGRESS_FIELDS`. This renews the claim too.
 
     Raises:
-        LostClaimError: another worker raises this run now.
+        LostClaimError: another worker trains this run now.
     """
     unknown = set(fields) - PROGRESS_FIELDS
     if unknown:
@@ -174,7 +174,7 @@ def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str
     The open queries are withdrawn.
 
     Raises:
-        LostClaimError: another worker raises this run now.
+        LostClaimError: another worker trains this run now.
     """
     with db.write() as session:
         run = held(session, mine)
@@ -224,7 +224,7 @@ def held(session: Session, mine: Claim) -> Run:
     run = hold(session, mine.run_id)
     if (run.worker, run.fencing_token) != (mine.worker, mine.fencing_token):
         raise LostClaimError(
-            f"Run {run.id} is raised by {run.worker or 'nobody'} now "
+            f"Run {run.id} is trained by {run.worker or 'no worker'} now "
             f"(fencing token {run.fencing_token}, not {mine.fencing_token})."
         )
     return run

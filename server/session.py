@@ -157,7 +157,7 @@ class RunSession:
             stored and stored.clips != encode(self.world, query)
         ):
             raise DivergedError(
-                f"Run {self.claim.run_id} asked something else when tick {self.last_tick} was lived again."
+                f"Run {self.claim.run_id} asked another question when tick {self.last_tick} was replayed."
             )
 
     def _note(self, answer: Answer) -> None:

@@ -89,7 +89,7 @@ def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None
     whole = torch.load(io.BytesIO(blob), weights_only=True)
     if whole["versions"] != versions():
         raise DivergedError(
-            f"This run was raised with {whole['versions']}; here it would go on with {versions()}."
+            f"This run was trained with {whole['versions']}; here it would continue with {versions()}."
         )
     template = initial_snapshot(world, config, 0, weights)
     return Snapshot(

@@ -90,7 +90,7 @@ def load(blob: bytes, wanted: Wanted) -> Tensor:
         raise NoWeightsError(f"{wanted.name} cannot be read as weights: {error}.") from None
     for key, value in wanted.metadata.items():
         if said.get(key) != value:
-            raise NoWeightsError(f"{wanted.name} is of {key} '{said.get(key)}', and '{value}' is wanted.")
+            raise NoWeightsError(f"{wanted.name} has {key} '{said.get(key)}', not '{value}'.")
     return weights
 
 

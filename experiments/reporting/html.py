@@ -121,7 +121,7 @@ def report(out: Path) -> Path:
     parts = list(_parts(out))
     if not parts:
         raise NoResultsError(
-            f"{out} holds no results. Make some: "
+            f"{out} holds no results. Run: "
             f"parenting experiment all --scale quick --out {shlex.quote(str(out))}"
         )
     page = _templates().get_template(PAGE).render(parts=parts, missing=list(_missing(out, parts)))

@@ -98,7 +98,7 @@ def submit(
         except CancelledError:
             raise NoClusterError(
                 address,
-                "the scheduler is gone. What came back is stored; the same command goes on from there.",
+                "the scheduler is gone. Finished tasks are stored; the same command continues from there.",
             ) from None
         else:
             yield futures[future], rows

@@ -61,7 +61,7 @@ def check_device(device: str) -> None:
     if device == "cuda" and not torch.cuda.is_available():
         raise NoGpuError(
             "--device cuda: torch sees no GPU here. "
-            "Take --device cpu, or a machine with a GPU and a torch that is built for it."
+            "Use --device cpu, or a machine with a GPU and a build of torch for it."
         )
 
 
@@ -123,7 +123,7 @@ def _until_done(tasks: Sequence[Task], store: Store, executor: Executor, on_done
     if fatal:
         raise WorkersDiedError(
             f"Worker processes died {TRIES} times over {', '.join(task.key for task in fatal)}. "
-            "Memory may be short. Take fewer workers; all other tasks that could be are done and stored."
+            "Memory may be short: use fewer workers. All other tasks that could run are done and stored."
         )
 
 

@@ -43,7 +43,7 @@ def call_each(
         yield from pool(numbered)
     except TerminatedWorkerError:
         raise WorkersDiedError(
-            "A worker process was killed; memory may be short. Take fewer: --workers."
+            "A worker process was killed; memory may be short. Use a smaller --workers."
         ) from None
 
 

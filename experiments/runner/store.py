@@ -86,7 +86,7 @@ class Store:
         other = [key for key in done if self._result(key)[OF] not in (self._of[key], older[key])]
         if other:
             raise PlanMismatchError(
-                f"{', '.join(other)}: these results in {self.folder} are of other tasks. "
+                f"{', '.join(other)}: these results in {self.folder} belong to other tasks. "
                 "Name another folder by --out, or remove them."
             )
 
@@ -170,7 +170,7 @@ def _read(path: Path, *names: str) -> dict[str, Any]:
         found = None
     if not isinstance(found, dict) or not found.keys() >= set(names):
         raise CorruptResultError(
-            f"{path} is damaged, or of an older version. Remove it; the same command then makes it again."
+            f"{path} is damaged, or of an older version. Remove it; the same command then computes it again."
         )
     return found
 

@@ -18,8 +18,8 @@ SUPERVISED = {
     "random": "The supervisor is there in half of the episodes.",
 }
 INSIDE = {
-    "up-down": "The parent's own way inside its cycle is up or down.",
-    "left": "The parent's own way inside its cycle is left.",
+    "up-down": "Inside its cycle the parent's own policy goes up or down.",
+    "left": "Inside its cycle the parent's own policy goes left.",
 }
 
 

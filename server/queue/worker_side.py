@@ -131,7 +131,7 @@ def post_query(
         policy: The policy that asks: its stage, and its gradient steps in that stage.
 
     Raises:
-        LostClaimError: another worker raises this run now.
+        LostClaimError: another worker trains this run now.
     """
     with db.write() as session:
         status = held_status(session, mine)
@@ -162,7 +162,7 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
     even if it was superseded later. This never waits.
 
     Raises:
-        LostClaimError: another worker raises this run now.
+        LostClaimError: another worker trains this run now.
     """
     with db.write(durable=False) as session:
         if _closed(session, mine.run_id, tick):
@@ -181,7 +181,7 @@ def take_operator_events(db: Database, mine: Claim, tick: int) -> Sequence[Opera
     more, and the run no longer counts as stuck, so that nobody ends the next episode as well.
 
     Raises:
-        LostClaimError: another worker raises this run now.
+        LostClaimError: another worker trains this run now.
     """
     mine_only = select(OperatorEvent).where(OperatorEvent.run_id == mine.run_id).order_by(OperatorEvent.id)
     recorded = mine_only.where(OperatorEvent.applied_tick == tick)

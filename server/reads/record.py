@@ -49,7 +49,7 @@ class StoredRecord:
         try:
             return Moment(list(self._events_of(tick)), self._answer_of(tick), self._query_of(tick))
         except (LookupError, TypeError, ValueError) as error:
-            raise UnreadableRecordError(f"What is stored of tick {tick} cannot be read: {error!r}.") from None
+            raise UnreadableRecordError(f"The record of tick {tick} cannot be read: {error!r}.") from None
 
     def _read(self, window: range) -> None:
         first, last, mine = window[0], window[-1], self.run_id

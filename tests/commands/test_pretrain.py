@@ -63,7 +63,7 @@ def test_weights_that_are_there_stay(made: tuple[Path, dict[str, Any]]) -> None:
     folder, found = made
     result = pretrain(*SMALL, "--out", str(folder))
     assert result.exit_code == 0
-    assert "is there already; --force makes it again" in result.stdout
+    assert "exists already; --force trains it again" in result.stdout
     assert digest((folder / f"{NAME}.safetensors").read_bytes()) == found["sha256"]
 
 

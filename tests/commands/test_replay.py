@@ -182,7 +182,7 @@ def test_what_cannot_be_replayed_is_said_in_a_sentence(db: Database, monkeypatch
     monkeypatch.setattr("parenting.server.replay.versions", lambda: {"torch": "9.9", "threads": 1})
     said = replay()
     assert (said.exit_code, said.stdout) == (2, "")
-    assert said.stderr.startswith("Run 1 was raised with torch ")
+    assert said.stderr.startswith("Run 1 was trained with torch ")
     assert "here are torch 9.9 and 1 thread, which give other bits. Install torch " in said.stderr
     sql(db, "UPDATE checkpoint SET blob = x'00'")
     assert "Every checkpoint of run 1 is damaged" in replay().stderr

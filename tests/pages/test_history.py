@@ -96,7 +96,7 @@ def test_some_of_them(client: httpx2.Client, db: Database, mine: Claim) -> None:
     assert numbers(page) == list(range(PAGE + 4, 4, -1))
     assert "<option selected>guidance" in page
     assert 'href="/runs/1/history?kind=guidance&amp;choice=left&amp;before=5"' in page
-    assert "No answer is like that." in client.get("/runs/1/history?choice=either").text
+    assert "No answer matches." in client.get("/runs/1/history?choice=either").text
     for wrong in ("choice=best", "kind=none", "before=0", "before=x"):
         assert client.get(f"/runs/1/history?{wrong}").status_code == 422
 

@@ -236,7 +236,7 @@ def test_a_record_that_disagrees_stops_the_run(db: Database) -> None:
     live_to(alive(db, run), 30)
     with db.write() as session:
         session.connection().exec_driver_sql("UPDATE query SET kind = 'preference' WHERE kind = 'guidance'")
-    with pytest.raises(ServerError, match="lived again"):
+    with pytest.raises(ServerError, match="was replayed"):
         live_to(alive(db, run), 30)
 
 

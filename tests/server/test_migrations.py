@@ -72,7 +72,7 @@ def test_newer_database_is_refused(db: Database, verb: object) -> None:
 def test_tables_of_others_are_left_alone(empty: Database) -> None:
     with empty.write() as session:
         session.execute(text("CREATE TABLE run (mine INTEGER)"))
-    with pytest.raises(SetupError, match="tables that are not ours"):
+    with pytest.raises(SetupError, match="tables of another program"):
         upgrade(empty)
 
 
