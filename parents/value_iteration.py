@@ -81,5 +81,5 @@ def _iterate(
             return ValueTable(gamma, better, model.reward + gamma * better[model.next_state])
         v = better
     raise ArithmeticError(
-        f"Values did not settle within {MAX_SWEEPS} sweeps at gamma = {gamma}; a smaller gamma settles."
+        f"Values did not converge within {MAX_SWEEPS} sweeps at gamma = {gamma}; use a smaller gamma."
     )

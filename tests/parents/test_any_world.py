@@ -60,7 +60,7 @@ def test_a_world_without_an_end_has_no_hopeless_state() -> None:
 
 def test_a_world_without_an_end_needs_a_smaller_gamma(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("parenting.parents.value_iteration.MAX_SWEEPS", 50)
-    with pytest.raises(ArithmeticError, match=r"at gamma = 1\.0; a smaller gamma"):
+    with pytest.raises(ArithmeticError, match=r"at gamma = 1\.0; use a smaller gamma"):
         exact_values(Endless(ISLAND, time_limit=100), 1.0)
 
 
