@@ -82,7 +82,7 @@ def test_an_unknown_name_is_said_with_those_that_there_are() -> None:
 )
 def test_a_report_refuses_what_it_would_not_heed(options: tuple[str, ...], done: Path) -> None:
     said = wrong("report", *options, "--out", str(done))
-    assert f"Leave out {', '.join(options[::2])}." in said
+    assert f"remove {', '.join(options[::2])}." in said
     assert not (done / "report.html").exists()
 
 

@@ -72,7 +72,7 @@ def test_shipped_weights_are_there_already(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setenv("PARENTING_DATA", str(tmp_path))
     result = pretrain("--world", "reward-hacking", "--level", "garden")
     assert result.exit_code == 0
-    assert "reward-hacking-7x9-v1.safetensors is there already" in result.stdout
+    assert "reward-hacking-7x9-v1.safetensors exists already" in result.stdout
     assert list(tmp_path.iterdir()) == []
 
 
