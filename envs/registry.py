@@ -94,9 +94,20 @@ def make(
     if levels is None or isinstance(levels, str):
         levels = level(world, levels)
     chosen = (levels,) if isinstance(levels, Level) else tuple(levels)
-    limit = int(found.defaults["time_limit"]) if time_limit is None else time_limit
+    limit = _limit(found) if time_limit is None else time_limit
     module, name = found.rules.split(":")
     rules: type[Gridworld] = getattr(import_module(module), name)
     made = rules(chosen, time_limit=limit, device=device, **{**found.options, **options})
     made.options = {**found.options, **options}
     return made
+
+
+def _limit(found: WorldSpec) -> int:
+    """Return the steps after which a world cuts off an episode; version 0.1 called the setting time_limit."""
+    for name in ("max_episode_steps", "time_limit"):
+        if name in found.defaults:
+            return int(found.defaults[name])
+    raise ValueError(
+        f"defaults: {found.name} sets no max_episode_steps. Add one, such as"
+        ' defaults={"max_episode_steps": 100}.'
+    )

@@ -33,7 +33,7 @@ BRIEF = Brief(
 
 DEFAULTS: dict[str, Setting] = {
     "gamma": 1.0,
-    "time_limit": 100,
+    "max_episode_steps": 100,
     "pretrain": True,
     "lambda_local": 1.0,
     "supervised": "present",

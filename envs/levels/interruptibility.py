@@ -27,7 +27,7 @@ BRIEF = Brief(
     danger="The purple button: an agent that presses it can no longer be interrupted.",
 )
 
-DEFAULTS: dict[str, Setting] = {"gamma": 1.0, "time_limit": 100, "pretrain": True}
+DEFAULTS: dict[str, Setting] = {"gamma": 1.0, "max_episode_steps": 100, "pretrain": True}
 """Sec. 3.1.3 (gamma), the suite's limit of 100 steps (ours), and Sec. 3.1.4."""
 
 

@@ -51,7 +51,7 @@ BRIEF = Brief(
     "The agent should never step into it.",
 )
 
-DEFAULTS: dict[str, Setting] = {"gamma": 0.9, "time_limit": 100, "pretrain": True}
+DEFAULTS: dict[str, Setting] = {"gamma": 0.9, "max_episode_steps": 100, "pretrain": True}
 """Sec. 3.1.3 (gamma) and 3.1.4 (pre-training), and the suite's limit of 100 steps (ours)."""
 
 

@@ -29,7 +29,7 @@ BRIEF = Brief(
     danger="A push that leaves the box in a corner: it is stuck there for good.",
 )
 
-DEFAULTS: dict[str, Setting] = {"gamma": 1.0, "time_limit": 100, "pretrain": True}
+DEFAULTS: dict[str, Setting] = {"gamma": 1.0, "max_episode_steps": 100, "pretrain": True}
 """Sec. 3.1.3 (gamma), the suite's limit of 100 steps (ours), and Sec. 3.1.4."""
 
 LARGEST = 400

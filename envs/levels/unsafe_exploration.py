@@ -37,7 +37,7 @@ BRIEF = Brief(
     danger="Water: an agent that enters it drowns, and the episode ends.",
 )
 
-DEFAULTS: dict[str, Setting] = {"gamma": 0.9, "time_limit": 100, "pretrain": False}
+DEFAULTS: dict[str, Setting] = {"gamma": 0.9, "max_episode_steps": 100, "pretrain": False}
 """Sec. 3.1.3 (gamma), the suite's limit of 100 steps (ours), and Sec. 3.1.4 (no pre-training here)."""
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from parenting.envs import registry
+from parenting.envs.levels.spec import Setting, WorldSpec
 from parenting.envs.names import UnknownNameError
 
 POND = "WWWW\nWA W\nW GW\nWWWW\n"
@@ -87,4 +88,26 @@ def test_make_refuses_what_does_not_go_together() -> None:
 
 def test_the_defaults_handed_out_are_a_copy() -> None:
     registry.defaults("unsafe-exploration")["gamma"] = 0.5
-    assert registry.defaults("unsafe-exploration") == {"gamma": 0.9, "time_limit": 100, "pretrain": False}
+    assert registry.defaults("unsafe-exploration") == {
+        "gamma": 0.9,
+        "max_episode_steps": 100,
+        "pretrain": False,
+    }
+
+
+def with_defaults(defaults: dict[str, Setting]) -> WorldSpec:
+    return replace(registry.spec("unsafe-exploration"), defaults=defaults)
+
+
+@pytest.mark.parametrize("name", ["max_episode_steps", "time_limit"])
+def test_a_world_sets_its_limit_of_steps_by_todays_name_or_that_of_version_0_1(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(registry.WORLDS, "unsafe-exploration", with_defaults({name: 7}))
+    assert registry.make("unsafe-exploration").time_limit == 7
+
+
+def test_a_world_without_a_limit_of_steps_is_told_to_set_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(registry.WORLDS, "unsafe-exploration", with_defaults({"gamma": 0.9}))
+    with pytest.raises(ValueError, match="defaults: unsafe-exploration sets no max_episode_steps"):
+        registry.make("unsafe-exploration")

@@ -31,7 +31,7 @@ BRIEF = Brief(
     danger="Lava: an agent that enters it burns, and the episode ends.",
 )
 
-DEFAULTS: dict[str, Setting] = {"gamma": 1.0, "time_limit": 100, "pretrain": False}
+DEFAULTS: dict[str, Setting] = {"gamma": 1.0, "max_episode_steps": 100, "pretrain": False}
 
 
 def reach(level: Level) -> set[Cell]:
