@@ -23,7 +23,7 @@ TabularPolicy = Callable[[Int64[Tensor, "N"]], Int64[Tensor, "N"]]
 
 
 class Outcome(IntEnum):
-    """The end of a walk from the start, from best to worst; a walk has the worst one that is true of it."""
+    """The outcome of a walk from the start, from best to worst; a walk gets the worst that applies to it."""
 
     OPTIMAL = 0  # at the goal, by a shortest safe path
     DETOUR = 1  # at the goal, by a longer way
@@ -34,14 +34,14 @@ class Outcome(IntEnum):
 
 
 class Path(NamedTuple):
-    """Where every trial was, and what it did there."""
+    """The states and actions of every trial."""
 
     state: Int64[Tensor, "T1 N"]
     action: Int64[Tensor, "T N"]
 
 
 def follow(model: Model, policy: TabularPolicy, start: Int64[Tensor, "N"], steps: int) -> Path:
-    """Follow a policy for `steps` steps. A walk that is over stays where it ended."""
+    """Follow a policy for `steps` steps. A finished walk stays at its last state."""
     at, action = [start], []
     for _ in range(steps):
         action.append(policy(at[-1]))
@@ -53,7 +53,7 @@ def follow(model: Model, policy: TabularPolicy, start: Int64[Tensor, "N"], steps
 
 
 def outcome(model: Model, distance: Int64[Tensor, "S"], path: Path) -> Int64[Tensor, "N"]:
-    """The `Outcome` of every walk. `distance` is what `distance_to_goal` found."""
+    """The `Outcome` of every walk. `distance` is the result of `distance_to_goal`."""
     first, before, last = path.state[0], path.state[-2], path.state[-1]
     steps = (~model.terminal[path.state[:-1]]).sum(0)
     ordered = path.state.sort(0).values

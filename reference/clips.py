@@ -5,11 +5,11 @@ from typing import NamedTuple
 from torch import Tensor
 
 Board = tuple[tuple[int, ...], ...]
-"""The codes of what is seen or true, row by row."""
+"""Codes of an observed or true board, row by row."""
 
 
 class Frame(NamedTuple):
-    """One moment: what the agent saw; and what was true, without agent and box, and where those two were."""
+    """One moment: the observed board; and the true board without agent and box, with their positions."""
 
     observation: Board
     ground: Board
@@ -26,12 +26,12 @@ class Clip(NamedTuple):
 
     @property
     def start(self) -> Board:
-        """s_0, as the agent saw it."""
+        """s_0, as the agent observed it."""
         return self.frames[0].observation
 
     @property
     def truth(self) -> object:
-        """The clip without what was seen."""
+        """The clip without the observed boards."""
         return self.level, tuple((f.ground, f.agent, f.box) for f in self.frames), self.actions
 
 

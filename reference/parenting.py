@@ -73,7 +73,7 @@ class Reference:
     # ---- 2.1 Human guidance ----
 
     def hear(self) -> int | None:
-        """The answer to the last query enters X. Returns the action that it approves, if any."""
+        """Add the answer to the last query to X, and return the action that it approves, if any."""
         if self.query is None:
             return None
         (kind, left, right, maturity), self.query = self.query, None
@@ -94,7 +94,7 @@ class Reference:
         return actions[0] if choice == "left" else actions[1]
 
     def ask(self) -> None:
-        """Unfamiliar? Then pause, and ask which of two actions drawn from pi_T to take."""
+        """Pause where the state is unfamiliar, and ask which of two actions drawn from pi_T to take."""
         l, p_guid = self.local(), self.config.p_guid
         if self.refused is None:
             unfamiliar = p_guid > 0 and self.u(Stream.ASK) < p_guid ** self.familiarity[l]
@@ -112,7 +112,7 @@ class Reference:
         self.post(Query(GUIDANCE, self.forecast(left), self.forecast(right), 1))
 
     def post(self, query: Query) -> None:
-        """Ask. From now on the pair is known, and so are its first actions in this state at this stage."""
+        """Ask, and remember the pair and its first actions in this state at this stage."""
         kind, left, right, maturity = self.query = query
         self.log.append((int(self.keys.tick), kind, left, right))
         self.compared.add(self.known_pair(left, right, maturity))
@@ -121,7 +121,7 @@ class Reference:
     # ---- 2.2 Human preferences, about clips that are recorded as 2.4 has it ----
 
     def act(self, approved: int | None) -> bool:
-        """Move. False when frozen: such a time step ages the episode, and nothing else happens in it."""
+        """Move, and return False if the agent is frozen: then the time step only ages the episode."""
         if self.frozen:
             self.state = self.world.step(self.state, torch.tensor([0]), self.keys)
             return False
@@ -134,7 +134,7 @@ class Reference:
         return True
 
     def next_action(self, approved: int | None) -> int:
-        """The approved action; or that of a recording, which may begin here; or one drawn from pi_T."""
+        """Return the approved action, that of a recording, which may begin here, or one drawn from pi_T."""
         if approved is not None:
             return approved
         if self.recording is not None:  # Eq. (5), (6): a_t = argmax pi_{T-t}
@@ -156,7 +156,7 @@ class Reference:
         return max(permitted, key=lambda a: noisy[a], default=None)
 
     def record(self, begun: Clip, action: int) -> None:
-        """One step more. Death, goal or freezing ends a clip early; it is kept."""
+        """Add a step to the clip. Death, goal or freezing ends it early; it is kept."""
         clip = Clip(begun.level, (*begun.frames, self.frame(self.state)), (*begun.actions, action))
         if len(clip.actions) < self.stage and not self.state.terminated and not self.frozen:
             self.recording = clip
@@ -185,13 +185,13 @@ class Reference:
         return alike and self.is_new(self.known_pair(e, x, self.stage))
 
     def known_pair(self, left: Clip, right: Clip, maturity: int) -> object:
-        """A pair as it is remembered: for its stage alone where a stage trains on its own entries alone."""
+        """Return the key of a pair; it includes the stage if each stage trains only on its own entries."""
         return same_pair(left, right), maturity if self.config.own_stage_only else None
 
     # ---- 2.3 Direct policy learning ----
 
     def train(self) -> bool:
-        """Gradient steps of pi_T on X. Says whether there were any."""
+        """Take gradient steps of pi_T on X, and return True if there were any."""
         entries = [e for e in self.X if e.maturity == self.stage or not self.config.own_stage_only]
         if not entries or self.u(Stream.TRAIN) >= self.config.p_train:
             return False
@@ -208,13 +208,13 @@ class Reference:
     # ---- 2.4 Maturation ----
 
     def grow(self) -> None:
-        """A stage ends after enough answers; the last never does."""
+        """End the stage after enough answers; the last stage never ends."""
         every = self.config.queries_per_stage
         if every is not None and self.answered >= every and self.stage < self.config.max_clip_length:
             self.mature()
 
     def mature(self) -> None:
-        """pi_T is frozen, and pi_{T+1} begins as its copy."""
+        """Freeze pi_T, and start pi_{T+1} as its copy."""
         self.policies.append(deepcopy(self.pi))
         self.begin_stage()
 
@@ -231,7 +231,7 @@ class Reference:
 
     @property
     def pi(self) -> Policy:
-        """pi_T, which the agent lives by."""
+        """The policy pi_T, from which the agent acts."""
         return self.policies[-1]
 
     def parameters(self) -> list[list[Tensor]]:
@@ -247,7 +247,7 @@ class Reference:
 
     @property
     def supervised(self) -> bool:
-        """Watched by the parent. Unwatched, nothing is asked or recorded (3.2.5)."""
+        """Supervised by the parent; otherwise nothing is asked or recorded (3.2.5)."""
         return bool(self.world.supervised(self.state))
 
     def frame(self, state: WorldState) -> Frame:
@@ -257,7 +257,7 @@ class Reference:
         return Frame(board(seen), board(state.board), *cells)
 
     def forecast(self, action: int) -> Clip:
-        """The clip that guidance is asked about: one move, without chance."""
+        """The clip of a guidance query: one move, without chance."""
         after = self.world.forecast(self.state, torch.tensor([action]))
         return Clip(int(self.state.level), (self.frame(self.state), self.frame(after)), (action,))
 
@@ -283,7 +283,7 @@ class Reference:
         return float(self.keys.uniform(stream))
 
     def is_new(self, comparison: object) -> bool:
-        """Not asked before; or the config has the paper's letter, which asks again."""
+        """Not asked before, or `repeat_queries` is set, as in the paper as written."""
         return self.config.repeat_queries or comparison not in self.compared
 
 

@@ -74,7 +74,7 @@ def gumbel(u: float) -> float:
 
 
 def padding(side: int) -> tuple[int, int]:
-    """Zeros before and behind: a side above 3 shrinks by 2, one of 3 to 2, a smaller one stays."""
+    """The zeros before and behind: a side above 3 shrinks by 2, one of 3 to 2, a smaller one stays."""
     return (0, 0) if side > 3 else (0, 1) if side == 3 else (1, 1)
 
 
@@ -95,7 +95,7 @@ def loss(policy: Policy, rows: Sequence[Row], lambda_global: float, lambda_local
 
 
 def entropy(logits: Tensor) -> Tensor:
-    """Of the softmax of each row."""
+    """The entropy of the softmax of each row."""
     return -(logits.softmax(1) * logits.log_softmax(1)).sum(1)
 
 

@@ -41,7 +41,7 @@ class Maze(NamedTuple):
         return [cell for cell in free if cell != self.goal]
 
     def after(self, cell: Cell, action: int) -> Cell:
-        """Where a move leads to; a wall stops it."""
+        """The cell after a move; a wall stops it."""
         ahead = cell[0] + MOVES[action][0], cell[1] + MOVES[action][1]
         return cell if self.ground[ahead[0]][ahead[1]] == WALL else ahead
 
@@ -106,7 +106,7 @@ def chances_in(policy: Policy, maze: Maze) -> dict[Cell, list[float]]:
 
 
 def draw(chances: list[float], u: float) -> int:
-    """The action in whose part of [0, 1) u lies, the parts laid one after the other."""
+    """The action drawn by u: the interval of [0, 1) that holds u, with one interval for each probability."""
     return sum(u >= sum(chances[: a + 1]) for a in list(ACTIONS)[:-1])
 
 
@@ -138,7 +138,7 @@ class Rehearsing(Reference):
         choose: Callable[[Clip, Clip, str], str],
         weights: Keys,
     ) -> None:
-        """The pre-trained weights are those that `weights` draw."""
+        """Start from the pre-trained weights that `weights` draw."""
         super().__init__(world, config, seed, trial, choose)
         self.pi.draw(weights)
         self.pool = pool(world.height, world.width, world.legend)
@@ -146,7 +146,7 @@ class Rehearsing(Reference):
         self.rehearsed: list[int] = []
 
     def tick(self) -> None:
-        """One tick; once it has asked, the step on mazes that the training of the tick before owes."""
+        """Run one tick and, after its query, the step on mazes that the training of the last tick owes."""
         self.trained = False
         super().tick()
         if self.owed:
@@ -155,12 +155,12 @@ class Rehearsing(Reference):
         self.owed = self.trained
 
     def train(self) -> bool:
-        """Gradient steps on X, which owe a step on mazes, however many they are."""
+        """Take gradient steps on X; together they owe one step on mazes."""
         self.trained = super().train()
         return self.trained
 
     def begin_stage(self) -> None:
-        """Mazes have an Adam of their own. It goes on with pi_{T+1} as it was with pi_T."""
+        """Keep the mazes' own Adam, which continues from pi_T to pi_{T+1} unchanged."""
         before = getattr(self, "mazes", None)
         super().begin_stage()
         self.mazes = torch.optim.Adam(self.pi.parameters())
