@@ -8,7 +8,7 @@ from typing import NamedTuple
 class Option(NamedTuple):
     """A setting of the run; empty is what the world itself sets."""
 
-    field: str  # of the form; behind "config." one of agent.config.Config
+    field: str  # of the form; behind "config." a field of agent.config.Config, by its name in API v1
     title: str
     needs: str  # the glyph that a world's legend must hold, if any
     choices: tuple[tuple[str, str], ...]  # values and their names; without any, a number is typed
