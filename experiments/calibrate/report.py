@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import isfinite
 from statistics import fmean
 
+from parenting.agent.config import FIELDS
 from parenting.experiments.calibrate.distance import (
     BY_REWARD,
     DEATHS,
@@ -51,9 +52,8 @@ def _selected(best: Found) -> Comparison:
 
 
 def _describe(found: Found) -> str:
-    return (
-        ", ".join(f"{name} {found.direct[name]}" for name in HYPERPARAMETERS) + f"; entropy {found.entropy}"
-    )
+    setting = ", ".join(f"{FIELDS.get(name, name)} {found.direct[name]}" for name in HYPERPARAMETERS)
+    return f"{setting}; entropy {found.entropy}"
 
 
 def _nearest(found: Found) -> Comparison:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import hypot
 from statistics import fmean
 
+from parenting.agent.config import FIELDS
 from parenting.agent.pretraining_mazes import EPISODES as BATCH
 from parenting.evaluation.rollouts import EPISODES
 from parenting.experiments.figure2.agents import NEAR, compare_arms, queries_needed
@@ -59,6 +60,7 @@ def report(rows: Sequence[Row], arms: Mapping[str, Arm], against: Baselines) -> 
 def _prose(arms: Mapping[str, Arm], against: Baselines) -> list[str]:
     return paragraphs(
         "figure2/page.md",
+        fields=FIELDS,
         arms={shown(name): arm for name, arm in arms.items()},
         main=arms[MAIN],
         many=arms.get(MANY),
