@@ -3,7 +3,7 @@
 .DEFAULT_GOAL := help
 .PHONY: help run test mutants torture stress check docs format coverage pictures weights constraints clean wheel
 
-# Tests start many processes; without byte code each of them would compile a thousand modules anew.
+# Tests start many processes; without byte code each of them would compile a thousand modules again.
 unexport PYTHONDONTWRITEBYTECODE
 
 PYTHON ?= python3
@@ -48,7 +48,7 @@ format: $(VENV)/.installed-dev ## Format the code and mend what lint can mend
 coverage: $(VENV)/.installed-dev ## Run the tests and print the lines that none of them reached
 	$(BIN)/pytest --cov --cov-report=term-missing:skip-covered $(ARGS)
 
-pictures: $(VENV)/.installed-dev ## Draw the pictures of the documentation anew (needs Chromium)
+pictures: $(VENV)/.installed-dev ## Draw the pictures of the documentation again (needs Chromium)
 	$(BIN)/parenting worlds --draw docs/pictures > /dev/null
 	$(BIN)/python scripts/pictures.py
 	$(BIN)/python scripts/screenshots.py
@@ -57,7 +57,7 @@ docs: $(VENV)/.installed-dev ## Build the documentation as a site in build/docs;
 	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs build/docs
 	$(BIN)/python scripts/offline.py build/docs
 
-weights: $(VENV)/.installed ## Pre-train the weights of the built-in levels anew (20 minutes)
+weights: $(VENV)/.installed ## Pre-train the weights of the built-in levels again (20 minutes)
 	$(BIN)/parenting pretrain --out weights --force
 
 wheel: $(VENV)/.installed-dev ## Build the wheel of this version into dist/
@@ -66,7 +66,7 @@ wheel: $(VENV)/.installed-dev ## Build the wheel of this version into dist/
 # torch stays at the version that constraints.txt names: a newer one may pull gigabytes. TORCH=... changes it.
 TORCH = $(shell sed -n 's/^torch==//p' constraints.txt)
 LOCK := build/constraints
-constraints: ## Resolve all dependencies anew and write constraints.txt
+constraints: ## Resolve all dependencies again and write constraints.txt
 	rm -rf $(LOCK)
 	$(PYTHON) -m venv $(LOCK)
 	$(LOCK)/bin/pip install --quiet --no-compile --disable-pip-version-check "torch==$(TORCH)" '.[dev]'

@@ -72,7 +72,7 @@ def test_no_banned_word() -> None:
     """The message names the standard term."""
     found = [
         f"{name}:{line}: {words!r}; write: {standard}"
-        for name in sources(".py", ".md", ".html", ".js", ".css")
+        for name in sources(".py", ".md", ".html", ".js", ".css", ".toml", ".yml", "Makefile", ".ci/run")
         for line, words, standard in banned(read(name))
         if (name, words.lower()) not in EXEMPT
     ]
