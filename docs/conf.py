@@ -54,7 +54,7 @@ default_role = "code"  # a name between single backticks in a docstring is code
 nitpicky = False
 html_theme = "furo"
 html_title = "Parenting"
-html_logo = html_favicon = "../web/static/icon.svg"
+html_favicon = "../web/static/icon.svg"
 html_static_path: list[str] = []
 html_math_renderer = "mathml"
 
