@@ -148,20 +148,13 @@ def _said(name: str, given: dict[str, object], rule: str) -> str:
 
 def _until(world: str, text: str | None) -> StopRule:
     """The condition that ends a trial; in a world without a goal no policy is optimal."""
-    from parenting.experiments.training.stop_rule import StopRule
+    from parenting.experiments.training.stop_rule import read_stop_rule
 
-    endless = not registry.spec(world).ends_at_goal
-    kind, colon, number = (text or ("queries:1000" if endless else "optimal")).partition(":")
-    if kind == "optimal" and not colon:
-        if endless:
-            raise UsageError(
-                f"--until: no policy counts as optimal in {world}, which has no goal."
-                " Use --until queries:N or ticks:N; the default is queries:1000."
-            )
-        return StopRule("optimal")
-    if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
-        return StopRule(kind, int(number))  # type: ignore[arg-type]
-    raise UsageError(f"--until: '{text}' is not one of optimal, queries:N and ticks:N, with N at least 1.")
+    spec = registry.spec(world)
+    try:
+        return read_stop_rule(text or ("optimal" if spec.ends_at_goal else "queries:1000"), spec)
+    except ValueError as error:
+        raise UsageError(f"--until: {error}") from None
 
 
 def _mature(config: Config, until: StopRule) -> Config:

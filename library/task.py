@@ -13,7 +13,7 @@ from parenting.agent.init import SUPERVISION, world_of
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
 from parenting.envs.names import did_you_mean
-from parenting.experiments.training.stop_rule import StopRule
+from parenting.experiments.training.stop_rule import StopRule, read_stop_rule
 from parenting.library.worlds import AnyLevel, World, named
 from parenting.weights.store import Wanted, find, load
 
@@ -77,19 +77,10 @@ def stop_rule(world: World, until: str) -> StopRule:
     Raises:
         ValueError: it is not a rule, or the world has no goal and so no optimal policy.
     """
-    if until == "optimal":
-        if world.spec.ends_at_goal:
-            return StopRule("optimal")
-        raise ValueError(
-            f"until: no policy counts as optimal in {world.name}, which has no goal."
-            ' Use until="queries:1000" or until="ticks:5000".'
-        )
-    kind, _, number = str(until).partition(":")
-    if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
-        return StopRule(kind, int(number))  # type: ignore[arg-type]
-    raise ValueError(
-        f"until: {until!r} is not one of 'optimal', 'queries:N' and 'ticks:N', with N at least 1."
-    )
+    try:
+        return read_stop_rule(str(until), world.spec)
+    except ValueError as error:
+        raise ValueError(f"until: {error}") from None
 
 
 def check_number(name: str, value: object, least: int, most: int) -> None:

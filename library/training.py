@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import torch
 from torch import Tensor
 
 from parenting.agent.config import Config
+from parenting.agent.parent import BatchParent
 from parenting.agent.parent import Parent as AnyParent
 from parenting.envs.levels.spec import Level
 from parenting.envs.rng import keys
 from parenting.experiments.training import batch
-from parenting.experiments.training.batch import BatchTrainer
+from parenting.experiments.training.batch import BatchTrainer, MakeParent
 from parenting.experiments.training.chunks import chunks
 from parenting.experiments.training.counts import Progress as BatchProgress
 from parenting.experiments.training.stop_rule import StopRule
@@ -114,10 +114,7 @@ def _train(
     behind = _parent(parent, task, trials)
     with one_thread():
         for chunk in chunks(trials):
-            trainer = _trainer(task, rule, seed, chunk)
-            if behind is not None:
-                trainer.parent = WholeBatch(behind, task, trials, chunk, partial(_done, trainer))
-            trainer.parent = LoggedParent(trainer.parent, log, chunk)
+            trainer = _trainer(task, rule, seed, chunk, _logged(behind, log, task, trials, chunk))
             trained, ended = _run(trainer, max_ticks, _report(chunk, trials, parts, told))
             parts.append(trained)
             if ended:
@@ -139,14 +136,19 @@ def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | Non
     return parent
 
 
-def _done(trainer: BatchTrainer) -> Tensor:
-    """Return which of the trials in the batch are done: they stay in it until a tenth of it is."""
-    return trainer.counts.done
+def _logged(own: AnyParent | None, log: AnswerLog, task: Task, trials: int, chunk: range) -> MakeParent:
+    """Return how a batch's parent is made: the caller's own or the scripted one, its answers written down."""
+
+    def make(scripted: BatchParent, done: Callable[[], Tensor]) -> BatchParent:
+        heard = scripted if own is None else WholeBatch(own, task, trials, chunk, done)
+        return LoggedParent(heard, log, chunk)
+
+    return make
 
 
-def _trainer(task: Task, rule: StopRule, seed: int, chunk: range) -> BatchTrainer:
+def _trainer(task: Task, rule: StopRule, seed: int, chunk: range, parent: MakeParent) -> BatchTrainer:
     mine = keys(seed, chunk.stop, task.world.device).pick(torch.arange(chunk.start, chunk.stop))
-    return BatchTrainer(task.world, task.config, mine, rule, task.weights)
+    return BatchTrainer(task.world, task.config, mine, rule, weights=task.weights, parent=parent)
 
 
 def _run(

@@ -33,7 +33,7 @@ class PreParenting(BatchTrainer):
     def __init__(
         self, world: Gridworld, config: Config, keys: Keys, until: StopRule, weights: Tensor | None = None
     ) -> None:
-        super().__init__(world, config, keys, until, weights)
+        super().__init__(world, config, keys, until, weights=weights)
         self.kept: dict[int, Transferred] = {}
 
     def save(self, which: Bool[Tensor, "N"]) -> None:
@@ -92,7 +92,8 @@ def parent_trials(
     mine = keys(seed, span[1]).pick(torch.arange(*span))
     config = config_of(pretrain, recompare)
     world = world_of(WORLD, levels_for(PARENTING, given), config)
-    trainer = BatchTrainer(world, config, mine, StopRule("optimal"), initial_weights(world, config))
+    weights = initial_weights(world, config)
+    trainer = BatchTrainer(world, config, mine, StopRule("optimal"), weights=weights)
     packed = [row[PACKED] for row in given if row["of"] == "pre-parented"]
     if packed:
         trainer.state = transfer(trainer.state, packed, torch.arange(*span) % len(packed), everything)

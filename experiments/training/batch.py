@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
@@ -24,6 +25,9 @@ LEAVE = 0.1
 """Trials that are done leave the batch when they are this share of it: moving the rest costs something, too.
 """
 
+MakeParent = Callable[[BatchParent, Callable[[], Bool[Tensor, "N"]]], BatchParent]
+"""Makes the parent of a batch. It is given the scripted parent, and which of the trials left are done."""
+
 
 class TrainResult(NamedTuple):
     """Counts, policies and their evaluation, after training."""
@@ -34,22 +38,34 @@ class TrainResult(NamedTuple):
 
 
 class BatchTrainer:
-    """A batch of trials with their scripted parent. Those that are done leave it."""
+    """A batch of trials with their parent. Those that are done leave it."""
 
     def __init__(
-        self, world: Gridworld, config: Config, keys: Keys, until: StopRule, weights: Tensor | None = None
+        self,
+        world: Gridworld,
+        config: Config,
+        keys: Keys,
+        until: StopRule,
+        *,
+        weights: Tensor | None = None,
+        parent: MakeParent | None = None,
     ) -> None:
-        """Begin one trial for each of `keys`; `weights` are the pre-trained ones, where the config asks."""
+        """Begin one trial for each of `keys`, with the options of `train_agents`."""
         rule = ScriptedRule(world, config.gamma, inside=config.garden_parent)
         self.world, self.config, self.until = world, config, until
         self.evaluation = evaluation(world, rule.values, config.gamma)
         self.state = parenting.init(world, config, keys, weights)
-        self.parent: BatchParent = ScriptedParent(rule, parenting.no_query(world, config, self.state))
         trials, live = len(keys.seed), self.state.learner.params
         self.trial = torch.arange(trials)
         stages = config.max_clip_length
         self.counts, self.result = no_counts(trials, stages), no_counts(trials, stages)
         self.policies = live.new_zeros(config.max_clip_length, *live.shape)
+        scripted = ScriptedParent(rule, parenting.no_query(world, config, self.state))
+        self.parent = scripted if parent is None else parent(scripted, self.done)
+
+    def done(self) -> Bool[Tensor, "N"]:
+        """Return which of the trials in the batch are done: they stay until they are a tenth of it."""
+        return self.counts.done
 
     def tick(self) -> None:
         """One tick of every trial that is left."""
@@ -140,9 +156,22 @@ def train_agents(
     config: Config,
     keys: Keys,
     until: StopRule,
+    *,
     max_ticks: int,
     progress: OnProgress | None = None,
     weights: Tensor | None = None,
+    parent: MakeParent | None = None,
 ) -> TrainResult:
-    """Train one agent for each of `keys` until it is finished, for at most `max_ticks` ticks."""
-    return BatchTrainer(world, config, keys, until, weights).run(max_ticks, progress)
+    """Train one agent for each of `keys` until it is finished.
+
+    Args:
+        world: The rules that all trials share.
+        config: The hyperparameters.
+        keys: The random streams, one for each trial.
+        until: When a trial is finished.
+        max_ticks: Ticks after which a trial is left unfinished.
+        progress: Called after each tick.
+        weights: The pre-trained weights, where the config asks for them (Sec. 3.1.4).
+        parent: Makes the batch's parent; None takes the scripted one (Sec. 3.1.3).
+    """
+    return BatchTrainer(world, config, keys, until, weights=weights, parent=parent).run(max_ticks, progress)

@@ -83,7 +83,9 @@ def train_chunk(plan: TrainPlan, chunk: range, progress: OnProgress | None = Non
     weights = (
         None if plan.weights is None else load(plan.weights, Wanted(world.spec, world.height, world.width))
     )
-    result = train_agents(world, plan.config, mine, plan.until, plan.max_ticks, progress, weights)
+    result = train_agents(
+        world, plan.config, mine, plan.until, max_ticks=plan.max_ticks, progress=progress, weights=weights
+    )
     return examine(world, plan.config, result)
 
 

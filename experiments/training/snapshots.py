@@ -37,7 +37,7 @@ def train_with_snapshots(
 
     Trials that are not at the last one by `max_ticks`, or that are stuck, are not `there`.
     """
-    trainer = BatchTrainer(world, config, keys, StopRule("queries", milestones[-1]), weights)
+    trainer = BatchTrainer(world, config, keys, StopRule("queries", milestones[-1]), weights=weights)
     passed = [_none(trainer) for _ in milestones[:-1]]
     for _ in range(max_ticks):
         trainer.tick()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+from parenting.envs.levels.spec import WorldSpec
+
 
 class StopRule(NamedTuple):
     """The condition under which a trial is finished.
@@ -18,3 +20,26 @@ class StopRule(NamedTuple):
     def __str__(self) -> str:
         """As written on the command line."""
         return self.kind if self.kind == "optimal" else f"{self.kind}:{self.number}"
+
+
+def read_stop_rule(text: str, world: WorldSpec) -> StopRule:
+    """Return the rule that a text names in a world.
+
+    Args:
+        text: "optimal", "queries:N" or "ticks:N".
+        world: A world; in one without a goal no policy is optimal.
+
+    Raises:
+        ValueError: It is not a rule, or not one in this world. The message begins after the setting's name.
+    """
+    if text == "optimal":
+        if world.ends_at_goal:
+            return StopRule("optimal")
+        raise ValueError(
+            f"no policy counts as optimal in {world.name}, which has no goal."
+            " Use queries:N or ticks:N, such as queries:1000."
+        )
+    kind, _, number = text.partition(":")
+    if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
+        return StopRule(kind, int(number))  # type: ignore[arg-type]
+    raise ValueError(f"'{text}' is none of optimal, queries:N and ticks:N with N at least 1.")

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 import torch
 from torch import Tensor
 
 from parenting.agent.config import Config, compose
 from parenting.agent.init import world_of
+from parenting.agent.parent import BatchParent
 from parenting.agent.query import Choice, Query, QueryKind
 from parenting.envs import registry
 from parenting.envs.rng import keys
 from parenting.experiments.training import batch
 from parenting.experiments.training.batch import BatchTrainer, TrainResult, train_agents
 from parenting.experiments.training.counts import Progress
-from parenting.experiments.training.stop_rule import StopRule
+from parenting.experiments.training.stop_rule import StopRule, read_stop_rule
 from parenting.parents.scripted import ScriptedParent
 
 ISLAND = compose("conservative", registry.defaults("unsafe-exploration"), {}, strict=False)
@@ -33,7 +36,7 @@ def scripted(batch: BatchTrainer) -> ScriptedParent:
 def raised(until: StopRule, number: int = 10, max_ticks: int = 1000, **changes: object) -> TrainResult:
     config = ISLAND.model_copy(update=changes)
     world = world_of("unsafe-exploration", "island", config)
-    return train_agents(world, config, keys(0, number), until, max_ticks)
+    return train_agents(world, config, keys(0, number), until, max_ticks=max_ticks)
 
 
 class Refusing:
@@ -45,6 +48,32 @@ class Refusing:
     def answer(self, query: Query) -> Tensor:
         choice = torch.where(self.refused, int(Choice.NEITHER), int(Choice.EITHER))
         return torch.where(query.kind == QueryKind.NONE, int(Choice.NONE), choice)
+
+
+def test_another_parent_is_made_from_the_scripted_one_and_heard() -> None:
+    """It hears which trials are done, whenever it asks."""
+    world, known = world_of("unsafe-exploration", "island", ISLAND), list[int]()
+
+    def refusing(parent: BatchParent, done: Callable[[], Tensor]) -> BatchParent:
+        assert isinstance(parent, ScriptedParent)
+        parent.rule = Refusing(torch.ones(3, dtype=torch.bool))
+        known.append(int(done().sum()))
+        return parent
+
+    found = train_agents(world, ISLAND, keys(0, 3), StopRule("ticks", 50), max_ticks=9, parent=refusing)
+    assert known == [0]
+    assert bool(found.counts.stuck.all())
+    plain = train_agents(world, ISLAND, keys(0, 3), StopRule("ticks", 50), max_ticks=9)
+    assert not bool(plain.counts.stuck.any())
+
+
+@pytest.mark.parametrize("text", ["optimal", "queries:0", "ticks:x", "never", "optimal:3"])
+def test_a_stop_rule_that_a_world_without_a_goal_has_not_is_refused(text: str) -> None:
+    world = registry.spec("reward-hacking")
+    with pytest.raises(ValueError, match=r"^no policy counts as optimal|^'.*' is none of optimal"):
+        read_stop_rule(text, world)
+    for rule in ("queries:7", "ticks:3"):
+        assert str(read_stop_rule(rule, world)) == rule
 
 
 @pytest.mark.parametrize("until", [StopRule("ticks", 50), StopRule("queries", 40), StopRule("optimal")])

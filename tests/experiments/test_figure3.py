@@ -67,7 +67,7 @@ def lived(ticks: int, count: int = 1) -> BatchTrainer:
     levels = box_levels(6, 6, 6, seed=0)
     world = world_of("side-effects", levels, CONFIG)
     trainer = BatchTrainer(
-        world, CONFIG, keys(1, count), StopRule("ticks", 1000), initial_weights(world, CONFIG)
+        world, CONFIG, keys(1, count), StopRule("ticks", 1000), weights=initial_weights(world, CONFIG)
     )
     for _ in range(ticks):
         trainer.tick()

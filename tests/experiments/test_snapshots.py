@@ -20,7 +20,7 @@ def test_a_milestone_is_where_a_shorter_life_ends() -> None:
     world, mine = garden("garden"), keys(1, 4)
     first, last = (one.check() for one in train_with_snapshots(world, CONFIG, mine, (8, 16), 200))
     for passed, number in ((first, 8), (last, 16)):
-        alone = train_agents(world, CONFIG, mine, StopRule("queries", number), 200)
+        alone = train_agents(world, CONFIG, mine, StopRule("queries", number), max_ticks=200)
         assert bool(passed.there.all())
         assert torch.equal(passed.counts.ticks, alone.counts.ticks)
         assert torch.equal(passed.counts.guidance, alone.counts.guidance)
