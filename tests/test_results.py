@@ -128,6 +128,15 @@ def test_the_tables_of_the_readme_and_of_the_list_are_those_of_the_results(name:
     assert path.read_text(encoding="utf-8") == tables(ROOT)[path], f"make them again: {remedy}"
 
 
+def test_the_readme_says_how_many_policies_ever_enter_the_bucket() -> None:
+    """The strict reading of the claim on reward hacking fails, and the README's verdict counts it."""
+    rows = results("reward-hacking")["findings"]
+    strict = [one for one in rows if re.match(r"garden, defaults, .*: enter the bucket", one["what"])]
+    worst = max((one["ours"] for one in strict), key=lambda ours: int(ours.split()[0]))
+    (line,) = re.findall(r"^\| \[Safety claims\].*$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE)
+    assert f"; {worst} enter the bucket in some episode | 3 agree, 2 do not |" in line
+
+
 def test_the_list_counts_what_did_not_reproduce() -> None:
     for name in NAMES:
         (line,) = re.findall(rf"^\| \[`{name}`\]\({name}\.md\) \| (.*?) \|", LIST, re.MULTILINE)

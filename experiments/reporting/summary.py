@@ -71,15 +71,29 @@ def _table1(rows: Sequence[Comparison]) -> list[Line]:
 
 
 def _safety(pages: Sequence[Sequence[Comparison]]) -> Line:
-    """The claims under the paper's settings, which are the first rows of their pages."""
+    """The claims under the paper's settings: the first rows of their pages, and the strict reading of one."""
     rows = [next(row for row in page if row.paper in (NEVER, NONE_OF_100)) for page in pages]
+    strict = _entered(next(page for page in pages if any(row.paper == NEVER for row in page)))
     hits, trials = zip(*(row.ours.split(" of ") for row in rows), strict=True)
+    counts = f"{', '.join(hits)} of {' or '.join(dict.fromkeys(trials))}"
     return Line(
         "[Safety claims](docs/results/README.md) (Sec. 3.2.2 to 3.2.5): policies that violate them",
         NONE_OF_100,
-        f"{', '.join(hits)} of {' or '.join(dict.fromkeys(trials))}",
-        rows,
+        f"{counts}; {strict.ours} enter the bucket in some episode",
+        [*rows, strict],
     )
+
+
+def _entered(page: Sequence[Comparison]) -> Comparison:
+    """The strict reading of reward hacking, of which no episode may enter the bucket: its worst row.
+
+    Args:
+        page: The rows of reward hacking; those of the paper's settings have the first row's beginning.
+    """
+    settings = page[0].what.partition(", after ")[0]
+    of_paper = [row for row in page if row.what.startswith(f"{settings}, after ") and row.paper == NEVER]
+    strict = [row for row in of_paper if ": enter the bucket " in row.what]
+    return max(strict, key=lambda row: int(row.ours.split(" of ")[0]))
 
 
 def _figure2(rows: Sequence[Comparison]) -> list[Line]:

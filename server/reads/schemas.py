@@ -25,9 +25,13 @@ from parenting.server.schemas import (
 )
 from parenting.server.statuses import OVER, RunState, RunStatus, Waiting
 from parenting.server.tables import Answer, Metric, Query, Run
+from parenting.server.workers import alive
+
+Sign = Literal["alive", "silent", "done"]
 
 SILENT_AFTER = timedelta(seconds=5)
-"""A run counts as not raised once its worker has been silent for this long."""
+"""A run counts as not raised once its worker has been silent for this long. One that no worker has
+claimed yet, as a run that was just started, is not raised if no worker is alive at all."""
 
 
 def run_schema(db: Database, run_id: int) -> RunSchema:
@@ -37,14 +41,16 @@ def run_schema(db: Database, run_id: int) -> RunSchema:
         NotFound: there is none of this id.
     """
     with db.read() as session:
-        return _run_schema(find(session, run_id), open_in(session, run_id), db.clock())
+        run, opened = find(session, run_id), open_in(session, run_id)
+    return _run_schema(run, opened, _worker(run, db.clock(), _taken_soon(db, [run])))
 
 
 def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema]:
     """Return the schemas of runs."""
     with db.read() as session:
         opened = open_by_run(session, [run.id for run in runs])
-    return [_run_schema(run, opened[run.id], db.clock()) for run in runs]
+    now, soon = db.clock(), _taken_soon(db, runs)
+    return [_run_schema(run, opened[run.id], _worker(run, now, soon)) for run in runs]
 
 
 def query_schema(query: Query) -> QuerySchema:
@@ -84,16 +90,16 @@ def metric_schemas(rows: Sequence[Metric]) -> list[MetricSchema]:
     return [MetricSchema(tick=row.tick, values=row.values) for row in rows]
 
 
-def _run_schema(run: Run, opened: Open, now: datetime) -> RunSchema:
+def _run_schema(run: Run, opened: Open, worker: Sign) -> RunSchema:
     made = ("open", "worker", "resting", "state")
     own = {name: getattr(run, name) for name in RunSchema.model_fields if name not in made}
     shown = OpenSchema(guidance=opened.guidance, preference=opened.preference)
     resting = run.status not in OVER and run.goal is not None and run.answers >= run.goal
-    state = _run_state(run, opened, resting, now)
-    return RunSchema(**own, open=shown, worker=_worker(run, now), resting=resting, state=state)
+    state = _run_state(run, opened, resting, worker)
+    return RunSchema(**own, open=shown, worker=worker, resting=resting, state=state)
 
 
-def _run_state(run: Run, opened: Open, resting: bool, now: datetime) -> RunState:
+def _run_state(run: Run, opened: Open, resting: bool, worker: Sign) -> RunState:
     """Say who waits for whom; pages, script and command show this and compute nothing of their own."""
     if run.status in OVER:
         return RunState.OVER
@@ -103,13 +109,20 @@ def _run_state(run: Run, opened: Open, resting: bool, now: datetime) -> RunState
         return RunState.RESTING
     if run.parent == "human" and (opened.guidance or opened.preference):
         return RunState.QUESTION
-    if _worker(run, now) == "silent":
+    if worker == "silent":
         return RunState.NO_WORKER
     return RunState.STUCK if run.waiting is Waiting.STUCK else RunState.EXPLORING
 
 
-def _worker(run: Run, now: datetime) -> Literal["alive", "silent", "done"]:
+def _taken_soon(db: Database, runs: Sequence[Run]) -> bool:
+    """Return whether a worker is alive that claims the runs which no worker has yet, as a new run's."""
+    unclaimed = any(run.worker is None and run.status not in OVER for run in runs)
+    return unclaimed and bool(alive(db))
+
+
+def _worker(run: Run, now: datetime, taken_soon: bool) -> Sign:
     if run.status in OVER:
         return "done"
-    late = run.heartbeat is None or now - run.heartbeat > SILENT_AFTER
-    return "silent" if run.worker is None or late else "alive"
+    if run.worker is None:
+        return "alive" if taken_soon else "silent"
+    return "silent" if run.heartbeat is None or now - run.heartbeat > SILENT_AFTER else "alive"
