@@ -73,7 +73,7 @@ class RunSchema(Schema):
     """The number of answers so far, superseded ones included."""
     open: OpenSchema
     worker: Literal["alive", "silent", "done"]
-    """alive, silent (none raises this run just now), or done (the run is over)."""
+    """alive, silent (none raises this run, nor will one that is alive), or done (the run is over)."""
 
 
 class FrameSchema(Schema):

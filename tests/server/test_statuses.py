@@ -8,12 +8,12 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
-from parenting.server import runs
+from parenting.server import runs, workers
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
-from parenting.server.reads.schemas import run_schema
+from parenting.server.reads.schemas import SILENT_AFTER, run_schema
 from parenting.server.runs import Claim
 from parenting.server.statuses import (
     QUERY_STATUSES,
@@ -26,7 +26,7 @@ from parenting.server.statuses import (
     RunStatus,
     Waiting,
 )
-from tests.server.conftest import CLIPS
+from tests.server.conftest import CLIPS, Clock
 
 
 @pytest.mark.parametrize(
@@ -83,3 +83,22 @@ def test_a_question_to_a_script_waits_for_nobody(db: Database) -> None:
     (mine,) = runs.claim(db, "test")
     post_query(db, mine, 1, "guidance", 1, CLIPS)
     assert state(db) is RunState.EXPLORING
+
+
+def test_a_new_run_has_a_worker_where_one_is_alive(db: Database, clock: Clock) -> None:
+    started = start(db, NewRun(world="unsafe-exploration")).id
+    assert run_schema(db, started).worker == "silent"
+    assert state(db, started) is RunState.NO_WORKER
+    workers.sign(db, "somebody")
+    assert run_schema(db, started).worker == "alive"
+    assert state(db, started) is RunState.EXPLORING
+    clock.pass_seconds(workers.SILENT_SECONDS + 1)
+    assert state(db, started) is RunState.NO_WORKER
+
+
+def test_a_living_worker_does_not_hide_that_the_one_of_a_run_is_silent(
+    db: Database, mine: Claim, clock: Clock
+) -> None:
+    clock.pass_seconds(SILENT_AFTER.total_seconds() + 1)
+    workers.sign(db, "somebody else")
+    assert run_schema(db, mine.run_id).worker == "silent"
