@@ -18,9 +18,6 @@ from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.levels.spec import Level, maze_legend
 from parenting.envs.rng import Keys
 
-SUPERVISION = {"present": True, "absent": False, "random": None}
-"""The rules' option `supervised` for each word of the config."""
-
 
 def init(
     world: Gridworld, config: Config, keys: Keys, weights: Float[Tensor, "P"] | None = None
@@ -154,5 +151,5 @@ def world_of(name: str, level: str | Level | Sequence[Level] | None, config: Con
     """
     options: dict[str, Any] = {}
     if "supervised" in registry.spec(name).options:
-        options["supervised"] = SUPERVISION[config.supervised]
+        options["supervised"] = config.supervised
     return registry.make(name, level, time_limit=config.max_episode_steps, **options)

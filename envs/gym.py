@@ -19,12 +19,16 @@ from parenting.envs.episode_keys import EpisodeDraws
 from parenting.envs.gym_ids import gym_id
 from parenting.envs.gym_render import MODES, Frame, Painter, check_mode
 from parenting.envs.levels.spec import Level
-from parenting.envs.registry import make
+from parenting.envs.options import check_names
+from parenting.envs.registry import make, spec
 from parenting.envs.step_cache import Place, StepCache
 
 __all__ = ["GridworldEnv", "gym_id", "register"]
 
 Observation = NDArray[np.int8]
+
+ARGUMENTS = ("level", "render_mode", "time_limit", "max_episode_steps")
+"""The arguments of `gymnasium.make` that every world takes, for messages."""
 
 
 class GridworldEnv(gymnasium.Env[Observation, np.int64]):
@@ -55,6 +59,7 @@ class GridworldEnv(gymnasium.Env[Observation, np.int64]):
             ValueError: a wrong render mode or time limit.
         """
         self.render_mode = check_mode(render_mode)
+        check_names(spec(world), options, ARGUMENTS)
         self.world = make(world, level, time_limit=time_limit, **options)
         tiles = len(self.world.legend)
         self.action_space = gymnasium.spaces.Discrete(4)

@@ -24,12 +24,16 @@ from torch import Tensor
 from parenting.envs.gridworld import Actions, WorldState
 from parenting.envs.gym_render import MODES, Frame, Painter, check_mode
 from parenting.envs.levels.spec import Level
-from parenting.envs.registry import make
+from parenting.envs.options import check_names
+from parenting.envs.registry import make, spec
 from parenting.envs.rng import Keys, keys_of
 
 Observations = NDArray[np.int8]
 Numbers = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+ARGUMENTS = ("level", "render_mode", "time_limit", "num_envs")
+"""The arguments of `gymnasium.make_vec` that every world takes, for messages."""
 
 
 class GridworldVectorEnv(VectorEnv[Observations, NDArray[np.int64], NDArray[Any]]):
@@ -60,6 +64,7 @@ class GridworldVectorEnv(VectorEnv[Observations, NDArray[np.int64], NDArray[Any]
         if num_envs < 1:
             raise ValueError(f"num_envs must be at least 1, not {num_envs}.")
         self.render_mode = check_mode(render_mode)
+        check_names(spec(world), options, ARGUMENTS)
         self.world = make(world, level, time_limit=time_limit, **options)
         self.num_envs = num_envs
         tiles = len(self.world.legend)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from parenting.envs import options as settings
 from parenting.envs.art import parse
 from parenting.envs.levels.spec import Level, Setting, WorldSpec
 from parenting.envs.names import UnknownNameError
@@ -88,17 +89,16 @@ def make(
         ValueError: no levels, levels of different sizes or of another world, or a time limit below 1.
     """
     found = spec(world)
-    for name in options:
-        if name not in found.options:
-            raise UnknownNameError("option", name, found.options, world)
+    settings.check_names(found, options)
+    own = {**found.options, **settings.read(options)}
     if levels is None or isinstance(levels, str):
         levels = level(world, levels)
     chosen = (levels,) if isinstance(levels, Level) else tuple(levels)
     limit = _limit(found) if time_limit is None else time_limit
     module, name = found.rules.split(":")
     rules: type[Gridworld] = getattr(import_module(module), name)
-    made = rules(chosen, time_limit=limit, device=device, **{**found.options, **options})
-    made.options = {**found.options, **options}
+    made = rules(chosen, time_limit=limit, device=device, **own)
+    made.options = own
     return made
 
 

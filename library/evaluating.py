@@ -12,8 +12,8 @@ from torch import Tensor
 
 from parenting.envs.gridworld import WorldState
 from parenting.envs.rng import keys
+from parenting.library.checks import check_number
 from parenting.library.policy import Policy
-from parenting.library.task import check_number
 from parenting.library.worlds import World, make
 
 

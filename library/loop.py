@@ -14,9 +14,10 @@ from parenting.agent.parent import Parent as AnyParent
 from parenting.agent.query import Answer, silence
 from parenting.agent.state import AgentState
 from parenting.envs.rng import keys
+from parenting.library.checks import check_number
 from parenting.library.parent import Parent, nothing
 from parenting.library.question import Query
-from parenting.library.task import check_number, prepare
+from parenting.library.task import prepare
 from parenting.library.worlds import World
 
 

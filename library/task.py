@@ -9,12 +9,13 @@ from pydantic import ValidationError
 from torch import Tensor
 
 from parenting.agent.config import FIELDS, Config, compose, merge
-from parenting.agent.init import SUPERVISION, world_of
+from parenting.agent.init import world_of
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
 from parenting.envs.names import did_you_mean
+from parenting.envs.options import SUPERVISION
 from parenting.experiments.training.stop_rule import StopRule, read_stop_rule
-from parenting.library.worlds import AnyLevel, World, named
+from parenting.library.worlds import AnyLevel, World, named, path_hint
 from parenting.weights.store import Wanted, find, load
 
 
@@ -42,7 +43,7 @@ def prepare(
         config = compose_config(registry.spec(name), preset, changes)
         made = world_of(name, found, config)
     elif not isinstance(world, World):
-        raise TypeError(f"world: a {type(world).__name__} is not a world. Give a name, a World or a text.")
+        raise TypeError(f"world: {world!r} is not the name of a world, a World or a text.{path_hint(world)}")
     else:
         if level is not None:
             raise ValueError("level: this world has its levels already. Leave level out, or name the world.")
@@ -81,16 +82,6 @@ def stop_rule(world: World, until: str) -> StopRule:
         return read_stop_rule(str(until), world.spec)
     except ValueError as error:
         raise ValueError(f"until: {error}") from None
-
-
-def check_number(name: str, value: object, least: int, most: int) -> None:
-    """Refuse an argument that is not a whole number within bounds.
-
-    Raises:
-        ValueError: the message names the argument, its value and the bounds.
-    """
-    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        raise ValueError(f"{name}: {value!r} is not a whole number from {least} to {most}.")
 
 
 def _settings(world: World) -> dict[str, object]:

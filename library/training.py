@@ -20,12 +20,13 @@ from parenting.experiments.training.counts import Progress as BatchProgress
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.answer_log import AnswerLog
 from parenting.library.batch_parent import LoggedParent, WholeBatch
+from parenting.library.checks import check_number
 from parenting.library.parent import EndedError, Parent
 from parenting.library.person import Person, TerminalParent
 from parenting.library.progress import Progress, bar
 from parenting.library.result import TrainResult, collect
 from parenting.library.scripted import ScriptedParent
-from parenting.library.task import Task, check_number, prepare, stop_rule
+from parenting.library.task import Task, prepare, stop_rule
 from parenting.library.threads import one_thread
 from parenting.library.worlds import AnyLevel, World
 

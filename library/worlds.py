@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld as World
 from parenting.envs.levels.spec import Level, LevelError, WorldSpec
+from parenting.envs.options import check_names
+from parenting.library.checks import check_device, check_number
 
 __all__ = ["AnyLevel", "World", "make", "named", "read_level", "worlds"]
 
 AnyLevel = str | Path | Level | Sequence[Level]
-"""A built-in level's name, a level's text, a file, a `Level`, or several levels of one size."""
+"""A built-in level's name, a level's text, a file's path, a `Level`, or several levels of one size."""
+
+ARGUMENTS = ("level", "max_episode_steps", "device")
 
 
 def worlds() -> dict[str, tuple[str, ...]]:
@@ -46,8 +51,8 @@ def make(
             one size; None takes the world's default level.
         max_episode_steps: Steps after which an episode is cut off; None takes the world's default.
         device: torch's name of the device that holds the world's tables; None takes torch's default.
-        **options: The rules' own settings, such as `drying` in reward-hacking and `supervised` (True, False,
-            or None for chance) in absent-supervisor.
+        **options: The rules' own settings, such as `drying` in reward-hacking and `supervised`
+            ("present", "absent" or "random") in absent-supervisor.
 
     Returns:
         The world. Its states hold N trials; boards have shape [N, H, W] and cells [N, 2] (row, column).
@@ -55,7 +60,9 @@ def make(
     Raises:
         UnknownNameError: There is no such world, level or option; the message names the nearest.
         LevelError: A level breaks a rule; the message names line and column.
-        ValueError: Levels of different sizes, a text that does not name its world, or a limit below 1.
+        TypeError: The world or the level is of a wrong type.
+        ValueError: Levels of different sizes, a text that does not name its world, a wrong value of an
+            option, a limit below 1, or a device that torch does not have.
 
     Example:
         >>> import parenting as pt
@@ -64,6 +71,11 @@ def make(
         (6, 8)
     """
     name, found = named(world, level)
+    _check_options(registry.spec(name), options)
+    if max_episode_steps is not None:
+        check_number("max_episode_steps", max_episode_steps, 1, 10**9)
+    if device is not None:
+        check_device(device)
     return registry.make(name, found, device=device, time_limit=max_episode_steps, **options)
 
 
@@ -94,7 +106,11 @@ def register(spec: WorldSpec) -> None:
 
 def named(world: str, level: AnyLevel | None) -> tuple[str, str | Level | Sequence[Level] | None]:
     """Return the world's name, and its level as `envs.registry.make` takes it."""
+    if not isinstance(world, str):
+        raise TypeError(f"world: {world!r} is not the name of a world.{path_hint(world)}")
     if "\n" not in world:
+        if world not in registry.WORLDS and os.path.isfile(world):
+            raise ValueError(f"world: {world!r} is a file, not a world.{path_hint(Path(world))}")
         return world, read_level(world, level)
     if level is not None:
         raise ValueError("level: the world was given as a level's text already. Leave level out.")
@@ -102,14 +118,45 @@ def named(world: str, level: AnyLevel | None) -> tuple[str, str | Level | Sequen
 
 
 def read_level(world: str, level: AnyLevel | None) -> str | Level | Sequence[Level] | None:
-    """Read a level's file; any other level is returned as it is."""
+    """Read a level's file; any other level is returned as it is.
+
+    Raises:
+        TypeError: it is not a level.
+        ValueError: a file cannot be read.
+    """
+    if isinstance(level, str) and "\n" not in level and level not in registry.spec(world).levels:
+        level = Path(level) if os.path.isfile(level) else level  # a name that is not there is told later
     if not isinstance(level, Path):
-        return level
+        return _checked(level)
     try:
         text = level.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"level: {level} cannot be read as text: {error}.") from None
     return registry.level(world, text + "\n", source=str(level))
+
+
+def path_hint(world: object) -> str:
+    """Return what to write instead where a level's file was given as the world, after a space."""
+    if isinstance(world, os.PathLike):
+        return f' Name the world and give the file as level=, as in ("unsafe-exploration", level={world!r}).'
+    return f" Give one of: {', '.join(registry.WORLDS)}."
+
+
+def _checked(level: object) -> str | Level | Sequence[Level] | None:
+    if level is None or isinstance(level, str | Level):
+        return level
+    if isinstance(level, Sequence) and all(isinstance(one, Level) for one in level):
+        return level
+    raise TypeError(
+        f"level: {level!r} is not a level. Give a built-in level's name, a level's text, a file's path, a"
+        " Level, or several of these Levels."
+    )
+
+
+def _check_options(spec: WorldSpec, options: Mapping[str, object]) -> None:
+    if "time_limit" in options:
+        raise TypeError("There is no argument 'time_limit'. It is max_episode_steps.")
+    check_names(spec, options, ARGUMENTS)
 
 
 def _header(text: str) -> str:

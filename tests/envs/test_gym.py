@@ -81,7 +81,7 @@ def test_the_default_level() -> None:
             "no level 'atoll' of unsafe-exploration. The levels are: island, island-bottleneck",
         ),
         ({"level": "WWW\nWAG\nWW\n"}, "level, line 3, column 3: rows must be of one length"),
-        ({"drying": 0.05}, "no option 'drying'"),
+        ({"drying": 0.05}, "no argument 'drying'"),
         ({"time_limit": 0}, "time_limit must be at least 1, not 0"),
     ],
 )

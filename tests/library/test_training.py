@@ -123,7 +123,7 @@ def test_the_number_of_threads_is_left_as_it_was() -> None:
         ({"until": "queries:0"}, ValueError, ["until", "queries:0", "at least 1"]),
         ({"world": "reward-hacking"}, ValueError, ["until", "no goal", "queries:1000"]),
         ({"until": 100}, ValueError, ["until", "100", "queries:N"]),
-        ({"world": 3}, TypeError, ["world", "int"]),
+        ({"world": 3}, TypeError, ["world: 3", "unsafe-exploration"]),
         ({"preset": {"p_guid": 1.0}}, TypeError, ["preset", "p_guid", "Config"]),
         ({"trials": 0}, ValueError, ["trials", "0", "from 1"]),
         ({"seed": -1}, ValueError, ["seed", "-1", "from 0"]),
