@@ -105,11 +105,11 @@ def _first_look(client: Client, run: int) -> dict[str, Any]:
     try:
         found: dict[str, Any] = client.get(f"runs/{run}")
     except UnavailableError as error:
-        raise UsageError(f"--url: {error} Start one with parenting up, or name another.") from None
+        raise UsageError(f"--url: {error} Start one with `parenting up`, or name another.") from None
     except RefusedError as error:
         if error.status != 404:
             raise UsageError(f"--url: {error}") from None
-        raise UsageError(f"--run: {error} On the server's machine parenting runs lists them.") from None
+        raise UsageError(f"--run: {error} On the server's machine `parenting runs` lists them.") from None
     if found["parent"] == "scripted":
         raise UsageError(
             f"--run: the worker itself answers run {run}, since it was started with the parent 'scripted'. "

@@ -203,7 +203,7 @@ def _why(run: dict[str, Any]) -> str:
     name, tick = f"run {run['id']}", run["tick"]
     sentences = {
         "paused": f"R{name[1:]} is paused: resume it on its page.",
-        "no_worker": f"No worker raises {name}. Start one: parenting worker.",
+        "no_worker": f"No worker raises {name}. Start one: `parenting worker`.",
         "question": f"Somebody else holds the questions of {name}.",
     }
     return sentences.get(run["state"], f"The agent of {name} explores, at tick {tick}.")

@@ -99,7 +99,7 @@ class Client:
         )
 
 
-_EXAMPLE = "Write it as http://localhost:8765; parenting up says which it is."
+_EXAMPLE = "Write it as http://localhost:8765; `parenting up` says which it is."
 
 
 def _reason(error: httpx2.TransportError) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -55,7 +55,13 @@ def settings(**given: Any) -> Settings:
     try:
         return Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
-        wrong = "\n".join(
-            f"PARENTING_{str(item['loc'][0]).upper()}: {item['msg']}" for item in error.errors()
-        )
-        raise ServerError(wrong) from None
+        raise ServerError("\n".join(_wrong(item, given) for item in error.errors())) from None
+
+
+def _wrong(item: Any, given: Mapping[str, Any]) -> str:
+    """Name a wrong setting as the user gave it: as an option or as a variable of the environment."""
+    name = str(item["loc"][0])
+    option = given.get(name) is not None
+    where = f"--{name.replace('_', '-')}" if option else f"PARENTING_{name.upper()}"
+    about = Settings.model_fields[name].description
+    return f"{where}: '{item['input']}' is wrong: {item['msg']}. {about}"

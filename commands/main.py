@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from importlib.metadata import version
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from parenting.commands.command import Command, paragraphs
 from parenting.commands.renamed import modern
+from parenting.envs.names import did_you_mean
 
 COMMANDS = {
     "up": "Start everything (migrate, web and worker) and open the pages in a browser.",
@@ -54,16 +57,20 @@ class LazyGroup(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Import the command that was called, and give its options their present names."""
-        if not args or args[0] not in COMMANDS:
-            return super().resolve_command(ctx, args)  # reports the unknown command
+        if not args or args[0].startswith("-"):
+            return super().resolve_command(ctx, args)  # reports what is wrong
         name = args[0]
+        if name not in COMMANDS:
+            hint = did_you_mean(name, COMMANDS)
+            ctx.fail(f"No such command '{name}'.{hint} `parenting --help` lists the commands.")
         function = getattr(import_module(f"parenting.commands.{name}"), name)
         return name, _command(name, function), modern(name, args[1:])
 
 
 def _command(name: str, function: Callable[..., Any], help_text: str | None = None) -> Any:
     single = typer.Typer(add_completion=False)
-    single.command(name, help=help_text)(function)
+    told = paragraphs(help_text or function.__doc__ or "")
+    single.command(name, cls=Command, help=told)(function)
     return typer.main.get_command(single)
 
 
@@ -80,8 +87,19 @@ app = typer.Typer(
 )
 
 
+def _version(asked: bool) -> None:
+    """Print the version and end, where it is asked for."""
+    if asked:
+        typer.echo(f"parenting {version('parenting')}")
+        raise typer.Exit
+
+
 @app.callback()
-def parenting() -> None:
+def parenting(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
     """Train agents safely from a parent's guidance and preferences, without a reward signal."""
 
 

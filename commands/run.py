@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from pydantic import ValidationError
 
-from parenting.agent.config import FIELDS, Config, compose
+from parenting.agent.config import FIELDS, PRESETS, Config, UnknownPresetError, compose
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
 from parenting.commands.run_report import page
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
+from parenting.envs.names import UnknownNameError, did_you_mean
 from parenting.weights.store import Wanted, find
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ def run(
     Example: parenting run unsafe-exploration --preset conservative --trials 100
     """
     with friendly_errors():
+        _known(world, preset)
         found = _level(world, level)
         config = _config(world, preset, changes or [])
         goal = _until(world, until)
@@ -88,6 +90,20 @@ def run(
         raise typer.Exit(1) from None
     results = summarise(plan, found.name, outcomes, time.monotonic() - began)
     typer.echo(json.dumps(results) if as_json else page(results))
+
+
+def _known(world: str, preset: str) -> None:
+    """Check the names of the world and of the preset.
+
+    Raises:
+        UsageError: there is none of this name; the sentence names the argument or the option.
+    """
+    try:
+        registry.spec(world)
+    except UnknownNameError as error:
+        raise UsageError(f"WORLD: {error}") from None
+    if preset not in PRESETS:
+        raise UsageError(f"--preset: {UnknownPresetError(preset)}")
 
 
 def _level(world: str, name_or_file: str | None) -> Level:
@@ -132,7 +148,8 @@ def _read(changes: list[str]) -> tuple[dict[str, object], list[str]]:
             wrong.append(f"--set: '{change}' is not KEY=VALUE. Write it as --set p_guid=0.9.")
         elif name not in Config.model_fields:
             known = ", ".join(Config.model_fields)
-            wrong.append(f"--set: there is no hyperparameter '{key}'; there is: {known}.")
+            hint = did_you_mean(key, (*Config.model_fields, *FIELDS))
+            wrong.append(f"--set: there is no hyperparameter '{key}'.{hint} There is: {known}.")
         elif written.setdefault(name, key) != key:
             wrong.append(f"--set: {written[name]} and {key} are two names of one setting: give one of them.")
         else:

@@ -46,7 +46,7 @@ def runs(
         console = Console(width=None if sys.stdout.isatty() else WIDE)
         console.print(_table(shown, console.width >= ENOUGH))
     else:
-        typer.echo("There are no runs yet. Start one on the pages: parenting up")
+        typer.echo("There are no runs yet. Start one on the pages: `parenting up`")
 
 
 def _table(shown: list[RunSchema], wide: bool) -> Table:

@@ -50,7 +50,7 @@ def _check() -> int:
     if not names:
         typer.echo(
             f"No worker of this machine has given a sign of life for {SILENT_SECONDS:g} s. "
-            "Start one: parenting worker",
+            "Start one: `parenting worker`",
             err=True,
         )
         return 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,14 +25,23 @@ def worlds(
         str | None,
         typer.Option(metavar="WORLD", help=f"Print random levels of a world; {RANDOM} has them (Sec. 3.4)."),
     ] = None,
-    size: Annotated[str, typer.Option(metavar="HxW", help="Rows and columns of the random levels.")] = "6x6",
-    count: Annotated[int, typer.Option(min=1, help="Number of random levels; all of them differ.")] = 1,
+    size: Annotated[
+        str | None,
+        typer.Option(metavar="HxW", help="Rows and columns of the random levels.", show_default="6x6"),
+    ] = None,
+    count: Annotated[
+        int | None,
+        typer.Option(min=1, help="Number of random levels; all of them differ.", show_default="1"),
+    ] = None,
     seed: Annotated[
-        int,
+        int | None,
         typer.Option(
-            min=0, max=2**53 - 1, help="Seed; a smaller count gives the first levels of a larger one."
+            min=0,
+            max=2**53 - 1,
+            help="Seed; a smaller count gives the first levels of a larger one.",
+            show_default="0",
         ),
-    ] = 0,
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write each random level to a file in this folder.")
     ] = None,
@@ -50,14 +59,28 @@ def worlds(
     """
     try:
         if random is None:
+            _only_with_random({"--size": size, "--count": count, "--seed": seed, "--out": out})
             _listed(draw, as_json)
         else:
-            found = _survey(random, _size(size), count, seed)
+            found = _survey(random, _size(size or "6x6"), count or 1, seed or 0)
             _keep(found.levels, out, draw)
             _shown(found, as_json)
     except ValueError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(2) from None
+
+
+def _only_with_random(options: Mapping[str, object]) -> None:
+    """Refuse the options of random levels where none are asked for.
+
+    Raises:
+        ValueError: one of them is given.
+    """
+    for option, value in options.items():
+        if value is not None:
+            raise ValueError(
+                f"{option}: {value} is for random levels. Add --random {RANDOM}, or leave {option} out."
+            )
 
 
 def _listed(draw: Path | None, as_json: bool) -> None:

@@ -175,5 +175,5 @@ def _add_health(app: FastAPI) -> None:
         except SetupError as error:
             raise NotReadyError(error.message) from None
         if not alive(db):
-            raise NotReadyError("No worker gives a sign of life. Start one: parenting worker")
+            raise NotReadyError("No worker gives a sign of life. Start one: `parenting worker`")
         return ready

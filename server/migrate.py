@@ -69,9 +69,9 @@ def require_current(db: Database) -> None:
     with db.read() as session:
         found = _revision(session.connection())
     if found is None:
-        raise SetupError(f"{_place(db)} has no tables yet. Run: parenting migrate")
+        raise SetupError(f"{_place(db)} has no tables yet. Run: `parenting migrate`")
     if found != _head():
-        raise SetupError(f"{_place(db)} is from an older version of Parenting. Run: parenting migrate")
+        raise SetupError(f"{_place(db)} is from an older version of Parenting. Run: `parenting migrate`")
 
 
 def _revision(connection: Connection) -> str | None:

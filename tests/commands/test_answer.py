@@ -98,7 +98,7 @@ def test_the_timeout_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.
     said = answer("--timeout", "0.3")
     assert said.exit_code == 1
     assert (
-        "No worker raises run 1. Start one: parenting worker. Nothing was asked for 0.3 s.\n" in said.stdout
+        "No worker raises run 1. Start one: `parenting worker`. Nothing was asked for 0.3 s.\n" in said.stdout
     )
     runs.set_status(db, 1, RunStatus.PAUSED)
     assert "Run 1 is paused: resume it on its page." in answer("--timeout", "0.3").stdout
@@ -141,7 +141,7 @@ def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Clie
 def test_wrong_runs(db: Database, web: httpx2.Client) -> None:
     said = answer(run=7)
     assert (said.exit_code, said.stdout) == (2, "")
-    assert said.stderr == "--run: There is no run 7. On the server's machine parenting runs lists them.\n"
+    assert said.stderr == "--run: There is no run 7. On the server's machine `parenting runs` lists them.\n"
     begin(db, parent="scripted")
     said = answer()
     assert said.exit_code == 2
@@ -173,7 +173,7 @@ def test_wrong_addresses(url: str) -> None:
     said = answer("--url", url)
     assert said.exit_code == 2
     assert said.stderr.startswith(f"--url: {url} ")
-    assert said.stderr.endswith("Write it as http://localhost:8765; parenting up says which it is.\n")
+    assert said.stderr.endswith("Write it as http://localhost:8765; `parenting up` says which it is.\n")
 
 
 @pytest.mark.parametrize(("status", "body"), [(200, b"<p>Hello"), (404, b"{}"), (200, b"[]"), (301, b"")])
@@ -204,5 +204,5 @@ def test_no_server_is_told_by_the_process_without_a_trace(tmp_path: Path) -> Non
         out, said = child.communicate(timeout=60)
     assert (child.returncode, out) == (2, "")
     assert said.startswith(f"--url: No server answers at {url} (")
-    assert said.endswith("). Start one with parenting up, or name another.\n")
+    assert said.endswith("). Start one with `parenting up`, or name another.\n")
     assert said.count("\n") == 1

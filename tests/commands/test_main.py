@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+from importlib.metadata import version
+from itertools import pairwise
 
 import pytest
 from typer.testing import CliRunner
@@ -10,6 +12,11 @@ from parenting.commands.main import COMMANDS, app
 from tests.tree import ROOT
 
 run = CliRunner().invoke
+
+
+def plain(text: str) -> str:
+    """A message without the frame that it stands in."""
+    return " ".join(text.replace("│", " ").split())
 
 
 def test_help_lists_every_command() -> None:
@@ -40,7 +47,52 @@ def test_exit_codes_are_in_its_help(name: str) -> None:
 def test_unknown_command_is_refused() -> None:
     result = run(app, ["bogus"])
     assert result.exit_code == 2
-    assert "No such command 'bogus'" in result.output
+    assert "No such command 'bogus'. `parenting --help` lists the commands." in plain(result.output)
+
+
+def test_a_mistyped_command_is_answered_with_the_nearest() -> None:
+    assert "No such command 'rnu'. Did you mean 'run'?" in plain(run(app, ["rnu"]).output)
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    result = run(app, ["--version"])
+    assert (result.exit_code, result.output) == (0, f"parenting {version('parenting')}\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ["run", "side-effects", "--trials", "-1"],
+            "'--trials': '-1' is not a whole number of at least 1.",
+        ),
+        (
+            ["run", "side-effects", "--trials", "x"],
+            "'--trials': 'x' is not a whole number of at least 1.",
+        ),
+        (["runs", "--limit", "0"], "'--limit': '0' is not a whole number from 1 to 10000."),
+        (["replay", "abc"], "'run': 'abc' is not a whole number of at least 1."),
+        (
+            ["answer", "--run", "1", "--timeout", "soon"],
+            "'--timeout': 'soon' is not a number of at least 0.1.",
+        ),
+    ],
+)
+def test_a_wrong_value_is_named_with_what_is_accepted(arguments: list[str], said: str) -> None:
+    result = run(app, arguments)
+    assert result.exit_code == 2
+    assert said in plain(result.output)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("width", [80, 120])
+def test_paragraphs_of_help_are_as_wide_as_the_terminal(name: str, width: int) -> None:
+    """No line ends before the next word would have no room."""
+    shown = run(app, [name, "--help"], env={"COLUMNS": str(width)}, terminal_width=width).output
+    lines = [line.strip() for line in shown.partition("╭")[0].splitlines()]
+    for line, following in pairwise(lines):
+        if line and following:
+            assert len(line) + 1 + len(following.split()[0]) > width - 2, line
 
 
 def test_help_loads_no_torch() -> None:

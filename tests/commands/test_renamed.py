@@ -8,8 +8,10 @@ from importlib import import_module
 import pytest
 from typer.testing import CliRunner
 
+from parenting.agent.config import FIELDS
 from parenting.commands.main import _command, app
 from parenting.commands.renamed import RENAMED, modern
+from tests.tree import ROOT
 
 
 @pytest.mark.parametrize(("command", "old"), [(name, old) for name in RENAMED for old in RENAMED[name]])
@@ -36,3 +38,12 @@ def test_the_program_takes_an_old_option() -> None:
     assert said.exit_code == 2
     assert "--again is now --force" in said.stderr
     assert "--size: '1x1' is out of bounds" in said.stderr
+
+
+def test_the_documentation_lists_every_old_name() -> None:
+    table = (ROOT / "docs/commands.md").read_text(encoding="utf-8").partition("## Options with new names")[2]
+    for command, names in RENAMED.items():
+        for old, new in names.items():
+            assert f"| `parenting {command} {old}` | `{new}` |" in table
+    for old, new in FIELDS.items():
+        assert f"| `parenting run --set {old}=...` | `--set {new}=...` |" in table

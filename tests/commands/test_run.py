@@ -69,6 +69,9 @@ def test_order_of_options_is_free() -> None:
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
+        (["unsafe"], "WORLD: There is no world 'unsafe'."),
+        (["unsafe-exploration", "--preset", "cons"], "--preset: There is no preset 'cons'."),
+        (["unsafe-exploration", "--set", "p_gid=1"], "'p_gid'. Did you mean 'p_guid'?"),
         (["nowhere"], "nowhere"),
         (["unsafe-exploration", "--level", "atlantis"], "atlantis"),
         (["unsafe-exploration", "--preset", "strict"], "strict"),

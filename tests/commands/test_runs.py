@@ -40,7 +40,7 @@ def now() -> str:
 
 
 def test_none_yet(db: Database) -> None:
-    assert listed() == ["There are no runs yet. Start one on the pages: parenting up"]
+    assert listed() == ["There are no runs yet. Start one on the pages: `parenting up`"]
     assert listed("--json") == ["[]"]
 
 

@@ -49,7 +49,7 @@ def test_no_worker_is_told_in_a_sentence(db: Database) -> None:
     said = check()
     assert said.exit_code == 1
     assert said.stderr == (
-        "No worker of this machine has given a sign of life for 10 s. Start one: parenting worker\n"
+        "No worker of this machine has given a sign of life for 10 s. Start one: `parenting worker`\n"
     )
     assert said.stdout == ""
 
@@ -76,7 +76,7 @@ def test_workers_of_other_machines_do_not_count(db: Database) -> None:
 def test_tables_are_missing(empty: Database) -> None:
     said = check()
     assert said.exit_code == 2
-    assert said.stderr.endswith("has no tables yet. Run: parenting migrate\n")
+    assert said.stderr.endswith("has no tables yet. Run: `parenting migrate`\n")
 
 
 def test_the_check_loads_no_torch() -> None:

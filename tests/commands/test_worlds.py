@@ -102,6 +102,8 @@ def test_random_levels_as_files_and_as_pictures(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        (["--size", "6"], "--size: 6 is for random levels. Add --random side-effects, or leave --size out."),
+        (["--count", "2"], "--count: 2 is for random levels. Add --random side-effects, or"),
         (["--random", "atoll"], "There is no world 'atoll'"),
         (["--random", "reward-hacking"], "--random: reward-hacking has no random levels; side-effects has."),
         (["--random", "side-effects", "--size", "6"], "--size: '6' is not HxW"),

@@ -24,7 +24,7 @@ def test_readiness_needs_a_worker(client: httpx2.Client, db: Database, clock: Cl
         said: str = reply.json()["error"]["message"] if reply.status_code == 503 else reply.json()["worker"]
         return said
 
-    assert said() == "No worker gives a sign of life. Start one: parenting worker"
+    assert said() == "No worker gives a sign of life. Start one: `parenting worker`"
     sign(db, "worker-1")
     assert said() == "ok"
     clock.pass_seconds(SILENT_SECONDS + 1)

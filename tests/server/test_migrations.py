@@ -56,7 +56,7 @@ def test_twice_is_once(empty: Database) -> None:
 
 
 def test_unmigrated_database_is_refused(empty: Database) -> None:
-    with pytest.raises(SetupError, match=r"has no tables yet\. Run: parenting migrate"):
+    with pytest.raises(SetupError, match=r"has no tables yet\. Run: `parenting migrate`"):
         require_current(empty)
 
 
@@ -90,7 +90,7 @@ def test_down_and_up_again_leads_to_the_same_tables(db: Database, mine: Claim, r
     with db.read() as session:
         before = checks(session.connection())
     downgrade(db, revision)
-    with pytest.raises(SetupError, match=r"older version of Parenting\. Run: parenting migrate"):
+    with pytest.raises(SetupError, match=r"older version of Parenting\. Run: `parenting migrate`"):
         require_current(db)
     assert upgrade(db) is True
     with db.read() as session:

@@ -66,7 +66,7 @@ def same_build(db: Database) -> None:
 
 
 def test_it_is_refused_until_its_tables_are_brought_up_to_date(unmigrated: Database) -> None:
-    with pytest.raises(SetupError, match=r"older version of Parenting\. Run: parenting migrate"):
+    with pytest.raises(SetupError, match=r"older version of Parenting\. Run: `parenting migrate`"):
         require_current(unmigrated)
     assert upgrade(unmigrated) is True
     require_current(unmigrated)

@@ -113,7 +113,7 @@ def test_unmigrated_database_is_refused_in_a_sentence(tmp_path: Path, command: s
     with parenting(command, data=tmp_path) as child:
         out, said = child.communicate(timeout=60)
     assert child.returncode == 2
-    assert said.endswith("has no tables yet. Run: parenting migrate\n")
+    assert said.endswith("has no tables yet. Run: `parenting migrate`\n")
     assert said.count("\n") == 1
     assert out == ""
 
@@ -132,6 +132,14 @@ def test_wrong_setting_is_told_in_a_sentence(data: Path, name: str, value: str, 
     assert child.returncode == 2
     assert told in said
     assert "Traceback" not in said
+
+
+def test_a_wrong_option_is_named_as_it_was_given(data: Path) -> None:
+    with parenting("up", "--port", "99999", data=data) as child:
+        _, said = child.communicate(timeout=60)
+    assert child.returncode == 2
+    assert said.startswith("--port: '99999' is wrong: ")
+    assert "PARENTING_PORT" not in said
 
 
 def test_migrate_twice(tmp_path: Path) -> None:

@@ -1,0 +1,53 @@
+"""The class of every command: its help wraps as wide as the terminal, and a wrong value has its sentence."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import typer
+from pydantic import ValidationError
+from typer.core import TyperCommand
+
+
+class Command(TyperCommand):
+    """A command whose messages name the option, the value and what is accepted."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the arguments.
+
+        Raises:
+            BadParameter: one is wrong.
+        """
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            if isinstance(error.__cause__, ValidationError):
+                error.message = _sentence(error.param, error.__cause__)
+            raise
+
+
+def paragraphs(text: str) -> str:
+    """Join the lines of each paragraph, which the terminal wraps at its own width."""
+    return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
+
+
+def _sentence(option: Any, error: ValidationError) -> str:
+    """Say what an option accepts, in place of pydantic's words.
+
+    Args:
+        option: The option or argument, with its bounds `min` and `max`.
+        error: The reason why its value is refused.
+    """
+    first = error.errors()[0]
+    value, kind = first["input"], first["type"]
+    if kind.startswith(("int_", "float_", "greater_than", "less_than", "finite_")):
+        number = "whole number" if option.type_descriptor.annotation in (int, int | None) else "number"
+        return f"'{value}' is not a {number}{_bounds(option.min, option.max)}."
+    return f"'{value}': {first['msg']}."
+
+
+def _bounds(least: float | None, most: float | None) -> str:
+    if least is None:
+        return "" if most is None else f" up to {most}"
+    return f" of at least {least}" if most is None else f" from {least} to {most}"
