@@ -79,6 +79,7 @@ def evaluate(
         Means and standard deviations over the episodes.
 
     Raises:
+        TypeError: It is not a policy.
         ValueError: No world is known, a number is below 1, or the observations do not fit the policy.
 
     Example:
@@ -89,12 +90,29 @@ def evaluate(
         (1.0, 0.0, 1.0)
     """
     check_number("episodes", episodes, 1, 1_000_000)
+    if isinstance(policy, type) or not callable(getattr(policy, "predict", None)):
+        raise TypeError(
+            f"policy: {policy!r} is not a policy; use pt.load_policy(file) or one of result.policies, such"
+            " as result.policies[0]."
+        )
     if world is None:
         if not isinstance(policy, Policy):
             raise ValueError("world: name the world, since this policy does not know its own.")
         world = policy.world
-    made = make(world) if isinstance(world, str) else world
+    made = world if isinstance(world, World) else make(world)
+    if isinstance(policy, Policy):
+        _check_fits(policy, made)
     return _summary(_live(made, policy, episodes, deterministic, seed))
+
+
+def _check_fits(policy: Policy, world: World) -> None:
+    """Refuse a world whose observations have another shape than those that a policy was trained on."""
+    shapes = [(one.height, one.width, len(one.legend)) for one in (policy.world, world)]
+    if shapes[0] != shapes[1]:
+        raise ValueError(
+            f"world: {world.name} shows observations of shape {shapes[1]}, and this policy was trained in"
+            f" {policy.world.name}, which shows {shapes[0]}. Leave world out, or give one of that shape."
+        )
 
 
 def _live(

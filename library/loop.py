@@ -14,7 +14,8 @@ from parenting.agent.parent import Parent as AnyParent
 from parenting.agent.query import Answer, silence
 from parenting.agent.state import AgentState
 from parenting.envs.rng import keys
-from parenting.library.checks import check_number
+from parenting.library.checks import check_number, check_parent
+from parenting.library.loop_checks import check_agents, check_answer
 from parenting.library.parent import Parent, nothing
 from parenting.library.question import Query
 from parenting.library.task import prepare
@@ -59,11 +60,11 @@ def configure(world: str | World, preset: str | Config = "conservative", **chang
     return prepare(world, None, preset, changes).config
 
 
-def init(world: World, config: Config | None = None, *, trials: int = 1, seed: int = 0) -> AgentState:
+def init(world: str | World, config: Config | None = None, *, trials: int = 1, seed: int = 0) -> AgentState:
     """Make agents at tick 0: fresh weights, a first episode, nothing known.
 
     Args:
-        world: The world that they live in.
+        world: The world that they live in, or its name; `step` and `tick` need the `World`.
         config: The hyperparameters; None takes those of `configure(world)`.
         trials: Number of agents N. Agent i of a seed is the same whatever N is.
         seed: Seed of all randomness.
@@ -82,7 +83,7 @@ def init(world: World, config: Config | None = None, *, trials: int = 1, seed: i
     check_number("trials", trials, 1, 1_000_000)
     check_number("seed", seed, 0, 2**53 - 1)
     task = prepare(world, None, "conservative" if config is None else config, {})
-    return parenting.init(world, task.config, keys(seed, trials, world.device), task.weights)
+    return parenting.init(task.world, task.config, keys(seed, trials, task.world.device), task.weights)
 
 
 def step(
@@ -99,6 +100,10 @@ def step(
     Returns:
         The agents after the tick, and what they ask in it: N trials, at most one question each.
 
+    Raises:
+        TypeError, ValueError: An argument is of another type, or world, config, state and answer do not
+            belong together; the message names it.
+
     Example:
         >>> import parenting as pt
         >>> world, config = pt.make("unsafe-exploration"), pt.configure("unsafe-exploration")
@@ -107,7 +112,11 @@ def step(
         >>> int(before.keys.tick[0]), int(after.keys.tick[0])
         (0, 1)
     """
-    heard = silence(nothing(world, config, len(state.waiting))) if answer is None else answer
+    check_agents(world, config, state)
+    blank = nothing(world, config, len(state.waiting))
+    if answer is not None:
+        check_answer(answer, state, blank.board)
+    heard = silence(blank) if answer is None else answer
     after, query = parenting.step(world, config, state.clone(), heard)
     return parenting.rehearse(world, config, after), Query.of(query, world)
 
@@ -124,6 +133,9 @@ def tick(world: World, config: Config, state: AgentState, parent: AnyParent) -> 
     Returns:
         The agents after the tick, what they ask, what they heard, and the config.
 
+    Raises:
+        TypeError, ValueError: As `step`, and for what is not a parent.
+
     Example:
         >>> import parenting as pt
         >>> world, config = pt.make("unsafe-exploration"), pt.configure("unsafe-exploration")
@@ -133,6 +145,8 @@ def tick(world: World, config: Config, state: AgentState, parent: AnyParent) -> 
         >>> int(state.answered[0]) > 0
         True
     """
+    check_agents(world, config, state)
+    check_parent(parent)
     if isinstance(parent, Parent) and int(state.keys.tick[0]) == 0:
         parent.begin(world, config, len(state.waiting))
     after, query, answer, config = parenting.tick(world, config, state.clone(), parent)

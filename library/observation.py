@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import torch
 from jaxtyping import UInt8
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
 from parenting.envs.gridworld import local_state
@@ -21,11 +23,12 @@ def codes(world: World, observation: ArrayLike) -> tuple[UInt8[Tensor, "N H W"],
         observation: One-hot bits (H, W, O) or codes (H, W), or N of either.
 
     Raises:
-        ValueError: The shape fits neither.
+        ValueError: The shape fits neither, or a code or bit does not exist.
     """
     array = np.asarray(observation)
     board = (world.height, world.width)
     if array.shape[-3:] == (*board, len(world.legend)) and array.ndim in (3, 4):
+        _check_bits(array)
         array = array.argmax(-1)
     if array.shape[-2:] != board or array.ndim not in (2, 3):
         height, width, tiles = *board, len(world.legend)
@@ -33,8 +36,25 @@ def codes(world: World, observation: ArrayLike) -> tuple[UInt8[Tensor, "N H W"],
             f"observation: {world.name} at this size shows one-hot bits of shape ({height}, {width}, {tiles})"
             f" or codes of shape ({height}, {width}), or N of either; not {np.shape(observation)}."
         )
+    _check_codes(array, len(world.legend))
     found = torch.from_numpy(np.ascontiguousarray(array, dtype=np.uint8))
     return (found[None], True) if array.ndim == 2 else (found, False)
+
+
+def _check_bits(array: NDArray[Any]) -> None:
+    """Refuse what does not have exactly one 1 in each cell."""
+    if array.dtype.kind not in "biuf" or not (((array == 0) | (array == 1)).all() and _ones(array)):
+        raise ValueError("observation: in one-hot bits each cell has one 1, and 0 for all other tiles.")
+
+
+def _ones(array: NDArray[Any]) -> bool:
+    return bool((array.sum(-1, dtype=np.int64) == 1).all())
+
+
+def _check_codes(array: NDArray[Any], tiles: int) -> None:
+    """Refuse codes of tiles that the world does not have."""
+    if array.dtype.kind not in "biu" or not ((array >= 0) & (array < tiles)).all():
+        raise ValueError(f"observation: codes are whole numbers from 0 to {tiles - 1}, one for each tile.")
 
 
 def local_states(world: World, seen: UInt8[Tensor, "N H W"]) -> UInt8[Tensor, "N 4"]:

@@ -14,6 +14,7 @@ from torch import Tensor
 from parenting.agent.config import Config
 from parenting.agent.init import network_of
 from parenting.library import observation as observations
+from parenting.library.checks import path_of
 from parenting.library.pictures import Drawing
 from parenting.library.policy_drawing import drawn
 from parenting.library.policy_file import FormatError, about_world, read_tensors, world_from, write_tensors
@@ -184,7 +185,7 @@ def load_policy(path: str | Path) -> Policy:
         >>> pt.load_policy(file)
         <Policy unsafe-exploration, level island, stage 1>
     """
-    tensors, about = read_tensors(Path(path), "policy")
+    tensors, about = read_tensors(path_of("path", path), "policy")
     try:
         config = Config.model_validate(about["config"])
         own = {name: about[name] for name in ("stage", "trial", "seed")}

@@ -39,6 +39,7 @@ class ReplayParent(Parent):
             what was asked).
 
     Raises:
+        TypeError: `recorded` is neither.
         ReplayError: From `train` and `tick`: the agents ask something else than was recorded.
 
     Example:
@@ -50,7 +51,12 @@ class ReplayParent(Parent):
     """
 
     def __init__(self, recorded: TrainResult | Sequence[Mapping[str, Any]]) -> None:
-        rows = recorded.answers if isinstance(recorded, TrainResult) else recorded
+        rows: Any = recorded.answers if isinstance(recorded, TrainResult) else recorded
+        if isinstance(rows, str) or not isinstance(rows, Sequence) or not all(map(_is_record, rows)):
+            raise TypeError(
+                f"recorded: {recorded!r} is neither a TrainResult nor its answers. A saved one is read by"
+                " pt.load_result(folder)."
+            )
         self.records = [row for row in rows if row["answered"] is not None]
         self.acts = recorded.events if isinstance(recorded, TrainResult) else []
 
@@ -102,6 +108,11 @@ class ReplayParent(Parent):
             f"At tick {tick} trial {trial} asks {asked}; recorded is {row['left']!r} or {row['right']!r}. "
             "Use the world, level, config, seed and number of trials of the recording."
         )
+
+
+def _is_record(row: object) -> bool:
+    wanted = {"trial", "asked", "answered", "choice", *QUESTION}
+    return isinstance(row, Mapping) and wanted <= set(row)
 
 
 def _event(act: Mapping[str, Any]) -> Event:

@@ -12,6 +12,7 @@ from parenting.agent.config import Config
 from parenting.evaluation.outcomes import name
 from parenting.experiments.training import batch
 from parenting.experiments.training.outcomes import Outcomes, deployments, examine
+from parenting.library.checks import path_of
 from parenting.library.policy import Policy
 from parenting.library.result_folder import Fields, Record, read, write
 from parenting.library.task import Task
@@ -115,7 +116,7 @@ def load_result(folder: str | Path) -> TrainResult:
         >>> again.trials == result.trials
         True
     """
-    return TrainResult(*read(Path(folder)))
+    return TrainResult(*read(path_of("folder", folder)))
 
 
 def collect(

@@ -44,4 +44,4 @@ def show(thing: Query | Question | Level | Policy | World) -> Drawing:
         case World():
             texts = ["\n".join(level.rows) for level in thing.levels]
             return Drawing([draw_level(level, thing.spec) for level in thing.levels], "\n\n".join(texts))
-    raise TypeError(f"thing: a {type(thing).__name__} cannot be drawn; a query, level, world or policy can.")
+    raise TypeError(f"thing: {thing!r} cannot be drawn; a query, question, level, world or policy can.")

@@ -20,7 +20,7 @@ from parenting.experiments.training.counts import Progress as BatchProgress
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.answer_log import AnswerLog
 from parenting.library.batch_parent import LoggedParent, WholeBatch
-from parenting.library.checks import check_number
+from parenting.library.checks import check_callback, check_number, check_parent, check_progress
 from parenting.library.parent import EndedError, Parent
 from parenting.library.person import Person, TerminalParent
 from parenting.library.progress import Progress, bar
@@ -84,6 +84,8 @@ def train(
     check_number("trials", trials, 1, 1_000_000)
     check_number("seed", seed, 0, 2**53 - 1)
     check_number("max_ticks", max_ticks, 1, 10**9)
+    check_callback(callback)
+    check_progress(progress)
     if isinstance(parent, Person):
         if trials != 1:
             raise ValueError(f"trials: a person raises one agent at a time, not {trials}.")
@@ -127,14 +129,10 @@ def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | Non
     """Return a parent of the caller's, ready for these trials; None stands for the scripted one."""
     if parent == "scripted" or type(parent) is ScriptedParent:  # a subclass may answer otherwise
         return None
-    if isinstance(parent, str) or not all(hasattr(parent, verb) for verb in ("events", "take", "post")):
-        raise ValueError(
-            f'parent: {parent!r} is not a parent. Use "scripted", parenting.Person(), or an instance of'
-            " your own subclass of parenting.Parent."
-        )
-    if isinstance(parent, Parent):
-        parent.begin(task.world, task.config, trials)
-    return parent
+    known = check_parent(parent)
+    if isinstance(known, Parent):
+        known.begin(task.world, task.config, trials)
+    return known
 
 
 def _logged(own: AnyParent | None, log: AnswerLog, task: Task, trials: int, chunk: range) -> MakeParent:

@@ -88,12 +88,15 @@ def register(spec: WorldSpec) -> None:
         spec: What the world is; `spec.rules` names the class of its rules, as "module:class".
 
     Raises:
+        TypeError: It is not a `WorldSpec`.
         ValueError: There is another world of this name, or a built-in level breaks a rule.
 
     Example:
         >>> import parenting as pt
         >>> pt.register(pt.make("side-effects").spec)  # the same again changes nothing
     """
+    if not isinstance(spec, WorldSpec):
+        raise TypeError(f"spec: {spec!r} is not a WorldSpec. Give pt.WorldSpec(name=..., rules=..., ...).")
     if registry.WORLDS.setdefault(spec.name, spec) is not spec:
         raise ValueError(f"spec: there is another world '{spec.name}' already. Choose another name.")
     for name in spec.levels:
