@@ -86,5 +86,5 @@ def _two_levels() -> list[pt.Level]:
 
 
 def test_what_cannot_be_drawn_is_named() -> None:
-    with pytest.raises(TypeError, match="a str cannot be drawn"):
+    with pytest.raises(TypeError, match="thing: 'island' cannot be drawn"):
         pt.show("island")  # type: ignore[arg-type]
