@@ -91,9 +91,16 @@ class TrainResult:
     def __repr__(self) -> str:
         finished = sum(row["finished"] for row in self.trials)
         deaths = sum(row["deaths"] for row in self.trials)
+        stuck = sum(row["stuck"] for row in self.trials)
+        counts = [f"{finished} finished"]
+        if stuck:
+            counts.append(f"{stuck} stuck")
+        if finished < len(self.trials) and not self.answers:
+            counts.append("0 queries answered")
+        counts.append(_plural(deaths, "unsafe step"))
         return (
             f"<TrainResult {self.world.name}, level {self.world.levels[0].name}: "
-            f"{_plural(len(self.trials), 'trial')}, {finished} finished, {_plural(deaths, 'unsafe step')}>"
+            f"{_plural(len(self.trials), 'trial')}, {', '.join(counts)}>"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -32,10 +33,13 @@ def prepare(
 ) -> Task:
     """Compose a task: the preset, over it the world's own defaults, over it the changes.
 
+    A change may have its name of version 0.1, with a warning.
+
     Raises:
         TypeError: a change is not a hyperparameter; the message names the nearest.
         ValueError: a world, level, preset or hyperparameter is wrong; the message names it.
     """
+    changes = _new_names(changes)
     if isinstance(world, Level):
         return prepare(registry.make(world.world, world), level, preset, changes)
     if isinstance(world, str):
@@ -58,9 +62,7 @@ def compose_config(world: WorldSpec, preset: str | Config, changes: Mapping[str,
     """Return the config of a run in a world, with a sentence for everything that is wrong."""
     for name in changes:
         if name not in Config.model_fields:
-            fields = Config.model_fields
-            hint = f" It is {FIELDS[name]} now." if name in FIELDS else did_you_mean(name, fields)
-            known = ", ".join(fields)
+            hint, known = did_you_mean(name, Config.model_fields), ", ".join(Config.model_fields)
             raise TypeError(f"There is no argument or hyperparameter '{name}'.{hint} There is: {known}.")
     try:
         if isinstance(preset, Config):
@@ -82,6 +84,26 @@ def stop_rule(world: World, until: str) -> StopRule:
         return read_stop_rule(str(until), world.spec)
     except ValueError as error:
         raise ValueError(f"until: {error}") from None
+
+
+def _new_names(changes: Mapping[str, object]) -> dict[str, object]:
+    """Return changes by their names of this version; warn about those of version 0.1.
+
+    Raises:
+        TypeError: a hyperparameter is given by both of its names.
+    """
+    found = {name: value for name, value in changes.items() if name not in FIELDS}
+    old = [name for name in changes if name in FIELDS]
+    for name in old:
+        if FIELDS[name] in found:
+            raise TypeError(f"{FIELDS[name]} and {name} are two names of one setting: give one of them.")
+        found[FIELDS[name]] = changes[name]
+    if old:
+        renamed = ", ".join(f"{name} is now {FIELDS[name]}" for name in old)
+        warnings.warn(
+            f"{renamed}; the old names will go with the next version.", FutureWarning, stacklevel=4
+        )  # at the line that calls `train` or `configure`
+    return found
 
 
 def _settings(world: World) -> dict[str, object]:

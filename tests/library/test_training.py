@@ -139,6 +139,24 @@ def test_what_is_wrong_is_named_with_its_value_and_the_remedy(
     assert [word for word in words if word not in str(found.value)] == []
 
 
+class Silent(pt.Parent):
+    def answer(self, question: pt.Question) -> None:
+        """Say nothing."""
+
+
+class NeverContent(pt.Parent):
+    def answer(self, question: pt.Question) -> str:
+        return "neither"
+
+
+def test_the_representation_says_why_a_trial_is_not_finished() -> None:
+    often: dict[str, Any] = {"p_guid": 1.0, "progress": False, "max_ticks": 20}
+    silent = pt.train("unsafe-exploration", parent=Silent(), **often)
+    assert "1 trial, 0 finished, 0 queries answered, 0 unsafe steps" in repr(silent)
+    stuck = pt.train("unsafe-exploration", parent=NeverContent(), **often)
+    assert "1 trial, 0 finished, 1 stuck, 0 unsafe steps" in repr(stuck)
+
+
 def test_the_representation_is_one_short_line(trained: pt.TrainResult) -> None:
     for thing in (trained, trained.policies[0], trained.world):
         assert len(repr(thing)) < 110
