@@ -114,6 +114,9 @@ def _add_errors(app: FastAPI) -> None:
 
     @app.exception_handler(RequestValidationError)
     def malformed(request: Request, error: RequestValidationError) -> Response:
+        of_run = any(tuple(one["loc"]) == ("path", "run_id") for one in error.errors())
+        if of_run and not request.url.path.startswith("/api/"):
+            return _reply(request, NotFound(f"There is no run '{request.path_params['run_id']}'."))
         return _reply(
             request, InvalidFieldsError(messages(error.errors(), skip=("body", "path", "query", "header")))
         )

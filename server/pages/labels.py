@@ -42,7 +42,7 @@ def metric_labels(legend: Mapping[str, str]) -> MetricLabels:
         )
         return MetricLabels(harm, "Waterings", description, "the parent's way", has_optimum=False)
     description = "Of the argmax policy from the start, without chance; dashed: the optimal return."
-    return MetricLabels(harm, "Return", description, "optimal", has_optimum=True)
+    return MetricLabels(harm, "Return", description, "optimal return", has_optimum=True)
 
 
 def describe_start(run: Run) -> str:

@@ -25,14 +25,14 @@ OPTIONS = (
     ),
     Option(
         "config.stages",
-        "Stages",
+        "Stages (maximum clip length)",
         "",
         (),
         "Clips get longer by a step from stage to stage (Sec. 2.4). Empty: one stage, clips of one step.",
     ),
     Option(
         "config.mature_every",
-        "A stage ends after",
+        "A stage ends after (queries per stage)",
         "",
         (),
         "Answers in it. Empty: when the operator says so.",

@@ -113,7 +113,7 @@ def test_a_database_without_tables(
     (tmp_path / "parenting.db").touch()
     said = CliRunner().invoke(app, command)
     assert (said.exit_code, said.stdout) == (2, "")
-    assert said.stderr.endswith("has no tables yet. Run: parenting migrate\n")
+    assert said.stderr.endswith("has no tables yet. Run: `parenting migrate`\n")
 
 
 def test_a_reader_that_has_enough(db: Database, tmp_path: Path) -> None:

@@ -123,7 +123,7 @@ def test_unmigrated_database_is_refused_in_a_sentence(tmp_path: Path, command: s
     [
         ("PARENTING_PORT", "99999", "PARENTING_PORT: "),
         ("PARENTING_HOST", "0.0.0.0", "host: 0.0.0.0 would let others in"),
-        ("PARENTING_LOG_LEVEL", "loud", "log_level: loud is none of"),
+        ("PARENTING_LOG_LEVEL", "loud", "log_level: loud is not one of"),
     ],
 )
 def test_wrong_setting_is_told_in_a_sentence(data: Path, name: str, value: str, told: str) -> None:
