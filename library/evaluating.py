@@ -99,6 +99,8 @@ def evaluate(
         if not isinstance(policy, Policy):
             raise ValueError("world: name the world, since this policy does not know its own.")
         world = policy.world
+    if not isinstance(world, str | World):
+        raise TypeError(f"world: {world!r} is not the name of a world or a World, such as pt.make makes.")
     made = world if isinstance(world, World) else make(world)
     if isinstance(policy, Policy):
         _check_fits(policy, made)

@@ -15,7 +15,7 @@ from parenting.agent.query import Answer, silence
 from parenting.agent.state import AgentState
 from parenting.envs.rng import keys
 from parenting.library.checks import check_number, check_parent
-from parenting.library.loop_checks import check_agents, check_answer
+from parenting.library.loop_checks import check_agents, check_answer, check_config
 from parenting.library.parent import Parent, nothing
 from parenting.library.question import Query
 from parenting.library.task import prepare
@@ -82,6 +82,8 @@ def init(world: str | World, config: Config | None = None, *, trials: int = 1, s
     """
     check_number("trials", trials, 1, 1_000_000)
     check_number("seed", seed, 0, 2**53 - 1)
+    if config is not None:
+        check_config(config)
     task = prepare(world, None, "conservative" if config is None else config, {})
     return parenting.init(task.world, task.config, keys(seed, trials, task.world.device), task.weights)
 

@@ -20,8 +20,7 @@ def check_agents(world: object, config: object, state: object) -> None:
     """
     if not isinstance(world, World):
         raise TypeError(f"world: {world!r} is not a World. Make one with pt.make(name).")
-    if not isinstance(config, Config):
-        raise TypeError(f"config: {config!r} is not a Config. Compose one with pt.configure(world).")
+    known = check_config(config)
     if not isinstance(state, AgentState):
         raise TypeError(f"state: {state!r} is not the state of agents. Make one with pt.init(world, config).")
     board, parameters = state.world.board.shape[1:], state.learner.params.shape[1]
@@ -33,11 +32,22 @@ def check_agents(world: object, config: object, state: object) -> None:
     if int(state.world.level.max()) >= len(world.levels):
         raise ValueError(f"state: an agent lives on a level that {world!r} does not have.")
     length = state.recorder.clip.action.shape[-1]
-    if length != config.max_clip_length:
+    if length != known.max_clip_length:
         raise ValueError(
-            f"config: max_clip_length is {config.max_clip_length}, and this state was made for {length}."
+            f"config: max_clip_length is {known.max_clip_length}, and this state was made for {length}."
             " Give the config that pt.init was given."
         )
+
+
+def check_config(config: object) -> Config:
+    """Return a config; refuse what is not one.
+
+    Raises:
+        TypeError: the message names what was given.
+    """
+    if not isinstance(config, Config):
+        raise TypeError(f"config: {config!r} is not a Config. Compose one with pt.configure(world).")
+    return config
 
 
 def check_answer(answer: object, state: AgentState, nothing: Tensor) -> None:

@@ -141,7 +141,8 @@ def read_level(world: str, level: AnyLevel | None) -> str | Level | Sequence[Lev
 def path_hint(world: object) -> str:
     """Return what to write instead where a level's file was given as the world, after a space."""
     if isinstance(world, os.PathLike):
-        return f' Name the world and give the file as level=, as in ("unsafe-exploration", level={world!r}).'
+        file = os.fspath(world)
+        return f' Name the world and give the file as level=, as in ("unsafe-exploration", level={file!r}).'
     return f" Give one of: {', '.join(registry.WORLDS)}."
 
 

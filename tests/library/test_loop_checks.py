@@ -67,6 +67,9 @@ def test_other_types_are_named_with_what_makes_the_right_one(
     for arguments, remedy in wrong:
         with pytest.raises(TypeError, match=remedy):
             pt.step(*arguments)
+    for config_of_init in (3, "lax"):
+        with pytest.raises(TypeError, match=r"config: .* is not a Config.*pt.configure"):
+            pt.init(world, config_of_init)  # type: ignore[arg-type]
     others: list[tuple[Any, str]] = [
         ("scripted", "'scripted' is not a parent.*pt.ScriptedParent"),
         (pt.ScriptedParent, r"is a class.*Call it: parent=pt.ScriptedParent\(\)"),
