@@ -31,6 +31,11 @@ published keep its names: the database's JSON, the API v1, export 1, `--json`, r
 FIELDS = {old: name for name, old in V1_NAMES.items()}
 
 
+def v1_names(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings by the names that published formats write."""
+    return {V1_NAMES.get(name, name): value for name, value in settings.items()}
+
+
 def _names_to_read(field: str) -> str | AliasChoices:
     return AliasChoices(field, V1_NAMES[field]) if field in V1_NAMES else field
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from parenting.agent.config import v1_names
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
 
@@ -100,7 +101,7 @@ def describe(world: WorldSpec) -> dict[str, Any]:
         "goal": world.brief.goal,
         "danger": world.brief.danger,
         "legend": dict(world.legend),
-        "defaults": registry.defaults(world.name),
+        "defaults": v1_names(registry.defaults(world.name)),
         "levels": [_plain(level) for level in levels],
     }
 

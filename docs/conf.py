@@ -89,6 +89,12 @@ def _write(page: HTML5Translator, node: Element, display: str) -> None:
     raise SkipNode
 
 
+def skip_second(app: Sphinx, _what: str, name: str, *_rest: object) -> bool | None:
+    """Leave out of the page of public names what the page of levels describes under the same name."""
+    return True if app.env.docname == "reference/parenting" and name in ("Level", "LevelError") else None
+
+
 def setup(app: Sphinx) -> None:
     """Register the renderer of formulas."""
+    app.connect("autodoc-skip-member", skip_second)
     app.add_html_math_renderer("mathml", (inline_mathml, None), (block_mathml, None))

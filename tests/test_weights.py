@@ -50,7 +50,7 @@ def test_missing_weights_name_the_command_that_makes_them(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("wanted", "said"),
     [
-        (BOX._replace(height=7), "size '6x6', and '7x6'"),
+        (BOX._replace(height=7), "size '6x6', not '7x6'"),
         (BOX._replace(world=registry.spec("interruptibility")), "legend '# GXA'"),
     ],
 )

@@ -71,7 +71,7 @@ def arm_trials(
 
 def _defaults() -> dict[str, Any]:
     """The world's own settings, but Fig. 2's short episodes, and without pre-training."""
-    return {**registry.defaults(WORLD), "time_limit": 10, "pretrain": False}
+    return {**registry.defaults(WORLD), "max_episode_steps": 10, "pretrain": False}
 
 
 def _watered(world: RewardHacking, live: Float[Tensor, "N P"]) -> list[Row]:

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from parenting.agent.config import PRESETS, compose
+from parenting.agent.config import PRESETS, compose, v1_names
 from parenting.envs import registry
 from parenting.weights.store import SHIPPED, SUFFIX, digest
 
@@ -50,6 +50,6 @@ def settings() -> dict[str, Any]:
     """
     return {
         "presets": {name: compose(name, {}, {}, strict=True).model_dump(mode="json") for name in PRESETS},
-        "worlds": {world: registry.defaults(world) for world in sorted(registry.WORLDS)},
+        "worlds": {world: v1_names(registry.defaults(world)) for world in sorted(registry.WORLDS)},
         "weights": {path.name: digest(path.read_bytes()) for path in sorted(SHIPPED.glob(f"*{SUFFIX}"))},
     }

@@ -101,5 +101,5 @@ def test_random_streams_stay_on_their_device(stream: Stream) -> None:
 def test_a_gpu_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
     said = run(app, ["experiment", "table1", "--trials", "1", "--device", "cuda", "--out", str(tmp_path)])
     assert said.exit_code == 2
-    assert "torch sees no GPU here. Take --device cpu" in " ".join(said.output.split())
+    assert "torch sees no GPU here. Use --device cpu" in " ".join(said.output.split())
     assert not list(tmp_path.iterdir())

@@ -8,6 +8,7 @@ import pytest
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
+from parenting.agent.config import FIELDS
 from parenting.experiments.figure2 import EXPERIMENT
 from parenting.experiments.figure2.agents import extrapolated
 from parenting.experiments.figure2.rows import MAIN, MANY, shown
@@ -248,7 +249,11 @@ def test_the_prose_has_the_numbers_and_the_arms_of_its_scale() -> None:
         assert all(f"*{shown(name)}*" in words for name in arms)
         assert f"answer {arms[MAIN].every} queries" in words
         assert f"{lines.budget.episodes} episodes" in words
-        assert all(f"`{key}` {value}" in words for arm in arms.values() for key, value in arm.changes.items())
+        assert all(
+            f"`{FIELDS.get(key, key)}` {value}" in words
+            for arm in arms.values()
+            for key, value in arm.changes.items()
+        )
         absent = set(ARMS["paper"]) - set(arms)
         assert not [name for name in absent if f"*{shown(name)}*" in words]
 

@@ -15,6 +15,7 @@ import pytest
 from fastapi.testclient import TestClient
 from structlog.testing import capture_logs
 
+from parenting.agent.config import v1_names
 from parenting.envs import registry
 from parenting.server.app import create_app
 from parenting.server.db import Database
@@ -113,7 +114,7 @@ def test_it_begins_by_its_name_alone(settings: Settings, db: Database, world: st
     """`{"world": ...}` is enough: the world's defaults hold, and its weights are in the database."""
     with TestClient(create_app(settings, db), base_url="http://localhost") as web:
         run: dict[str, Any] = _good(web.post("/api/v1/runs", json={"world": world}), 201)
-        defaults = registry.defaults(world)
+        defaults = v1_names(registry.defaults(world))
         assert {name: run["config"][name] for name in defaults} == defaults
         life = taken_up(db, run["id"])
         seen = worker_side.watch(db, [run["id"]])[run["id"]]

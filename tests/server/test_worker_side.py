@@ -176,7 +176,7 @@ def test_worker_that_slept_past_its_claim_cannot_write(
         lambda: take_operator_events(db, mine, 9),
         lambda: report_progress(db, mine, tick=9),
     ):
-        with pytest.raises(LostClaimError, match="raised by worker-2"):
+        with pytest.raises(LostClaimError, match="trained by worker-2"):
             write()
     assert get_run(db, run.id).tick == 0
     assert get_query(db, query).status == "answered"
