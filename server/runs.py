@@ -17,6 +17,7 @@ from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
+from parenting.server.identity import unused_number
 from parenting.server.queue.queries import withdraw_in
 from parenting.server.statuses import LIVING, OVER, RunStatus
 from parenting.server.tables import Run
@@ -50,7 +51,7 @@ def create_run(db: Database, **fields: Any) -> Run:
     The fields are those of `tables.Run`; `server.new_run` checks and fills them in from a form.
     """
     with db.write() as session:
-        run = Run(created=db.clock(), **fields)
+        run = Run(id=unused_number(session, Run), created=db.clock(), **fields)
         session.add(run)
         session.flush()
         return run

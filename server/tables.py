@@ -1,4 +1,4 @@
-"""The tables: runs, queries, answers, operator events, metrics, checkpoints, workers, weights.
+"""The tables: identity, runs, queries, answers, operator events, metrics, checkpoints, workers, weights.
 
 The database enforces the invariants: one query for each run and tick, one standing answer for each query,
 known words only. Times are UTC. JSON is readable by eye; `Query.clips` describes the shape of a clip.
@@ -6,69 +6,34 @@ known words only. Times are UTC. JSON is readable by eye; `Query.clips` describe
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Iterable
-from datetime import UTC, datetime
-from enum import StrEnum
-from typing import Any, ClassVar, Generic, TypeVar
+from datetime import datetime
+from typing import Any, ClassVar
 
 from sqlalchemy import (
     JSON,
     BigInteger,
     CheckConstraint,
-    DateTime,
-    Dialect,
+    Connection,
     ForeignKey,
     Index,
     LargeBinary,
     MetaData,
     Text,
-    TypeDecorator,
     UniqueConstraint,
+    event,
     text,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
+from parenting.server.columns import Utc, Word
+from parenting.server.public_ids import public_id
 from parenting.server.statuses import QUERY_STATUSES, RUN_STATUSES, WAITING, QueryStatus, RunStatus, Waiting
 
 KINDS = ("guidance", "preference")
 CHOICES = ("left", "right", "either", "neither")
 PARENTS = ("human", "scripted")
-
-E = TypeVar("E", bound=StrEnum)
-
-
-class Utc(TypeDecorator[datetime]):
-    """A time, stored as UTC without a zone and read back as UTC, in every database alike."""
-
-    impl = DateTime(timezone=False)
-    cache_ok = True
-
-    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """To UTC, without its zone."""
-        return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
-
-    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """Back to UTC, with its zone."""
-        return None if value is None else value.replace(tzinfo=UTC)
-
-
-class Word(TypeDecorator[E], Generic[E]):
-    """A member of an enumeration, stored as its text."""
-
-    impl = Text
-    cache_ok = True
-
-    def __init__(self, words: type[E]) -> None:
-        self.words = words
-        super().__init__()
-
-    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
-        """To text."""
-        return None if value is None else str(value)
-
-    def process_result_value(self, value: str | None, dialect: Dialect) -> E | None:
-        """Back to the member."""
-        return None if value is None else self.words(value)
 
 
 class Table(DeclarativeBase):
@@ -100,6 +65,30 @@ def _one_of(column: str, words: Iterable[str], nullable: bool = False) -> CheckC
     return CheckConstraint(f"{column} IS NULL OR {rule}" if nullable else rule, name=column)
 
 
+def _public_id() -> Mapped[str]:
+    """Return the column of a name that means the same forever, in whatever copy of the database."""
+    return mapped_column(default=public_id, server_default=text("''"), unique=True, index=True)
+
+
+def new_uuid() -> str:
+    """Draw a new UUID for a database."""
+    return str(uuid.uuid4())
+
+
+class Identity(Table):
+    """The identity of this database, in its only row (`server.identity`)."""
+
+    __tablename__ = "database_identity"
+    __table_args__ = (CheckConstraint("id = 1", name="one_row"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    uuid: Mapped[str]
+    since: Mapped[datetime]
+    copied_from: Mapped[str | None]  # the UUID that it had before it was given this one
+    last_run: Mapped[int] = mapped_column(default=0, server_default=text("0"))  # the largest deleted number
+    last_query: Mapped[int] = mapped_column(default=0, server_default=text("0"))
+
+
 class Run(Table):
     """A run: its settings, its progress, and the worker that raises it."""
 
@@ -111,7 +100,8 @@ class Run(Table):
         Index(None, "status"),
     )
 
-    id: Mapped[int] = mapped_column(primary_key=True)
+    id: Mapped[int] = mapped_column(primary_key=True)  # its number: a short name within this database
+    public_id: Mapped[str] = _public_id()
     created: Mapped[datetime]
     name: Mapped[str | None]
     world: Mapped[str]
@@ -171,6 +161,7 @@ class Query(Table):
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)
+    public_id: Mapped[str] = _public_id()
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
     tick: Mapped[int]
     kind: Mapped[str]
@@ -270,3 +261,18 @@ class Checkpoint(Table):
     blob: Mapped[bytes]
     sha256: Mapped[str]
     created: Mapped[datetime]
+
+
+def _keep_deleted_number(table: str) -> str:
+    """Return SQLite's trigger that keeps the largest deleted number, so that it is given to no other row."""
+    return (
+        f"CREATE TRIGGER keep_deleted_{table} AFTER DELETE ON {table} BEGIN UPDATE database_identity "
+        f"SET last_{table} = OLD.id WHERE last_{table} < OLD.id; END"
+    )
+
+
+@event.listens_for(Table.metadata, "after_create")
+def _add_triggers(_target: Any, connection: Connection, **_more: Any) -> None:
+    if connection.dialect.name == "sqlite":
+        for table in (Run, Query):
+            connection.exec_driver_sql(_keep_deleted_number(table.__tablename__))

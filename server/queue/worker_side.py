@@ -21,6 +21,7 @@ from sqlalchemy import BindParameter, ColumnElement, ScalarSelect, bindparam, fu
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
+from parenting.server.identity import unused_number
 from parenting.server.queue.queries import guidance_first, withdraw_in
 from parenting.server.runs import Claim, held, held_status
 from parenting.server.statuses import LIVING, QueryStatus, RunStatus
@@ -138,7 +139,8 @@ def post_query(
         known = session.execute(_KNOWN, {"run_id": mine.run_id, "tick": tick}).scalar()
         if known is not None:
             return int(known)
-        query = Query(run_id=mine.run_id, tick=tick, kind=kind, maturity=maturity, clips=clips)
+        number = unused_number(session, Query)
+        query = Query(id=number, run_id=mine.run_id, tick=tick, kind=kind, maturity=maturity, clips=clips)
         query.policy_stage, query.policy_steps = policy or (None, None)
         query.posted, query.status = (
             db.clock(),
