@@ -1,24 +1,200 @@
-"""Types of columns: times in UTC, and members of enumerations as their text."""
+"""The types of columns. Reading never raises: a value that cannot be read becomes a `Damaged` one.
+
+So a row that cannot be read costs that row, and not the list that it stands in. Whoever uses a damaged value
+meets a `DamagedRowError`, a sentence that names the column; `server.damage` asks rows before they are used.
+"""
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Callable
 from datetime import UTC, datetime
 from enum import StrEnum
-from typing import Generic, TypeVar
+from typing import Any, Generic, NoReturn, TypeVar
 
-from sqlalchemy import DateTime, Dialect, Text, TypeDecorator
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Boolean,
+    DateTime,
+    Dialect,
+    Double,
+    Integer,
+    LargeBinary,
+    MetaData,
+    Text,
+    TypeDecorator,
+)
+from sqlalchemy.types import TypeEngine
+
+from parenting.server.errors import DamagedRowError
 
 E = TypeVar("E", bound=StrEnum)
+T = TypeVar("T")
+UNREADABLE = (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError)
+"""Errors that a stored value causes which is not what its column holds."""
 
 
-class Utc(TypeDecorator[datetime]):
+class Damaged:
+    """A stored value that cannot be read. Every use of it raises `DamagedRowError`."""
+
+    def __init__(self, reason: str, place: str = "a column") -> None:
+        self._reason, self._place = reason, place
+
+    @property
+    def reason(self) -> str:
+        """Return the end of a sentence that begins with the column's name."""
+        return self._reason
+
+    def _refuse(self, *_: object) -> NoReturn:
+        raise DamagedRowError(f"A stored value cannot be read: {self._place} {self._reason}.")
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse to be used; names of Python's own protocols are absent."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        self._refuse()
+
+    def __repr__(self) -> str:
+        """Name the column, for logs and messages of validators."""
+        return f"<damaged: {self._place} {self._reason}>"
+
+    __hash__ = object.__hash__
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _refuse
+    __bool__ = __len__ = __iter__ = __contains__ = __getitem__ = __str__ = __format__ = _refuse
+    __int__ = __float__ = __index__ = __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = _refuse
+
+
+def loads(text: str | bytes) -> Any:
+    """Read JSON as the standard has it, without NaN and halves of surrogate pairs; else `Damaged`."""
+    try:
+        found = json.loads(text, parse_constant=_refuse_constant)
+        if (b"\\u" if isinstance(text, bytes) else "\\u") in text:  # type: ignore[operator]  # both are of one kind
+            json.dumps(found, ensure_ascii=False).encode()
+        return found
+    except UNREADABLE:
+        return Damaged("is no JSON")
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(name)
+
+
+class Checked(TypeDecorator[T], Generic[T]):
+    """A column that holds values of one type, whatever the store lets in."""
+
+    impl: TypeEngine[Any] | type[TypeEngine[Any]] = Text
+    cache_ok = True
+    kind: type | tuple[type, ...]
+    noun: str
+    place = "a column"
+
+    def result_processor(self, dialect: Dialect, coltype: Any) -> Callable[[Any], Any]:
+        """Read a value, or say that it cannot be read."""
+        inner = super().result_processor(dialect, coltype)
+        damaged = Damaged(f"is no {self.noun}", self.place)
+
+        def read(value: Any) -> Any:
+            try:
+                found = inner(value) if inner is not None else value
+            except UNREADABLE:
+                return damaged
+            return found if found is None or self.sound(found) else damaged
+
+        return read
+
+    def sound(self, found: Any) -> bool:
+        """Return whether a value is one of this column's."""
+        return isinstance(found, self.kind)
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> Any:
+        """Refuse to store what could not be read."""
+        if isinstance(value, Damaged):
+            value._refuse()
+        return value
+
+    def compare_values(self, x: Any, y: Any) -> bool:
+        """Return whether two values are equal; a damaged one equals none."""
+        if isinstance(x, Damaged) or isinstance(y, Damaged):
+            return x is y
+        return bool(super().compare_values(x, y))
+
+
+class Words(Checked[str]):
+    """Text."""
+
+    cache_ok = True
+    kind, noun = str, "text"
+
+
+class Whole(Checked[int]):
+    """A whole number."""
+
+    cache_ok = True
+    impl = Integer
+    kind, noun = int, "whole number"
+
+
+class Big(Whole):
+    """A whole number of 64 bits."""
+
+    cache_ok = True
+    impl = BigInteger
+
+
+class Real(Checked[float]):
+    """A finite number."""
+
+    cache_ok = True
+    impl = Double
+    kind, noun = (int, float), "finite number"
+
+    def sound(self, found: Any) -> bool:
+        """Return whether it is a finite number."""
+        return isinstance(found, self.kind) and math.isfinite(found)
+
+
+class Flag(Checked[bool]):
+    """True or false."""
+
+    cache_ok = True
+    impl = Boolean
+    kind, noun = bool, "truth value"
+
+    def result_processor(self, dialect: Dialect, coltype: Any) -> Callable[[Any], Any]:
+        """Read a truth value; the driver would take any text for true."""
+        read = super().result_processor(dialect, coltype)
+        damaged = Damaged(f"is no {self.noun}", self.place)
+        return lambda value: read(value) if value is None or type(value) in (bool, int) else damaged
+
+
+class Blob(Checked[bytes]):
+    """Bytes."""
+
+    cache_ok = True
+    impl = LargeBinary
+    kind, noun = bytes, "bytes"
+
+
+class Json(Checked[dict[str, Any]]):
+    """A JSON object."""
+
+    cache_ok = True
+    impl = JSON(none_as_null=True)
+    kind, noun = dict, "JSON object"
+
+
+class Utc(Checked[datetime]):
     """A time, stored as UTC without a zone and read back as UTC, in every database alike."""
 
-    impl = DateTime(timezone=False)
     cache_ok = True
+    impl = DateTime(timezone=False)
+    kind, noun = datetime, "time"
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
         """To UTC, without its zone."""
+        value = super().process_bind_param(value, dialect)
         return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
@@ -26,20 +202,45 @@ class Utc(TypeDecorator[datetime]):
         return None if value is None else value.replace(tzinfo=UTC)
 
 
-class Word(TypeDecorator[E], Generic[E]):
+class Word(Checked[E], Generic[E]):
     """A member of an enumeration, stored as its text."""
 
-    impl = Text
     cache_ok = True
+    kind = StrEnum
 
     def __init__(self, words: type[E]) -> None:
-        self.words = words
+        self.words, self.noun = words, f"word of {', '.join(words)}"
         super().__init__()
 
     def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
         """To text."""
+        value = super().process_bind_param(value, dialect)
         return None if value is None else str(value)
 
     def process_result_value(self, value: str | None, dialect: Dialect) -> E | None:
         """Back to the member."""
         return None if value is None else self.words(value)
+
+
+class OneOf(Checked[str]):
+    """One of a few words, as text."""
+
+    cache_ok = True
+    kind = str
+
+    def __init__(self, words: tuple[str, ...]) -> None:
+        self.words, self.noun = words, f"word of {', '.join(words)}"
+        super().__init__()
+
+    def sound(self, found: Any) -> bool:
+        """Return whether it is one of the words."""
+        return found in self.words
+
+
+def name_places(metadata: MetaData) -> None:
+    """Tell each column's type the column's name, for its messages."""
+    for table in metadata.tables.values():
+        for column in table.columns:
+            if isinstance(column.type, Checked):
+                column.type = column.type.copy()
+                column.type.place = f"{table.name}.{column.name}"

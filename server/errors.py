@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from sqlalchemy.exc import DontWrapMixin
+
 
 class ServerError(Exception):
     """Something went wrong here; it was logged. Try again."""
@@ -89,6 +91,12 @@ class DiskFullError(ServerError):
     """The disk is full; nothing was stored. Free some space and send the same again."""
 
     status, code = 507, "disk_full"
+
+
+class DamagedRowError(ServerError, DontWrapMixin):
+    """A stored row cannot be read. Only what needs this row fails; docs/operations.md names the remedies."""
+
+    status, code = 500, "damaged"
 
 
 class InvalidFieldsError(ServerError):

@@ -11,23 +11,22 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import Any, ClassVar
 
-from sqlalchemy import (
-    JSON,
-    BigInteger,
-    CheckConstraint,
-    Connection,
-    ForeignKey,
-    Index,
-    LargeBinary,
-    MetaData,
-    Text,
-    UniqueConstraint,
-    event,
-    text,
-)
+from sqlalchemy import CheckConstraint, Connection, ForeignKey, Index, MetaData, UniqueConstraint, event, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-from parenting.server.columns import Utc, Word
+from parenting.server.columns import (
+    Big,
+    Blob,
+    Flag,
+    Json,
+    OneOf,
+    Real,
+    Utc,
+    Whole,
+    Word,
+    Words,
+    name_places,
+)
 from parenting.server.public_ids import public_id
 from parenting.server.statuses import QUERY_STATUSES, RUN_STATUSES, WAITING, QueryStatus, RunStatus, Waiting
 
@@ -49,10 +48,13 @@ class Table(DeclarativeBase):
         }
     )
     type_annotation_map: ClassVar[dict[Any, Any]] = {
-        str: Text,
+        str: Words,
+        int: Whole,
+        float: Real,
+        bool: Flag,
         datetime: Utc,
-        dict[str, Any]: JSON(none_as_null=True),
-        bytes: LargeBinary,
+        dict[str, Any]: Json,
+        bytes: Blob,
         RunStatus: Word(RunStatus),
         QueryStatus: Word(QueryStatus),
         Waiting: Word(Waiting),
@@ -111,8 +113,8 @@ class Run(Table):
     brief: Mapped[dict[str, Any]]  # {"goal": ..., "danger": ...}
     config: Mapped[dict[str, Any]]  # agent.config.Config, whole
     preset: Mapped[str]
-    seed: Mapped[int] = mapped_column(BigInteger)
-    parent: Mapped[str]
+    seed: Mapped[int] = mapped_column(Big)
+    parent: Mapped[str] = mapped_column(OneOf(PARENTS))
     # where it is
     status: Mapped[RunStatus] = mapped_column(default=RunStatus.ACTIVE)
     reason: Mapped[str | None]
@@ -164,7 +166,7 @@ class Query(Table):
     public_id: Mapped[str] = _public_id()
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
     tick: Mapped[int]
-    kind: Mapped[str]
+    kind: Mapped[str] = mapped_column(OneOf(KINDS))
     maturity: Mapped[int]
     clips: Mapped[dict[str, Any]]
     """{"left": CLIP, "right": CLIP}, CLIP = {"actions": ["up", ...], "length": n, "frames": [n + 1 of
@@ -206,8 +208,8 @@ class Answer(Table):
     query_id: Mapped[int] = mapped_column(ForeignKey("query.id"))
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
     number: Mapped[int]
-    choice: Mapped[str]
-    parent: Mapped[str]
+    choice: Mapped[str] = mapped_column(OneOf(CHOICES))
+    parent: Mapped[str] = mapped_column(OneOf(PARENTS))
     client_id: Mapped[str]
     supersedes: Mapped[int | None] = mapped_column(ForeignKey("answer.id"))
     standing: Mapped[bool] = mapped_column(default=True)
@@ -261,6 +263,9 @@ class Checkpoint(Table):
     blob: Mapped[bytes]
     sha256: Mapped[str]
     created: Mapped[datetime]
+
+
+name_places(Table.metadata)
 
 
 def _keep_deleted_number(table: str) -> str:
