@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -70,16 +71,34 @@ def test_up_stops_both_with_a_tab_open(tmp_path: Path, number: signal.Signals) -
         assert "Traceback" not in up.communicate()[1]
 
 
-def test_up_stops_when_the_worker_dies(tmp_path: Path) -> None:
+def test_up_starts_again_what_dies_and_the_pages_stay(tmp_path: Path) -> None:
+    """Both are killed; the address that was printed answers again, and a signal still stops everything."""
     with parenting("up", "--port", "0", "--no-browser", data=tmp_path) as up:
         assert up.stdout is not None
-        until_up(re.findall(r"http://localhost:\d+", up.stdout.readline())[0])
-        web, worker = processes_of(up.pid)
-        os.kill(worker, signal.SIGKILL)
+        until_up(url := re.findall(r"http://localhost:\d+", up.stdout.readline())[0])
+        before = processes_of(up.pid)
+        os.kill(before[1], signal.SIGKILL)  # the worker
+        until_up(url)
+        os.kill(before[0], signal.SIGKILL)
+        until(lambda: len(set(processes_of(up.pid)) - set(before)) == 2)
+        until_up(url)
+        children = processes_of(up.pid)
+        stop(up, signal.SIGTERM)
+        said = up.communicate()[1]
+        assert up.returncode == 0
+        for name in ("worker", "web"):
+            died = f"The {name} process ended by itself (killed by SIGKILL); it starts again in 0.5 s.\n"
+            assert said.count(died) == 1
+        assert not any(alive(child) for child in children)
+
+
+def test_up_ends_with_the_sentence_of_a_wrong_setting(tmp_path: Path) -> None:
+    with parenting("up", "--port", "0", "--no-browser", data=tmp_path, PARENTING_LOG_LEVEL="loud") as up:
         _, said = up.communicate(timeout=60)
-        assert up.returncode == 1
-        assert "The worker process ended by itself (killed by SIGKILL), so all was stopped." in said
-        assert not alive(web)
+    assert up.returncode == 2
+    assert "log_level: loud is not one of debug, info, warning and error." in said
+    assert "process cannot work like this, so all was stopped." in said
+    assert "starts again" not in said
 
 
 def test_web_and_worker_do_not_outlive_up(tmp_path: Path) -> None:
@@ -88,10 +107,7 @@ def test_web_and_worker_do_not_outlive_up(tmp_path: Path) -> None:
         until_up(re.findall(r"http://localhost:\d+", up.stdout.readline())[0])
         children = processes_of(up.pid)
         os.kill(up.pid, signal.SIGKILL)
-        end = time.monotonic() + 60
-        while any(alive(child) for child in children):
-            assert time.monotonic() < end, "a process was left behind"
-            time.sleep(0.05)
+        until(lambda: not any(alive(child) for child in children))
 
 
 @pytest.mark.parametrize("command", ["up", "web"])
@@ -149,6 +165,14 @@ def test_migrate_twice(tmp_path: Path) -> None:
             said.append(child.communicate(timeout=60)[0])
             assert child.returncode == 0
     assert said == ["The database is up to date now.\n", "The database was up to date.\n"]
+
+
+def until(met: Callable[[], bool]) -> None:
+    """Wait until something holds."""
+    end = time.monotonic() + 60
+    while not met():
+        assert time.monotonic() < end, "it did not come to pass"
+        time.sleep(0.05)
 
 
 def processes_of(parent: int) -> list[int]:
