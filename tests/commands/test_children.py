@@ -123,7 +123,7 @@ def test_no_memory_for_a_process_counts_as_a_death(clock: Clock) -> None:
 
 def test_a_child_that_does_not_stop_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(children, "STOP_SECONDS", 0.1)
-    deaf = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print(flush=True); time.sleep(60)"
+    deaf = "import signal as s, time; s.signal(s.SIGTERM, s.SIG_IGN); print(flush=True); time.sleep(60)"
     child = Child(
         "web", lambda: subprocess.Popen([sys.executable, "-c", deaf], stdout=subprocess.PIPE), lambda _: None
     )
