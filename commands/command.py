@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import inspect
+import os
+import sys
+from io import TextIOWrapper
 from typing import Any
 
 import typer
 from pydantic import ValidationError
 from typer.core import TyperCommand
+
+from parenting.commands.errors import friendly_errors
+from parenting.server.environment import warnings
+from parenting.server.lifeline import VARIABLE
+from parenting.server.settings import FILE, names
 
 
 class Command(TyperCommand):
@@ -25,6 +33,26 @@ class Command(TyperCommand):
             if isinstance(error.__cause__, ValidationError):
                 error.message = _sentence(error.param, error.__cause__)
             raise
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command, after a word on settings that cannot be meant as they are written.
+
+        The processes that `parenting up` starts leave that to it.
+        """
+        if VARIABLE not in os.environ:
+            with friendly_errors():
+                for said in warnings(os.environ, FILE, names()):
+                    typer.echo(said, err=True)
+        return super().invoke(ctx)
+
+
+def replace_unprintable() -> None:
+    """Let output go on where the terminal's encoding lacks a character: a question mark stands for it."""
+    for stream in (sys.stdout, sys.stderr):
+        if not isinstance(stream, TextIOWrapper) or stream.errors == "backslashreplace":
+            continue
+        if stream.errors == "strict" or "utf" not in stream.encoding.lower():
+            stream.reconfigure(errors="replace")
 
 
 def paragraphs(text: str) -> str:

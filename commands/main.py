@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from parenting.commands.command import Command, paragraphs
+from parenting.commands.command import Command, paragraphs, replace_unprintable
 from parenting.commands.renamed import modern
 from parenting.envs.names import did_you_mean
 
@@ -46,6 +46,11 @@ parenting run unsafe-exploration --preset conservative --trials 100
 
 class LazyGroup(TyperGroup):
     """A group that imports a command's module when the command is called, not when it is listed."""
+
+    def main(self, *args: Any, **named: Any) -> Any:
+        """Run the program; no character of its output can end it."""
+        replace_unprintable()
+        return super().main(*args, **named)
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names in the order of `COMMANDS`."""

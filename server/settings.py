@@ -6,8 +6,13 @@ import os
 from pathlib import Path
 
 from pydantic import Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 from sqlalchemy import URL
+
+from parenting.server.environment import PREFIX, EnvironmentFile
+
+FILE = Path(".env")
+"""Settings of the folder where the program is started."""
 
 
 def state_folder() -> Path:
@@ -18,9 +23,13 @@ def state_folder() -> Path:
 
 
 class Settings(BaseSettings):
-    """The settings of web and worker. Each is set by `PARENTING_` and its name in capitals."""
+    """The settings of web and worker. Each is set by `PARENTING_` and its name in capitals.
 
-    model_config = SettingsConfigDict(env_prefix="PARENTING_", env_file=".env", extra="ignore")
+    Raises:
+        SetupError: the file `.env` cannot be read.
+    """
+
+    model_config = SettingsConfigDict(env_prefix=PREFIX, env_ignore_empty=True, extra="ignore")
 
     data: Path = Field(
         default_factory=state_folder,
@@ -53,6 +62,19 @@ class Settings(BaseSettings):
     streams: int = Field(50, ge=1, description="Live streams of events that may be open at once.")
     log_level: str = Field("warning", description="debug, info, warning or error.")
 
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Read options first, then the environment, then the file."""
+        file = EnvironmentFile(settings_cls, env_file=FILE, env_file_encoding="utf-8-sig")
+        return init_settings, env_settings, file
+
     @property
     def weights(self) -> Path:
         """Return the folder where `parenting pretrain` writes weights and where new runs look for them."""
@@ -65,3 +87,8 @@ class Settings(BaseSettings):
             return self.database_url
         path = (self.data / "parenting.db").absolute()
         return URL.create("sqlite", database=str(path)).render_as_string(hide_password=False)
+
+
+def names() -> list[str]:
+    """Return the settings' names as variables of the environment."""
+    return [PREFIX + name.upper() for name in Settings.model_fields]

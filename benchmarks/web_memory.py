@@ -1,0 +1,186 @@
+"""The memory of the web process under a steady load, and which lines of code hold what grows.
+
+    python -m benchmarks.web_memory                30 minutes of 50 requests a second
+    python -m benchmarks.web_memory --minutes 5    a shorter look
+    python -m benchmarks.web_memory --trace        the same with tracemalloc, which is slow and large itself
+
+Web and worker serve a run in a temporary folder. The load is the same mix all the time: pages, lists, static
+files, metrics, health checks, refused requests, a question leased and answered, and live streams that come
+and go. Some rows are added meanwhile, one answer a second, as a busy parent gives them.
+
+A line is printed each minute with the resident memory of the web process. The growth that counts is the one
+from minute 5 on: before, caches fill. With `--trace` the last lines name the places whose live memory grew
+most between minute 5 and the end. Resident memory also holds what was freed and not given back.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from itertools import count
+from pathlib import Path
+
+import httpx2
+
+from tests.server.serving import free_port, parenting, until_up
+
+WARM_MINUTES = 5
+CLIENT = "benchmark"
+FRAMES = 6
+SECONDS_TO_START = 300.0
+TOP = 25
+PATHS = (
+    "/",
+    "/runs/1",
+    "/runs/1/parent",
+    "/runs/1/stages",
+    "/runs/1/history",
+    "/api/v1/runs",
+    "/api/v1/runs/1",
+    "/api/v1/runs/1/queries?limit=20",
+    "/api/v1/runs/1/metrics?limit=50",
+    "/static/parent.js",
+    "/healthz",
+    "/readyz",
+    "/api/v1/runs/999",
+    "/nothing/here",
+    "/api/v1/runs/one",
+)
+"""Read in turn; the last ones are refused."""
+
+
+def serve(port: int, folder: Path) -> None:
+    """Serve with tracemalloc; each SIGUSR1 writes a snapshot of what is held."""
+    tracemalloc.start(FRAMES)
+    from parenting.server.serve import bind, make_server
+    from parenting.server.settings import Settings
+
+    numbers = count(1)
+    signal.signal(
+        signal.SIGUSR1,
+        lambda *_: tracemalloc.take_snapshot().dump(str(folder / f"snapshot-{next(numbers)}")),
+    )
+    chosen = Settings(port=port)
+    make_server(chosen).run(sockets=[bind(chosen.host, port)])
+
+
+@contextmanager
+def traced(port: int, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Run `serve` as a process."""
+    command = [sys.executable, "-m", "benchmarks.web_memory", "--serve", str(port), "--folder", str(folder)]
+    child = subprocess.Popen(command, env={**os.environ, "PARENTING_DATA": str(folder)}, text=True)
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.wait()
+
+
+def resident(pid: int) -> float:
+    """Return the resident memory of a process in MB."""
+    fields = Path(f"/proc/{pid}/statm").read_text().split()
+    return int(fields[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def load(web: httpx2.Client, minutes: float, rate: float, each_minute: Callable[[int], None]) -> int:
+    """Send the mix at this rate; return the number of requests, streams included."""
+    began, sent, minute = time.monotonic(), 0, 0
+    while (passed := time.monotonic() - began) < 60 * minutes:
+        if passed >= 60 * minute:
+            each_minute(minute)
+            minute += 1
+        time.sleep(max(0.0, sent / rate - passed))
+        sent += 1
+        with suppress(httpx2.TransportError):
+            if sent % 50 == 0:
+                answer(web)
+            elif sent % 50 == 25:
+                look_at_stream(web)
+            else:
+                web.get(PATHS[sent % len(PATHS)])
+    each_minute(minute)
+    return sent
+
+
+def answer(web: httpx2.Client) -> None:
+    """Lease the next question and answer it, where there is one."""
+    leased = web.post("/api/v1/runs/1/queries/lease", json={"client_id": CLIENT})
+    if leased.status_code == 200:
+        body = {"choice": "left", "client_id": CLIENT}
+        web.post(f"/api/v1/queries/{leased.json()['id']}/answer", json=body)
+
+
+def look_at_stream(web: httpx2.Client) -> None:
+    """Open a live stream and leave it after the first event."""
+    with web.stream("GET", "/api/v1/runs/1/events") as reply:
+        next(reply.iter_lines())
+
+
+def report(folder: Path) -> None:
+    """Print the places whose live memory grew most between the two snapshots."""
+    one, two = (tracemalloc.Snapshot.load(str(folder / f"snapshot-{number}")) for number in (1, 2))
+    print("live memory that grew most, by place")
+    for line in two.compare_to(one, "lineno")[:TOP]:
+        print(f"  {line.size_diff / 1e3:9.1f} kB {line.count_diff:8} blocks  {line.traceback}")
+    print("by way of")
+    for line in two.compare_to(one, "traceback")[:5]:
+        print(f"  {line.size_diff / 1e3:9.1f} kB\n    " + "\n    ".join(line.traceback.format()))
+
+
+def measure(minutes: float, rate: float, trace: bool) -> None:
+    """Start web and worker, send the load and print what the web process holds."""
+    with tempfile.TemporaryDirectory() as name:
+        folder, port = Path(name), free_port()
+        with parenting("migrate", data=folder) as made:
+            made.wait()
+        started = traced(port, folder) if trace else parenting("web", "--port", str(port), data=folder)
+        with started as web, parenting("worker", data=folder):
+            url = f"http://localhost:{port}"
+            until_up(url, SECONDS_TO_START)
+            client = httpx2.Client(base_url=url, timeout=30)
+            client.post("/api/v1/runs", json={"world": "unsafe-exploration"}).raise_for_status()
+            seen: list[float] = []
+
+            def look(minute: int) -> None:
+                seen.append(resident(web.pid))
+                print(f"minute {minute:3}  {seen[-1]:7.1f} MB", flush=True)
+                if trace and minute == min(WARM_MINUTES, int(minutes) - 1):
+                    web.send_signal(signal.SIGUSR1)
+
+            sent = load(client, minutes, rate, look)
+            warm = seen[min(WARM_MINUTES, len(seen) - 2)]
+            print(f"{sent} requests in {minutes:g} minutes; growth since minute {WARM_MINUTES}: ", end="")
+            print(f"{seen[-1] - warm:+.1f} MB")
+            if trace:
+                web.send_signal(signal.SIGUSR1)
+                while not (folder / "snapshot-2").exists():
+                    time.sleep(0.2)
+                time.sleep(5)  # until it is whole
+                report(folder)
+
+
+def main() -> None:
+    """Read the options."""
+    parser = argparse.ArgumentParser(description="The web process's memory under a steady load.")
+    parser.add_argument("--minutes", type=float, default=30)
+    parser.add_argument("--rate", type=float, default=50)
+    parser.add_argument("--trace", action="store_true")
+    parser.add_argument("--serve", type=int, metavar="PORT", help=argparse.SUPPRESS)
+    parser.add_argument("--folder", type=Path, help=argparse.SUPPRESS)
+    chosen = parser.parse_args()
+    if chosen.serve:
+        serve(chosen.serve, chosen.folder)
+    else:
+        measure(chosen.minutes, chosen.rate, chosen.trace)
+
+
+if __name__ == "__main__":
+    main()

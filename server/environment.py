@@ -1,0 +1,89 @@
+"""The settings' file `.env` and the names of settings in the environment: what cannot be read or is misspelt.
+
+A file that is no UTF-8 text is refused with a sentence. A name that is no setting is not an error, because
+other programs share the environment, but it is told with the nearest setting: it may be a slip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from io import StringIO
+from pathlib import Path
+
+from dotenv import dotenv_values
+from pydantic_settings import DotEnvSettingsSource
+
+from parenting.server.errors import SetupError
+
+PREFIX = "PARENTING_"
+NO_SETTINGS = ("PARENTING_LIFELINE", "PARENTING_CHROMIUM", "PARENTING_TORTURE", "PARENTING_KILL_ROUNDS")
+"""Variables that are read elsewhere: by the processes that `parenting up` starts, and by the tests."""
+NEAR = 0.85
+"""The least likeness of a name without the prefix to that of a setting, so that it counts as misspelt."""
+SAVE_AGAIN = "Save it as UTF-8, in an editor or by: iconv -f"
+
+
+class EnvironmentFile(DotEnvSettingsSource):
+    """The settings of a file of lines `NAME=value`."""
+
+    def _read_env_file(self, file_path: Path) -> Mapping[str, str | None]:
+        read(file_path)
+        return super()._read_env_file(file_path)
+
+
+def read(file: Path) -> str:
+    """Return the text of a file of settings, with or without a byte order mark; empty where there is none.
+
+    Raises:
+        SetupError: the file cannot be read, or is no text in UTF-8.
+    """
+    if not file.is_file():
+        return ""  # a folder of this name may be somebody's virtual environment
+    try:
+        stored = file.read_bytes()
+    except OSError as error:
+        raise SetupError(f"{file.absolute()} cannot be read: {error.strerror}.") from None
+    if stored.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in stored:
+        raise SetupError(
+            f"{file.absolute()} cannot be read: it is no UTF-8 text, but looks like UTF-16. "
+            f"{SAVE_AGAIN} UTF-16 -t UTF-8"
+        )
+    try:
+        return stored.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line, byte = stored.count(b"\n", 0, error.start) + 1, stored[error.start]
+        raise SetupError(
+            f"{file.absolute()} cannot be read: line {line} is no UTF-8 text (byte 0x{byte:02x}). "
+            f"{SAVE_AGAIN} LATIN1 -t UTF-8"
+        ) from None
+
+
+def warnings(environment: Iterable[str], file: Path, settings: Iterable[str]) -> list[str]:
+    """Return a sentence for each name that is no setting, but looks like one.
+
+    Args:
+        environment: The names of the environment's variables.
+        file: The file of settings.
+        settings: The names of the settings as variables.
+
+    Raises:
+        SetupError: the file cannot be read.
+    """
+    known = list(settings)
+    in_file = dotenv_values(stream=StringIO(read(file)))
+    found = [(name, "in the environment") for name in environment]
+    found += [(name, f"in {file.absolute()}") for name in in_file]
+    return [said for name, where in found if (said := _warning(name, where, known)) is not None]
+
+
+def _warning(name: str, where: str, known: Sequence[str]) -> str | None:
+    upper = name.upper()
+    if upper in known or upper in NO_SETTINGS:
+        return None
+    ours = upper.startswith(PREFIX)
+    near = get_close_matches(upper, known, 1, cutoff=NEAR)
+    if not near and not ours:
+        return None
+    hint = f" Did you mean {near[0]}?" if near else " docs/commands.md lists the settings."
+    return f"Warning: {name} {where} is no setting and is ignored.{hint}"

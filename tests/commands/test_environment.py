@@ -1,0 +1,111 @@
+"""A file of settings that is no text ends with a sentence; a misspelt setting is told; no output breaks."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from parenting.commands.main import COMMANDS, app
+from parenting.server.db import Database
+from parenting.server.errors import SetupError
+from parenting.server.new_run import NewRun, start
+from parenting.server.settings import Settings
+
+LINE = "PARENTING_PORT=8801\n"
+NO_UTF8 = {
+    "utf-16 with a mark": LINE.encode("utf-16"),
+    "utf-16 without": LINE.encode("utf-16-le"),
+    "utf-32": LINE.encode("utf-32"),
+    "latin-1": f"# für Zürich\n{LINE}".encode("latin-1"),
+    "cut off": b"\n\n" + "# ü".encode()[:-1],
+}
+ARGUMENTS = {
+    "run": ["unsafe-exploration"],
+    "experiment": ["table1"],
+    "answer": ["--run", "1"],
+    "export": ["1"],
+    "replay": ["1"],
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder where the program is started."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "data"))
+    return tmp_path
+
+
+@pytest.mark.parametrize("stored", NO_UTF8.values(), ids=NO_UTF8)
+def test_a_file_that_is_no_utf8_is_refused_with_its_remedy(folder: Path, stored: bytes) -> None:
+    (folder / ".env").write_bytes(stored)
+    with pytest.raises(SetupError, match=r"\.env cannot be read.*Save it as UTF-8"):
+        Settings()
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_refuses_it(folder: Path, command: str) -> None:
+    (folder / ".env").write_bytes(NO_UTF8["latin-1"])
+    said = CliRunner().invoke(app, [command, *ARGUMENTS.get(command, [])])
+    assert said.exit_code == 2
+    assert said.stderr.startswith(f"{folder}/.env cannot be read: line 1 is no UTF-8 text (byte 0xfc).")
+    assert said.stderr.count("\n") == 1
+
+
+def test_its_help_is_shown_all_the_same(folder: Path) -> None:
+    (folder / ".env").write_bytes(NO_UTF8["latin-1"])
+    assert CliRunner().invoke(app, ["runs", "--help"]).exit_code == 0
+
+
+def test_a_byte_order_mark_and_an_empty_value_are_no_settings(folder: Path) -> None:
+    (folder / ".env").write_text(f"\ufeff{LINE}PARENTING_HOST=\n", encoding="utf-8")
+    assert (Settings().port, Settings().host) == (8801, "127.0.0.1")
+
+
+def test_a_folder_of_that_name_is_not_the_file(folder: Path) -> None:
+    (folder / ".env").mkdir()
+    assert Settings().port == 8765
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("PARENTNG_DATA", " Did you mean PARENTING_DATA?"),
+        ("PARENTING_DATTA", " Did you mean PARENTING_DATA?"),
+        ("parenting_prot", " Did you mean PARENTING_PORT?"),
+        ("PARENTING_WEATHER", " docs/commands.md lists the settings."),
+    ],
+)
+def test_a_name_that_is_no_setting_is_told_wherever_it_stands(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, meant: str
+) -> None:
+    (folder / ".env").write_text(f"{name}=secret\n", encoding="utf-8")
+    end = f" is no setting and is ignored.{meant}\n"
+    assert CliRunner().invoke(app, ["worlds"]).stderr == f"Warning: {name} in {folder}/.env{end}"
+    (folder / ".env").unlink()
+    monkeypatch.setenv(name, "secret")
+    assert CliRunner().invoke(app, ["worlds"]).stderr == f"Warning: {name} in the environment{end}"
+
+
+@pytest.mark.parametrize("name", ["PARENTING_DATA", "parenting_port", "DATABASE_URL", "PARENT", "PATH"])
+def test_settings_and_the_names_of_others_are_not_told(folder: Path, name: str) -> None:
+    (folder / ".env").write_text(f"{name}=1\n", encoding="utf-8")
+    assert CliRunner().invoke(app, ["worlds"]).stderr == ""
+
+
+@pytest.mark.parametrize("errors", ["strict", "surrogateescape"])
+def test_characters_that_a_terminal_lacks_are_replaced(
+    db: Database, monkeypatch: pytest.MonkeyPatch, errors: str
+) -> None:
+    start(db, NewRun(world="unsafe-exploration", name="Zoë 🌱"))
+    shown = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(shown, encoding="ascii", errors=errors))
+    with pytest.raises(SystemExit) as end:
+        app(["runs"])
+    sys.stdout.flush()
+    assert end.value.code == 0
+    assert b" Zo? ? " in shown.getvalue()
