@@ -1,7 +1,7 @@
 # Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
 # A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
 .DEFAULT_GOAL := help
-.PHONY: help run test mutants torture stress check docs format coverage pictures weights constraints clean wheel
+.PHONY: help run test faults mutants torture stress check docs format coverage pictures weights constraints clean wheel
 
 # Tests start many processes; without byte code each of them would compile a thousand modules again.
 unexport PYTHONDONTWRITEBYTECODE
@@ -25,11 +25,14 @@ test: $(VENV)/.installed-dev ## Install, then run every check and every test (AR
 	echo "checks: $$checks in $$((middle - start)) s, tests: $$tests in $$((end - middle)) s"; \
 	test $$checks = passed && test $$tests = passed
 
+faults: $(VENV)/.installed-dev ## Kills, power cuts, refusing stores, races, sabotage (10 minutes; ARGS for some)
+	scripts/faults $(ARGS)
+
 mutants: $(VENV)/.installed-dev ## Plant faults one by one; each must be caught by its test (10 minutes, nightly)
 	$(BIN)/python -m scripts.mutants $(ARGS)
 
 torture: $(VENV)/.installed-dev ## The long forms of the tests that have two lengths (20 minutes, nightly)
-	PARENTING_TORTURE=1 $(BIN)/pytest -m torture $(ARGS)
+	PARENTING_TORTURE=1 $(BIN)/pytest -m torture tests tests/faults $(ARGS)
 
 stress: $(VENV)/.installed-dev ## Every test, ten times over, with both cores busy (needs stress; ARGS for some)
 	scripts/stress $(ARGS)

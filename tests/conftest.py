@@ -5,10 +5,13 @@ Keep this file small: a fixture for one folder belongs in that folder's conftest
 
 import os
 import shutil
+from pathlib import Path
 
 import hypothesis
 import pytest
 import torch
+
+FAULTS = Path(__file__).parent / "faults"
 
 # Two torch threads are slower than one here, and give other bits. pytest-xdist runs one process a core.
 torch.set_num_threads(1)
@@ -28,3 +31,9 @@ def chromium_path() -> str:
     if os.environ.get("CI") == "true":
         pytest.fail(reason)
     pytest.skip(reason)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave tests/faults to those who name it: they take minutes, and `make faults` runs them."""
+    named = any("faults" in argument for argument in config.args)
+    return True if collection_path == FAULTS and not named else None
