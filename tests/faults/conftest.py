@@ -1,4 +1,4 @@
-"""What the fault tests share: draws by the seed of the run, figures that are printed at its end, both stores.
+"""Fixtures of the fault tests: draws by the seed of the run, figures that are printed at its end.
 
 make faults                                     what every CI run does
 PARENTING_FAULTS_SEED=7 make faults ARGS=...    the same draws again

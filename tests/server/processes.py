@@ -10,7 +10,7 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from multiprocessing.connection import Connection
@@ -38,14 +38,29 @@ def _context() -> Any:
 class Command:
     """`parenting ...` as a process; what it prints goes into a file."""
 
-    def __init__(self, *arguments: str, data: Path, patches: Mapping[str, Any] | None = None) -> None:
-        """Start it. `patches` are set in it alone, by the dotted names of modules' variables."""
+    def __init__(
+        self,
+        *arguments: str,
+        data: Path,
+        patches: Mapping[str, Any] | None = None,
+        prepare: Callable[[], object] | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """Start it.
+
+        `patches` are set in it alone, by the dotted names of modules' variables; `prepare` is called in it
+        first, with the `environment` already set.
+        """
         self.arguments = arguments
         self.output = data / f"{arguments[0]}-{os.urandom(4).hex()}.out"
         there, self._lifeline = _context().Pipe(duplex=False)
-        environment = {"PARENTING_DATA": str(data), "PARENTING_CLAIM_SECONDS": "0.2"}
+        variables = {
+            "PARENTING_DATA": str(data),
+            "PARENTING_CLAIM_SECONDS": "0.2",
+            **(environment or {}),
+        }
         self.process = _context().Process(
-            target=_run, args=(arguments, environment, str(self.output), there, dict(patches or {}))
+            target=_run, args=(arguments, variables, str(self.output), there, dict(patches or {}), prepare)
         )
         self.process.start()
         there.close()
@@ -92,6 +107,7 @@ def _run(
     output: str,
     lifeline: Connection,
     patches: dict[str, Any],
+    prepare: Callable[[], object] | None,
 ) -> None:
     file = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
     for descriptor in (1, 2):
@@ -101,6 +117,8 @@ def _run(
     for name, value in patches.items():
         module, _, variable = name.rpartition(".")
         setattr(sys.modules[module], variable, value)
+    if prepare is not None:
+        prepare()
     from parenting.commands.main import app
 
     app(list(arguments))
