@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from parenting.commands.errors import friendly_errors, settings
+from parenting.server.backups.before_migrating import migrate as migrate_tables
 from parenting.server.db import connect
-from parenting.server.migrate import downgrade, upgrade
 
 
 def migrate(
@@ -21,19 +21,25 @@ def migrate(
             show_default="the newest",
         ),
     ] = None,
+    backup: Annotated[
+        bool,
+        typer.Option("--backup/--no-backup", help="Copy the database first, if anything is to be changed."),
+    ] = True,
 ) -> None:
     """Bring the database's tables up to date. All changes are made or none; a second call changes nothing.
 
-    Exit codes: 0; 2 the database cannot be used.
+    Before it changes tables it copies the database into the folder backups beside it, where the last three
+    copies of this kind are kept.
+
+    Exit codes: 0; 2 the database cannot be used, is of a newer version, or there is no room for the copy.
 
     Example: PARENTING_DATA=/srv/parenting parenting migrate
     """
     with friendly_errors():
-        db = connect(settings())
+        chosen = settings()
+        db = connect(chosen)
         try:
-            if to is not None:
-                downgrade(db, to)
-            changed = to is None and upgrade(db)
+            changed = migrate_tables(db, chosen.data, to, backup)
         finally:
             db.close()
     if to is not None:

@@ -22,9 +22,9 @@ import typer
 from parenting.commands import children
 from parenting.commands.children import Child
 from parenting.commands.errors import friendly_errors, settings
+from parenting.server.backups.before_migrating import migrate
 from parenting.server.db import connect
 from parenting.server.lifeline import follow
-from parenting.server.migrate import upgrade
 from parenting.server.serve import bind
 from parenting.server.settings import Settings
 
@@ -61,7 +61,7 @@ def up(
 def _migrate(chosen: Settings) -> None:
     db = connect(chosen)
     try:
-        upgrade(db)
+        migrate(db, chosen.data)
     finally:
         db.close()
 

@@ -5,6 +5,7 @@ The scripts are in `migrations/`, in a checkout and in an installed wheel alike.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from alembic import command
@@ -19,11 +20,20 @@ from parenting.server.errors import SetupError
 FOLDER = Path(__file__).parents[1] / "migrations"
 
 
-def upgrade(db: Database) -> bool:
+Keep = Callable[[str], Path]
+"""A function that copies a database of a revision before it is migrated."""
+
+
+def upgrade(db: Database, keep: Keep | None = None) -> bool:
     """Apply the missing migrations, all or none, and return whether there were any.
 
+    Args:
+        db: The database.
+        keep: Copies the database before its first change, where it has tables; none makes no copy.
+
     Raises:
-        SetupError: the database was written by a newer version, or holds other tables than ours.
+        SetupError: the database was written by a newer version, holds other tables than ours, or cannot be
+            copied first.
     """
     with db.write() as session:
         connection = session.connection()
@@ -32,32 +42,37 @@ def upgrade(db: Database) -> bool:
             return False
         if before is None and inspect(connection).has_table("run"):
             raise SetupError(f"{_place(db)} holds tables of another program. Name another database.")
+        if keep is not None and before is not None:
+            keep(before)
         config = _config()
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
         return True
 
 
-def downgrade(db: Database, revision: str) -> None:
+def downgrade(db: Database, to: str, keep: Keep | None = None) -> None:
     """Take the database back to an older revision, all or nothing, for an older version of Parenting.
 
     Columns and tables that the older version does not know are dropped with what they hold.
 
     Args:
         db: A database that is up to date.
-        revision: One of the revisions in `migrations/versions`, from "0001" on.
+        to: One of the revisions in `migrations/versions`, from "0001" on.
+        keep: Copies the database first; none makes no copy.
 
     Raises:
         SetupError: there is no such older revision, or the database is not up to date.
     """
     require_current(db)
-    known = [script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()]
-    if revision not in known[1:]:
-        raise SetupError(f"'{revision}' is not an older revision. Use one of: {', '.join(known[:0:-1])}.")
+    known = known_revisions()
+    if to not in known[1:]:
+        raise SetupError(f"'{to}' is not an older revision. Use one of: {', '.join(known[:0:-1])}.")
     with db.write() as session:
+        if keep is not None:
+            keep(newest())
         config = _config()
         config.attributes["connection"] = session.connection()
-        command.downgrade(config, revision)
+        command.downgrade(config, to)
 
 
 def require_current(db: Database) -> None:
@@ -66,18 +81,36 @@ def require_current(db: Database) -> None:
     Raises:
         SetupError: the database has no tables, older ones or newer ones; the sentence names the remedy.
     """
-    with db.read() as session:
-        found = _revision(session.connection())
+    found = revision(db)
     if found is None:
         raise SetupError(f"{_place(db)} has no tables yet. Run: `parenting migrate`")
     if found != _head():
         raise SetupError(f"{_place(db)} is from an older version of Parenting. Run: `parenting migrate`")
 
 
+def revision(db: Database) -> str | None:
+    """Return the revision of a database's tables; None if it has none.
+
+    Raises:
+        SetupError: a newer version wrote them.
+    """
+    with db.read() as session:
+        return _revision(session.connection())
+
+
+def newest() -> str:
+    """Return the revision of this version's tables."""
+    return str(_head())
+
+
+def known_revisions() -> list[str]:
+    """Return all revisions, the newest first."""
+    return [script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()]
+
+
 def _revision(connection: Connection) -> str | None:
     found = MigrationContext.configure(connection).get_current_revision()
-    known = {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
-    if found is not None and found not in known:
+    if found is not None and found not in known_revisions():
         raise SetupError(
             f"The database is from a newer version of Parenting (revision {found}). "
             "Update Parenting, or name another database."

@@ -46,6 +46,14 @@ class Notifier:
                 except OSError:
                     continue  # its buffer is full: it will wake anyway
 
+    def listeners(self) -> int:
+        """Return the number of processes that listen, those that were stopped by a signal included."""
+        try:
+            paths = list(self.folder.iterdir())
+        except OSError:
+            return 0
+        return sum(_held(path) for path in paths)
+
     def wait(self, timeout: float) -> bool:
         """Wait for a notification, at most `timeout` seconds; return False when none came.
 
@@ -83,6 +91,16 @@ class Notifier:
             self._listener.close()
             self._path.unlink(missing_ok=True)
             self._listener = self._path = None
+
+
+def _held(path: Path) -> bool:
+    """Return whether a process holds the socket of this path."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
+        try:
+            out.connect(str(path))
+        except OSError:
+            return False
+    return True
 
 
 def _folder(data: Path, channel: str) -> Path:

@@ -1,0 +1,127 @@
+"""Copies of a SQLite database, made by SQLite's own backup interface while others read and write.
+
+A plain copy of the file misses what is only in the log beside it, and mixes moments. Here one read
+transaction counts the rows and copies the pages, so a copy is the database of one moment: it holds every
+answer that was acknowledged before the copy began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from parenting.server.db import BUSY_SECONDS, sqlite_module
+from parenting.server.errors import SetupError
+
+HEAD = b"SQLite format 3\0"
+TABLES = ("run", "query", "answer", "event", "metric", "checkpoint", "weights")
+"""The tables whose rows a copy is checked for."""
+FAILED = "{} cannot be copied: {}. If it is damaged, put a backup in its place: `parenting restore`"
+
+
+@dataclass(frozen=True)
+class Contents:
+    """The contents of a database, in few numbers."""
+
+    revision: str | None  # of the migrations
+    rows: dict[str, int]  # by table; older revisions lack some
+
+    def __str__(self) -> str:
+        """Return what a person wants to know of a backup."""
+        counts = ", ".join(f"{self.rows.get(name, 0)} {word}" for name, word in _WORDS.items())
+        return f"{counts}; revision {self.revision}"
+
+
+_WORDS = {"run": "runs", "answer": "answers", "checkpoint": "checkpoints"}
+
+
+def copy(source: Path, target: Path) -> Contents:
+    """Copy a database that may be in use into a new file, and return what the copy has to hold.
+
+    The copy has no log beside it. It is not on the disk until `target` is synced.
+
+    Raises:
+        SetupError: `source` is no database, or one of the two cannot be used.
+    """
+    # Without a log beside it nobody has it open, and immutable lets SQLite read it from a read-only folder.
+    mode = "mode=rw" if Path(f"{source}-wal").exists() else "immutable=1"
+    with _connected(source, mode, FAILED) as old, _connected(target, "mode=rwc", "") as new:
+        old.execute("BEGIN")
+        told = _contents(old)
+        old.backup(new)
+        new.execute("PRAGMA journal_mode=delete").fetchall()  # one file, whatever the source's journal is
+        old.execute("ROLLBACK")
+        return told
+
+
+def check(file: Path) -> Contents:
+    """Read a database that nobody has open from end to end, and return its contents.
+
+    Raises:
+        SetupError: it is no database, or is damaged.
+    """
+    with _connected(file, "immutable=1") as database:
+        faults = [row[0] for row in database.execute("PRAGMA integrity_check(3)")]
+        if faults != ["ok"]:
+            raise SetupError(f"{file} is damaged: {'; '.join(faults)}. Use another backup.")
+        if orphan := database.execute("PRAGMA foreign_key_check").fetchone():
+            raise SetupError(f"{file} is damaged: a row of {orphan[0]} names none of {orphan[2]}.")
+        return _contents(database)
+
+
+def require_database(file: Path) -> None:
+    """Refuse a file that is no SQLite database.
+
+    Raises:
+        SetupError: there is none, it cannot be read, or it is something else.
+    """
+    try:
+        with file.open("rb") as opened:
+            begins = opened.read(len(HEAD))
+    except OSError as error:
+        raise SetupError(f"{file} cannot be read: {error.strerror}. Name a backup.") from None
+    if begins[:5] == b"PGDMP":
+        raise SetupError(f"{file} is a dump of PostgreSQL; PARENTING_DATABASE_URL names no such database.")
+    if begins != HEAD:
+        raise SetupError(f"{file} is no SQLite database. Name a file that `parenting backup` has written.")
+
+
+def _contents(database: Any) -> Contents:
+    there = {row[0] for row in database.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+    revision = None
+    if "alembic_version" in there:
+        found = database.execute("SELECT version_num FROM alembic_version").fetchone()
+        revision = None if found is None else str(found[0])
+    counted = [name for name in TABLES if name in there]
+    rows = {name: database.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in counted}
+    return Contents(revision, rows)
+
+
+@contextmanager
+def _connected(file: Path, mode: str, said: str = "{} cannot be used as a database: {}.") -> Iterator[Any]:
+    """Open a file without SQLAlchemy.
+
+    Args:
+        file: The file.
+        mode: Parameters of SQLite's address.
+        said: The sentence of a failure, with places for the file and the driver's words; none lets it pass.
+
+    Raises:
+        SetupError: the sentence.
+    """
+    sqlite = sqlite_module()
+    try:
+        connection = sqlite.connect(
+            f"{file.absolute().as_uri()}?{mode}", uri=True, timeout=BUSY_SECONDS, isolation_level=None
+        )
+        try:
+            yield connection
+        finally:
+            connection.close()
+    except sqlite.Error as error:
+        if not said:
+            raise
+        raise SetupError(said.format(file, error)) from None

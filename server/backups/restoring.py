@@ -1,0 +1,141 @@
+"""Restore: put a backup in place of the database, which nobody may use meanwhile and which is kept aside."""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy import URL, make_url
+
+from parenting.server import identity
+from parenting.server.backups import copies, dumps
+from parenting.server.backups.in_use import alone, require_stopped, require_unconnected
+from parenting.server.backups.making import FOLDER, back_up, stamp
+from parenting.server.backups.whole import require_room, size, whole
+from parenting.server.db import connect, make_folder, utc_now
+from parenting.server.errors import SetupError
+from parenting.server.migrate import known_revisions, newest, revision, upgrade
+from parenting.server.settings import Settings
+
+BESIDE = ("-wal", "-shm", "-journal")
+
+
+@dataclass(frozen=True)
+class Restored:
+    """What a restore has done."""
+
+    database: str
+    holds: str
+    aside: Path | None  # where the former database is
+    older: bool  # the next start migrates it
+
+
+def restore(settings: Settings, file: Path, replace: bool = False, new_identity: bool = False) -> Restored:
+    """Put a backup in place of the database of these settings.
+
+    Args:
+        settings: The settings that name the database.
+        file: A file that `back_up` has written, or the file of a database that nobody has open.
+        replace: Replace a database that exists; it is kept in the folder `backups`.
+        new_identity: Give the copy a UUID of its own, so that it and the original are told apart. An older
+            copy is migrated first.
+
+    Raises:
+        SetupError: the database is in use or exists, or the file is damaged, of a newer version or no backup.
+    """
+    url = make_url(settings.url)
+    require_stopped(settings.data)
+    if url.get_backend_name() == "postgresql":
+        done = _restore_dump(settings, url, file, replace)
+    else:
+        done = _restore_copy(url, file, replace)
+    if new_identity:
+        db = connect(settings)
+        try:
+            upgrade(db)
+            identity.renew(db)
+        finally:
+            db.close()
+    return done
+
+
+def _restore_copy(url: URL, file: Path, replace: bool) -> Restored:
+    target = Path(str(url.database))
+    copies.require_database(file)
+    if target.exists() and target.samefile(file):
+        raise SetupError(f"{file} is the database itself. Name a backup.")
+    if target.exists() and not replace:
+        raise SetupError(f"There is a database at {target}. Give --replace to put it aside first.")
+    make_folder(target.parent)
+    require_room(target.parent, size(file), "Free some space first.")
+    with ExitStack() as until_replaced, whole(target, force=True) as part:
+        copies.copy(file, part)
+        holds = copies.check(part)
+        older = _is_older(holds.revision, file)
+        aside = None
+        if target.exists():
+            until_replaced.enter_context(alone(target))  # its log is in the file now, unless it is damaged
+            aside = _put_aside(target)
+    return Restored(str(target), str(holds), aside, older)
+
+
+def _put_aside(target: Path) -> Path:
+    """Keep the database under a second name, and leave nothing of its log for the one that comes.
+
+    The first name goes on until the new file replaces it: at no moment is there none.
+    """
+    aside = target.parent / FOLDER / f"before-restore-{stamp(utc_now())}.db"
+    aside.parent.mkdir(exist_ok=True, mode=0o700)
+    os.link(target, aside)
+    aside.chmod(0o600)
+    for end in BESIDE:
+        with suppress(FileNotFoundError):
+            Path(f"{target}{end}").rename(f"{aside}{end}")
+    return aside
+
+
+def _restore_dump(settings: Settings, url: URL, file: Path, replace: bool) -> Restored:
+    if not file.is_file():
+        raise SetupError(f"{file} cannot be read: there is no such file. Name a backup.")
+    number = dumps.check(file)
+    require_unconnected(url)
+    aside = None
+    if revision_of(settings) is not None:
+        if not replace:
+            raise SetupError(
+                f"{url.render_as_string()} holds tables. Give --replace to dump them aside and restore these."
+            )
+        name = f"before-restore-{stamp(utc_now())}.dump"
+        aside = back_up(settings, settings.data / FOLDER / name).file
+    dumps.restore(url, file)
+    return Restored(url.render_as_string(), f"{number} tables", aside, revision_of(settings) != newest())
+
+
+def revision_of(settings: Settings) -> str | None:
+    """Return the revision of a database's tables; None if it has none.
+
+    Raises:
+        SetupError: a newer version wrote them.
+    """
+    db = connect(settings)
+    try:
+        return revision(db)
+    finally:
+        db.close()
+
+
+def _is_older(found: str | None, file: Path) -> bool:
+    """Return whether the next start has to migrate.
+
+    Raises:
+        SetupError: a newer version wrote it, or another program.
+    """
+    if found is None:
+        raise SetupError(f"{file} is a database of another program: it has no revision of Parenting's.")
+    if found not in known_revisions():
+        raise SetupError(
+            f"{file} is from a newer version of Parenting (revision {found}). Update Parenting first."
+        )
+    return found != newest()

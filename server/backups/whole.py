@@ -1,0 +1,92 @@
+"""A file that has its name only once it is whole and on the disk, and never replaces another one unasked."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from parenting.server.errors import SetupError
+
+SPARE_BYTES = 8 * 1024 * 1024
+"""Room that must be left on the disk beside a copy."""
+
+
+@contextmanager
+def whole(target: Path, force: bool = False) -> Iterator[Path]:
+    """Yield the path of an empty file of the owner's, which takes the name `target` at the end.
+
+    If an error comes before, nothing is left of it.
+
+    Raises:
+        SetupError: `target` exists and `force` is not given, or cannot be written.
+    """
+    if target.is_dir():
+        raise SetupError(f"{target} is a folder. Name a file in it.")
+    if target.exists() and not force:
+        raise _exists(target)
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
+        yield part
+        _sync(part)
+        _name(part, target, force)
+        _sync(target.parent)
+    except OSError as error:
+        raise SetupError(f"{target} cannot be written: {error.strerror}. Name another file.") from None
+    finally:
+        for left in (part, Path(f"{part}-journal"), Path(f"{part}-wal"), Path(f"{part}-shm")):
+            with suppress(OSError):
+                left.unlink(missing_ok=True)
+
+
+def require_room(folder: Path, needed: int, remedy: str) -> None:
+    """Refuse to begin what the disk has no room for.
+
+    Args:
+        folder: A folder on that disk; it need not exist yet.
+        needed: The bytes that will be written.
+        remedy: A sentence.
+
+    Raises:
+        SetupError: the disk lacks room.
+    """
+    there = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    free = shutil.disk_usage(there).free
+    if free < needed + SPARE_BYTES:
+        lacking = (needed + SPARE_BYTES - free) / 1e6
+        raise SetupError(
+            f"The disk of {folder} has {free / 1e6:.0f} MB free; {lacking:.0f} MB more are needed. {remedy}"
+        )
+
+
+def size(database: Path) -> int:
+    """Return the bytes of a database with its log."""
+    return sum(file.stat().st_size for file in (database, Path(f"{database}-wal")) if file.exists())
+
+
+def _name(part: Path, target: Path, force: bool) -> None:
+    if force:
+        part.replace(target)
+        return
+    try:
+        os.link(part, target)  # unlike a renaming, it never replaces a file that came meanwhile
+    except FileExistsError:
+        raise _exists(target) from None
+    except OSError:  # a file system without links
+        part.rename(target)
+
+
+def _exists(target: Path) -> SetupError:
+    return SetupError(f"{target} exists already. Name another file, or give --force to replace it.")
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
