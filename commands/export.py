@@ -14,8 +14,9 @@ import typer
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors
 from parenting.commands.progress import bar
+from parenting.server.damage import sound
 from parenting.server.export import lines
-from parenting.server.runs import get_run
+from parenting.server.runs import stored_run
 
 
 def export(
@@ -38,7 +39,7 @@ def export(
     Example: parenting export 3 -o run-3.jsonl
     """
     with exit_on_interrupt(), friendly_errors(), database() as db:
-        total, found = get_run(db, run).answers, lines(db, run)
+        total, found = sound(stored_run(db, run), "answers"), lines(db, run)
         if out is None:
             _copy(found, sys.stdout, total)
             return
@@ -47,7 +48,7 @@ def export(
     typer.echo(f"{written} answer{'' if written == 1 else 's'} of run {run} written to {out}.")
 
 
-def _copy(found: Iterator[str], file: TextIO, total: int) -> int:
+def _copy(found: Iterator[str], file: TextIO, total: int | None) -> int:
     """Copy line by line, and return the number of lines."""
     number = 0
     # On a terminal the lines themselves show the progress, and a bar would break them.

@@ -14,9 +14,9 @@ from rich.text import Text
 
 from parenting.commands.database import database
 from parenting.commands.errors import friendly_errors
-from parenting.server.reads.schemas import run_schema
+from parenting.server.reads.schemas import run_schemas
 from parenting.server.runs import list_runs
-from parenting.server.schemas import RunSchema
+from parenting.server.schemas import DamagedSchema, RunSchema
 from parenting.server.statuses import STATE_LABELS, RunState
 
 COLUMNS = ("run", "name", "world", "level", "parent", "now", "stage", "tick", "answers", "optimal")
@@ -39,7 +39,7 @@ def runs(
     Example: parenting runs --limit 5
     """
     with friendly_errors(), database() as db:
-        shown = [run_schema(db, run.id) for run in list_runs(db, limit)]
+        shown = run_schemas(db, list_runs(db, limit))
     if as_json:
         typer.echo(json.dumps([run.model_dump(mode="json") for run in shown]))
     elif shown:
@@ -49,7 +49,7 @@ def runs(
         typer.echo("There are no runs yet. Start one on the pages: `parenting up`")
 
 
-def _table(shown: list[RunSchema], wide: bool) -> Table:
+def _table(shown: list[RunSchema | DamagedSchema], wide: bool) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1))
     columns = [column for column in COLUMNS if wide or column not in NARROW]
     for column in columns:
@@ -60,7 +60,9 @@ def _table(shown: list[RunSchema], wide: bool) -> Table:
     return table
 
 
-def _row(run: RunSchema) -> dict[str, str]:
+def _row(run: RunSchema | DamagedSchema) -> dict[str, str]:
+    if isinstance(run, DamagedSchema):
+        return {**dict.fromkeys(COLUMNS, ""), "run": str(run.id), "world": "damaged", "now": run.damaged}
     return {
         "run": str(run.id),
         "name": run.name or "",

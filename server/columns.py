@@ -69,16 +69,28 @@ class Damaged:
 def loads(text: str | bytes) -> Any:
     """Read JSON as the standard has it, without NaN and halves of surrogate pairs; else `Damaged`."""
     try:
-        found = json.loads(text, parse_constant=_refuse_constant)
-        if (b"\\u" if isinstance(text, bytes) else "\\u") in text:  # type: ignore[operator]  # both are of one kind
-            json.dumps(found, ensure_ascii=False).encode()
+        whole = text if isinstance(text, str) else bytes(text).decode()
+        found = _DECODER.decode(whole)
+        if "\\u" in whole:
+            json.dumps(found, ensure_ascii=False).encode()  # refuses halves of surrogate pairs
         return found
     except UNREADABLE:
-        return Damaged("is no JSON")
+        return Damaged("is not JSON")
+
+
+def decoded(text: bytes) -> str | bytes:
+    """Return SQLite's text; bytes that are no text stay bytes, which no column takes for sound."""
+    try:
+        return text.decode()
+    except UnicodeDecodeError:
+        return text
 
 
 def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(name)
+
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse_constant)
 
 
 class Checked(TypeDecorator[T], Generic[T]):
@@ -93,7 +105,7 @@ class Checked(TypeDecorator[T], Generic[T]):
     def result_processor(self, dialect: Dialect, coltype: Any) -> Callable[[Any], Any]:
         """Read a value, or say that it cannot be read."""
         inner = super().result_processor(dialect, coltype)
-        damaged = Damaged(f"is no {self.noun}", self.place)
+        damaged = Damaged(f"is not {self.noun}", self.place)
 
         def read(value: Any) -> Any:
             try:
@@ -133,7 +145,7 @@ class Whole(Checked[int]):
 
     cache_ok = True
     impl = Integer
-    kind, noun = int, "whole number"
+    kind, noun = int, "a whole number"
 
 
 class Big(Whole):
@@ -148,7 +160,7 @@ class Real(Checked[float]):
 
     cache_ok = True
     impl = Double
-    kind, noun = (int, float), "finite number"
+    kind, noun = (int, float), "a finite number"
 
     def sound(self, found: Any) -> bool:
         """Return whether it is a finite number."""
@@ -160,12 +172,12 @@ class Flag(Checked[bool]):
 
     cache_ok = True
     impl = Boolean
-    kind, noun = bool, "truth value"
+    kind, noun = bool, "a truth value"
 
     def result_processor(self, dialect: Dialect, coltype: Any) -> Callable[[Any], Any]:
         """Read a truth value; the driver would take any text for true."""
         read = super().result_processor(dialect, coltype)
-        damaged = Damaged(f"is no {self.noun}", self.place)
+        damaged = Damaged(f"is not {self.noun}", self.place)
         return lambda value: read(value) if value is None or type(value) in (bool, int) else damaged
 
 
@@ -182,7 +194,7 @@ class Json(Checked[dict[str, Any]]):
 
     cache_ok = True
     impl = JSON(none_as_null=True)
-    kind, noun = dict, "JSON object"
+    kind, noun = dict, "a JSON object"
 
 
 class Utc(Checked[datetime]):
@@ -190,7 +202,7 @@ class Utc(Checked[datetime]):
 
     cache_ok = True
     impl = DateTime(timezone=False)
-    kind, noun = datetime, "time"
+    kind, noun = datetime, "a time"
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
         """To UTC, without its zone."""
@@ -209,7 +221,7 @@ class Word(Checked[E], Generic[E]):
     kind = StrEnum
 
     def __init__(self, words: type[E]) -> None:
-        self.words, self.noun = words, f"word of {', '.join(words)}"
+        self.words, self.noun = words, f"one of {', '.join(words)}"
         super().__init__()
 
     def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
@@ -229,7 +241,7 @@ class OneOf(Checked[str]):
     kind = str
 
     def __init__(self, words: tuple[str, ...]) -> None:
-        self.words, self.noun = words, f"word of {', '.join(words)}"
+        self.words, self.noun = words, f"one of {', '.join(words)}"
         super().__init__()
 
     def sound(self, found: Any) -> bool:

@@ -22,6 +22,7 @@ from sqlalchemy import Connection, Engine, PoolProxiedConnection, create_engine,
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError
 from sqlalchemy.orm import Session
 
+from parenting.server.columns import decoded, loads
 from parenting.server.errors import BusyError, DiskFullError, SetupError
 from parenting.server.settings import Settings
 
@@ -130,7 +131,9 @@ def connect(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Data
     try:
         url = make_url(settings.url)
         if url.get_backend_name() != "sqlite":
-            return Database(create_engine(url, json_serializer=_dumps, pool_pre_ping=True), clock)
+            return Database(
+                create_engine(url, json_serializer=_dumps, json_deserializer=loads, pool_pre_ping=True), clock
+            )
     except (ArgumentError, NoSuchModuleError, ImportError) as error:
         raise SetupError(
             f"PARENTING_DATABASE_URL: {error}. Write it as sqlite:////folder/parenting.db."
@@ -144,6 +147,7 @@ def connect(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Data
         url,
         module=sqlite_module(),
         json_serializer=_dumps,
+        json_deserializer=loads,
         pool_size=20,
         max_overflow=30,
         pool_timeout=BUSY_SECONDS,
@@ -191,6 +195,7 @@ def sqlite_module() -> Any:
 
 def _set_up(connection: Any, _record: Any) -> None:
     connection.isolation_level = None  # the driver begins nothing by itself; `_begin` does
+    connection.text_factory = decoded
     for name, value in PRAGMAS.items():
         connection.execute(f"PRAGMA {name}={value}").fetchall()
 

@@ -11,22 +11,30 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
+from parenting.server.damage import damage, sound
 from parenting.server.db import Database
 from parenting.server.reads.answers import Answered, every, number_of
-from parenting.server.runs import get_run
+from parenting.server.runs import stored_run
 from parenting.server.tables import Run
 
-MU = {"left": [1.0, 0.0], "right": [0.0, 1.0], "either": [0.5, 0.5], "neither": None}
+MU = {
+    "left": [1.0, 0.0],
+    "right": [0.0, 1.0],
+    "either": [0.5, 0.5],
+    "neither": None,
+}
 """Eq. (1); *neither* trains nothing."""
 
 
 def rows(db: Database, run_id: int) -> Iterator[dict[str, Any]]:
     """Return the answers of a run up to now, oldest first, read in batches.
 
+    A row that cannot be read stands there all the same: what is damaged is null, and `damaged` says so.
+
     Raises:
         NotFound: the run does not exist; raised here, not at the first row.
     """
-    run = get_run(db, run_id)
+    run = stored_run(db, run_id)
     return (_row(db, run, answered) for answered in every(db, run_id))
 
 
@@ -41,29 +49,34 @@ def lines(db: Database, run_id: int) -> Iterator[str]:
 
 def _row(db: Database, run: Run, answered: Answered) -> dict[str, Any]:
     answer, query = answered.answer, answered.query
-    return {
+    world, level = sound(run, "world"), sound(run, "level")
+    found = answered.damage or ("the run's world or level" if None in (world, level) else None)
+    clips = query.clips if damage(query) is None else {"left": None, "right": None}
+    choice, supersedes = sound(answer, "choice"), sound(answer, "supersedes")
+    row = {
         "run": run.id,
-        "number": answer.number,
-        "query": query.id,
-        "world": run.world,
-        "level": run.level,
-        "kind": query.kind,
-        "maturity": query.maturity,
-        "tick": query.tick,  # at which it was asked
-        "applied_tick": answer.applied_tick,  # at which the agent heard the answer; null: not yet
-        "policy": {"stage": query.policy_stage, "gradient_steps": query.policy_steps},
-        "left": query.clips["left"],
-        "right": query.clips["right"],
-        "choice": answer.choice,
-        "mu": MU[answer.choice],
-        "parent": answer.parent,
-        "asked": _time(query.posted),
-        "received": _time(answer.received),
-        "standing": answer.standing,
-        "supersedes": None if answer.supersedes is None else number_of(db, answer.supersedes),
+        "number": sound(answer, "number"),
+        "query": sound(answer, "query_id"),
+        "world": world,
+        "level": level,
+        "kind": sound(query, "kind"),
+        "maturity": sound(query, "maturity"),
+        "tick": sound(query, "tick"),  # at which it was asked
+        "applied_tick": sound(answer, "applied_tick"),  # at which the agent heard the answer; null: not yet
+        "policy": {"stage": sound(query, "policy_stage"), "gradient_steps": sound(query, "policy_steps")},
+        "left": clips["left"],
+        "right": clips["right"],
+        "choice": choice,
+        "mu": None if choice is None else MU[choice],
+        "parent": sound(answer, "parent"),
+        "asked": _time(sound(query, "posted")),
+        "received": _time(sound(answer, "received")),
+        "standing": sound(answer, "standing"),
+        "supersedes": None if supersedes is None else number_of(db, supersedes),
     }
+    return row if found is None else {**row, "damaged": found}
 
 
-def _time(moment: datetime) -> str:
+def _time(moment: datetime | None) -> str | None:
     """Format a time as ISO 8601 in UTC, always of the same length, so that it sorts as text."""
-    return moment.replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"
+    return None if moment is None else moment.replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"

@@ -7,6 +7,7 @@ from typing import Any
 
 from sqlalchemy import select
 
+from parenting.server.damage import readable
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
 from parenting.server.runs import living
@@ -21,7 +22,7 @@ def add_operator_event(db: Database, run_id: int, kind: str, payload: dict[str, 
         Conflict: the run is over, or the event would end its last stage.
     """
     with db.write() as session:
-        run = living(session, run_id)
+        run = readable(living(session, run_id))
         if kind == "mature" and run.maturity >= run.config["stages"]:
             raise Conflict(
                 f"Run {run_id} is in its last stage, T = {run.maturity}, which never ends. "

@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import bindparam, or_, select, update
 from sqlalchemy.orm import Session
 
+from parenting.server.damage import readable
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.identity import unused_number
@@ -65,6 +66,16 @@ def list_runs(db: Database, limit: int = 200) -> Sequence[Run]:
 
 def get_run(db: Database, run_id: int) -> Run:
     """Return one run.
+
+    Raises:
+        NotFound: there is none of this id.
+        DamagedRowError: its row cannot be read.
+    """
+    return readable(stored_run(db, run_id))
+
+
+def stored_run(db: Database, run_id: int) -> Run:
+    """Return one run, whether its row can be read or not.
 
     Raises:
         NotFound: there is none of this id.

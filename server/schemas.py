@@ -22,6 +22,14 @@ class Schema(BaseModel):
     model_config = ConfigDict(use_attribute_docstrings=True)
 
 
+class DamagedSchema(Schema):
+    """A row that cannot be read, in its place in a list. The rest of the database goes on."""
+
+    id: int
+    damaged: str
+    """The columns that cannot be read, and the reasons."""
+
+
 class OpenSchema(Schema):
     """The number of open questions, by kind."""
 
@@ -184,6 +192,14 @@ class AskedSchema(QuerySchema):
     """A question with its answer, if one stands."""
 
     answer: AnswerSchema | None
+
+
+class DamagedMetricSchema(Schema):
+    """Metrics that cannot be read."""
+
+    tick: int | None
+    damaged: str
+    """The columns that cannot be read, and the reasons."""
 
 
 class MetricSchema(Schema):

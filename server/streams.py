@@ -102,12 +102,12 @@ class Streams:
     async def _metrics(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
         while after is not None:
             rows = await run_in_threadpool(list_metrics, self.db, run_id, after, ROWS)
-            if rows:
-                shown = [row.model_dump(mode="json") for row in metric_schemas(rows)]
-                yield ServerSentEvent(event="metrics", data={"rows": shown}, id=str(rows[-1].tick))
-            after = (
-                rows[-1].tick if len(rows) == ROWS else None
-            )  # there may be more: a run that is over stays so
+            shown = [row.model_dump(mode="json") for row in metric_schemas(rows)]
+            ticks = [row["tick"] for row in shown if row["tick"] is not None]
+            if ticks:
+                yield ServerSentEvent(event="metrics", data={"rows": shown}, id=str(ticks[-1]))
+            # there may be more: a run that is over stays so
+            after = ticks[-1] if ticks and len(rows) == ROWS else None
 
     async def wait_for(
         self, look: Callable[[], Found | None], seconds: float, gone: Callable[[], Awaitable[bool]]

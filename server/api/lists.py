@@ -9,8 +9,16 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from parenting.agent.events import Event
 from parenting.server import tables
+from parenting.server.damage import damage
 from parenting.server.new_run import LARGEST_INT
-from parenting.server.schemas import AskedSchema, MetricSchema, RunSchema, Schema
+from parenting.server.schemas import (
+    AskedSchema,
+    DamagedMetricSchema,
+    DamagedSchema,
+    MetricSchema,
+    RunSchema,
+    Schema,
+)
 from parenting.server.statuses import QueryStatus
 
 Row = TypeVar("Row")
@@ -26,15 +34,15 @@ class Rows(Schema, Generic[Row]):
     """The cursor of the next page; null: these are the last rows for now."""
 
 
-class RunRows(Rows[RunSchema]):
+class RunRows(Rows[RunSchema | DamagedSchema]):
     """Runs, newest first."""
 
 
-class AskedRows(Rows[AskedSchema]):
+class AskedRows(Rows[AskedSchema | DamagedSchema]):
     """Questions, oldest first."""
 
 
-class MetricRows(Rows[MetricSchema]):
+class MetricRows(Rows[MetricSchema | DamagedMetricSchema]):
     """Metrics, in the order of the ticks."""
 
 
@@ -49,7 +57,7 @@ class OperatorEventSchema(Schema):
     """The tick before which it applied; null: not yet."""
 
 
-class OperatorEventRows(Rows[OperatorEventSchema]):
+class OperatorEventRows(Rows[OperatorEventSchema | DamagedSchema]):
     """Operator events, in their order."""
 
 
@@ -92,8 +100,11 @@ class EventPart(Part):
     limit: int = Field(200, ge=1, le=1000, description="At most this many rows.")
 
 
-def operator_event(row: tables.OperatorEvent) -> OperatorEventSchema:
-    """Return the schema of a stored event."""
+def operator_event(row: tables.OperatorEvent) -> OperatorEventSchema | DamagedSchema:
+    """Return the schema of a stored event, damaged or not."""
+    found = damage(row)
+    if found is not None:
+        return DamagedSchema(id=row.id, damaged=found)
     event = {"kind": row.kind, **row.payload}
     return OperatorEventSchema.model_validate(
         {

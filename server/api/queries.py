@@ -15,7 +15,7 @@ from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease, release
 from parenting.server.reads import pagination
-from parenting.server.reads.schemas import asked_schema, leased_schema
+from parenting.server.reads.schemas import asked_or_damaged, asked_schema, leased_schema
 from parenting.server.runs import get_run
 from parenting.server.schemas import AskedSchema, LeasedSchema, StoredSchema
 
@@ -29,7 +29,7 @@ def list_questions(run_id: RunId, db: Db, part: Annotated[AskedPart, Query()]) -
     Send the `next` of a page as `after` to get the following page.
     """
     page = pagination.asked_after(db, run_id, part.after, part.limit, part.status)
-    return AskedRows(rows=[asked_schema(row.query, row.answer) for row in page.rows], next=page.next)
+    return AskedRows(rows=[asked_or_damaged(row.query, row.answer) for row in page.rows], next=page.next)
 
 
 @router.post(

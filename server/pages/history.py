@@ -11,7 +11,9 @@ from fastapi import APIRouter, Query, Request, Response
 
 from parenting.server import runs
 from parenting.server.api.bodies import RunId
+from parenting.server.damage import sound
 from parenting.server.deps import Db
+from parenting.server.errors import DamagedRowError
 from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.parent import COOKIE
 from parenting.server.pages.question import QuestionView, question_view
@@ -55,13 +57,21 @@ class Entry(NamedTuple):
     shown: QuestionView
 
 
+class DamagedEntry(NamedTuple):
+    """An answer that cannot be read, or whose question cannot."""
+
+    id: int
+    number: int | None
+    damaged: str  # what cannot be read, and why
+
+
 @dataclass(frozen=True)
 class HistoryPage:
     """The content of web/templates/history.html."""
 
     run: Run
     title: str
-    entries: Sequence[Entry]  # one page of them
+    entries: Sequence[Entry | DamagedEntry]  # one page of them
     older: str | None  # the query string of the next page; None on the last one
     newest: str | None  # that of the first page; None on it
     kind: str  # the kind that is shown alone; "" for all
@@ -82,7 +92,7 @@ def history_page(
         run,
         run_title(run),
         _entries(rows[:PAGE], run, request.cookies.get(COOKIE, "")),
-        urlencode({**kept, "before": rows[PAGE - 1].answer.number}) if len(rows) > PAGE else None,
+        urlencode({**kept, "before": _last_number(rows[:PAGE])}) if len(rows) > PAGE else None,
         urlencode(kept) if before is not None else None,
         kind,
         choice,
@@ -90,12 +100,23 @@ def history_page(
     return page("history.html", **vars(context))
 
 
-def _entries(rows: Sequence[Answered], run: Run, mine: str) -> list[Entry]:
+def _last_number(rows: Sequence[Answered]) -> int | None:
+    return next((row.answer.number for row in reversed(rows) if row.placed), None)
+
+
+def _entries(rows: Sequence[Answered], run: Run, mine: str) -> list[Entry | DamagedEntry]:
     return [_entry(row, run, mine) for row in rows]
 
 
-def _entry(row: Answered, run: Run, mine: str) -> Entry:
+def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
     answer, query = row.answer, row.query
+    found = row.damage
+    if found is not None:
+        return DamagedEntry(answer.id, sound(answer, "number"), found)
+    try:
+        shown = question_view(query, run)
+    except DamagedRowError as error:
+        return DamagedEntry(answer.id, answer.number, error.message)
     return Entry(
         answer.number,
         CHOICE_TEXTS[answer.choice],
@@ -106,7 +127,7 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry:
         query.tick,
         answer.applied_tick,
         query.maturity if query.policy_stage is None else query.policy_stage,
-        question_view(query, run),
+        shown,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from parenting.server.damage import damage
 from parenting.server.tables import OperatorEvent, Run
 
 PROBABILITIES = {
@@ -25,13 +26,21 @@ class LogEntry(NamedTuple):
 
 def log_entries(events: Sequence[OperatorEvent]) -> list[LogEntry]:
     """Return everything that the operator did, the last first."""
-    return [LogEntry(_what(event), _when(event)) for event in reversed(events)]
+    return [_entry(event) for event in reversed(events)]
 
 
 def probabilities(run: Run, events: Sequence[OperatorEvent]) -> dict[str, float]:
     """Return the probabilities by name as they hold once every event has applied."""
-    changed = {event.payload["name"]: event.payload["value"] for event in events if event.kind == "change"}
+    sound = [event for event in events if damage(event) is None]
+    changed = {event.payload["name"]: event.payload["value"] for event in sound if event.kind == "change"}
     return {name: changed.get(name, run.config[name]) for name in PROBABILITIES}
+
+
+def _entry(event: OperatorEvent) -> LogEntry:
+    found = damage(event)
+    if found is not None:
+        return LogEntry(f"This entry is damaged: {found}", f"event {event.id}")
+    return LogEntry(_what(event), _when(event))
 
 
 def _what(event: OperatorEvent) -> str:

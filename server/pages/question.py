@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from parenting.drawing.query_view import QueryView, query_view
+from parenting.server.damage import reading
 from parenting.server.pages.texts import LEADS
 from parenting.server.tables import Query, Run
 
@@ -23,8 +24,13 @@ class QuestionView(QueryView):
 
 
 def question_view(query: Query, run: Run) -> QuestionView:
-    """Describe a stored query with its run's legend and level."""
-    view = query_view(query.clips, query.kind, query.maturity, run.legend, _rows(run))
+    """Describe a stored query with its run's legend and level.
+
+    Raises:
+        DamagedRowError: it cannot be read, or does not fit the run's legend.
+    """
+    with reading(query):
+        view = query_view(query.clips, query.kind, query.maturity, run.legend, _rows(run))
     return QuestionView(view.kind, view.sides, view.supervision, view.left_to_chance, query.id, query.run_id)
 
 

@@ -23,6 +23,7 @@ from parenting.server.pages.texts import run_title
 from parenting.server.reads.metrics import latest_metrics
 from parenting.server.reads.pagination import runs_before
 from parenting.server.reads.schemas import run_schemas
+from parenting.server.schemas import DamagedSchema
 from parenting.server.statuses import STATE_LABELS, RunState
 from parenting.server.tables import Metric, Run
 
@@ -61,6 +62,7 @@ class RunRow(NamedTuple):
     state: str
     harm: str  # what `deaths` are called
     deaths: float | int | None
+    damaged: str | None = None  # what of the run cannot be read; all else but its number is empty then
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,11 @@ def _rows(db: Database, listed: Sequence[Run]) -> list[RunRow]:
     """Return the rows of the list."""
     latest = latest_metrics(db, [run.id for run in listed])
     return [
-        RunRow(run, run_title(run), schema.state, metric_labels(run.legend).harm, _deaths(latest, run.id))
+        RunRow(run, f"Run {run.id}", RunState.OVER, "", None, schema.damaged)
+        if isinstance(schema, DamagedSchema)
+        else RunRow(
+            run, run_title(run), schema.state, metric_labels(run.legend).harm, _deaths(latest, run.id)
+        )
         for run, schema in zip(listed, run_schemas(db, listed), strict=True)
     ]
 

@@ -20,6 +20,10 @@ STATE_TEXTS = {
         "No action was acceptable.",
         "You refused all four moves, so the agent stands still. End this episode, and it starts again.",
     ),
+    "damaged": (
+        "This question cannot be shown.",
+        "Its stored clips are damaged. End the episode on the dashboard, and the agent goes on without it.",
+    ),
     "paused": ("The run is paused.", "No time passes for the agent until the run is resumed."),
     "no_worker": (
         "No worker is running.",

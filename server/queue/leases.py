@@ -11,8 +11,9 @@ from datetime import timedelta
 from typing import Any
 
 from sqlalchemy import and_, bindparam, case, func, or_, select
-from sqlalchemy.orm import aliased
+from sqlalchemy.orm import Session, aliased
 
+from parenting.server.damage import damage, readable
 from parenting.server.db import Database
 from parenting.server.queue.locks import lock_query
 from parenting.server.queue.queries import guidance_first
@@ -76,10 +77,29 @@ def _hold(db: Database, offer: Any, asks: dict[str, Any], seconds: float) -> Que
             return None
     with db.write(durable=False) as session:
         lock(session, asks["run_id"])
-        query: Query | None = session.scalars(offer, asks).first()
+        query = _first_readable(session, offer, asks)
         if query is not None:
             query.leased_by, query.leased_until = asks["client_id"], asks["now"] + timedelta(seconds=seconds)
         return query
+
+
+def _first_readable(session: Session, offer: Any, asks: dict[str, Any]) -> Query | None:
+    """Return the most urgent query that can be shown; damaged ones are not offered while there are others.
+
+    Raises:
+        DamagedRowError: all that could be offered is damaged, and nothing is on a page yet.
+    """
+    damaged: list[Query] = []
+    while True:
+        others = offer.where(Query.id.not_in([query.id for query in damaged])) if damaged else offer
+        query: Query | None = session.scalars(others, asks).first()
+        if query is None:
+            if damaged and "shown" not in asks:
+                readable(damaged[0])
+            return None
+        if damage(query) is None:
+            return query
+        damaged.append(query)
 
 
 # Statements that every question needs are built once.

@@ -13,6 +13,7 @@ from typing import Generic, TypeVar
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from parenting.server.columns import Damaged
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.reads.metrics import list_metrics
@@ -102,9 +103,13 @@ def metrics_after(db: Database, run_id: int, tick: int, limit: int) -> Page[Metr
 
 
 def _cut(rows: Sequence[Row], limit: int, place: Callable[[Row], int]) -> Page[Row]:
-    """Return a page of `limit` rows; one row more than that says that another page follows."""
+    """Return a page of `limit` rows; one row more than that says that another page follows.
+
+    A row whose place is damaged gives no cursor: the one before it does. SQLite sorts such rows last.
+    """
     shown = rows[:limit]
-    return Page(shown, place(shown[-1]) if len(rows) > limit else None)
+    places = [place(row) for row in shown] if len(rows) > limit else []
+    return Page(shown, next((at for at in reversed(places) if not isinstance(at, Damaged)), None))
 
 
 def _standing(session: Session, query_ids: Sequence[int]) -> dict[int, Answer]:

@@ -7,12 +7,15 @@ from datetime import datetime, timedelta
 from typing import Literal
 
 from parenting.agent.config import Config
+from parenting.server.damage import damage, readable, reading, sound
 from parenting.server.db import Database
 from parenting.server.queue.queries import Open, open_by_run, open_in
 from parenting.server.runs import find
 from parenting.server.schemas import (
     AnswerSchema,
     AskedSchema,
+    DamagedMetricSchema,
+    DamagedSchema,
     LeasedSchema,
     MetricSchema,
     OpenSchema,
@@ -42,15 +45,22 @@ def run_schema(db: Database, run_id: int) -> RunSchema:
     """
     with db.read() as session:
         run, opened = find(session, run_id), open_in(session, run_id)
-    return _run_schema(run, opened, _worker(run, db.clock(), _taken_soon(db, [run])))
+    with reading(run):
+        return _run_schema(run, opened, _worker(run, db.clock(), _taken_soon(db, [run])))
 
 
-def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema]:
-    """Return the schemas of runs."""
+def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema | DamagedSchema]:
+    """Return the schemas of runs, damaged or not."""
     with db.read() as session:
         opened = open_by_run(session, [run.id for run in runs])
-    now, soon = db.clock(), _taken_soon(db, runs)
-    return [_run_schema(run, opened[run.id], _worker(run, now, soon)) for run in runs]
+    faults = {run.id: damage(run) for run in runs}
+    now, soon = db.clock(), _taken_soon(db, [run for run in runs if faults[run.id] is None])
+    return [
+        DamagedSchema(id=run.id, damaged=fault)
+        if (fault := faults[run.id]) is not None
+        else _run_schema(run, opened[run.id], _worker(run, now, soon))
+        for run in runs
+    ]
 
 
 def query_schema(query: Query) -> QuerySchema:
@@ -63,15 +73,26 @@ def query_schema(query: Query) -> QuerySchema:
 
 def asked_schema(query: Query, answer: Answer | None) -> AskedSchema:
     """Return the schema of a query, with the answer that stands for it."""
-    names = ("number", "choice", "parent", "received", "applied_tick")
-    said = None if answer is None else AnswerSchema(**{name: getattr(answer, name) for name in names})
+    readable(query)
+    said = None if answer is None else _answer_schema(readable(answer))
     return AskedSchema(**query_schema(query).model_dump(), answer=said)
+
+
+def _answer_schema(answer: Answer) -> AnswerSchema:
+    names = ("number", "choice", "parent", "received", "applied_tick")
+    return AnswerSchema(**{name: getattr(answer, name) for name in names})
+
+
+def asked_or_damaged(query: Query, answer: Answer | None) -> AskedSchema | DamagedSchema:
+    """Return the schema of a query with its answer in a list, damaged or not."""
+    found = damage(query) or (None if answer is None else damage(answer))
+    return asked_schema(query, answer) if found is None else DamagedSchema(id=query.id, damaged=found)
 
 
 def leased_schema(db: Database, query: Query) -> LeasedSchema:
     """Return the schema of a leased query: with its world, the parent's settings and progress."""
     with db.read() as session:
-        run = find(session, query.run_id)
+        run = readable(find(session, readable(query).run_id))
         opened = open_in(session, run.id)
     config = Config.model_validate(run.config)
     world = WorldSchema(
@@ -85,9 +106,16 @@ def leased_schema(db: Database, query: Query) -> LeasedSchema:
     )
 
 
-def metric_schemas(rows: Sequence[Metric]) -> list[MetricSchema]:
-    """Return the schemas of metrics."""
-    return [MetricSchema(tick=row.tick, values=row.values) for row in rows]
+def metric_schemas(rows: Sequence[Metric]) -> list[MetricSchema | DamagedMetricSchema]:
+    """Return the schemas of metrics, damaged or not."""
+    return [_metric_schema(row) for row in rows]
+
+
+def _metric_schema(row: Metric) -> MetricSchema | DamagedMetricSchema:
+    found = damage(row)
+    if found is not None:
+        return DamagedMetricSchema(tick=sound(row, "tick"), damaged=found)
+    return MetricSchema(tick=row.tick, values=row.values)
 
 
 def _run_schema(run: Run, opened: Open, worker: Sign) -> RunSchema:

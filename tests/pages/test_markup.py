@@ -86,7 +86,7 @@ def test_a_static_file_is_short(path: Path) -> None:
 
 def test_script_and_server_know_the_same_states() -> None:
     """The state of a run comes from the server. A page adds what only it can know, and has words for each."""
-    own = {"elsewhere", "offline"}
+    own = {"elsewhere", "offline", "damaged"}
     assert {*RunState} | own == set(STATE_TEXTS)
     script = (WEB / "static/parent.js").read_text()
     named = set(re.findall(r'wait\("(\w+)"\)|state = "(\w+)"|\? "(\w+)" : ', script))

@@ -117,7 +117,7 @@ const put = (name, value) => {
 
 function add(rows) {
   for (const row of rows) {
-    if (row.tick <= last) continue;
+    if (row.damaged || row.tick <= last) continue;
     ticks.push(row.tick);
     last = row.tick;
     for (const name in values) values[name].push(row.values[name] ?? null);

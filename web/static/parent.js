@@ -33,6 +33,7 @@ async function ask(shown = [], seconds = 0, signal = undefined) {
   const body = new URLSearchParams({ client_id: client, wait: seconds });
   for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
   const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body, signal });
+  if (reply.status === 500) throw Object.assign(new Error(reply.statusText), { damaged: true });
   if (!reply.ok) throw new Error(reply.statusText);
   if (reply.status === 204) return null;
   const holder = document.createElement("template");
@@ -55,7 +56,10 @@ async function next(seconds = 0) {
     } while (!form && again && !current);
     if (form && !current) show(form);
     else if (!current) wait(state === "question" ? "elsewhere" : state);
-  } catch { wait("offline"); } finally { asking = false; }
+  } catch (error) {
+    if (error.damaged) wait("damaged");
+    else wait("offline");
+  } finally { asking = false; }
 }
 
 // The question after this one: its request lies at the server while somebody thinks, so that its reply leaves as soon as

@@ -1,0 +1,143 @@
+"""Find out whether a stored row can be read: its columns by their types, its JSON by its shape.
+
+A list shows a damaged row by the sentence of `damage`; whoever needs the row calls `readable`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+from sqlalchemy import inspect
+
+from parenting.agent.config import Config
+from parenting.agent.events import Event
+from parenting.server.columns import UNREADABLE, Damaged
+from parenting.server.errors import DamagedRowError
+from parenting.server.schemas import ClipSchema
+from parenting.server.tables import Metric, OperatorEvent, Query, Run, Table
+
+Row = TypeVar("Row", bound=Table)
+REMEDY = "The rest of the database goes on; a backup of before the damage holds the row."
+
+
+class Brief(NamedTuple):
+    """The brief of a run's world."""
+
+    goal: str
+    danger: str
+
+
+_EVENT: TypeAdapter[Any] = TypeAdapter(Event)
+_GLYPHS: TypeAdapter[dict[str, str]] = TypeAdapter(dict[str, str])
+_NUMBERS: TypeAdapter[Any] = TypeAdapter(dict[str, int | float | None])
+
+
+def damage(row: Table) -> str | None:
+    """Say which columns of a row cannot be read, and why; None if the row is sound."""
+    found = list(_columns(row)) or list(_shapes(row))
+    return "; ".join(found) or None
+
+
+def readable(row: Row) -> Row:
+    """Return a row that can be read.
+
+    Raises:
+        DamagedRowError: it cannot; the sentence names the columns.
+    """
+    found = damage(row)
+    if found is not None:
+        raise DamagedRowError(f"{_name(row)} is damaged: {found}. {REMEDY}")
+    return row
+
+
+def sound(row: Table, name: str) -> Any:
+    """Return a value of a row; None if it is damaged."""
+    value = getattr(row, name)
+    return None if isinstance(value, Damaged) else value
+
+
+@contextmanager
+def reading(row: Table) -> Iterator[None]:
+    """Hold what is done with a row against what the row holds.
+
+    Raises:
+        DamagedRowError: the row is damaged, or its content does not fit together, such as a clip with glyphs
+            that its run's legend lacks.
+    """
+    readable(row)
+    try:
+        yield
+    except UNREADABLE as error:
+        raise DamagedRowError(f"{_name(row)} is damaged: {_said(error)}. {REMEDY}") from error
+
+
+def _columns(row: Table) -> Iterator[str]:
+    state = inspect(row)
+    for column in row.__table__.columns:
+        value = state.dict.get(column.name)
+        place = f"{row.__tablename__}.{column.name}"
+        if isinstance(value, Damaged):
+            yield f"{place} {value.reason}"
+        elif value is None and not column.nullable and column.name in state.dict:
+            yield f"{place} is missing"
+
+
+def _shapes(row: Table) -> Iterator[str]:
+    column, check = SHAPES.get(type(row), ("", None))
+    try:
+        if check is not None:
+            check(row)
+    except UNREADABLE as error:
+        yield f"{column} has not the shape that it was written with ({_said(error)})"
+
+
+def _run(run: Run) -> None:
+    Config.model_validate(run.config)
+    for name in ALWAYS_SET:
+        run.config[name]  # what is absent would silently become the default
+    _GLYPHS.validate_python(run.legend, strict=True)
+    Brief(**run.brief)
+    if not run.level_text.strip():
+        raise ValueError("the level is empty")
+
+
+def _query(query: Query) -> None:
+    for side in ("left", "right"):
+        clip = ClipSchema.model_validate(query.clips[side])
+        if (len(clip.actions), len(clip.frames)) != (clip.length, clip.length + 1):
+            raise ValueError(f"{side}: its length is not that of its actions and frames")
+
+
+def _metric(metric: Metric) -> None:
+    _NUMBERS.validate_python(metric.values, strict=True)
+
+
+def _event(event: OperatorEvent) -> None:
+    _EVENT.validate_python({"kind": event.kind, **event.payload})
+
+
+ALWAYS_SET = ("stages", "p_guid", "p_rec", "p_pref", "p_train")
+SHAPES: dict[type[Table], tuple[str, Callable[[Any], None]]] = {
+    Run: ("its config, legend, brief or level", _run),
+    Query: ("query.clips", _query),
+    Metric: ("metric.values", _metric),
+    OperatorEvent: ("event.payload", _event),
+}
+
+
+def _said(error: Exception) -> str:
+    if isinstance(error, ValidationError):
+        first = error.errors(include_input=False, include_url=False)[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return f"{type(error).__name__}: {error}"
+
+
+def _name(row: Table) -> str:
+    key = inspect(row).identity
+    return f"{NAMES.get(type(row), row.__tablename__.capitalize())} {key[-1] if key else ''}".rstrip()
+
+
+NAMES: dict[type[Table], str] = {Run: "Run", Query: "Question", OperatorEvent: "Operator event"}
