@@ -37,8 +37,8 @@ class Answered:
         return not isinstance(self.answer.number, Damaged)
 
 
-def after(db: Database, run_id: int, number: int = 0, limit: int = BATCH) -> Sequence[Answered]:
-    """Return the answers of a run after the one of this number, oldest first, at most `limit`.
+def after(db: Database, run_id: int, number: int | None = None, limit: int = BATCH) -> Sequence[Answered]:
+    """Return the answers of a run after the one of this number or all, oldest first, at most `limit`.
 
     Raises:
         NotFound: there is no such run.
@@ -46,7 +46,9 @@ def after(db: Database, run_id: int, number: int = 0, limit: int = BATCH) -> Seq
     with db.read() as session:
         find(session, run_id)
         rows = select(Answer, Query).outerjoin(Query, Answer.query_id == Query.id)
-        rows = rows.where(Answer.run_id == run_id, Answer.number > number).order_by(Answer.number)
+        rows = rows.where(Answer.run_id == run_id).order_by(Answer.number)
+        if number is not None:
+            rows = rows.where(Answer.number > number)
         return [_answered(*row) for row in session.execute(rows.limit(limit))]
 
 
@@ -96,8 +98,9 @@ def every(db: Database, run_id: int, batch: int = BATCH) -> Iterator[Answered]:
     with db.read() as session:
         stored = find(session, run_id).answers
     last = EVERY if isinstance(stored, Damaged) else stored
-    number, misplaced = 0, set()
-    while number < last:
+    number: int | None = None
+    misplaced = set()
+    while number is None or number < last:
         rows = after(db, run_id, number, batch)
         placed = [row for row in rows if row.placed and row.answer.number <= last]
         yield from placed

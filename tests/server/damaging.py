@@ -68,7 +68,7 @@ def columns() -> Iterator[Column[Any]]:
 
 
 def garbage(column: Column[Any]) -> tuple[Any, ...]:
-    """What a bit flip, another program or a hand could have left in a column."""
+    """Return values that a bit flip, another program or a hand could have left in a column."""
     return GARBAGE + (JSON_GARBAGE if isinstance(column.type, Json) else ())
 
 
