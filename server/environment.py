@@ -1,6 +1,6 @@
 """The settings' file `.env` and the names of settings in the environment: what cannot be read or is misspelt.
 
-A file that is no UTF-8 text is refused with a sentence. A name that is no setting is not an error, because
+A file that is not UTF-8 text is refused with a sentence. A name that is not a setting is not an error, because
 other programs share the environment, but it is told with the nearest setting: it may be a slip.
 """
 
@@ -36,7 +36,7 @@ def read(file: Path) -> str:
     """Return the text of a file of settings, with or without a byte order mark; empty where there is none.
 
     Raises:
-        SetupError: the file cannot be read, or is no text in UTF-8.
+        SetupError: the file cannot be read, or is not text in UTF-8.
     """
     if not file.is_file():
         return ""  # a folder of this name may be somebody's virtual environment
@@ -46,7 +46,7 @@ def read(file: Path) -> str:
         raise SetupError(f"{file.absolute()} cannot be read: {error.strerror}.") from None
     if stored.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in stored:
         raise SetupError(
-            f"{file.absolute()} cannot be read: it is no UTF-8 text, but looks like UTF-16. "
+            f"{file.absolute()} cannot be read: it is not UTF-8 text, but looks like UTF-16. "
             f"{SAVE_AGAIN} UTF-16 -t UTF-8"
         )
     try:
@@ -54,13 +54,13 @@ def read(file: Path) -> str:
     except UnicodeDecodeError as error:
         line, byte = stored.count(b"\n", 0, error.start) + 1, stored[error.start]
         raise SetupError(
-            f"{file.absolute()} cannot be read: line {line} is no UTF-8 text (byte 0x{byte:02x}). "
+            f"{file.absolute()} cannot be read: line {line} is not UTF-8 text (byte 0x{byte:02x}). "
             f"{SAVE_AGAIN} LATIN1 -t UTF-8"
         ) from None
 
 
 def warnings(environment: Iterable[str], file: Path, settings: Iterable[str]) -> list[str]:
-    """Return a sentence for each name that is no setting, but looks like one.
+    """Return a sentence for each name that is not a setting, but looks like one.
 
     Args:
         environment: The names of the environment's variables.
@@ -86,4 +86,4 @@ def _warning(name: str, where: str, known: Sequence[str]) -> str | None:
     if not near and not ours:
         return None
     hint = f" Did you mean {near[0]}?" if near else " docs/commands.md lists the settings."
-    return f"Warning: {name} {where} is no setting and is ignored.{hint}"
+    return f"Warning: {name} {where} is not a setting and is ignored.{hint}"

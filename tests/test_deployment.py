@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from parenting.server.app import create_app
-from parenting.server.db import Database, connect, sqlite_module
+from parenting.server.db import Database, connect
 from parenting.server.migrate import require_current
 from parenting.server.new_run import NewRun, start
 from parenting.server.runs import list_runs, set_status
@@ -57,37 +57,29 @@ def writing(db: Database) -> Iterator[None]:
         writer.join()
 
 
-def back_up(folder: Path) -> subprocess.CompletedProcess[str]:
-    """The documented command, in the data folder, with the python that has Parenting."""
-    (command,) = re.findall(r"^ {4}(python -c .*VACUUM INTO.*)$", TEXT, re.MULTILINE)
+def documented(words: str, folder: Path, file: str) -> subprocess.CompletedProcess[str]:
+    """Run the documented command that begins so, on the data in the folder, with another file."""
+    (command,) = re.findall(rf"^ {{4}}({words} [^#\n]*?) +#", TEXT, re.MULTILINE)
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
-    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "PARENTING_DATA": str(folder)}
+    command = command.replace("/media/disk/monday.db", file)
     return subprocess.run(["sh", "-c", command], cwd=folder, env=environment, capture_output=True, text=True)
 
 
-def test_backup_is_whole_while_others_write(db: Database, tmp_path: Path) -> None:
+def test_its_commands_back_up_while_others_write_and_bring_it_back(db: Database, tmp_path: Path) -> None:
     with writing(db):
-        done = back_up(tmp_path)
+        done = documented("parenting backup", tmp_path, "monday.db")
     assert done.returncode == 0, done.stderr
-    copy = tmp_path / "backup.db"
-    with sqlite_module().connect(str(copy)) as found:
-        assert found.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
-    found.close()
-    again = connect(Settings(data=tmp_path, database_url=f"sqlite:///{copy}"))
+    start(db, NewRun(world="unsafe-exploration", name="third"))
+    refused = documented("parenting restore", tmp_path, "monday.db")
+    assert (refused.returncode, "in use" in refused.stderr) == (2, True), refused.stderr
+    db.close()
+    done = documented("parenting restore", tmp_path, "monday.db")
+    assert done.returncode == 0, done.stderr
+    again = connect(Settings(data=tmp_path, database_url=None))
     require_current(again)
     assert [run.name for run in list_runs(again)] == ["second", "first"]
     again.close()
-
-
-def test_backup_overwrites_nothing(db: Database, tmp_path: Path) -> None:
-    (tmp_path / "backup.db").write_text("an earlier one")
-    assert back_up(tmp_path).returncode != 0
-    assert (tmp_path / "backup.db").read_text() == "an earlier one"
-
-
-def test_backup_of_nothing_fails_and_makes_nothing(tmp_path: Path) -> None:
-    assert back_up(tmp_path).returncode != 0
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_unit_is_one(tmp_path: Path) -> None:

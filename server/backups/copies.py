@@ -44,7 +44,7 @@ def copy(source: Path, target: Path) -> Contents:
     The copy has no log beside it. It is not on the disk until `target` is synced.
 
     Raises:
-        SetupError: `source` is no database, or one of the two cannot be used.
+        SetupError: `source` is not a database, or one of the two cannot be used.
     """
     # Without a log beside it nobody has it open, and immutable lets SQLite read it from a read-only folder.
     mode = "mode=rw" if Path(f"{source}-wal").exists() else "immutable=1"
@@ -61,7 +61,7 @@ def check(file: Path) -> Contents:
     """Read a database that nobody has open from end to end, and return its contents.
 
     Raises:
-        SetupError: it is no database, or is damaged.
+        SetupError: it is not a database, or is damaged.
     """
     with _connected(file, "immutable=1") as database:
         faults = [row[0] for row in database.execute("PRAGMA integrity_check(3)")]
@@ -73,7 +73,7 @@ def check(file: Path) -> Contents:
 
 
 def require_database(file: Path) -> None:
-    """Refuse a file that is no SQLite database.
+    """Refuse a file that is not an SQLite database.
 
     Raises:
         SetupError: there is none, it cannot be read, or it is something else.
@@ -86,7 +86,9 @@ def require_database(file: Path) -> None:
     if begins[:5] == b"PGDMP":
         raise SetupError(f"{file} is a dump of PostgreSQL; PARENTING_DATABASE_URL names no such database.")
     if begins != HEAD:
-        raise SetupError(f"{file} is no SQLite database. Name a file that `parenting backup` has written.")
+        raise SetupError(
+            f"{file} is not an SQLite database. Name a file that `parenting backup` has written."
+        )
 
 
 def _contents(database: Any) -> Contents:

@@ -37,7 +37,7 @@ def check(file: Path) -> int:
     """Read the list of a dump, and return the number of tables whose data it has.
 
     Raises:
-        SetupError: it is no dump, is cut off, or lacks a table of ours.
+        SetupError: it is not a dump, is cut off, or lacks a table of ours.
     """
     listed = _run(None, "pg_restore", "--list", str(file)).splitlines()
     tables = {line.split()[6] for line in listed if " TABLE DATA " in line and len(line.split()) > 6}

@@ -39,7 +39,7 @@ def require_stopped(data: Path) -> None:
 def alone(file: Path) -> Iterator[None]:
     """Hold a SQLite database for this process alone, its log written back into the file.
 
-    A file that is no database, or too damaged to be locked, is let through.
+    A file that is not a database, or too damaged to be locked, is let through.
 
     Raises:
         SetupError: another program has it open.

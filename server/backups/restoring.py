@@ -24,7 +24,7 @@ BESIDE = ("-wal", "-shm", "-journal")
 
 @dataclass(frozen=True)
 class Restored:
-    """What a restore has done."""
+    """The outcome of a restore."""
 
     database: str
     holds: str

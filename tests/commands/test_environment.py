@@ -1,4 +1,4 @@
-"""A file of settings that is no text ends with a sentence; a misspelt setting is told; no output breaks."""
+"""A file of settings that is not text ends with a sentence; a misspelt setting is told; no output breaks."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_every_command_refuses_it(folder: Path, command: str) -> None:
     (folder / ".env").write_bytes(NO_UTF8["latin-1"])
     said = CliRunner().invoke(app, [command, *ARGUMENTS.get(command, [])])
     assert said.exit_code == 2
-    assert said.stderr.startswith(f"{folder}/.env cannot be read: line 1 is no UTF-8 text (byte 0xfc).")
+    assert said.stderr.startswith(f"{folder}/.env cannot be read: line 1 is not UTF-8 text (byte 0xfc).")
     assert said.stderr.count("\n") == 1
 
 
@@ -84,7 +84,7 @@ def test_a_name_that_is_no_setting_is_told_wherever_it_stands(
     folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, meant: str
 ) -> None:
     (folder / ".env").write_text(f"{name}=secret\n", encoding="utf-8")
-    end = f" is no setting and is ignored.{meant}\n"
+    end = f" is not a setting and is ignored.{meant}\n"
     assert CliRunner().invoke(app, ["worlds"]).stderr == f"Warning: {name} in {folder}/.env{end}"
     (folder / ".env").unlink()
     monkeypatch.setenv(name, "secret")

@@ -143,7 +143,7 @@ class Free:
 
 
 def test_without_a_database_there_is_nothing_to_copy(settings: Settings) -> None:
-    with pytest.raises(SetupError, match="There is no database at"):
+    with pytest.raises(SetupError, match="There is not a database at"):
         back_up(settings)
     assert not (settings.data / "parenting.db").exists()
 
@@ -153,6 +153,6 @@ def test_a_damaged_database_is_a_sentence(settings: Settings, db: Database, size
     db.close()
     file = settings.data / "parenting.db"
     os.truncate(file, size)
-    with pytest.raises(SetupError, match=r"is no SQLite database|cannot be copied|is damaged"):
+    with pytest.raises(SetupError, match=r"is not an SQLite database|cannot be copied|is damaged"):
         back_up(settings)
     assert list(settings.data.glob("backups/*")) == []

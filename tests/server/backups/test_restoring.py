@@ -121,7 +121,7 @@ def test_a_damaged_backup_changes_nothing(
     settings: Settings, copy: Path, opened: Callable[[], Database], size: int
 ) -> None:
     os.truncate(copy, size)
-    with pytest.raises(SetupError, match=r"is no SQLite database|cannot be copied|is damaged"):
+    with pytest.raises(SetupError, match=r"is not an SQLite database|cannot be copied|is damaged"):
         restore(settings, copy, replace=True)
     assert worlds(opened()) == ["reward-hacking", "unsafe-exploration"]
     assert list(settings.data.glob("**/*.part")) == []
