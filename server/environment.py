@@ -1,6 +1,6 @@
 """The settings' file `.env` and the names of settings in the environment: what cannot be read or is misspelt.
 
-A file that is not UTF-8 text is refused with a sentence. A name that is not a setting is not an error, because
+A file that is not UTF-8 text is refused with a sentence. A name that is not a setting is not an error, since
 other programs share the environment, but it is told with the nearest setting: it may be a slip.
 """
 

@@ -86,9 +86,7 @@ def require_database(file: Path) -> None:
     if begins[:5] == b"PGDMP":
         raise SetupError(f"{file} is a dump of PostgreSQL; PARENTING_DATABASE_URL names no such database.")
     if begins != HEAD:
-        raise SetupError(
-            f"{file} is not an SQLite database. Name a file that `parenting backup` has written."
-        )
+        raise SetupError(f"{file} is not an SQLite database. Name a file that `parenting backup` wrote.")
 
 
 def _contents(database: Any) -> Contents:

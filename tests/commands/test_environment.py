@@ -29,6 +29,7 @@ ARGUMENTS = {
     "answer": ["--run", "1"],
     "export": ["1"],
     "replay": ["1"],
+    "restore": ["monday.db"],
 }
 
 

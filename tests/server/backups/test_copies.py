@@ -143,7 +143,7 @@ class Free:
 
 
 def test_without_a_database_there_is_nothing_to_copy(settings: Settings) -> None:
-    with pytest.raises(SetupError, match="There is not a database at"):
+    with pytest.raises(SetupError, match="There is no database at"):
         back_up(settings)
     assert not (settings.data / "parenting.db").exists()
 
