@@ -40,7 +40,7 @@ from typing import Any, NamedTuple
 import httpx2
 from playwright.sync_api import Browser, Page
 
-from parenting.server.db import PRAGMAS, sqlite_module
+from parenting.server.store.sqlite import PRAGMAS, sqlite_module
 from tests.simulated_person import chromium, up
 
 WORLDS = ("unsafe-exploration", "side-effects")

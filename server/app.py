@@ -18,13 +18,13 @@ from parenting.server.api.responses import error_responses
 from parenting.server.db import Database, connect
 from parenting.server.deps import Db
 from parenting.server.errors import (
-    BusyError,
     InvalidFieldsError,
     MethodNotAllowed,
     NotFound,
     NotReadyError,
     ServerError,
     SetupError,
+    StoreError,
     TooLargeError,
 )
 from parenting.server.migrate import require_current
@@ -109,7 +109,7 @@ def _add_errors(app: FastAPI) -> None:
     def refused(request: Request, error: ServerError) -> Response:
         if error.status >= 500:
             log.warning("refused", path=request.url.path, code=error.code)
-        headers = {"Retry-After": "1"} if isinstance(error, BusyError) else None
+        headers = {"Retry-After": "1"} if isinstance(error, StoreError) else None
         return _reply(request, error, headers)
 
     @app.exception_handler(RequestValidationError)

@@ -21,7 +21,7 @@ class ServerError(Exception):
     code = "internal"
 
     def __init__(self, message: str | None = None, *, field: str | None = None) -> None:
-        self.message = message or (type(self).__doc__ or "").strip()
+        self.message = message or " ".join((type(self).__doc__ or "").split())
         self.field = field
         super().__init__(self.message)
 
@@ -81,16 +81,43 @@ class TooLargeError(ServerError):
     status, code = 413, "too_large"
 
 
-class BusyError(ServerError):
+class StoreError(ServerError):
+    """The database cannot be used at the moment; nothing was stored. Send the same again."""
+
+    status, code = 503, "store"
+
+
+class BusyError(StoreError):
     """The database was busy for five seconds; nothing was stored. Send the same again."""
 
     status, code = 503, "busy"
 
 
-class DiskFullError(ServerError):
+class RefusedError(StoreError):
+    """The database cannot be written: it is read-only, its quota is used up or its disk has an error.
+
+    Nothing was stored. Remove the cause and send the same again.
+    """
+
+    status, code = 507, "store_refused"
+
+
+class DiskFullError(RefusedError):
     """The disk is full; nothing was stored. Free some space and send the same again."""
 
     status, code = 507, "disk_full"
+
+
+class GoneError(StoreError):
+    """The database cannot be reached; nothing was stored. Send the same again once it is back."""
+
+    status, code = 503, "store_gone"
+
+
+class DamagedError(StoreError):
+    """The database is damaged; nothing was stored. Restore a backup: parenting restore."""
+
+    status, code = 503, "store_damaged"
 
 
 class DamagedRowError(ServerError, DontWrapMixin):

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from parenting.server.db import BUSY_SECONDS, sqlite_module
 from parenting.server.errors import SetupError
+from parenting.server.store.sqlite import BUSY_SECONDS, sqlite_module
 
 HEAD = b"SQLite format 3\0"
 TABLES = ("run", "query", "answer", "event", "metric", "checkpoint", "weights")

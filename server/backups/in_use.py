@@ -14,9 +14,9 @@ from typing import Any
 from sqlalchemy import URL, create_engine, text
 from sqlalchemy.exc import DBAPIError
 
-from parenting.server.db import sqlite_module
 from parenting.server.errors import SetupError
 from parenting.server.notify import Notifier
+from parenting.server.store.sqlite import sqlite_module
 
 CHANNELS = {"web": "pages are served", "worker": "a worker is running"}
 PATIENCE = 0.5

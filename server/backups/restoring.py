@@ -14,10 +14,11 @@ from parenting.server.backups import copies, dumps
 from parenting.server.backups.in_use import alone, require_stopped, require_unconnected
 from parenting.server.backups.making import FOLDER, back_up, stamp
 from parenting.server.backups.whole import require_room, size, whole
-from parenting.server.db import connect, make_folder, utc_now
+from parenting.server.db import connect, utc_now
 from parenting.server.errors import SetupError
 from parenting.server.migrate import known_revisions, newest, revision, upgrade
 from parenting.server.settings import Settings
+from parenting.server.store.sqlite import make_folder
 
 BESIDE = ("-wal", "-shm", "-journal")
 

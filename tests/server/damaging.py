@@ -13,11 +13,12 @@ from sqlalchemy import Column
 from parenting.server import metrics, operator_events
 from parenting.server.checkpoints import save_checkpoint
 from parenting.server.columns import Checked, Json
-from parenting.server.db import Database, sqlite_module
+from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query, take_answer, take_operator_events
 from parenting.server.runs import claim, report_progress
+from parenting.server.store.sqlite import sqlite_module
 from parenting.server.tables import Table
 from parenting.server.weights import put as put_weights
 from parenting.server.workers import sign

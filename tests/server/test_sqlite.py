@@ -15,7 +15,7 @@ from sqlalchemy.exc import IntegrityError, OperationalError
 
 from parenting.server import db as database
 from parenting.server.checkpoints import save_checkpoint
-from parenting.server.db import Database, connect, sqlite_module
+from parenting.server.db import Database, connect
 from parenting.server.errors import BusyError, DiskFullError, SetupError
 from parenting.server.operator_events import add_operator_event
 from parenting.server.queue.answers import answer
@@ -23,6 +23,8 @@ from parenting.server.queue.leases import lease
 from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.runs import Claim, report_progress
 from parenting.server.settings import Settings
+from parenting.server.store import sqlite
+from parenting.server.store.sqlite import sqlite_module
 from parenting.server.tables import Answer, Query, Run
 from tests.tree import ROOT
 
@@ -114,7 +116,7 @@ def test_write_lock_is_held_before_the_first_statement(db: Database, settings: S
 def test_database_that_stays_locked_is_busy(
     db: Database, settings: Settings, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(database.PRAGMAS, "busy_timeout", "50")
+    monkeypatch.setitem(sqlite.PRAGMAS, "busy_timeout", "50")
     other = connect(settings)
     with db.write(), pytest.raises(BusyError), other.write():
         pass
@@ -144,7 +146,7 @@ def test_other_faults_are_not_hidden(db: Database) -> None:
 
 def test_old_sqlite_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     old = SimpleNamespace(sqlite_version_info=(3, 51, 2), sqlite_version="3.51.2")
-    monkeypatch.setattr("parenting.server.db.importlib.import_module", lambda _name: old)
+    monkeypatch.setattr("parenting.server.store.sqlite.importlib.import_module", lambda _name: old)
     with pytest.raises(SetupError, match=r"SQLite 3\.51\.2 can corrupt .* pip install 'pysqlite3>=0\.6\.1'"):
         sqlite_module()
 

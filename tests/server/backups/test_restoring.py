@@ -10,7 +10,7 @@ import pytest
 
 from parenting.server.backups.making import back_up
 from parenting.server.backups.restoring import restore
-from parenting.server.db import Database, connect, sqlite_module
+from parenting.server.db import Database, connect
 from parenting.server.errors import SetupError
 from parenting.server.identity import database_id
 from parenting.server.migrate import downgrade, require_current, upgrade
@@ -18,6 +18,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.notify import Notifier
 from parenting.server.runs import list_runs
 from parenting.server.settings import Settings
+from parenting.server.store.sqlite import sqlite_module
 
 
 @pytest.fixture

@@ -1,0 +1,120 @@
+"""What a store says, and which of the four kinds of refusal callers see (D2, D4, E12)."""
+
+from pathlib import Path
+
+import psycopg
+import pytest
+from sqlalchemy import text
+from sqlalchemy.exc import IntegrityError, OperationalError
+from sqlalchemy.exc import TimeoutError as NoConnectionError
+
+from parenting.server.db import Database, connect
+from parenting.server.errors import (
+    BusyError,
+    DamagedError,
+    DiskFullError,
+    GoneError,
+    RefusedError,
+    StoreError,
+)
+from parenting.server.settings import Settings
+from parenting.server.store.refusals import refusal, translated
+from parenting.server.store.sqlite import sqlite_module
+
+
+def sqlite_says(name: str) -> OperationalError:
+    said = sqlite_module().OperationalError("refused")
+    said.sqlite_errorname = name
+    return OperationalError("INSERT", {}, said)
+
+
+def postgresql_says(state: str | None) -> OperationalError:
+    kind = psycopg.OperationalError if state is None else psycopg.errors.lookup(state)
+    return OperationalError("INSERT", {}, kind("refused"))
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("SQLITE_BUSY", BusyError),
+        ("SQLITE_BUSY_SNAPSHOT", BusyError),
+        ("SQLITE_LOCKED_SHAREDCACHE", BusyError),
+        ("SQLITE_FULL", DiskFullError),
+        ("SQLITE_IOERR_WRITE", RefusedError),
+        ("SQLITE_IOERR_FSYNC", RefusedError),
+        ("SQLITE_READONLY", RefusedError),
+        ("SQLITE_READONLY_DIRECTORY", RefusedError),
+        ("SQLITE_READONLY_DBMOVED", GoneError),
+        ("SQLITE_CANTOPEN", GoneError),
+        ("SQLITE_CORRUPT_INDEX", DamagedError),
+        ("SQLITE_NOTADB", DamagedError),
+    ],
+)
+def test_each_result_code_of_sqlite_has_its_kind(name: str, kind: type[StoreError]) -> None:
+    assert refusal(sqlite_says(name)) is kind
+
+
+@pytest.mark.parametrize(
+    ("state", "kind"),
+    [
+        (None, GoneError),  # connection refused, or broken
+        ("57P01", GoneError),  # the administrator shuts down
+        ("57P03", GoneError),  # it starts
+        ("08006", GoneError),
+        ("40001", BusyError),
+        ("40P01", BusyError),
+        ("55P03", BusyError),
+        ("57014", BusyError),
+        ("53300", BusyError),
+        ("53100", DiskFullError),
+        ("25006", RefusedError),
+        ("58030", RefusedError),
+        ("XX001", DamagedError),
+    ],
+)
+def test_each_state_of_postgresql_has_its_kind(state: str | None, kind: type[StoreError]) -> None:
+    assert refusal(postgresql_says(state)) is kind
+
+
+def test_no_connection_free_in_time_is_busy() -> None:
+    assert refusal(NoConnectionError("QueuePool limit")) is BusyError
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        sqlite_says("SQLITE_ERROR"),
+        postgresql_says("42601"),
+        IntegrityError("INSERT", {}, psycopg.errors.UniqueViolation("twice")),
+        ValueError("of somebody else"),
+    ],
+)
+def test_what_is_not_a_refusal_passes(error: Exception) -> None:
+    with pytest.raises(type(error)), translated():
+        raise error
+
+
+def test_file_that_is_not_a_database_is_damaged(tmp_path: Path) -> None:
+    (tmp_path / "parenting.db").write_bytes(b"This is a letter. " * 400)
+    database = connect(Settings(data=tmp_path, database_url=None))
+    with pytest.raises(DamagedError), database.read() as session:
+        session.execute(text("SELECT 1 FROM run"))
+    database.close()
+
+
+def test_folder_in_place_of_the_file_is_gone(tmp_path: Path) -> None:
+    (tmp_path / "parenting.db").mkdir()
+    database = connect(Settings(data=tmp_path, database_url=None))
+    with pytest.raises(GoneError), database.read() as session:
+        session.execute(text("SELECT 1"))
+    database.close()
+
+
+def test_write_of_a_database_opened_for_reading_is_refused(db: Database) -> None:
+    def spoil() -> None:
+        with db.write() as session:
+            session.execute(text("PRAGMA query_only = on"))
+            session.execute(text("DELETE FROM run"))
+
+    with pytest.raises(RefusedError):
+        spoil()
