@@ -45,6 +45,12 @@ class Conflict(ServerError):
     status, code = 409, "conflict"
 
 
+class ElsewhereError(ServerError):
+    """This answer is meant for another database, run or question; it was not stored here. Keep it."""
+
+    status, code = 410, "elsewhere"
+
+
 class Forbidden(ServerError):
     """This request came from another site and was refused."""
 

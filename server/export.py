@@ -13,6 +13,7 @@ from typing import Any
 
 from parenting.server.damage import damage, sound
 from parenting.server.db import Database
+from parenting.server.identity import database_id
 from parenting.server.reads.answers import Answered, every, number_of
 from parenting.server.runs import stored_run
 from parenting.server.tables import Run
@@ -34,8 +35,8 @@ def rows(db: Database, run_id: int) -> Iterator[dict[str, Any]]:
     Raises:
         NotFound: the run does not exist; raised here, not at the first row.
     """
-    run = stored_run(db, run_id)
-    return (_row(db, run, answered) for answered in every(db, run_id))
+    run, database = stored_run(db, run_id), database_id(db)
+    return (_row(db, database, run, answered) for answered in every(db, run_id))
 
 
 def lines(db: Database, run_id: int) -> Iterator[str]:
@@ -47,7 +48,7 @@ def lines(db: Database, run_id: int) -> Iterator[str]:
     return (json.dumps(row, separators=(",", ":")) + "\n" for row in rows(db, run_id))
 
 
-def _row(db: Database, run: Run, answered: Answered) -> dict[str, Any]:
+def _row(db: Database, database: str, run: Run, answered: Answered) -> dict[str, Any]:
     answer, query = answered.answer, answered.query
     world, level = sound(run, "world"), sound(run, "level")
     found = answered.damage or ("the run's world or level" if None in (world, level) else None)
@@ -73,6 +74,9 @@ def _row(db: Database, run: Run, answered: Answered) -> dict[str, Any]:
         "received": _time(sound(answer, "received")),
         "standing": sound(answer, "standing"),
         "supersedes": None if supersedes is None else number_of(db, supersedes),
+        "database": database,  # the names that mean the same everywhere
+        "run_public_id": sound(run, "public_id"),
+        "query_public_id": sound(query, "public_id"),
     }
     return row if found is None else {**row, "damaged": found}
 

@@ -41,6 +41,11 @@ class RunSchema(Schema):
     """A run as it is now."""
 
     id: int
+    """Its number, a short name within this database."""
+    public_id: str
+    """Its name everywhere: random, and never given again."""
+    database: str
+    """The UUID of the database that it is in."""
     created: datetime
     name: str | None
     world: str
@@ -117,6 +122,10 @@ class QuerySchema(Schema):
 
     id: int
     run: int
+    database: str
+    """The UUID of the database; an answer that names it is stored nowhere else."""
+    run_public_id: str
+    public_id: str
     tick: int
     """The tick at which the agent asked."""
     kind: Kind
@@ -175,6 +184,9 @@ class StoredSchema(Schema):
     """The number of the answer within its run, from 1."""
     choice: Choice
     received: datetime
+    database: str
+    run_public_id: str
+    query_public_id: str
 
 
 class AnswerSchema(Schema):

@@ -188,7 +188,7 @@ def _tell(subscription: Subscription) -> None:
 def _look(db: Database, run_id: int) -> tuple[dict[str, Any], dict[str, Any] | None]:
     """The run, and the most urgent open question, in few words."""
     query = waiting(db, run_id)
-    question = None if query is None else {"id": query.id, "kind": query.kind}
+    question = None if query is None else {"id": query.id, "public_id": query.public_id, "kind": query.kind}
     return run_schema(db, run_id).model_dump(mode="json"), question
 
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from fastapi import Path, Query
+from fastapi import Query
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from parenting.server import schemas
+from parenting.server.api.names import DatabaseId, PublicId
 from parenting.server.new_run import LARGEST_INT, Goal, Pace
 from parenting.server.schemas import By
 
-RunId = Annotated[int, Path(ge=1, le=LARGEST_INT, description="The run's id.", examples=[1])]
-QueryId = Annotated[int, Path(ge=1, le=LARGEST_INT, description="The question's id.", examples=[7])]
 After = Annotated[
     int | None,
     Query(ge=-1, le=LARGEST_INT, description="Send metrics too: those of the ticks after this one."),
@@ -41,6 +40,9 @@ class AnswerBody(Strict):
     choice: Choice = Field(description="left and right are the clips; neither: both are unacceptable.")
     client_id: ClientId = Field(description="The name under which the question was leased.")
     parent: By = Field("human", description="Who decided, a person or a script; stored with the answer.")
+    database: DatabaseId | None = Field(None, description="The `database` that came with the question.")
+    run: PublicId | None = Field(None, description="The `run_public_id` that came with it.")
+    question: PublicId | None = Field(None, description="The `public_id` of the question.")
 
 
 class ChangeBody(Strict):

@@ -16,6 +16,8 @@ GROUND = [row.replace("A", " ") for row in LEVEL.rows]
 START = (1, 4)
 BRIEF = {"goal": SPEC.brief.goal, "danger": SPEC.brief.danger}
 NOON = "2026-11-22T12:00:00Z"
+DATABASE, RUN_ID = "7c9e6679-7425-40de-944b-e07fc1f90ae7", "5J3mBbAH58CpQ3Y8RNJpUK"
+QUESTION_ID = "8kZ4cVxtw1Rr5Qh2mPzDvN"
 OWN_LEVEL = "WWWWW\nWA GW\nWWWWW"
 
 
@@ -49,6 +51,8 @@ NEW_RUNS = {
 }
 RUN: dict[str, Any] = {
     "id": 1,
+    "public_id": RUN_ID,
+    "database": DATABASE,
     "created": NOON,
     "name": "first",
     "world": WORLD,
@@ -77,6 +81,9 @@ STOPPED = {"status": "stopped", "reason": "Stopped by the operator.", "state": "
 QUERY: dict[str, Any] = {
     "id": 7,
     "run": 1,
+    "database": DATABASE,
+    "run_public_id": RUN_ID,
+    "public_id": QUESTION_ID,
     "tick": 5,
     "kind": "guidance",
     "maturity": 1,
@@ -108,9 +115,17 @@ LEASED = {
 LEASE = {"client_id": "me"}
 ANSWERS = {
     "by a person": {"choice": "left", "client_id": "me"},
+    "to this question and no other": {
+        "choice": "left",
+        "client_id": "me",
+        "database": DATABASE,
+        "run": RUN_ID,
+        "question": QUESTION_ID,
+    },
     "by a script": {"choice": "neither", "client_id": "script", "parent": "scripted"},
 }
-STORED = {"query": 7, "run": 1, "number": 4, "choice": "left", "received": NOON}
+NAMES = {"database": DATABASE, "run_public_id": RUN_ID, "query_public_id": QUESTION_ID}
+STORED = {"query": 7, "run": 1, "number": 4, "choice": "left", "received": NOON, **NAMES}
 METRIC = {"tick": 4, "values": {"deaths": 0, "loss": 0.6931, "entropy_global": 1.386}}
 EVENTS = [
     {"id": 1, "run": 1, "event": {"kind": "mature"}, "created": NOON, "applied_tick": 4},
@@ -123,7 +138,7 @@ EVENTS = [
     },
 ]
 STREAM = (
-    'event: question\ndata: {"id": 7, "kind": "guidance"}\n\n'
+    'event: question\ndata: {"id": 7, "public_id": "' + QUESTION_ID + '", "kind": "guidance"}\n\n'
     f"event: run\ndata: {json.dumps(RUN)}\n\n"
     f"event: metrics\ndata: {json.dumps({'rows': [METRIC]})}\nid: {METRIC['tick']}\n\n"
 )
@@ -147,6 +162,7 @@ EXPORTED: dict[str, Any] = {
     "received": "2026-11-22T12:00:03.250000Z",
     "standing": True,
     "supersedes": None,
+    **NAMES,
 }
 
 

@@ -6,7 +6,8 @@ from fastapi import APIRouter, Request
 
 from parenting.agent.events import Change, EndEpisode, Event, Mature
 from parenting.server import runs
-from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody, RunId
+from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody
+from parenting.server.api.names import RunId
 from parenting.server.api.responses import write_responses
 from parenting.server.deps import Db, notify_worker
 from parenting.server.operator_events import add_operator_event

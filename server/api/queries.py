@@ -8,14 +8,16 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
 
-from parenting.server.api.bodies import AnswerBody, LeaseBody, QueryId, RunId
+from parenting.server.api.bodies import AnswerBody, LeaseBody
 from parenting.server.api.lists import AskedPart, AskedRows
+from parenting.server.api.names import QueryId, QueryName, RunId
 from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease, release
+from parenting.server.queue.names import Names
 from parenting.server.reads import pagination
-from parenting.server.reads.schemas import asked_or_damaged, asked_schema, leased_schema
+from parenting.server.reads.schemas import asked_schema, asked_schemas, leased_schema
 from parenting.server.runs import get_run
 from parenting.server.schemas import AskedSchema, LeasedSchema, StoredSchema
 
@@ -29,7 +31,7 @@ def list_questions(run_id: RunId, db: Db, part: Annotated[AskedPart, Query()]) -
     Send the `next` of a page as `after` to get the following page.
     """
     page = pagination.asked_after(db, run_id, part.after, part.limit, part.status)
-    return AskedRows(rows=[asked_or_damaged(row.query, row.answer) for row in page.rows], next=page.next)
+    return AskedRows(rows=asked_schemas(db, page.rows), next=page.next)
 
 
 @router.post(
@@ -54,19 +56,25 @@ def lease_question(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf)
 @router.get("/queries/{query_id}", summary="Look at a question", responses=read_responses(404))
 def get_question(query_id: QueryId, db: Db) -> AskedSchema:
     """Read one question, with its answer if one stands. This leases nothing."""
-    found = pagination.asked(db, query_id)
-    return asked_schema(found.query, found.answer)
+    return asked_schema(db, pagination.asked(db, query_id))
 
 
-@router.post("/queries/{query_id}/answer", summary="Answer a question", responses=write_responses(404, 409))
-def answer_question(request: Request, query_id: QueryId, body: AnswerBody, db: Db) -> StoredSchema:
+@router.post(
+    "/queries/{query_id}/answer", summary="Answer a question", responses=write_responses(404, 409, 410)
+)
+def answer_question(request: Request, query_id: QueryName, body: AnswerBody, db: Db) -> StoredSchema:
     """Store an answer, once.
+
+    An answer that names a database, a run or a question which is not the one here gets 410 (`elsewhere`) and
+    is not stored. Send the names that came with the question, so that no other server at this address takes
+    the answer for a question of the same number.
 
     The same answer by the same client gets the same reply, so a client that lost the reply can send it again.
     Another choice, or another client's answer, gets 409 and is not stored. A late answer is stored if none
     stands.
     """
-    stored = answer(db, query_id, body.choice, body.client_id, body.parent)
+    names = Names(body.database, body.run, body.question)
+    stored = answer(db, query_id, body.choice, body.client_id, body.parent, names)
     notify_worker(request)
     return StoredSchema(**asdict(stored))
 

@@ -6,7 +6,6 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 
-from parenting.server.api.bodies import RunId
 from parenting.server.api.lists import (
     EventPart,
     MetricPart,
@@ -16,6 +15,7 @@ from parenting.server.api.lists import (
     RunRows,
     operator_event,
 )
+from parenting.server.api.names import RunId
 from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.new_run import NewRun, start

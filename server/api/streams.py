@@ -9,7 +9,8 @@ from fastapi import APIRouter, Depends, Header, Request
 from fastapi.responses import StreamingResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from parenting.server.api.bodies import After, RunId
+from parenting.server.api.bodies import After
+from parenting.server.api.names import RunId
 from parenting.server.api.responses import streams
 from parenting.server.deps import Db
 from parenting.server.export import lines

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from parenting.agent.events import Change, EndEpisode, Mature, Probability
 from parenting.server import operator_events, runs
-from parenting.server.api.bodies import RunId
+from parenting.server.api.names import RunId
 from parenting.server.deps import Db, notify_worker
 from parenting.server.new_run import Goal, Pace
 from parenting.server.pages.dashboard import dashboard_page
@@ -47,7 +47,7 @@ def set_status(
     """Pause, resume or stop, then back to where the button was."""
     reason = "Stopped by the operator." if status == "stopped" else None
     runs.set_status(db, run_id, RunStatus(status), reason)
-    return _back(request, run_id, back)
+    return _back(request, back)
 
 
 @router.post("/runs/{run_id}/event")
@@ -61,7 +61,7 @@ def event(
     """End the stage, or an episode in which no action was acceptable."""
     happens = Mature() if kind == "mature" else EndEpisode()
     operator_events.add_operator_event(db, run_id, kind, happens.model_dump(mode="json"))
-    return _back(request, run_id, back)
+    return _back(request, back)
 
 
 @router.post("/runs/{run_id}/probabilities")
@@ -75,7 +75,7 @@ def set_probabilities(request: Request, run_id: RunId, db: Db, form: FormFields)
     for name in [name for name in PROBABILITIES if given[name] != known[name]]:
         change = Change.model_validate({"name": name, "value": given[name]})
         operator_events.add_operator_event(db, run_id, change.kind, change.model_dump(mode="json"))
-    return _back(request, run_id, "operator")
+    return _back(request, "operator")
 
 
 @router.post("/runs/{run_id}/goal")
@@ -85,7 +85,7 @@ def set_goal(request: Request, run_id: RunId, db: Db, form: FormFields, back: Ba
     if wrong:
         return dashboard_page(db, run_id, form, wrong)
     runs.set_goal(db, run_id, given["goal"])
-    return _back(request, run_id, back)
+    return _back(request, back)
 
 
 @router.post("/runs/{run_id}/pace")
@@ -95,7 +95,7 @@ def set_pace(request: Request, run_id: RunId, db: Db, form: FormFields) -> Respo
     if wrong:
         return dashboard_page(db, run_id, form, wrong)
     runs.set_pace(db, run_id, given["pace"])
-    return _back(request, run_id, "operator")
+    return _back(request, "operator")
 
 
 def _numbers(
@@ -111,7 +111,7 @@ def _numbers(
     return given, wrong
 
 
-def _back(request: Request, run_id: int, back: str) -> Response:
-    """Wake the worker, and go back to where the button was."""
+def _back(request: Request, back: str) -> Response:
+    """Wake the worker, and go back to where the button was, by the name that the form has for the run."""
     notify_worker(request)
-    return redirect(f"/runs/{run_id}{BACK_PATHS[back]}")
+    return redirect(f"/runs/{request.path_params['run_id']}{BACK_PATHS[back]}")

@@ -12,7 +12,7 @@ from fastapi import APIRouter, Response
 from fastapi.responses import JSONResponse
 
 from parenting.server import operator_events, runs
-from parenting.server.api.bodies import RunId
+from parenting.server.api.names import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.pages.labels import MetricLabels, describe_start, metric_labels

@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Query, Request, Response
 
 from parenting.server import runs
-from parenting.server.api.bodies import RunId
+from parenting.server.api.names import RunId
 from parenting.server.damage import sound
 from parenting.server.deps import Db
 from parenting.server.errors import DamagedRowError

@@ -10,26 +10,29 @@ from __future__ import annotations
 import re
 import secrets
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Form, Query, Request, Response
-from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from parenting.server import runs, tables
-from parenting.server.api.bodies import Choice, ClientId, RunId
+from parenting.server.api.bodies import Choice, ClientId
+from parenting.server.api.names import DatabaseId, PublicId, RunId, RunName, read_name
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker
-from parenting.server.errors import NotFound
-from parenting.server.new_run import LARGEST_INT
+from parenting.server.errors import ElsewhereError, NotFound
+from parenting.server.identity import database_id
 from parenting.server.pages.question import QuestionView, question_view
 from parenting.server.pages.render import page, redirect
-from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, run_title
+from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, parent_title
+from parenting.server.public_ids import LENGTH
 from parenting.server.queue import answers, leases
 from parenting.server.queue.leases import lease_ahead, may_lease
+from parenting.server.queue.names import Names
+from parenting.server.reads.names import query_number, query_numbers
 from parenting.server.reads.schemas import run_schema
 from parenting.server.statuses import RunState
 from parenting.server.streams import Streams
@@ -43,20 +46,27 @@ NAME = re.compile(r"[A-Za-z0-9_-]{8,64}")
 PATIENCE = 0.5
 """Seconds for which a plain form waits for the next question before the page says that the agent explores."""
 
+BY_NUMBER = (
+    "This form is of an older version and names its question by a number, which may be another question by "
+    "now. Its answer was not stored. Open the page again."
+)
+
 ClientField = Annotated[ClientId, Form()]
 ChoiceField = Annotated[Choice, Form()]
-Number = Annotated[int, Form(ge=1, le=LARGEST_INT)]
-Numbers = Annotated[tuple[Annotated[int, Field(ge=1, le=LARGEST_INT)], ...], Form(max_length=100)]
+DatabaseField = Annotated[DatabaseId | None, Form()]
+QuestionField = Annotated[PublicId | None, Form()]
+Shown = Annotated[tuple[PublicId, ...], Form(max_length=100)]
 Seconds = Annotated[float, Form(ge=0, le=10, allow_inf_nan=False)]
-QueryShown = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
+QueryShown = Annotated[str | None, Query(max_length=LENGTH)]
 
 
 @dataclass(frozen=True)
 class ParentPage:
-    """The content of web/templates/parent.html."""
+    """The content of web/templates/parent.html. No number of a run or a question is in it."""
 
     run: Run
     title: str
+    database: str  # the UUID that an answer names
     client: str  # the random name of who answers
     shown: QuestionView | None  # the question on the page
     state: str  # which of `sentences` holds while there is none
@@ -67,13 +77,20 @@ class ParentPage:
 
 @router.get("/runs/{run_id}/parent")
 def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = None) -> Response:
-    """The page; with `query` it shows that question, as the forms do. Changes nothing."""
+    """The page; with `query` it shows that question, as the forms do. Changes nothing.
+
+    Its address carries the run's public id. A researcher who writes the number is led there.
+    """
     run = runs.get_run(db, run_id)
+    asked = None if query is None else _question_of(db, run, query)
+    if request.path_params["run_id"] != run.public_id or (asked is not None and query != asked.public_id):
+        return redirect(_address(run, asked), status=307)
     client = _client(request)
-    shown = None if query is None else _open_question(db, run, query)
+    shown = question_view(asked, run) if asked is not None and asked.status == "open" else None
     now = _page_state(run_schema(db, run_id).state, may_lease(db, run_id, client))
     refresh = shown is None and now in ("exploring", "no_worker", "elsewhere")
-    context = ParentPage(run, run_title(run), client, shown, now, STATE_TEXTS, GOAL_STEP, refresh)
+    here = database_id(db)
+    context = ParentPage(run, parent_title(run), here, client, shown, now, STATE_TEXTS, GOAL_STEP, refresh)
     response = page("parent.html", **vars(context))
     response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")
     return response
@@ -86,7 +103,7 @@ async def question(
     db: Db,
     settings: SettingsOf,
     client_id: ClientField,
-    shown: Numbers = (),
+    shown: Shown = (),
     wait: Seconds = 0.0,
 ) -> Response:
     """For the script: the next question as markup, leased; 204 if there is none within `wait` seconds.
@@ -97,65 +114,83 @@ async def question(
     """
     streams: Streams = request.app.state.streams
     run = await run_in_threadpool(runs.get_run, db, run_id)
-    lease = partial(_lease_next, db, run_id, client_id, shown, settings.lease_seconds)
+    numbers = await run_in_threadpool(query_numbers, db, shown)
+    lease = partial(_lease_next, db, run_id, client_id, numbers, settings.lease_seconds)
     query = await streams.wait_for(lease, wait, request.is_disconnected)
     if query is None:
         return Response(status_code=204)
     if await request.is_disconnected():  # it left while the question was looked up
         await run_in_threadpool(leases.release, db, query.id, client_id)
-    return await run_in_threadpool(_markup, run, query, client_id)
+    return await run_in_threadpool(_markup, db, run, query, client_id)
 
 
 @router.post("/runs/{run_id}/parent/next")
 def next_question(run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField) -> Response:
     """For the form: lease the next question and go to it."""
-    runs.get_run(db, run_id)
-    return _go_on(db, run_id, client_id, settings.lease_seconds)
+    return _go_on(db, runs.get_run(db, run_id), client_id, settings.lease_seconds)
 
 
 @router.post("/runs/{run_id}/parent/answer")
 def answer(
     request: Request,
-    run_id: RunId,
+    run_id: RunName,
     db: Db,
     settings: SettingsOf,
-    query_id: Number,
     choice: ChoiceField,
     client_id: ClientField,
+    database: DatabaseField = None,
+    question: QuestionField = None,
 ) -> Response:
-    """For the form: store the answer, then go to the next question. A closed question says so (409)."""
-    if answers.get_query(db, query_id).run_id != run_id:
-        raise NotFound(f"Question {query_id} is not one of run {run_id}.")
-    answers.answer(db, query_id, choice, client_id, parent="human")
+    """For the form: store the answer, then go to the next question.
+
+    A closed question says so (409). An answer for another database, run or question is not stored (410).
+    """
+    if isinstance(run_id, int) or database is None or question is None:
+        raise ElsewhereError(BY_NUMBER)
+    names = Names(database, run_id, question)
+    stored = answers.answer(db, question, choice, client_id, "human", names)
     notify_worker(request)
-    return _go_on(db, run_id, client_id, settings.lease_seconds, patience=PATIENCE)
+    return _go_on(db, runs.get_run(db, stored.run), client_id, settings.lease_seconds, patience=PATIENCE)
 
 
 def _lease_next(
-    db: Database, run_id: int, client_id: str, shown: tuple[int, ...], seconds: float
+    db: Database, run_id: int, client_id: str, shown: Sequence[int], seconds: float
 ) -> tables.Query | None:
     if shown:
         return lease_ahead(db, run_id, client_id, shown, seconds)
     return leases.lease(db, run_id, client_id, seconds)
 
 
-def _markup(run: Run, query: tables.Query, client_id: str) -> Response:
-    return page("_question.html", shown=question_view(query, run), client=client_id)
+def _markup(db: Database, run: Run, query: tables.Query, client_id: str) -> Response:
+    shown = question_view(query, run)
+    return page("_question.html", shown=shown, client=client_id, database=database_id(db))
 
 
-def _go_on(db: Database, run_id: int, client_id: str, seconds: float, patience: float = 0.0) -> Response:
+def _go_on(db: Database, run: Run, client_id: str, seconds: float, patience: float = 0.0) -> Response:
     """To the next question, which may come within `patience` seconds, or to the page that waits for it."""
     until = time.monotonic() + patience
-    while (query := leases.lease(db, run_id, client_id, seconds)) is None and time.monotonic() < until:
+    while (query := leases.lease(db, run.id, client_id, seconds)) is None and time.monotonic() < until:
         time.sleep(0.02)
-    return redirect(f"/runs/{run_id}/parent" + (f"?query={query.id}" if query else ""))
+    return redirect(_address(run, query))
 
 
-def _open_question(db: Database, run: Run, query_id: int) -> QuestionView | None:
-    query = answers.get_query(db, query_id)
-    if query.run_id != run.id:
-        raise NotFound(f"Question {query_id} is not one of run {run.id}.")
-    return question_view(query, run) if query.status == "open" else None
+def _address(run: Run, query: tables.Query | None) -> str:
+    return f"/runs/{run.public_id}/parent" + (f"?query={query.public_id}" if query else "")
+
+
+def _question_of(db: Database, run: Run, name: str) -> tables.Query:
+    """Return the question that an address names by its public id, or an older address by its number.
+
+    Raises:
+        NotFound: it is not one of this run.
+    """
+    try:
+        query = answers.get_query(db, query_number(db, read_name(name)))
+    except (ValueError, NotFound):
+        query = None
+    if query is None or query.run_id != run.id:
+        raise NotFound("This question is not one of this run.")
+    return query
 
 
 def _page_state(state: RunState, offered: bool) -> str:

@@ -14,8 +14,8 @@ from parenting.server.tables import Query, Run
 class QuestionView(QueryView):
     """A question, ready for web/templates/_question.html."""
 
-    id: int
-    run: int
+    id: str  # public, as all that the page sends back
+    run: str
 
     @property
     def lead(self) -> str:
@@ -31,7 +31,7 @@ def question_view(query: Query, run: Run) -> QuestionView:
     """
     with reading(query):
         view = query_view(query.clips, query.kind, query.maturity, run.legend, _rows(run))
-    return QuestionView(view.kind, view.sides, view.supervision, view.left_to_chance, query.id, query.run_id)
+    return QuestionView(**vars(view), id=query.public_id, run=run.public_id)
 
 
 def _rows(run: Run) -> list[str]:

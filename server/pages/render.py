@@ -10,6 +10,7 @@ from starlette.responses import HTMLResponse, RedirectResponse
 
 from parenting.drawing.render import environment
 from parenting.server.errors import ServerError
+from parenting.server.public_ids import ALPHABET, LENGTH
 
 WEB = Path(__file__).parent.parent.parent / "web"
 
@@ -33,9 +34,9 @@ def format_number(number: float | None) -> str:
     return "" if number is None else str(number).removesuffix(".0")
 
 
-def redirect(path: str) -> RedirectResponse:
-    """After a POST: look there (303), so that a reload repeats nothing."""
-    return RedirectResponse(path, status_code=303)
+def redirect(path: str, status: int = 303) -> RedirectResponse:
+    """After a POST: look there (303), so that a reload repeats nothing. 307: an old address of a page."""
+    return RedirectResponse(path, status_code=status)
 
 
 def error_page(request: Request, error: ServerError) -> HTMLResponse:
@@ -43,6 +44,6 @@ def error_page(request: Request, error: ServerError) -> HTMLResponse:
 
     What a run refused leads back to it; else there may be no such run.
     """
-    run = re.match(r"/runs/\d+(/parent)?", request.url.path)
+    run = re.match(rf"/runs/([1-9][0-9]*|[{ALPHABET}]{{{LENGTH}}})(/parent)?", request.url.path)
     back = run[0] if run and error.status == 409 else "/"
     return page("error.html", error.status, message=error.message, back=back)

@@ -109,7 +109,7 @@ def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> 
         return _page(db, {**EMPTY_FORM, **form}, errors)
     run = start(db, read_form(given), settings.weights)
     notify_worker(request)
-    return redirect(f"/runs/{run.id}" + ("/parent" if run.parent == "human" else ""))
+    return redirect(f"/runs/{run.public_id}/parent" if run.parent == "human" else f"/runs/{run.id}")
 
 
 def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:

@@ -31,6 +31,10 @@ STATE_TEXTS = {
     ),
     "resting": ("That was the last question of this goal.", "The agent rests until you go on."),
     "over": ("This run is over.", "The agent asks no more questions."),
+    "away": (
+        "This run is not here.",
+        "The server at this address has another database now. Your answers are kept in this browser.",
+    ),
     "offline": (
         "No connection to the server.",
         "Your answers are kept in this browser and sent as soon as it is back.",
@@ -44,5 +48,10 @@ GOAL_STEP = 50
 
 
 def run_title(run: Run) -> str:
-    """Return the title of a run, the same on every page."""
-    return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}, run {run.id}"
+    """Return the title of a run, the same on every page of a researcher."""
+    return run.name or f"{parent_title(run)}, run {run.id}"
+
+
+def parent_title(run: Run) -> str:
+    """Return the title of a run for its parent, who knows no numbers of runs."""
+    return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}"

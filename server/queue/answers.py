@@ -13,7 +13,9 @@ from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
-from parenting.server.queue.locks import lock_query, lock_run_of
+from parenting.server.queue.locks import lock_query
+from parenting.server.queue.names import UNSTATED, Names, Place, find_place
+from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
 from parenting.server.tables import Answer, Query, Run
 
@@ -27,6 +29,9 @@ class Stored:
     number: int
     choice: str
     received: datetime
+    database: str
+    run_public_id: str
+    query_public_id: str
 
 
 @dataclass(frozen=True)
@@ -51,33 +56,38 @@ def get_query(db: Database, query_id: int) -> Query:
     return query
 
 
-def answer(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Stored:
-    """Store an answer, once.
+def answer(
+    db: Database, query: int | str, choice: str, client_id: str, parent: str, names: Names = UNSTATED
+) -> Stored:
+    """Store an answer, once, if it is meant for this database, run and question.
 
     The same answer by the same client gets the same reply. A late answer is taken if none stands.
 
     Args:
         db: The database.
-        query_id: The query that is answered; it need not be leased.
+        query: The number or the public id of the query that is answered; it need not be leased.
         choice: left, right, either or neither (Sec. 2.3).
         client_id: The name under which the client answers.
         parent: Who decided: human or scripted.
+        names: The database, run and question that the answer is meant for, as far as it names them.
 
     Raises:
+        ElsewhereError: it is meant for another database, run or question.
         NotFound: there is no such query.
         Conflict: it was answered otherwise, or by somebody else, or withdrawn; the message says which.
     """
     said = Said(choice, client_id, parent)
     with db.write() as session:
-        run_id = lock_run_of(session, query_id)
-        before = _standing(session, query_id)
+        place = find_place(session, query, names)
+        lock(session, place.run)
+        before = _standing(session, place.query)
         if before is not None:
-            return _again(before, said)
-        if session.execute(_ANSWERED, {"query_id": query_id}).scalar() is None:
+            return _again(before, said, place)
+        if session.execute(_ANSWERED, {"query_id": place.query}).scalar() is None:
             raise Conflict(
-                f"Question {query_id} was withdrawn: the run or its episode was ended before an answer came."
+                "This question was withdrawn: the run or its episode was ended before an answer came."
             )
-        return _stored(_add(session, db, query_id, run_id, said))
+        return _stored(_add(session, db, place.query, place.run, said), place)
 
 
 def supersede(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Answer:
@@ -120,23 +130,18 @@ def _add(
     return row
 
 
-def _again(before: Answer, said: Said) -> Stored:
+def _again(before: Answer, said: Said, place: Place) -> Stored:
     if before.client_id != said.client_id:
-        raise Conflict(
-            f"Question {before.query_id} was already answered by someone else; your answer was not stored."
-        )
+        raise Conflict("This question was already answered by someone else; your answer was not stored.")
     if before.choice != said.choice:
         raise Conflict(
-            f"You already answered question {before.query_id} with {before.choice}; "
-            f"{said.choice} was not stored."
+            f"You already answered this question with {before.choice}; {said.choice} was not stored."
         )
-    return _stored(before)
+    return _stored(before, place)
 
 
-def _stored(row: Answer) -> Stored:
-    return Stored(
-        query=row.query_id, run=row.run_id, number=row.number, choice=row.choice, received=row.received
-    )
+def _stored(row: Answer, place: Place) -> Stored:
+    return Stored(**vars(place), number=row.number, choice=row.choice, received=row.received)
 
 
 def _standing(session: Session, query_id: int) -> Answer | None:

@@ -6,10 +6,14 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Literal
 
+from sqlalchemy import select
+
 from parenting.agent.config import Config
 from parenting.server.damage import damage, readable, reading, sound
 from parenting.server.db import Database
+from parenting.server.identity import database_id_in
 from parenting.server.queue.queries import Open, open_by_run, open_in
+from parenting.server.reads.pagination import Asked
 from parenting.server.runs import find
 from parenting.server.schemas import (
     AnswerSchema,
@@ -44,62 +48,71 @@ def run_schema(db: Database, run_id: int) -> RunSchema:
         NotFound: there is none of this id.
     """
     with db.read() as session:
-        run, opened = find(session, run_id), open_in(session, run_id)
+        run, opened, here = find(session, run_id), open_in(session, run_id), database_id_in(session)
     with reading(run):
-        return _run_schema(run, opened, _worker(run, db.clock(), _taken_soon(db, [run])))
+        return _run_schema(run, opened, _worker(run, db.clock(), _taken_soon(db, [run])), here)
 
 
 def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema | DamagedSchema]:
     """Return the schemas of runs, damaged or not."""
     with db.read() as session:
-        opened = open_by_run(session, [run.id for run in runs])
+        opened, here = open_by_run(session, [run.id for run in runs]), database_id_in(session)
     faults = {run.id: damage(run) for run in runs}
     now, soon = db.clock(), _taken_soon(db, [run for run in runs if faults[run.id] is None])
     return [
         DamagedSchema(id=run.id, damaged=fault)
         if (fault := faults[run.id]) is not None
-        else _run_schema(run, opened[run.id], _worker(run, now, soon))
+        else _run_schema(run, opened[run.id], _worker(run, now, soon), here)
         for run in runs
     ]
 
 
-def query_schema(query: Query) -> QuerySchema:
-    """Return the schema of a query."""
-    names = ("id", "tick", "kind", "maturity", "status", "posted", "leased_until")
-    policy = PolicySchema(stage=query.policy_stage, gradient_steps=query.policy_steps)
-    own = {name: getattr(query, name) for name in names}
-    return QuerySchema(run=query.run_id, policy=policy, **own, **query.clips)
+def asked_schema(db: Database, row: Asked) -> AskedSchema:
+    """Return the schema of a query, with the answer that stands for it.
+
+    Raises:
+        DamagedRowError: it or its answer cannot be read.
+    """
+    readable(row.query)
+    if row.answer is not None:
+        readable(row.answer)
+    return _asked_schema(row, _names(db, [row]))
 
 
-def asked_schema(query: Query, answer: Answer | None) -> AskedSchema:
-    """Return the schema of a query, with the answer that stands for it."""
-    readable(query)
-    said = None if answer is None else _answer_schema(readable(answer))
-    return AskedSchema(**query_schema(query).model_dump(), answer=said)
+def asked_schemas(db: Database, rows: Sequence[Asked]) -> list[AskedSchema | DamagedSchema]:
+    """Return the schemas of queries with their answers in a list, damaged or not."""
+    faults = [damage(row.query) or (None if row.answer is None else damage(row.answer)) for row in rows]
+    names = _names(db, [row for row, fault in zip(rows, faults, strict=True) if fault is None])
+    return [
+        _asked_schema(row, names) if fault is None else DamagedSchema(id=row.query.id, damaged=fault)
+        for row, fault in zip(rows, faults, strict=True)
+    ]
 
 
-def _answer_schema(answer: Answer) -> AnswerSchema:
-    names = ("number", "choice", "parent", "received", "applied_tick")
-    return AnswerSchema(**{name: getattr(answer, name) for name in names})
+def _names(db: Database, rows: Sequence[Asked]) -> tuple[str, dict[int, str]]:
+    """Return the UUID of the database, and the public id of each run of these queries."""
+    named = select(Run.id, Run.public_id).where(Run.id.in_({row.query.run_id for row in rows}))
+    with db.read() as session:
+        return database_id_in(session), {row.id: row.public_id for row in session.execute(named)}
 
 
-def asked_or_damaged(query: Query, answer: Answer | None) -> AskedSchema | DamagedSchema:
-    """Return the schema of a query with its answer in a list, damaged or not."""
-    found = damage(query) or (None if answer is None else damage(answer))
-    return asked_schema(query, answer) if found is None else DamagedSchema(id=query.id, damaged=found)
+def _asked_schema(row: Asked, names: tuple[str, dict[int, str]]) -> AskedSchema:
+    database, runs = names
+    shown = _query_schema(row.query, database, runs[row.query.run_id]).model_dump()
+    return AskedSchema(**shown, answer=None if row.answer is None else _answer_schema(row.answer))
 
 
 def leased_schema(db: Database, query: Query) -> LeasedSchema:
     """Return the schema of a leased query: with its world, the parent's settings and progress."""
     with db.read() as session:
-        run = readable(find(session, readable(query).run_id))
+        run, here = readable(find(session, readable(query).run_id)), database_id_in(session)
         opened = open_in(session, run.id)
     config = Config.model_validate(run.config)
     world = WorldSchema(
         name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
     )
     return LeasedSchema(
-        **query_schema(query).model_dump(),
+        **_query_schema(query, here, run.public_id).model_dump(),
         world=world,
         parent=ParentSchema(gamma=config.gamma, inside=config.garden_parent),
         progress=ProgressSchema(answered=run.answers, open=opened.guidance + opened.preference),
@@ -118,13 +131,32 @@ def _metric_schema(row: Metric) -> MetricSchema | DamagedMetricSchema:
     return MetricSchema(tick=row.tick, values=row.values)
 
 
-def _run_schema(run: Run, opened: Open, worker: Sign) -> RunSchema:
-    made = ("open", "worker", "resting", "state")
+def _query_schema(query: Query, database: str, run_public_id: str) -> QuerySchema:
+    names = ("id", "public_id", "tick", "kind", "maturity", "status", "posted", "leased_until")
+    own = {name: getattr(query, name) for name in names}
+    policy = PolicySchema(stage=query.policy_stage, gradient_steps=query.policy_steps)
+    return QuerySchema(
+        run=query.run_id,
+        run_public_id=run_public_id,
+        database=database,
+        policy=policy,
+        **own,
+        **query.clips,
+    )
+
+
+def _answer_schema(answer: Answer) -> AnswerSchema:
+    names = ("number", "choice", "parent", "received", "applied_tick")
+    return AnswerSchema(**{name: getattr(answer, name) for name in names})
+
+
+def _run_schema(run: Run, opened: Open, worker: Sign, database: str) -> RunSchema:
+    made = ("open", "worker", "resting", "state", "database")
     own = {name: getattr(run, name) for name in RunSchema.model_fields if name not in made}
     shown = OpenSchema(guidance=opened.guidance, preference=opened.preference)
     resting = run.status not in OVER and run.goal is not None and run.answers >= run.goal
     state = _run_state(run, opened, resting, worker)
-    return RunSchema(**own, open=shown, worker=worker, resting=resting, state=state)
+    return RunSchema(**own, open=shown, worker=worker, resting=resting, state=state, database=database)
 
 
 def _run_state(run: Run, opened: Open, resting: bool, worker: Sign) -> RunState:

@@ -53,9 +53,16 @@ QUEUE = [
     Mutant(
         "an answer that is sent again is refused (idempotence)",
         "server/queue/answers.py",
-        "if before is not None:\n            return _again(before, said)",
+        "if before is not None:\n            return _again(before, said, place)",
         'if before is not None:\n            raise Conflict("It was answered already.")',
         f"{ANSWERS}::test_same_answer_again_gets_the_same_reply",
+    ),
+    Mutant(
+        "an answer for another database is stored here",
+        "server/queue/names.py",
+        "if _differs(row, names) or (row.query is None and isinstance(query, str)):",
+        "if row.query is None and isinstance(query, str):",
+        "tests/server/test_elsewhere.py::test_answer_that_names_something_else_is_not_stored",
     ),
     Mutant(
         "a second answer that differs is taken for the first",

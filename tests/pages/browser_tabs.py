@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, expect
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request
 from sqlalchemy import select
 
 from parenting.server.db import Database
@@ -60,8 +60,3 @@ def until(holds: Callable[[], bool], seconds: float = 30.0) -> None:
     while not holds():
         assert time.monotonic() < end, "it did not happen"
         time.sleep(0.02)
-
-
-def shown(page: Page, number: int) -> None:
-    """Wait until a question is on the page."""
-    expect(page.locator(f'#question[data-query="{number}"]')).to_be_visible()

@@ -13,7 +13,8 @@ from playwright.sync_api import APIResponse, Route, expect
 
 from parenting.server.db import Database
 from parenting.server.queue import answers
-from tests.pages.browser_tabs import BrowserTabs, given, shown, until
+from tests.pages.browser_tabs import BrowserTabs, given, until
+from tests.pages.parent_page import named, shown
 
 
 def test_a_question_that_comes_later_is_fetched_ahead_too(tabs: BrowserTabs, ask: Callable[..., int]) -> None:
@@ -22,7 +23,7 @@ def test_a_question_that_comes_later_is_fetched_ahead_too(tabs: BrowserTabs, ask
     shown(page, first)
     expect(page.locator("#question")).to_have_attribute("data-ahead", "")
     second = ask("preference", "left left", "down")
-    expect(page.locator("#question")).to_have_attribute("data-ahead", str(second))
+    expect(page.locator("#question")).to_have_attribute("data-ahead", named(page, second))
 
 
 def test_the_request_for_the_next_question_lies_at_the_server_while_somebody_thinks(
@@ -39,16 +40,16 @@ def test_the_request_for_the_next_question_lies_at_the_server_while_somebody_thi
     shown(page, second)
     reply = lookout.value.response()
     assert reply is not None
-    assert f'data-query="{second}"' in reply.text()
+    assert f'data-query="{named(page, second)}"' in reply.text()
 
 
 def test_guidance_goes_before_what_was_leased_ahead(tabs: BrowserTabs, ask: Callable[..., int]) -> None:
     first, second = (ask("preference", "down down", "left") for _ in range(2))
     page = tabs.open("/runs/1/parent")
     shown(page, first)
-    expect(page.locator("#question")).to_have_attribute("data-ahead", str(second))
+    expect(page.locator("#question")).to_have_attribute("data-ahead", named(page, second))
     urgent = ask()
-    expect(page.locator("#question")).to_have_attribute("data-ahead", str(urgent))
+    expect(page.locator("#question")).to_have_attribute("data-ahead", named(page, urgent))
     page.keyboard.press("ArrowLeft")
     shown(page, urgent)
     page.keyboard.press("ArrowLeft")

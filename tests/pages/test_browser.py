@@ -12,7 +12,8 @@ from parenting.server.queue import answers
 from parenting.server.runs import Claim
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Query
-from tests.pages.browser_tabs import BrowserTabs, given, shown, until
+from tests.pages.browser_tabs import BrowserTabs, given, until
+from tests.pages.parent_page import address, shown
 
 
 def test_keys_answer_one_question_after_another(
@@ -43,10 +44,10 @@ def test_cards_and_buttons_answer_too(tabs: BrowserTabs, db: Database, ask: Call
 def test_a_new_question_appears_by_itself(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     page = tabs.open("/runs/1/parent")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
-    expect(page).to_have_title("The agent is exploring on its own. · Unsafe exploration, island, run 1")
+    expect(page).to_have_title("The agent is exploring on its own. · Unsafe exploration, island")
     number = ask()
     shown(page, number)
-    expect(page).to_have_title("● Which move is better here? · Unsafe exploration, island, run 1")
+    expect(page).to_have_title("● Which move is better here? · Unsafe exploration, island")
     expect(page.locator("#said")).to_contain_text("Left: Left. Ends in the water. Right: Down.")
     page.keyboard.press("ArrowRight")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
@@ -181,7 +182,7 @@ def test_it_works_without_javascript(tabs: BrowserTabs, db: Database, ask: Calla
     page.get_by_role("button", name="Show the question").click()
     expect(page.locator("svg.board .trail")).to_have_count(2)
     page.get_by_role("button", name="Either equally good").click()
-    expect(page).to_have_url(f"{tabs.address}/runs/1/parent?query={numbers[1]}")
+    expect(page).to_have_url(tabs.address + address(db, query=numbers[1]))
     page.locator(".card").first.click()
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
     assert given(db) == [(numbers[0], "either"), (numbers[1], "left")]

@@ -15,6 +15,7 @@ from parenting.server.queue import worker_side
 from parenting.server.runs import Claim, get_run, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
+from tests.pages.parent_page import address, form, look
 
 PROBABILITIES = {"p_guid": "0.95", "p_rec": "0.8", "p_pref": "0.8", "p_train": "1"}
 """Those of the conservative preset."""
@@ -200,7 +201,7 @@ def test_other_sites_can_do_nothing(client: httpx2.Client, mine: Claim, path: st
 def test_a_run_that_failed_says_why(client: httpx2.Client, db: Database, mine: Claim) -> None:
     runs.finish(db, mine, RunStatus.FAILED, "The agent could not go on: it was lost.", "Traceback: secret")
     for path in ("/runs/1", "/runs/1/parent", "/"):
-        page = client.get(path).text
+        page = client.get(path, follow_redirects=True).text
         assert "The agent could not go on: it was lost." in page
         assert "secret" not in page
 
@@ -208,14 +209,15 @@ def test_a_run_that_failed_says_why(client: httpx2.Client, db: Database, mine: C
 def test_at_its_goal_it_says_so_and_offers_more(client: httpx2.Client, db: Database, mine: Claim) -> None:
     runs.set_goal(db, 1, 1)
     query = fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "down"))
-    data = {"query_id": query, "choice": "left", "client_id": "me"}
-    client.post("/runs/1/parent/answer", data=data)
+    data = form(db, query, choice="left", client_id="me")
+    client.post(f"{address(db)}/answer", data=data)
     page = re.sub("<.*?>", "", client.get("/runs/1").text)
     assert "The goal of 1 questions is reached. The agent rests." in page
     for path in ("/runs/1", "/runs/1/parent"):
-        assert 'data-state="resting"' in client.get(path).text.partition("<main")[2].partition(">")[0]
-        assert 'name="goal" value="51"' in client.get(path).text
-    assert "That was the last question of this goal." in client.get("/runs/1/parent").text
+        text = client.get(path, follow_redirects=True).text
+        assert 'data-state="resting"' in text.partition("<main")[2].partition(">")[0]
+        assert 'name="goal" value="51"' in text
+    assert "That was the last question of this goal." in look(client).text
     client.post("/runs/1/goal", data={"goal": "51", "back": "parent"})
-    assert 'data-state="exploring"' in client.get("/runs/1/parent").text.partition("<main")[2]
-    assert "of <span>51</span>" in client.get("/runs/1/parent").text
+    assert 'data-state="exploring"' in look(client).text.partition("<main")[2]
+    assert "of <span>51</span>" in look(client).text

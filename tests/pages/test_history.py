@@ -12,6 +12,7 @@ from parenting.server.pages.history import PAGE
 from parenting.server.queue import answers, worker_side
 from parenting.server.runs import Claim
 from tests.pages import island_fixtures as fixtures
+from tests.pages.parent_page import look
 
 ME = "client-of-mine"
 
@@ -110,5 +111,7 @@ def test_a_corrected_answer_says_so(client: httpx2.Client, db: Database, mine: C
 
 
 def test_dashboard_and_parents_page_lead_there(client: httpx2.Client, mine: Claim) -> None:
-    for path in ("/runs/1", "/runs/1/parent"):
-        assert 'href="/runs/1/history"' in client.get(path).text
+    assert 'href="/runs/1/history"' in client.get("/runs/1").text
+    link = re.search(r'href="(/runs/\w+/history)"', look(client).text)
+    assert link is not None
+    assert client.get(link[1]).text == client.get("/runs/1/history").text

@@ -38,7 +38,7 @@ def tags(request: pytest.FixtureRequest, client: httpx2.Client, db: Database) ->
     fixtures.measure(db, mine, 30)
     fixtures.ask(db, mine, 31, "guidance", fixtures.guidance("left", "up", start=(1, 2)))
     fixtures.ask(db, mine, 32, "preference", fixtures.preference("down left left", "up down up down up down"))
-    return Tags(client.get(request.param).text)
+    return Tags(client.get(request.param, follow_redirects=True).text)
 
 
 def test_no_script_and_no_style_stands_in_a_page(tags: Tags) -> None:
@@ -86,7 +86,7 @@ def test_a_static_file_is_short(path: Path) -> None:
 
 def test_script_and_server_know_the_same_states() -> None:
     """The state of a run comes from the server. A page adds what only it can know, and has words for each."""
-    own = {"elsewhere", "offline", "damaged"}
+    own = {"elsewhere", "away", "offline", "damaged"}
     assert {*RunState} | own == set(STATE_TEXTS)
     script = (WEB / "static/parent.js").read_text()
     named = set(re.findall(r'wait\("(\w+)"\)|state = "(\w+)"|\? "(\w+)" : ', script))
@@ -98,14 +98,14 @@ def test_script_and_server_know_the_same_states() -> None:
 def test_pages_are_not_kept_by_the_browser(client: httpx2.Client, db: Database) -> None:
     fixtures.start_run(db)
     for path in ("/", "/runs/1", "/runs/1/parent"):
-        assert client.get(path).headers["cache-control"] == "no-store"
+        assert client.get(path, follow_redirects=True).headers["cache-control"] == "no-store"
 
 
 def test_the_content_security_policy_lets_no_script_in(client: httpx2.Client, db: Database) -> None:
     """The dashboard allows inline styles, since Plotly writes them; no page allows inline scripts."""
     fixtures.start_run(db)
     for path in ("/", "/runs/1", "/runs/1/parent"):
-        policy = client.get(path).headers["content-security-policy"]
+        policy = client.get(path, follow_redirects=True).headers["content-security-policy"]
         rules = dict(rule.split(maxsplit=1) for rule in policy.split(";") if rule.strip())
         assert "'unsafe-inline'" not in rules["default-src"]
         assert "script-src" not in rules

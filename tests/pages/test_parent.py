@@ -22,6 +22,7 @@ from parenting.server.statuses import RunState, RunStatus
 from parenting.server.tables import Answer, OperatorEvent, Query, Run
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import until
+from tests.pages.parent_page import address, form, look, public_id
 
 ME, OTHER = "client-of-mine", "client-of-another"
 
@@ -47,43 +48,42 @@ def rows(db: Database, table: Any) -> Any:
 
 
 def test_looking_changes_nothing(client: httpx2.Client, db: Database, asked: list[int]) -> None:
-    for path in ("/runs/1/parent", f"/runs/1/parent?query={asked[0]}", "/runs/1", "/"):
-        assert client.get(path).status_code == 200
+    for path in (address(db), address(db, query=asked[0]), "/runs/1/parent", "/runs/1", "/"):
+        assert client.get(path, follow_redirects=True).status_code == 200
     assert [query.leased_by for query in rows(db, Query)] == [None, None]
 
 
 def test_the_browser_is_known_by_a_cookie(client: httpx2.Client, life: tuple[Run, Claim]) -> None:
-    first = client.get("/runs/1/parent")
+    first = look(client)
     cookie = first.headers["set-cookie"]
     assert "HttpOnly" in cookie
     assert "SameSite=lax" in cookie
     (name,) = set(re.findall(r'data-client="([^"]+)"', first.text))
-    assert f'data-client="{name}"' in client.get("/runs/1/parent").text
+    assert f'data-client="{name}"' in look(client).text
 
 
 def test_a_forged_cookie_is_replaced(client: httpx2.Client, life: tuple[Run, Claim]) -> None:
     client.cookies.set("parenting_client", '"><script>')
-    page = client.get("/runs/1/parent").text
+    page = look(client).text
     assert '"><script>' not in page
 
 
 def test_without_javascript_forms_lead_from_question_to_question(
     client: httpx2.Client, db: Database, asked: list[int]
 ) -> None:
-    page = client.get("/runs/1/parent").text
+    page = look(client).text
     assert "A question is waiting for you." in page
-    assert 'action="/runs/1/parent/next"' in page
-    shown = client.post("/runs/1/parent/next", data={"client_id": ME})
-    assert (shown.status_code, shown.headers["location"]) == (303, f"/runs/1/parent?query={asked[1]}")
+    assert f'action="{address(db)}/next"' in page
+    shown = client.post(f"{address(db)}/next", data={"client_id": ME})
+    assert (shown.status_code, shown.headers["location"]) == (303, address(db, query=asked[1]))
     page = client.get(shown.headers["location"]).text
     assert "Which move is better here?" in page
     assert "Ends in the water." in page
     for choice in ("left", "right", "either", "neither"):
         assert f'name="choice" value="{choice}"' in page
-    given = {"client_id": ME, "query_id": asked[1], "choice": "right"}
-    on = client.post("/runs/1/parent/answer", data=given)
-    assert on.headers["location"] == f"/runs/1/parent?query={asked[0]}"
-    client.post("/runs/1/parent/answer", data={**given, "query_id": asked[0], "choice": "neither"})
+    on = client.post(f"{address(db)}/answer", data=form(db, asked[1], client_id=ME, choice="right"))
+    assert on.headers["location"] == address(db, query=asked[0])
+    client.post(f"{address(db)}/answer", data=form(db, asked[0], client_id=ME, choice="neither"))
     assert [(row.query_id, row.choice, row.client_id) for row in rows(db, Answer)] == [
         (asked[1], "right", ME),
         (asked[0], "neither", ME),
@@ -93,8 +93,8 @@ def test_without_javascript_forms_lead_from_question_to_question(
 def test_the_same_form_sent_twice_is_one_answer(
     client: httpx2.Client, db: Database, asked: list[int]
 ) -> None:
-    given = {"client_id": ME, "query_id": asked[1], "choice": "right"}
-    assert [client.post("/runs/1/parent/answer", data=given).status_code for _ in range(2)] == [303, 303]
+    given = form(db, asked[1], client_id=ME, choice="right")
+    assert [client.post(f"{address(db)}/answer", data=given).status_code for _ in range(2)] == [303, 303]
     assert len(rows(db, Answer)) == 1
 
 
@@ -102,13 +102,12 @@ def test_a_closed_question_says_so_and_leads_on(
     client: httpx2.Client, db: Database, asked: list[int]
 ) -> None:
     answers.answer(db, asked[1], "left", OTHER, "human")
-    reply = client.post(
-        "/runs/1/parent/answer", data={"client_id": ME, "query_id": asked[1], "choice": "right"}
-    )
+    given = form(db, asked[1], client_id=ME, choice="right")
+    reply = client.post(f"{address(db)}/answer", data=given)
     assert reply.status_code == 409
     assert "already answered by someone else" in reply.text
-    assert 'href="/runs/1/parent"' in reply.text
-    assert "Which move" not in client.get(f"/runs/1/parent?query={asked[1]}").text
+    assert f'href="{address(db)}"' in reply.text
+    assert "Which move" not in look(client, asked[1]).text
 
 
 @pytest.mark.parametrize(
@@ -116,8 +115,7 @@ def test_a_closed_question_says_so_and_leads_on(
     [
         ("/runs/1/parent/answer", {"query_id": 1, "choice": "maybe", "client_id": ME}, 422),
         ("/runs/1/parent/answer", {"query_id": 1, "choice": "left", "client_id": "<script>"}, 422),
-        ("/runs/1/parent/answer", {"query_id": 99, "choice": "left", "client_id": ME}, 404),
-        ("/runs/2/parent/answer", {"query_id": 1, "choice": "left", "client_id": ME}, 404),
+        ("/runs/1/parent/answer", {"query_id": 1, "choice": "left", "client_id": ME}, 410),
         ("/runs/9/parent/next", {"client_id": ME}, 404),
         ("/runs/9/parent/question", {"client_id": ME}, 404),
         ("/runs/1/parent/question", {}, 422),
@@ -144,20 +142,22 @@ def test_a_question_of_another_run_is_not_shown(
 def test_the_script_gets_the_same_markup(client: httpx2.Client, asked: list[int]) -> None:
     part = client.post("/runs/1/parent/question", data={"client_id": ME}).text
     client.cookies.set("parenting_client", ME)
-    page = client.get(f"/runs/1/parent?query={asked[1]}").text
+    page = look(client, asked[1]).text
     assert part.strip().startswith("<form")
     assert part.strip() in page
 
 
 def test_the_next_question_is_leased_ahead(client: httpx2.Client, db: Database, asked: list[int]) -> None:
     def lease(who: str, *shown: int) -> list[str]:
-        reply = client.post("/runs/1/parent/question", data={"client_id": who, "shown": list(shown)})
-        return re.findall(r'data-query="(\d+)"', reply.text) if reply.status_code == 200 else []
+        data = {"client_id": who, "shown": [names[number] for number in shown]}
+        reply = client.post("/runs/1/parent/question", data=data)
+        return re.findall(r'data-query="(\w+)"', reply.text) if reply.status_code == 200 else []
 
-    assert lease(ME) == [str(asked[1])]
-    assert lease(ME, asked[1]) == [str(asked[0])]
+    names = {number: public_id(db, number) for number in asked}
+    assert lease(ME) == [names[asked[1]]]
+    assert lease(ME, asked[1]) == [names[asked[0]]]
     assert lease(ME, *asked) == []
-    assert lease(ME) == [str(asked[1])]  # a reload gives the first again
+    assert lease(ME) == [names[asked[1]]]  # a reload gives the first again
     assert lease(OTHER) == []
     assert lease(OTHER, asked[0]) == []
     assert [query.leased_by for query in rows(db, Query)] == [ME, ME]
@@ -165,7 +165,7 @@ def test_the_next_question_is_leased_ahead(client: httpx2.Client, db: Database, 
 
 def test_nothing_is_leased_ahead_of_the_goal(client: httpx2.Client, db: Database, asked: list[int]) -> None:
     def offered() -> bool:
-        data = {"client_id": ME, "shown": [asked[1]]}
+        data = {"client_id": ME, "shown": [public_id(db, asked[1])]}
         return client.post("/runs/1/parent/question", data=data).status_code == 200
 
     runs.set_goal(db, 1, 1)
@@ -182,27 +182,28 @@ def test_somebody_elses_question_is_not_promised(
     client: httpx2.Client, db: Database, asked: list[int]
 ) -> None:
     for number in asked:
-        assert client.post("/runs/1/parent/question", data={"client_id": OTHER, "shown": number}).text
-    page = client.get("/runs/1/parent").text
+        data = {"client_id": OTHER, "shown": public_id(db, number)}
+        assert client.post("/runs/1/parent/question", data=data).text
+    page = look(client).text
     assert 'data-state="elsewhere"' in page.partition("<main")[2].partition(">")[0]
 
 
-def test_no_question_is_no_content(client: httpx2.Client, life: tuple[Run, Claim]) -> None:
+def test_no_question_is_no_content(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
     assert client.post("/runs/1/parent/question", data={"client_id": ME}).status_code == 204
-    assert client.post("/runs/1/parent/next", data={"client_id": ME}).headers["location"] == "/runs/1/parent"
+    assert client.post("/runs/1/parent/next", data={"client_id": ME}).headers["location"] == address(db)
 
 
 def test_while_it_waits_the_page_without_javascript_reloads(
     client: httpx2.Client, db: Database, life: tuple[Run, Claim]
 ) -> None:
-    assert '<noscript><meta http-equiv="refresh"' in client.get("/runs/1/parent").text
+    assert '<noscript><meta http-equiv="refresh"' in look(client).text
     fixtures.ask(db, life[1], 1, "guidance", fixtures.guidance("left", "down"))
-    assert 'http-equiv="refresh"' not in client.get("/runs/1/parent").text
+    assert 'http-equiv="refresh"' not in look(client).text
 
 
 def test_the_operator_ends_an_episode(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
     runs.report_progress(db, life[1], waiting="stuck")
-    page = client.get("/runs/1/parent").text
+    page = look(client).text
     assert 'data-state="stuck"' in page.partition("<main")[2].partition(">")[0]
     reply = client.post("/runs/1/event", data={"kind": "end_episode", "back": "parent"})
     assert reply.headers["location"] == "/runs/1/parent"
@@ -211,9 +212,9 @@ def test_the_operator_ends_an_episode(client: httpx2.Client, db: Database, life:
 
 def test_an_optimal_agent_is_announced(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
     note = re.compile(r'<div id="optimal" class="note"( hidden)?>')
-    assert note.search(client.get("/runs/1/parent").text)[1] == " hidden"  # type: ignore[index]
+    assert note.search(look(client).text)[1] == " hidden"  # type: ignore[index]
     runs.report_progress(db, life[1], optimal=True)
-    assert note.search(client.get("/runs/1/parent").text)[1] is None  # type: ignore[index]
+    assert note.search(look(client).text)[1] is None  # type: ignore[index]
 
 
 def state_of(page: httpx2.Response) -> str:
@@ -225,19 +226,19 @@ def test_the_page_says_who_waits_for_whom(
     client: httpx2.Client, db: Database, life: tuple[Run, Claim]
 ) -> None:
     """A question is offered while the run is paused; one that is leased is with somebody else."""
-    assert state_of(client.get("/runs/1/parent")) == "exploring"
+    assert state_of(look(client)) == "exploring"
     query = fixtures.ask(db, life[1], 1, "guidance", fixtures.guidance("left", "down"))
     runs.set_status(db, 1, RunStatus.PAUSED)
-    assert state_of(client.get("/runs/1/parent")) == "question"
+    assert state_of(look(client)) == "question"
     leases.lease(db, 1, "somebody", 60.0)
-    assert state_of(client.get("/runs/1/parent")) == "paused"
+    assert state_of(look(client)) == "paused"
     runs.set_status(db, 1, RunStatus.ACTIVE)
-    assert state_of(client.get("/runs/1/parent")) == "elsewhere"
+    assert state_of(look(client)) == "elsewhere"
     runs.set_goal(db, 1, 1)
     answers.answer(db, query, "left", "somebody", "human")
-    assert state_of(client.get("/runs/1/parent")) == "resting"
+    assert state_of(look(client)) == "resting"
     runs.set_status(db, 1, RunStatus.STOPPED)
-    assert state_of(client.get("/runs/1/parent")) == "over"
+    assert state_of(look(client)) == "over"
 
 
 def test_every_state_of_a_run_has_its_words_on_the_page() -> None:
@@ -246,7 +247,7 @@ def test_every_state_of_a_run_has_its_words_on_the_page() -> None:
 
 def test_a_silent_worker_is_told_of(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
     runs.let_go(db, [life[1]])
-    assert state_of(client.get("/runs/1/parent")) == "no_worker"
+    assert state_of(look(client)) == "no_worker"
 
 
 def test_a_request_for_a_question_waits_for_it(

@@ -15,6 +15,7 @@ from parenting.server.runs import get_run
 from parenting.server.settings import Settings
 from parenting.server.worker import Worker
 from tests.pages.browser_tabs import BrowserTabs
+from tests.pages.parent_page import address
 from tests.simulated_person import until
 
 
@@ -56,7 +57,7 @@ def test_from_start_to_stop(tabs: BrowserTabs, db: Database, worker: Worker) -> 
     expect(page.locator("[id='config.stages-error']")).to_contain_text("valid integer")
     page.get_by_label("Stages").fill("2")
     press(page, "Start")
-    expect(page).to_have_url(f"{tabs.address}/runs/1/parent")
+    expect(page).to_have_url(tabs.address + address(db))
     for choice in ("left", "right", "either"):
         answer(page, choice)
     expect(page.locator("#count")).to_have_text("3")

@@ -81,7 +81,7 @@ def test_same_answer_again_gets_the_same_reply(db: Database, run: Run, guidance:
 
 def test_another_answer_is_refused(db: Database, guidance: int) -> None:
     answer(db, guidance, "left", "a", "human")
-    with pytest.raises(Conflict, match=r"already answered question .* with left; right was not stored"):
+    with pytest.raises(Conflict, match=r"already answered this question with left; right was not stored"):
         answer(db, guidance, "right", "a", "human")
     with pytest.raises(Conflict, match="answered by someone else"):
         answer(db, guidance, "left", "b", "human")

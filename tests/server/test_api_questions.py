@@ -7,9 +7,10 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.errors import BusyError
+from parenting.server.identity import database_id
 from parenting.server.queue.answers import get_query
 from parenting.server.queue.worker_side import take_answer
-from parenting.server.runs import Claim, set_status
+from parenting.server.runs import Claim, get_run, set_status
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 from tests.server.conftest import CLIP, CLIPS, Clock
@@ -76,6 +77,9 @@ def test_same_answer_gets_the_same_reply_whatever_happened_since(
         "number": 1,
         "choice": "left",
         "received": "2026-11-22T12:00:00Z",
+        "database": database_id(db),
+        "run_public_id": get_run(db, mine.run_id).public_id,
+        "query_public_id": get_query(db, guidance).public_id,
     }
     take_answer(db, mine, 6)
     set_status(db, mine.run_id, RunStatus.STOPPED)

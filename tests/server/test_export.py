@@ -10,9 +10,10 @@ from parenting.server.codec import CHOICES
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.export import MU, lines, rows
-from parenting.server.queue.answers import answer, supersede
+from parenting.server.identity import database_id
+from parenting.server.queue.answers import answer, get_query, supersede
 from parenting.server.queue.worker_side import post_query, take_answer
-from parenting.server.runs import Claim
+from parenting.server.runs import Claim, get_run
 from tests.server.conftest import CLIPS, Clock
 from tests.server.heard import heard_answers
 
@@ -50,6 +51,9 @@ def test_a_row_tells_all_about_an_answer(db: Database, run_id: int) -> None:
         "received": "2026-11-22T12:00:00.500000Z",
         "standing": True,
         "supersedes": None,
+        "database": database_id(db),
+        "run_public_id": get_run(db, run_id).public_id,
+        "query_public_id": get_query(db, 1).public_id,
     }
 
 

@@ -13,7 +13,7 @@ from parenting.server.app import create_app
 from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
 from parenting.server.notify import Notifier
-from parenting.server.queue.answers import answer
+from parenting.server.queue.answers import answer, get_query
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, report_progress
 from parenting.server.settings import Settings
@@ -48,19 +48,25 @@ def url(settings: Settings, db: Database) -> Iterator[str]:
     assert not thread.is_alive()
 
 
+def told(db: Database, query: int) -> dict[str, object]:
+    """A question as the stream tells of it."""
+    row = get_query(db, query)
+    return {"id": query, "public_id": row.public_id, "kind": row.kind}
+
+
 def follow(url: str, mine: Claim, query: str = "") -> Stream:
     stream = Stream(f"{url}/api/v1/runs/{mine.run_id}/events{query}")
     assert stream.opened.wait(10)
     return stream
 
 
-def test_stream_begins_with_where_things_are(url: str, mine: Claim, guidance: int) -> None:
+def test_stream_begins_with_where_things_are(url: str, db: Database, mine: Claim, guidance: int) -> None:
     stream = follow(url, mine)
     assert stream.headers["content-type"].startswith("text/event-stream")
     (run,) = stream.wait_for("run")
     assert isinstance(run, dict)
     assert (run["status"], run["open"]["guidance"]) == ("active", 1)
-    assert stream.wait_for("question") == [{"id": guidance, "kind": "guidance"}]
+    assert stream.wait_for("question") == [told(db, guidance)]
 
 
 def test_question_is_told_when_the_bell_rings(
@@ -74,7 +80,7 @@ def test_question_is_told_when_the_bell_rings(
     for tick in range(5):
         query = post_query(db, mine, tick, "guidance", 1, CLIPS)
         notifier.notify()
-        assert stream.wait_for("question", 2 * tick + 2)[-1] == {"id": query, "kind": "guidance"}
+        assert stream.wait_for("question", 2 * tick + 2)[-1] == told(db, query)
         answer(db, query, "left", "a", "human")
         notifier.notify()
         assert stream.wait_for("question", 2 * tick + 3)[-1] is None
@@ -84,7 +90,7 @@ def test_question_is_told_without_any_bell(url: str, db: Database, mine: Claim) 
     stream = follow(url, mine)
     stream.wait_for("question")
     query = post_query(db, mine, 1, "preference", 1, CLIPS)
-    assert stream.wait_for("question", 2)[-1] == {"id": query, "kind": "preference"}
+    assert stream.wait_for("question", 2)[-1] == told(db, query)
 
 
 def test_the_rest_is_told_four_times_a_second(

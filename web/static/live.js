@@ -20,7 +20,7 @@ export function follow(id, tell, { background = false } = {}) {
         const run = await get(`/api/v1/runs/${id}`);
         const found = tell.metrics && (await get(`/api/v1/runs/${id}/metrics?after=${tell.after()}`));
         if (!heard) { tell.run(run); if (found) tell.metrics(found.rows); }
-      } catch { if (!heard) tell.lost(); }
+      } catch ({ status }) { if (!heard) tell.lost(status); }
     }
     clearTimeout(timer);
     if (!document.hidden || background) timer = setTimeout(poll, document.hidden ? HIDDEN : POLL);
@@ -39,6 +39,6 @@ export function follow(id, tell, { background = false } = {}) {
 
 async function get(path) {
   const reply = await fetch(path);
-  if (!reply.ok) throw new Error(reply.statusText);
+  if (!reply.ok) throw Object.assign(new Error(reply.statusText), { status: reply.status });
   return reply.json();
 }

@@ -1,6 +1,9 @@
 // Answers on their way. Each is kept in the browser until the server has acknowledged it, and sent again until then.
+// An answer names the database, the run and the question that it is meant for. A server that has another database, or a
+// copy with an identity of its own, does not store it; the browser keeps it for the server that does.
 const KEY = "parenting.answers";
 let memory = [], sending = null, delay = 500;
+const elsewhere = new Set(); // answers that the server at this address would not have, until it was away
 
 function read() {
   try { return JSON.parse(localStorage.getItem(KEY)) ?? memory; } catch { return memory; }
@@ -13,45 +16,59 @@ function write(answers) {
 
 const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListener("online", done, { once: true }); });
 
-// One attempt: "saved", "refused" (the server said no for good) or "kept" (no connection, or a server in trouble).
-async function send({ query, choice, client_id }) {
+// One key for an answer. Version 0.1 named no database, and its questions by number: such an answer is kept, not sent.
+const key = ({ database, question, query }) => `${database} ${question ?? query}`;
+const meant = (answer) => !elsewhere.has(key(answer));
+
+// One attempt: "saved", "refused" (the server said no for good), "elsewhere" (it is meant for another database) or "kept"
+// (no connection, or a server in trouble).
+async function send({ database, run, question, choice, client_id }) {
+  if (!question) return ["elsewhere"];
   try {
-    const reply = await fetch(`/api/v1/queries/${query}/answer`, {
-      method: "POST", keepalive: true, headers: { "content-type": "application/json" }, body: JSON.stringify({ choice, client_id }),
+    const reply = await fetch(`/api/v1/queries/${question}/answer`, {
+      method: "POST", keepalive: true, headers: { "content-type": "application/json" },
+      body: JSON.stringify({ choice, client_id, database, run, question }),
     });
     if (reply.ok) return ["saved", await reply.json()];
     if (reply.status >= 500 || reply.status === 429) return ["kept"];
     const { error } = await reply.json();
-    return ["refused", error];
+    return [error.code === "elsewhere" ? "elsewhere" : "refused", error];
   } catch {
     return ["kept"];
   }
 }
 
 async function drain(report) {
-  for (let answers = read(); answers.length; answers = read()) {
-    const [outcome, reply] = await send(answers[0]);
-    report(outcome, reply);
+  for (let answers = read().filter(meant); answers.length; answers = read().filter(meant)) {
+    const [answer] = answers, [outcome, reply] = await send(answer);
+    if (outcome === "elsewhere") elsewhere.add(key(answer));
+    report(outcome, reply, answer);
     if (outcome === "kept") {
       await wait(delay);
       delay = Math.min(5000, delay * 2);
       continue;
     }
     delay = 500;
-    write(read().filter((answer) => answer.query !== answers[0].query));
+    if (outcome !== "elsewhere") write(read().filter((other) => key(other) !== key(answer)));
   }
 }
 
 // Keep an answer, to be sent.
 export function keep(answer) {
-  write([...read().filter(({ query }) => query !== answer.query), answer]);
+  write([...read().filter((other) => key(other) !== key(answer)), answer]);
 }
 
-// Send whatever is kept, oldest first; resolves when nothing is left.
+// Send whatever is kept, oldest first; resolves when nothing is left that this server would have.
 export function flush(report) {
   sending ??= drain(report).finally(() => { sending = null; });
   return sending;
 }
 
-// The questions whose answers are still on their way.
-export const kept = () => read().map(({ query }) => query);
+// The server was away, so another one may have come: it is asked again to take what the last one would not have.
+export function flushAll(report) {
+  elsewhere.clear();
+  return flush(report);
+}
+
+// The questions whose answers are still on their way to this server.
+export const kept = () => read().filter((answer) => answer.question && meant(answer)).map(({ question }) => question);

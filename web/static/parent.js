@@ -2,7 +2,7 @@
 // The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
 import { recordAnswer, timeLeft } from "./eta.js";
 import { follow } from "./live.js";
-import { flush, keep, kept } from "./outbox.js";
+import { flush, flushAll, keep, kept } from "./outbox.js";
 import { play } from "./play.js";
 
 const $ = (id) => document.getElementById(id);
@@ -14,6 +14,7 @@ const PATIENCE = 1; // seconds that a request for a question may lie at the serv
 const LOOKOUT = 5; // the same for the one after it, while somebody thinks
 const HASTE = 40;   // ms after an answer when the next question is asked for, if the answer's reply is not there before
 const CALM = 60;   // ms after a question is painted when the page turns to what nobody waits for
+const ELSEWHERE = "An answer is meant for another database than the one that is served here. It was not stored; this browser keeps it.";
 const QUIET = 350; // an answered question stays this long before the page says that the agent explores
 
 let current = null;    // the form on the stage, until it is answered
@@ -33,8 +34,7 @@ async function ask(shown = [], seconds = 0, signal = undefined) {
   const body = new URLSearchParams({ client_id: client, wait: seconds });
   for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
   const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body, signal });
-  if (reply.status === 500) throw Object.assign(new Error(reply.statusText), { damaged: true });
-  if (!reply.ok) throw new Error(reply.statusText);
+  if (!reply.ok) throw Object.assign(new Error(reply.statusText), { status: reply.status });
   if (reply.status === 204) return null;
   const holder = document.createElement("template");
   holder.innerHTML = await reply.text();
@@ -56,9 +56,9 @@ async function next(seconds = 0) {
     } while (!form && again && !current);
     if (form && !current) show(form);
     else if (!current) wait(state === "question" ? "elsewhere" : state);
-  } catch (error) {
-    if (error.damaged) wait("damaged");
-    else wait("offline");
+  } catch ({ status }) {
+    if (status === 500) wait("damaged");
+    else wait(status === 404 ? "away" : "offline");
   } finally { asking = false; }
 }
 
@@ -142,6 +142,7 @@ function announce(which) {
 
 const tell = {
   run(now) {
+    if (state === "offline" || state === "away") flushAll(report);
     state = now.state;
     goal = now.goal;
     if (now.reason) $("reason").textContent = now.reason;
@@ -158,10 +159,10 @@ const tell = {
   question(asked) {
     if (!asked) return;
     if (!current) next();
-    else if (asked.kind === "guidance" && String(asked.id) !== current.dataset.query && !lookout) prefetch(); // it goes first
+    else if (asked.kind === "guidance" && asked.public_id !== current.dataset.query && !lookout) prefetch(); // it goes first
   },
-  lost() {
-    state = "offline";
+  lost(status) {
+    state = status === 404 ? "away" : "offline";
     wait(state);
   },
 };
@@ -179,16 +180,16 @@ function count(number) {
 
 function answer(choice) {
   if (!current) return;
-  const query = Number(current.dataset.query);
-  given.add(current.dataset.query);
+  const { database, query } = current.dataset;
+  given.add(query);
   for (const button of current.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
   current = null;
   unsaved++;
   $("saved").textContent = "Saving";
   $("alert").textContent = "";
-  performance.mark("answer", { detail: String(query) });
+  performance.mark("answer", { detail: query });
   recordAnswer();
-  keep({ query, choice, client_id: client });
+  keep({ database, run, question: query, choice, client_id: client });
   if (ahead) {
     painted(() => flush(report));
     return show(ahead);
@@ -203,7 +204,7 @@ function settle() {
   for (const reply of saved.splice(0)) report("saved", reply);
 }
 
-function report(outcome, reply) {
+function report(outcome, reply, answer) {
   if (outcome === "saved" && quiet) return saved.push(reply);
   $("saved").classList.toggle("kept", outcome === "kept");
   if (outcome === "kept") {
@@ -213,11 +214,12 @@ function report(outcome, reply) {
   }
   unsaved = Math.max(0, unsaved - 1);
   if (outcome === "saved") {
-    if (String(reply.run) === run) count(reply.number);
+    if (reply.run_public_id === run) count(reply.number);
     if (!unsaved) $("saved").textContent = "Saved";
   } else {
-    if (!unsaved) $("saved").textContent = "";
-    $("alert").textContent = reply.message;
+    if (!unsaved) $("saved").textContent = outcome === "elsewhere" ? "Kept here, not stored" : "";
+    $("alert").textContent = outcome === "elsewhere" ? ELSEWHERE : reply.message;
+    if (outcome === "elsewhere") given.delete(answer.question); // this server may ask the same: it is a copy
   }
 }
 
@@ -252,6 +254,6 @@ document.addEventListener("visibilitychange", () => {
 });
 history.replaceState(null, "", `/runs/${run}/parent`);
 const first = stage.querySelector("#question");
-if (first && !kept().includes(Number(first.dataset.query))) show(first);
+if (first && !kept().includes(first.dataset.query)) show(first);
 setInterval(renew, RENEW);
 flush(report).then(() => follow(run, tell, { background: true }));

@@ -1,0 +1,78 @@
+"""The names that an answer carries: of the database, the run and the question that it is meant for.
+
+Another database has a question of the same number, and a copy has one of the same public id. So whatever an
+answer names is compared, in the answer's own transaction, and an answer that is meant for elsewhere is not
+stored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import Row, bindparam, select
+from sqlalchemy.orm import Session
+
+from parenting.server.errors import ElsewhereError, NotFound
+from parenting.server.tables import Identity, Query, Run
+
+
+@dataclass(frozen=True)
+class Names:
+    """Public ids as an answer states them, and the UUID of its database; None: not stated."""
+
+    database: str | None = None
+    run: str | None = None
+    question: str | None = None
+
+
+@dataclass(frozen=True)
+class Place:
+    """A question with its numbers here and the names that mean the same everywhere."""
+
+    query: int
+    run: int
+    database: str
+    run_public_id: str
+    query_public_id: str
+
+
+UNSTATED = Names()
+
+
+def find_place(session: Session, query: int | str, names: Names = UNSTATED) -> Place:
+    """Return the question of a number or a public id, if it is the one that an answer names.
+
+    Raises:
+        ElsewhereError: it, its run or this database is another one than what is named.
+        NotFound: there is no question of this number, and nothing else was named.
+    """
+    if isinstance(query, str):
+        row = session.execute(_BY_PUBLIC_ID, {"query": query}).one()
+    else:
+        row = session.execute(_BY_NUMBER, {"query": query}).one()
+    if _differs(row, names) or (row.query is None and isinstance(query, str)):
+        raise ElsewhereError
+    if row.query is None:
+        raise NotFound(f"There is no question {query}.")
+    return Place(**row._mapping)
+
+
+def _differs(row: Row[str, int, int, str, str], names: Names) -> bool:
+    """Return whether anything that is named is not what was found; where nothing is found, all is."""
+    stated = (names.database, names.run, names.question)
+    found = (row.database, row.run_public_id, row.query_public_id)
+    return any(name is not None and name != here for name, here in zip(stated, found, strict=True))
+
+
+# Statements that every answer needs are built once. The only row of `Identity` is always there.
+_PLACE = select(
+    Identity.uuid.label("database"),
+    Query.id.label("query"),
+    Query.run_id.label("run"),
+    Run.public_id.label("run_public_id"),
+    Query.public_id.label("query_public_id"),
+).select_from(Identity)
+_BY_NUMBER = _PLACE.outerjoin(Query, Query.id == bindparam("query")).outerjoin(Run, Run.id == Query.run_id)
+_BY_PUBLIC_ID = _PLACE.outerjoin(Query, Query.public_id == bindparam("query")).outerjoin(
+    Run, Run.id == Query.run_id
+)
