@@ -16,6 +16,7 @@ from parenting.agent.config import Config
 from parenting.agent.events import Event
 from parenting.server.columns import UNREADABLE, Damaged
 from parenting.server.errors import DamagedRowError
+from parenting.server.public_ids import is_public_id
 from parenting.server.schemas import ClipSchema
 from parenting.server.tables import Metric, OperatorEvent, Query, Run, Table
 
@@ -83,6 +84,8 @@ def _columns(row: Table) -> Iterator[str]:
             yield f"{place} {value.reason}"
         elif value is None and not column.nullable and column.name in state.dict:
             yield f"{place} is missing"
+        elif column.name == "public_id" and value is not None and not is_public_id(value):
+            yield f"{place} is not a public id"
 
 
 def _shapes(row: Table) -> Iterator[str]:

@@ -11,7 +11,9 @@ from __future__ import annotations
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from parenting.server.columns import Damaged
 from parenting.server.db import Database
+from parenting.server.errors import DamagedRowError
 from parenting.server.tables import Identity, Query, Run, new_uuid
 
 
@@ -22,8 +24,26 @@ def database_id(db: Database) -> str:
 
 
 def database_id_in(session: Session) -> str:
-    """Return the UUID of a database, in a transaction that is already open."""
-    return session.execute(_UUID).scalar_one()
+    """Return the UUID of a database, in a transaction that is already open.
+
+    Raises:
+        DamagedRowError: it cannot be read, so nobody can say which database this is.
+    """
+    return stated(session.execute(_UUID).scalar_one())
+
+
+def stated(found: str | Damaged) -> str:
+    """Return a UUID that was read, if it could be.
+
+    Raises:
+        DamagedRowError: it could not.
+    """
+    if isinstance(found, Damaged):
+        raise DamagedRowError(
+            "The identity of this database cannot be read, so no answer can be held to be meant for it. "
+            "Restore a backup of before the damage."
+        )
+    return found
 
 
 def renew(db: Database) -> str:

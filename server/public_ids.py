@@ -7,6 +7,7 @@ A number has at most 16 digits, so the two are told apart by their length.
 
 from __future__ import annotations
 
+import re
 import secrets
 
 ALPHABET = "123456789ABCDEFGHJKLMNPQRSTUVWXYZabcdefghijkmnopqrstuvwxyz"
@@ -17,3 +18,11 @@ PATTERN = f"^[{ALPHABET}]{{{LENGTH}}}$"
 def public_id() -> str:
     """Draw a new public id from the system's source of randomness."""
     return "".join(secrets.choice(ALPHABET) for _ in range(LENGTH))
+
+
+def is_public_id(text: str) -> bool:
+    """Return whether a text has the form of a public id."""
+    return _FORM.fullmatch(text) is not None
+
+
+_FORM = re.compile(PATTERN)

@@ -10,10 +10,9 @@ from pydantic import PlainValidator, StringConstraints, WithJsonSchema
 
 from parenting.server.deps import Db
 from parenting.server.new_run import LARGEST_INT
-from parenting.server.public_ids import PATTERN
+from parenting.server.public_ids import PATTERN, is_public_id
 from parenting.server.reads import names
 
-_PUBLIC = re.compile(PATTERN)
 _DIGITS = re.compile(r"[0-9]{1,16}")
 SCHEMA: dict[str, Any] = {
     "anyOf": [
@@ -32,7 +31,7 @@ def read_name(text: str) -> int | str:
     Raises:
         ValueError: it is neither.
     """
-    if _PUBLIC.fullmatch(text):
+    if is_public_id(text):
         return text
     if _DIGITS.fullmatch(text) and 1 <= int(text) <= LARGEST_INT:
         return int(text)

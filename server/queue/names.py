@@ -13,6 +13,7 @@ from sqlalchemy import Row, bindparam, select
 from sqlalchemy.orm import Session
 
 from parenting.server.errors import ElsewhereError, NotFound
+from parenting.server.identity import stated
 from parenting.server.tables import Identity, Query, Run
 
 
@@ -50,6 +51,7 @@ def find_place(session: Session, query: int | str, names: Names = UNSTATED) -> P
         row = session.execute(_BY_PUBLIC_ID, {"query": query}).one()
     else:
         row = session.execute(_BY_NUMBER, {"query": query}).one()
+    stated(row.database)
     if _differs(row, names) or (row.query is None and isinstance(query, str)):
         raise ElsewhereError
     if row.query is None:

@@ -7,7 +7,7 @@ from typing import Any
 import httpx2
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import delete, func, select
+from sqlalchemy import delete, func, select, text
 
 from parenting.server.app import create_app
 from parenting.server.db import Database
@@ -127,6 +127,18 @@ def test_renewed_copy_refuses_what_was_meant_for_the_original(
     fresh = names_of(db)
     assert fresh["question"] == before["question"], "what is offered keeps its name"
     assert client.post(f"/api/v1/queries/{guidance}/answer", json={**body, **fresh}).status_code == 200
+
+
+def test_a_database_that_cannot_say_which_it_is_stores_no_answer(
+    client: httpx2.Client, db: Database, guidance: int
+) -> None:
+    body = {"choice": "left", "client_id": "me", **names_of(db)}
+    with db.write() as session:
+        session.execute(text("UPDATE database_identity SET uuid = x'ff00'"))
+    reply = client.post(f"/api/v1/queries/{guidance}/answer", json=body)
+    assert (reply.status_code, reply.json()["error"]["code"]) == (500, "damaged")
+    assert "identity of this database" in client.get("/").text
+    assert count(db) == 0
 
 
 def test_answer_to_a_deleted_question_goes_to_no_later_one(db: Database, guidance: int) -> None:
