@@ -49,9 +49,10 @@ def settings(tmp_path: Path) -> Settings:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    reports = [report for kind in ("passed", "failed") for report in terminalreporter.stats.get(kind, [])]
+    reports = [report for kind in terminalreporter.stats.values() for report in kind]
+    ended = [report for report in reports if getattr(report, "when", None) == "teardown"]
     total: Counter[tuple[str, str]] = add_up(
-        value for report in reports for name, value in report.user_properties if name == "figures"
+        value for report in ended for name, value in report.user_properties if name == "figures"
     )
     terminalreporter.section(f"figures, {seeds.VARIABLE}={seeds.settle()}")
     for line in lines(total):

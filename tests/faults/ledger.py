@@ -73,7 +73,12 @@ class Entries(NamedTuple):
 
 def read(*files: Path) -> Entries:
     """The lines of these ledgers. A line that was cut by a kill is no promise that was kept in mind."""
-    rows = [row for file in files for row in _rows(file.read_bytes())]
+    return told_in(*(file.read_bytes() for file in files))
+
+
+def told_in(*contents: bytes) -> Entries:
+    """The same for the contents of files."""
+    rows = [row for content in contents for row in _rows(content)]
     return Entries(
         [Told(*row[1:]) for row in rows if row[0] == "told"],
         [Offer(*row[1:]) for row in rows if row[0] == "offer"],

@@ -27,6 +27,7 @@ class Point(NamedTuple):
     when: str  # before, after
     pattern: str  # of the statement
     commit: bool = False  # the commit of the transaction that it is in, instead of itself
+    seldom: bool = False  # a process passes it once
     passage: int = 1  # which passage kills
 
     def fits(self, moment: Moment) -> bool:
@@ -77,33 +78,33 @@ def marked(file: Path) -> str:
     return file.read_bytes().decode().strip() or "before the first statement"
 
 
-def around(name: str, pattern: str) -> list[Point]:
+def around(name: str, pattern: str, seldom: bool = False) -> list[Point]:
     """The four points of a write: before and after the statement, before and after its commit."""
     return [
-        Point(f"before {name}", "before", pattern),
-        Point(f"after {name}, before its commit", "after", pattern),
-        Point(f"at the commit of {name}", "before", pattern, commit=True),
-        Point(f"after the commit of {name}", "after", pattern, commit=True),
+        Point(f"before {name}", "before", pattern, False, seldom),
+        Point(f"after {name}, before its commit", "after", pattern, False, seldom),
+        Point(f"at the commit of {name}", "before", pattern, True, seldom),
+        Point(f"after the commit of {name}", "after", pattern, True, seldom),
     ]
 
 
 WEB = [
     *around("an answer", r"INSERT INTO answer"),
-    *around("a lease", r"UPDATE query SET .*leased_by"),
+    *around("a lease", r'UPDATE "?query"? SET .*leased_by'),
     *around("an operator's event", r"INSERT INTO event"),
     *around("a pause", r"UPDATE run SET .*status"),
 ]
 WORKER = [
-    *around("a question", r"INSERT INTO query"),
+    *around("a question", r'INSERT INTO "?query"?'),
     *around("an answer's tick", r"UPDATE answer SET .*applied_tick"),
     *around("an event's tick", r"UPDATE event SET .*applied_tick"),
     *around("a checkpoint", r"INSERT INTO checkpoint"),
     *around("old checkpoints' end", r"DELETE FROM checkpoint"),
-    *around("a claim", r"UPDATE run SET .*fencing_token="),
+    *around("a claim", r"UPDATE run SET .*fencing_token=", seldom=True),
     *around("a sign of life", r"UPDATE run SET .*heartbeat="),
     *around("metrics", r"INSERT INTO metric"),
 ]
 CLOSING = [
-    *around("letting go of runs", r"UPDATE run SET .*worker="),
-    *around("signing off", r"DELETE FROM worker"),
+    *around("letting go of runs", r"UPDATE run SET worker=[^,]*, heartbeat="),
+    *around("signing off", r"DELETE FROM worker WHERE worker.name"),
 ]

@@ -1,0 +1,183 @@
+"""Web and workers as processes that are killed and started again while parents and an operator work."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import httpx2
+
+from parenting.server.settings import Settings
+from tests.faults.auditor import Store, audit
+from tests.faults.ledger import Ledger, read
+from tests.faults.parent import Parent
+from tests.faults.points import Point, arm, marked
+from tests.server.processes import Command
+from tests.server.serving import free_port
+
+PATCHES = {
+    "parenting.server.session.CHECKPOINT_SECONDS": 0.05,
+    "parenting.server.session.METRIC_SECONDS": 0.05,
+}
+"""Checkpoints and metrics are written often, so that kills hit them too."""
+LEASE_SECONDS = 2.0
+PATIENCE = 60.0
+
+
+class House:
+    """The processes of one data folder. `orders` are their command lines, by name."""
+
+    def __init__(self, settings: Settings, points: Sequence[Point] = (), workers: int = 1) -> None:
+        self.settings, self.points = settings, points
+        self.url = f"http://127.0.0.1:{free_port()}"
+        self.orders: dict[str, tuple[str, ...]] = {"web": ("web", "--port", self.url.rpartition(":")[2])}
+        self.orders |= {f"worker {number}": ("worker",) for number in range(1, workers + 1)}
+        self.patches: Mapping[str, Any] = PATCHES
+        self.prepare: Callable[[], object] | None = None
+        self.commands: dict[str, Command] = {}
+        self.ledger = Ledger(settings.data / "ledger")
+        self.parents: list[Parent] = []
+        self.operator: Operator | None = None
+
+    @property
+    def store(self) -> Store:
+        """The database, for the auditor."""
+        url = self.settings.database_url
+        return Store(self.settings.data / "parenting.db" if url is None else url)
+
+    def begin(self, name: str, point: Point | None = None) -> Command:
+        """Start a process, which kills itself at the point, if there is one."""
+        environment = {"PARENTING_LEASE_SECONDS": str(LEASE_SECONDS)}
+        if self.settings.database_url is not None:
+            environment["PARENTING_DATABASE_URL"] = self.settings.database_url
+        self.commands[name] = Command(
+            *self.orders[name],
+            data=self.settings.data,
+            patches=self.patches,
+            prepare=self.prepare or partial(arm, str(self.mark(name)), point, self.points),
+            environment=environment,
+        )
+        return self.commands[name]
+
+    def mark(self, name: str) -> Path:
+        """The file that says where a process was."""
+        return self.settings.data / f"{name.replace(' ', '-')}.mark"
+
+    def keep(self) -> None:
+        """Start again whatever does not run."""
+        for name in self.orders:
+            one = self.commands.get(name)
+            if one is None or not one.alive:
+                code = None if one is None else one.process.exitcode
+                assert code in (None, -signal.SIGKILL), f"{name} ended with {code}: {one and one.said()}"
+                self.begin(name)
+
+    def kill(self, name: str) -> str:
+        """SIGKILL; the place where the process was."""
+        self.commands[name].kill()
+        return marked(self.mark(name))
+
+    def signal(self, name: str, number: signal.Signals) -> None:
+        """Send a signal to a process."""
+        os.kill(self.commands[name].process.pid, number)
+
+    def move_in(self, runs: Sequence[int | str], parents: int, rng: random.Random) -> None:
+        """Let so many parents a run begin to answer, and an operator to interfere."""
+        for run in runs:
+            for number in range(parents):
+                self.parents.append(Parent(self.url, run, f"{number}.of.{run}", self.ledger, rng.random()))
+        self.operator = Operator(self.url, runs, rng.random())
+        for thread in (*self.parents, self.operator):
+            thread.start()
+
+    @property
+    def told(self) -> int:
+        """Answers that parents were told of."""
+        return sum(parent.told for parent in self.parents)
+
+    def until_told(self, more: int) -> None:
+        """Wait until so many more answers were told: work goes on after whatever happened."""
+        wanted, end = self.told + more, time.monotonic() + PATIENCE
+        while self.told < wanted:
+            assert time.monotonic() < end, {name: one.said()[-2000:] for name, one in self.commands.items()}
+            self.keep()
+            time.sleep(0.01)
+
+    def until_killed(self, name: str, what: str) -> None:
+        """Wait until a process has killed itself."""
+        one, end = self.commands[name], time.monotonic() + PATIENCE
+        while one.alive:
+            assert time.monotonic() < end, f"never hit: {what}"
+            time.sleep(0.002)
+        assert one.process.exitcode == -signal.SIGKILL, f"{what}: {one.process.exitcode}: {one.said()}"
+
+    def move_out(self) -> None:
+        """Let the parents leave, and stop the processes in order."""
+        for person in self._people():
+            person.leaving.set()
+        for person in self._people():
+            person.join(PATIENCE)
+        self.keep()
+        for name in sorted(self.commands, reverse=True):  # workers before the web
+            code = self.commands[name].stop()
+            assert code in (0, -signal.SIGTERM), f"{name} ended with {code}: {self.commands[name].said()}"
+
+    def _people(self) -> Sequence[Parent | Operator]:
+        return [*self.parents, *([self.operator] if self.operator else [])]
+
+    def audit(self) -> list[str]:
+        """Every breach of a promise: what parents complained of, and what the auditor finds."""
+        complaints = [one for parent in self.parents for one in parent.complaints]
+        return complaints + audit(self.store, read(self.ledger.file))
+
+    def __enter__(self) -> House:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for person in self._people():
+            person.leaving.set()
+        for one in self.commands.values():
+            if one.alive:
+                one.kill()
+        self.ledger.close()
+
+
+class Operator(threading.Thread):
+    """Pauses and resumes, changes a probability, ends an episode, again and again."""
+
+    def __init__(self, url: str, runs: Sequence[int | str], seed: float) -> None:
+        super().__init__(daemon=True)
+        self.http = httpx2.Client(base_url=f"{url}/api/v1/", timeout=10, trust_env=False)
+        self.runs, self.rng, self.leaving = runs, random.Random(seed), threading.Event()
+
+    def run(self) -> None:
+        """Interfere until told to leave; at last every run goes on."""
+        while not self.leaving.wait(self.rng.uniform(0, 0.4)):
+            self._interfere(self.rng.choice(self.runs))
+        for run in self.runs:
+            self._post(f"runs/{run}/resume")
+        self.http.close()
+
+    def _interfere(self, run: int | str) -> None:
+        verb = self.rng.choice(("pause", "change", "end-episode"))
+        if verb == "change":
+            value = round(self.rng.uniform(0.5, 0.9), 3)
+            self._post(f"runs/{run}/change", {"name": "p_rec", "value": value})
+            return
+        self._post(f"runs/{run}/{verb}")
+        if verb == "pause":
+            self._post(f"runs/{run}/resume")
+
+    def _post(self, path: str, body: dict[str, Any] | None = None) -> None:
+        """Post it once; what is lost with a killed server is lost."""
+        try:
+            self.http.post(path, json=body)
+        except httpx2.TransportError:
+            return

@@ -1,0 +1,125 @@
+"""The agent's whole state rebuilt from the record alone, by plain SQL and the agent's own code (A5, C1, C2).
+
+It imports nothing of `parenting.server`: it reads the stored answers and events with their ticks, raises the
+agent from tick 0, holds every query to its stored row, and compares all tensors with the last checkpoint's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from pydantic import TypeAdapter
+
+from parenting.agent import parenting
+from parenting.agent import query as queries
+from parenting.agent.config import Config
+from parenting.agent.events import Event
+from parenting.agent.init import world_of
+from parenting.agent.query import Answer, Choice, Query, QueryKind
+from parenting.agent.state import AgentState, current_names
+from parenting.drawing.query_tensors import read_clips
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import keys
+from tests.faults.auditor import Store
+
+_EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
+CHOICES = {name: Choice[name.upper()] for name in ("left", "right", "either", "neither")}
+
+
+def read_json(value: Any) -> Any:
+    """A JSON column: SQLite gives its text, PostgreSQL its content."""
+    return json.loads(value) if isinstance(value, str) else value
+
+
+class Recorded:
+    """A parent that gives stored answers back at their ticks and holds what is asked to the stored rows."""
+
+    def __init__(self, store: Store, run: int, world: Gridworld, stages: int) -> None:
+        self.world, self.nothing = world, queries.empty(1, stages, world.height, world.width)
+        self.asked = {
+            row["tick"]: row for row in store.rows(f"SELECT * FROM query WHERE run_id = {run} ORDER BY tick")
+        }
+        ticks = {row["id"]: row["tick"] for row in self.asked.values()}
+        answers = store.rows(f"SELECT * FROM answer WHERE run_id = {run} AND applied_tick IS NOT NULL")
+        self.heard = {row["applied_tick"]: (ticks[row["query_id"]], row["choice"]) for row in answers}
+        self.operator = store.rows(
+            f"SELECT * FROM event WHERE run_id = {run} AND applied_tick IS NOT NULL ORDER BY id"
+        )
+        self.kept: dict[int, Query] = {}
+        self.tick, self.found = 0, list[str]()
+
+    def events(self, state: AgentState) -> Sequence[Event]:
+        self.tick = int(state.keys.tick[0]) + 1
+        rows = [row for row in self.operator if row["applied_tick"] == self.tick]
+        return [_EVENTS.validate_python({"kind": row["kind"], **read_json(row["payload"])}) for row in rows]
+
+    def take(self, state: AgentState) -> Answer:
+        if self.tick not in self.heard:
+            return queries.silence(self.nothing)
+        asked, choice = self.heard[self.tick]
+        if asked not in self.kept:
+            self.found.append(
+                f"C2 at tick {self.tick} an answer to tick {asked} is heard, where nothing was asked"
+            )
+            return queries.silence(self.nothing)
+        query = self.kept[asked]
+        return Answer(query=query, choice=torch.full_like(query.kind, int(CHOICES[choice])))
+
+    def post(self, query: Query) -> None:
+        row = self.asked.get(self.tick)
+        if int(query.kind[0]) == QueryKind.NONE:
+            if row is not None:
+                self.found.append(f"C2 a query is stored at tick {self.tick}, where nothing is asked")
+            return
+        self.kept[self.tick] = query.clone()
+        kind = QueryKind(int(query.kind[0])).name.lower()
+        asked = [kind, int(query.maturity[0]), read_json(json.dumps(read_clips(query, self.world.legend)))]
+        if row is None or asked != [row["kind"], row["maturity"], read_json(row["clips"])]:
+            self.found.append(f"C3 the query of tick {self.tick} is not the stored one")
+
+
+def rebuild(store: Store, run: int) -> list[str]:
+    """Each way in which a run's last intact checkpoint differs from what its record gives, weights fresh."""
+    (row,) = store.rows(f"SELECT * FROM run WHERE id = {run}")
+    config = Config.model_validate(read_json(row["config"]))
+    world = world_of(row["world"], row["level_text"], config)
+    saved = _checkpoint(store, run)
+    state, parent = (
+        parenting.init(world, config, keys(row["seed"], 1), None),
+        Recorded(store, run, world, config.max_clip_length),
+    )
+    last = int(saved["keys.tick"][0])
+    for _ in range(last):
+        state, _, _, config = parenting.tick(world, config, state, parent)
+    late = [tick for tick in parent.asked if tick <= last and tick not in parent.kept]
+    found = parent.found + [f"C2 the query stored at tick {tick} was not asked" for tick in late]
+    return found + [f"A5 {name} differs from the record" for name in _differing(state, saved)]
+
+
+def entries_of_x(store: Store, run: int) -> tuple[int, int]:
+    """The entries of X in the last checkpoint, and the answers up to its tick that may have entered it."""
+    saved = _checkpoint(store, run)
+    heard = store.rows(
+        f"SELECT count(*) AS n FROM answer WHERE run_id = {run} AND choice <> 'neither' "
+        f"AND applied_tick <= {int(saved['keys.tick'][0])}"
+    )
+    return int(saved["x.size"][0]), int(heard[0]["n"])
+
+
+def _differing(state: AgentState, saved: dict[str, torch.Tensor]) -> list[str]:
+    parts = {name: part for name, part in state.tensors().items() if not name.startswith("info.")}
+    assert parts.keys() == saved.keys()
+    return [name for name, part in parts.items() if not torch.equal(part, saved[name])]
+
+
+def _checkpoint(store: Store, run: int) -> dict[str, torch.Tensor]:
+    rows = store.rows(f"SELECT * FROM checkpoint WHERE run_id = {run} ORDER BY id DESC")
+    intact = [row["blob"] for row in rows if hashlib.sha256(row["blob"]).hexdigest() == row["sha256"]]
+    whole = torch.load(io.BytesIO(intact[0]), weights_only=True)
+    named: dict[str, torch.Tensor] = dict(current_names(whole["state"]))
+    return named

@@ -1,0 +1,120 @@
+"""SIGKILL at every named point and at random moments, while parents answer and an operator interferes.
+
+No told answer is lost (A1), none is counted twice (A2), nothing is asked twice (C3), no question is in two
+hands (B1), and the state of each agent is what its record gives (A5, C1, C2). A point that no kill hit fails.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from parenting.server.db import Database
+from parenting.server.new_run import start
+from parenting.server.settings import Settings
+from tests.database import migrated
+from tests.faults.figures import Figures
+from tests.faults.house import House
+from tests.faults.points import CLOSING, WEB, WORKER, Point
+from tests.faults.rebuilt import entries_of_x, rebuild
+from tests.lengths import length
+from tests.server.raising import ISLAND
+
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(300, 6000))]
+RUNS, PARENTS = 2, 2
+KILLS = length(60, 3000)
+SPREAD = 0.15
+"""A kill comes up to so many seconds after work has gone on."""
+
+
+@pytest.fixture
+def db(settings: Settings) -> Iterator[Database]:
+    database = migrated(settings)
+    yield database
+    database.close()
+
+
+def begin(db: Database) -> list[int]:
+    return [start(db, ISLAND.new("human")).id for _ in range(RUNS)]
+
+
+def hold_to_the_promises(house: House, runs: list[int]) -> None:
+    assert house.audit() == []
+    for run in runs:
+        assert rebuild(house.store, run) == []
+        in_x, heard = entries_of_x(house.store, run)
+        assert 0 < in_x <= heard
+
+
+def kill_at(house: House, name: str, points: list[Point], rng: random.Random, figures: Figures) -> None:
+    """Kill a process at each of the points, in a random order; work goes on after each kill."""
+    for point in rng.sample(points, k=len(points)):
+        house.commands[name].kill()
+        house.begin(name, point._replace(passage=1 if point.seldom else rng.randint(1, 3)))
+        end = time.monotonic() + 60
+        while house.commands[name].alive:
+            assert time.monotonic() < end, f"never hit: {point.name}"
+            house.keep()
+            time.sleep(0.002)
+        figures.count("SIGKILLs at named points", f"{name}: {point.name}")
+        house.begin(name)
+        house.until_told(1)
+
+
+@pytest.mark.parametrize("name", ["web", "worker 1"])
+def test_killed_at_every_named_point(
+    settings: Settings, db: Database, rng: random.Random, figures: Figures, name: str
+) -> None:
+    points, runs = WEB if name == "web" else WORKER, begin(db)
+    with House(settings, [*WEB, *WORKER]) as house:
+        house.keep()
+        house.move_in(runs, PARENTS, rng)
+        house.until_told(2)
+        for _ in range(length(1, 20)):
+            kill_at(house, name, points, rng, figures)
+        house.move_out()
+        hold_to_the_promises(house, runs)
+
+
+def test_killed_at_random_moments(
+    settings: Settings, db: Database, rng: random.Random, figures: Figures
+) -> None:
+    runs = begin(db)
+    with House(settings, [*WEB, *WORKER]) as house:
+        house.keep()
+        house.move_in(runs, PARENTS, rng)
+        house.until_told(2)
+        for _ in range(KILLS):
+            time.sleep(rng.uniform(0, SPREAD))
+            name = rng.choice(("web", "worker 1"))
+            figures.count("SIGKILLs at random moments", f"{name}: {house.kill(name)}")
+            house.keep()
+            house.until_told(1)
+        house.move_out()
+        assert len(figures.of("SIGKILLs at random moments")) >= 5, "all kills fell into the same places"
+        hold_to_the_promises(house, runs)
+
+
+def test_killed_while_it_closes(
+    settings: Settings, db: Database, rng: random.Random, figures: Figures
+) -> None:
+    """A worker that is stopped in order and killed before it is done leaves its runs to the next one."""
+    runs = begin(db)
+    with House(settings, [*WORKER, *CLOSING]) as house:
+        house.keep()
+        house.move_in(runs, PARENTS, rng)
+        house.until_told(2)
+        for point in CLOSING:
+            house.commands["worker 1"].kill()
+            house.begin("worker 1", point)
+            house.until_told(2)
+            house.commands["worker 1"].process.terminate()
+            house.until_killed("worker 1", point.name)
+            figures.count("SIGKILLs at named points", f"worker 1: {point.name}")
+            house.begin("worker 1")
+            house.until_told(1)
+        house.move_out()
+        hold_to_the_promises(house, runs)
