@@ -13,6 +13,8 @@ import secrets
 import select
 import socket
 import tempfile
+import time
+from contextlib import suppress
 from pathlib import Path
 
 MAX_PATH_BYTES = 100
@@ -36,15 +38,13 @@ class Notifier:
             paths = list(self.folder.iterdir())
         except OSError:
             return  # nobody has listened yet
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
-            out.setblocking(False)
-            for path in paths:
-                try:
-                    out.sendto(b"!", str(path))
-                except (ConnectionRefusedError, FileNotFoundError):
-                    path.unlink(missing_ok=True)
-                except OSError:
-                    continue  # its buffer is full: it will wake anyway
+        for path in paths:
+            _send(path)
+
+    def wake(self) -> None:
+        """Wake this process's own `wait`, from another thread. Never blocks and never fails."""
+        if self._path is not None:
+            _send(self._path)
 
     def listeners(self) -> int:
         """Return the number of processes that listen, those that were stopped by a signal included."""
@@ -59,21 +59,34 @@ class Notifier:
 
         A notification sent since the last call counts.
         """
-        listener = self.listen()
+        try:
+            listener = self.listen()
+        except OSError:  # a folder that cannot be written for a while: whoever polls goes on
+            time.sleep(max(timeout, 0))
+            return False
         if not select.select([listener], [], [], max(timeout, 0))[0]:
             return False
         self.drain()
         return True
 
     def listen(self) -> socket.socket:
-        """Return the socket that receives notifications, bound at the first call; for an event loop."""
+        """Return the socket that receives notifications, bound at the first call; for an event loop.
+
+        Raises:
+            OSError: no socket can be made in the folder.
+        """
         if self._listener is None:
             self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             # A random name instead of the process id: containers that share the folder have equal ids.
-            self._path = self.folder / secrets.token_hex(8)
-            self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-            self._listener.setblocking(False)
-            self._listener.bind(str(self._path))
+            path = self.folder / secrets.token_hex(8)
+            listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            try:
+                listener.setblocking(False)
+                listener.bind(str(path))
+            except OSError:
+                listener.close()
+                raise
+            self._listener, self._path = listener, path
         return self._listener
 
     def drain(self) -> None:
@@ -89,7 +102,8 @@ class Notifier:
         """Stop listening and remove the socket."""
         if self._listener is not None and self._path is not None:
             self._listener.close()
-            self._path.unlink(missing_ok=True)
+            with suppress(OSError):
+                self._path.unlink()
             self._listener = self._path = None
 
 
@@ -101,6 +115,17 @@ def _held(path: Path) -> bool:
         except OSError:
             return False
     return True
+
+
+def _send(path: Path) -> None:
+    """Send a byte to a socket; one that no process holds is removed."""
+    with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
+        out.setblocking(False)
+        try:
+            out.sendto(b"!", str(path))
+        except (ConnectionRefusedError, FileNotFoundError):
+            path.unlink(missing_ok=True)
+        # any other error: its buffer is full, so that it wakes anyway; or the folder cannot be written
 
 
 def _folder(data: Path, channel: str) -> Path:

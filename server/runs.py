@@ -7,12 +7,12 @@ write.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import bindparam, or_, select, update
+from sqlalchemy import ColumnElement, bindparam, or_, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from parenting.server.damage import readable
@@ -128,39 +128,55 @@ def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
         return run
 
 
-def claim(db: Database, worker: str, seconds: float = CLAIM_SECONDS) -> Sequence[Claim]:
-    """Claim every run that is not over and is free, or whose worker was silent for `seconds`."""
+def claim(
+    db: Database,
+    worker: str,
+    seconds: float = CLAIM_SECONDS,
+    most: int | None = None,
+    but: Collection[int] = (),
+) -> Sequence[Claim]:
+    """Claim runs that are not over and are free, or whose worker was silent for `seconds`.
+
+    Args:
+        db: The database.
+        worker: The name of the worker that claims them.
+        seconds: How long a claim holds without a sign of life.
+        most: How many runs to claim at most; None claims all.
+        but: Runs to leave alone.
+    """
     late = db.clock() - timedelta(seconds=seconds)
-    living = (Run.status.in_(LIVING), or_(Run.worker.is_(None), Run.heartbeat < late))
+    free = (Run.status.in_(LIVING), or_(Run.worker.is_(None), Run.heartbeat < late), Run.id.not_in(but))
     with db.read() as session:  # nothing to claim is the common case, and takes no lock
-        if session.scalars(select(Run.id).where(*living).limit(1)).first() is None:
+        if session.scalars(select(Run.id).where(*free).limit(1)).first() is None:
             return []
     with db.write() as session:
-        runs = session.scalars(select(Run).where(*living).order_by(Run.id).with_for_update()).all()
+        rows = select(Run).where(*free).order_by(Run.id).limit(most).with_for_update()
+        runs = session.scalars(rows).all()
         for run in runs:
             run.worker, run.fencing_token, run.heartbeat = worker, run.fencing_token + 1, db.clock()
         return [Claim(run.id, worker, run.fencing_token) for run in runs]
 
 
 def let_go(db: Database, claims: Sequence[Claim]) -> None:
-    """Release claims at a worker's orderly end; runs that others have claimed since are left alone."""
+    """Release claims, as at a worker's orderly end; runs that others have claimed since are left alone."""
     with db.write() as session:
-        for mine in claims:
-            run = find(session, mine.run_id)
-            if (run.worker, run.fencing_token) == (mine.worker, mine.fencing_token):
-                run.worker = run.heartbeat = None
+        session.execute(update(Run).where(_of(claims)).values(worker=None, heartbeat=None))
 
 
 def heartbeat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
-    """Renew the claims of a worker, and return those that still hold."""
+    """Renew the claims of a worker, in one statement, and return those that still hold."""
+    if not claims:
+        return []
     with db.write(durable=False) as session:
-        kept = []
-        for mine in claims:
-            rows = update(Run).where(Run.id == mine.run_id, Run.worker == mine.worker)
-            rows = rows.where(Run.fencing_token == mine.fencing_token)
-            found = session.execute(rows.values(heartbeat=db.clock()).returning(Run.id)).scalar()
-            kept += [mine] if found is not None else []
-        return kept
+        rows = update(Run).where(_of(claims)).values(heartbeat=db.clock()).returning(Run.id)
+        found = set(session.scalars(rows).all())
+        return [mine for mine in claims if mine.run_id in found]
+
+
+def _of(claims: Sequence[Claim]) -> ColumnElement[bool]:
+    """Return the condition that a run is one of these claims', and the claim still holds."""
+    held = tuple_(Run.id, Run.worker, Run.fencing_token)
+    return held.in_([(mine.run_id, mine.worker, mine.fencing_token) for mine in claims])
 
 
 def report_progress(db: Database, mine: Claim, **fields: Any) -> Run:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -36,8 +37,14 @@ from parenting.server.tables import Run
 
 log = structlog.get_logger()
 
-CHECKPOINT_SECONDS = 2.0
-"""A restart repeats the ticks of at most this long; they replay exactly."""
+CHECKPOINT_SECONDS, LONGEST_CHECKPOINT_SECONDS = 2.0, 120.0
+"""A restart repeats the ticks of this long; they replay exactly. Where checkpoints are large it is longer, so
+that they take `CHECKPOINT_SHARE` of the time at most."""
+CHECKPOINT_SHARE = 0.05
+TOLD_SECONDS = 5.0
+"""The log tells of checkpoints that are written at longer intervals."""
+LOOK_SHARE = 0.1
+"""The share of time at most that evaluations of the policy take, where one is expensive."""
 METRIC_SECONDS = 1.0
 HURRY_SECONDS = 0.25
 """For this long after an answer, no metrics and no checkpoint delay the next question."""
@@ -65,6 +72,8 @@ class RunSession:
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
+        self._save_every, self._look_cost = CHECKPOINT_SECONDS, 0.0
+        self.whole, self._told = True, False
         self._stuck_at = (
             -1
         )  # the tick that was reported as stuck: who ends episodes must see the next one too
@@ -119,6 +128,13 @@ class RunSession:
             runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
         self.save_if_due()
 
+    def rests_until(self) -> float:
+        """Return when a run that waits has to report again though nothing has happened; `inf` for never."""
+        due = math.inf
+        if self.unsaved:
+            due = self._saved_at + self._save_every
+        return min(due, self._measured_at + self._look_every) if self._news else due
+
     def delay(self, pace: float | None) -> float:
         """Return the seconds until the next tick may pass at this pace; replayed ticks need not wait."""
         if pace is None or self.last_tick < self.record_ends:
@@ -130,8 +146,10 @@ class RunSession:
     def tick(self, seen: Watch | None = None) -> bool:
         """One tick; whether the next may follow at once, because nothing was asked and nothing is awaited.
 
-        `seen` is what a look at the mailbox has just shown; a tick right after another does not look.
+        `seen` is what a look at the mailbox has just shown; a tick right after another does not look. A
+        session that is not `whole` afterwards was left amid a tick by an error, and is of no more use.
         """
+        self.whole = False
         replayed = self.last_tick < self.record_ends
         parent = self.parent.looking(
             answers=replayed or bool(seen and seen.answers), events=replayed or bool(seen and seen.events)
@@ -145,6 +163,7 @@ class RunSession:
         at_once = not bool(state.waiting) and bool(query.kind[0] == QueryKind.NONE)
         hurried = at_once and self._lived_at - self._heard_at < HURRY_SECONDS
         self._measure(at_once, hurried)
+        self.whole = True
         if not hurried:
             self.save_if_due()
         return at_once
@@ -171,36 +190,63 @@ class RunSession:
         """Write a row of metrics after the parent was heard, and once a second besides.
 
         It waits until the next question is out: a person waits for that, and nobody for a row. Where a look
-        at the policy is expensive, as in the garden, the evaluation waits `refresh_seconds` between two rows.
+        at the policy is expensive, as in the garden, the evaluation waits `refresh_seconds` between two rows,
+        or longer where it would take more than `LOOK_SHARE` of the time.
         The tick that ends a stage has its row in any case: a stage is judged by what it ended with.
         """
         late, stage = time.monotonic() - self._measured_at, int(self.saved.state.maturity[0])
         due = not hurried and (late >= METRIC_SECONDS or (self._news and not at_once))
-        if stage == self.stage and (not due or late < self.evaluation.refresh_seconds):
+        if stage == self.stage and (not due or late < self._look_every):
             return
         speed = (self.last_tick - self._measured_tick) / late if self._measured_at and late else None
-        self._measured_at, self._measured_tick, self._news = time.monotonic(), self.last_tick, False
+        began = time.monotonic()
         row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed}
-        self.optimal, self.waiting, self.stage = bool(row["optimal"]), None, stage
+        optimal = bool(row["optimal"])
         metrics.write_metrics(self.db, self.claim, {self.last_tick: row})
-        shown = {"maturity": row["maturity"], "speed": speed, "optimal": self.optimal}
+        shown = {"maturity": row["maturity"], "speed": speed, "optimal": optimal}
         runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None, **shown)
+        self.optimal, self.waiting, self.stage, self._news = optimal, None, stage, False
+        self._measured_at, self._measured_tick = time.monotonic(), self.last_tick
+        self._look_cost = self._measured_at - began
+
+    @property
+    def _look_every(self) -> float:
+        """Return the seconds between two rows of metrics, where a look at the policy is expensive."""
+        least = self.evaluation.refresh_seconds
+        return max(least, self._look_cost / LOOK_SHARE) if least else 0.0
 
     def finished(self) -> bool:
-        """Return whether a scripted parent has no more to teach: the argmax policy is optimal."""
-        return self.run.parent == "scripted" and self.optimal
+        """Return whether a scripted parent has no more to teach: the argmax policy is optimal.
+
+        A run that was taken up from an earlier checkpoint first goes back to where it was.
+        """
+        again = self.last_tick < max(self.record_ends, self.run.tick or 0)
+        return self.run.parent == "scripted" and self.optimal and not again
 
     # Checkpoints
 
+    @property
+    def unsaved(self) -> bool:
+        """Return whether a tick has passed since the last checkpoint."""
+        return self.last_tick != self._saved_tick
+
     def save_if_due(self) -> None:
         """Save a checkpoint if the last one is old and a tick has passed since."""
-        if self.last_tick != self._saved_tick and time.monotonic() - self._saved_at >= CHECKPOINT_SECONDS:
+        if self.unsaved and time.monotonic() - self._saved_at >= self._save_every:
             self.save()
 
     def save(self) -> None:
-        """Write a checkpoint."""
-        checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, pack(self.saved))
+        """Write a checkpoint. The next one waits the longer, the longer this one took."""
+        began, blob = time.monotonic(), pack(self.saved)
+        checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, blob)
         self._saved_tick, self._saved_at = self.last_tick, time.monotonic()
+        wanted = max(CHECKPOINT_SECONDS, (self._saved_at - began) / CHECKPOINT_SHARE)
+        if wanted >= TOLD_SECONDS and not self._told:
+            self._told = True
+            log.warning(
+                f"checkpoints of {len(blob) / 1e6:.0f} MB: one every {wanted:.0f} s", run=self.claim.run_id
+            )
+        self._save_every = min(wanted, LONGEST_CHECKPOINT_SECONDS)
 
 
 def goal_reached(seen: Watch) -> bool:

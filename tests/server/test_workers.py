@@ -168,7 +168,7 @@ def test_each_run_has_its_turn_in_every_round(
     ids = [start(db, NewRun(world=world, preset="direct", parent="scripted")).id for world in worlds]
     waits = start(db, NewRun(world="unsafe-exploration", parent="human")).id
     monkeypatch.setattr(
-        "parenting.server.worker.SLICE_SECONDS", 0.0
+        "parenting.server.work.held.SLICE_SECONDS", 0.0
     )  # a tick a turn, however fast the machine is
     worker = Worker(db, settings)
     worker._claim()

@@ -1,0 +1,122 @@
+"""The runs that a worker holds: claims, sessions, and a turn of each. Turns may be in other threads."""
+
+from __future__ import annotations
+
+import math
+import time
+import traceback
+from collections.abc import Callable, Collection
+
+import structlog
+
+from parenting.server import runs
+from parenting.server.db import Database
+from parenting.server.errors import LostClaimError, StoreError
+from parenting.server.queue.worker_side import Watch
+from parenting.server.runs import Claim
+from parenting.server.session import RunSession, goal_reached
+from parenting.server.statuses import OVER, RunStatus
+from parenting.server.work.patience import Patience
+
+log = structlog.get_logger()
+
+SLICE_SECONDS = 0.01
+"""Seconds that one run may go on after a tick before the next has its turn."""
+NOW, AT_NEWS = 0.0, math.inf
+"""When the next turn of a run is due: at once, or when something is new for it."""
+
+
+class HeldRuns:
+    """The runs that a worker has claimed. Only one thread at a time touches a run."""
+
+    def __init__(self, db: Database, patience: Patience, asked: Callable[[], None]) -> None:
+        """Hold nothing yet; `asked` is called after each question."""
+        self.db, self._patience, self._asked = db, patience, asked
+        self.claims: dict[int, Claim] = {}
+        self.sessions: dict[int, RunSession] = {}
+        self.surplus: set[int] = set()
+
+    def turn(self, run_id: int, seen: Watch) -> float:
+        """Give one run its turn, and return when the next is due. A store error never fails a run."""
+        try:
+            return self._tried(run_id, seen)
+        except LostClaimError as error:
+            log.warning("run lost", run=run_id, reason=error.message)
+            self.drop(run_id)
+        except StoreError as error:
+            self._patience.refused(error)
+            session = self.sessions.get(run_id)
+            if session is not None and not session.whole:
+                del self.sessions[run_id]  # it goes on from its checkpoint
+            return time.monotonic() + self._patience.left()
+        return AT_NEWS
+
+    def _tried(self, run_id: int, seen: Watch) -> float:
+        """Give one run its turn. A run that fails stops alone, with its reason."""
+        try:
+            if run_id in self.surplus or seen.status in OVER:
+                return self._last(run_id)
+            return self._usual(run_id, seen) if seen.status is RunStatus.ACTIVE else AT_NEWS
+        except (LostClaimError, StoreError):
+            raise
+        except Exception as error:
+            log.error("run failed", run=run_id, error=repr(error))
+            reason = f"The agent could not go on: {error}"
+            runs.finish(self.db, self.claims[run_id], RunStatus.FAILED, reason, traceback.format_exc())
+            self.drop(run_id)
+        return AT_NEWS
+
+    def _usual(self, run_id: int, seen: Watch) -> float:
+        session = self.sessions.get(run_id) or self._begin(run_id)
+        if session.finished():  # the store refused to note it
+            return self._finish(session)
+        if not session.ready(seen):
+            session.report_waiting(seen)
+            return session.rests_until()
+        if (delay := session.delay(seen.pace)) > 0:
+            return time.monotonic() + delay
+        go_on = session.tick(seen) and seen.pace is None and not goal_reached(seen)
+        until = time.monotonic() + SLICE_SECONDS
+        while go_on and time.monotonic() < until and not session.finished():
+            go_on = session.tick()
+        return self._finish(session) if session.finished() else NOW
+
+    def _finish(self, session: RunSession) -> float:
+        session.save()
+        runs.finish(self.db, session.claim, RunStatus.FINISHED, "Its argmax policy is optimal.")
+        self.drop(session.claim.run_id)
+        return NOW
+
+    def _begin(self, run_id: int) -> RunSession:
+        run = runs.get_run(self.db, run_id)
+        self.sessions[run_id] = RunSession(self.db, self.claims[run_id], run, self._asked)
+        log.info("run taken up", run=run_id, tick=self.sessions[run_id].last_tick)
+        return self.sessions[run_id]
+
+    def _last(self, run_id: int) -> float:
+        """Save what was ticked of a run that somebody stopped, or that another worker raises, and let go."""
+        session = self.sessions.get(run_id)
+        if session is not None and session.unsaved:
+            session.save()
+        if run_id in self.surplus:
+            runs.let_go(self.db, [self.claims[run_id]])
+        self.drop(run_id)
+        return AT_NEWS
+
+    def drop(self, run_id: int) -> None:
+        """Hold a run no longer."""
+        self.sessions.pop(run_id, None)
+        self.claims.pop(run_id, None)
+
+    def save(self, working: Collection[int], end: float) -> None:
+        """Save every run whose turn is not just going on, until the time is over."""
+        for run_id, session in list(self.sessions.items()):
+            if run_id in working or not session.whole or not session.unsaved:
+                continue
+            if time.monotonic() > end:
+                log.warning("not all runs could be saved in time; they go on from their checkpoints")
+                return
+            try:
+                session.save()
+            except LostClaimError:
+                self.drop(run_id)

@@ -1,0 +1,94 @@
+"""Turns of runs: a quick one is waited for, a long one goes on beside the others.
+
+Threads suffice: torch works without Python's lock, and a step on a large network spends its time there. All
+turns of a run come one after another, each with the state that the one before left, so bits do not depend on
+what goes on beside them.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+
+import torch
+
+BESIDE_SECONDS = 0.05
+"""A turn that takes longer no longer holds up the other runs."""
+HUNG_SECONDS = 300.0
+"""A turn that takes longer counts as hung: the run's claim is not renewed, and another worker may take it."""
+LONG_AT_ONCE = (os.cpu_count() or 1) + 2
+"""Long turns at once. More would only take the processor from quick ones."""
+
+Turn = Callable[[], float]
+"""It returns the time of `time.monotonic` from which the run's next turn is due."""
+
+
+@dataclass(frozen=True)
+class Working:
+    """A turn that has begun."""
+
+    began: float
+    done: Future[float]
+
+
+class Turns:
+    """The turns of a worker's runs, at most one of each run at a time."""
+
+    def __init__(self, wake: Callable[[], None], beside_after: float | None = BESIDE_SECONDS) -> None:
+        """Nothing has begun.
+
+        Args:
+            wake: Called in another thread when a long turn has ended.
+            beside_after: Seconds for which a turn is waited for; None waits for each to its end.
+        """
+        self._wake, self.beside_after = wake, beside_after
+        self._working: dict[int, Working] = {}
+        self._long: set[int] = set()
+        self._pool = ThreadPoolExecutor(
+            2 * LONG_AT_ONCE, "turn", initializer=torch.set_num_threads, initargs=(1,)
+        )
+
+    def may_begin(self, run_id: int, new: bool) -> bool:
+        """Return whether a turn of a run may begin now. The first one of a `new` run counts as long."""
+        if run_id in self._working:
+            return False
+        most = LONG_AT_ONCE if new or run_id in self._long else 2 * LONG_AT_ONCE
+        return len(self._working) < most
+
+    def begin(self, run_id: int, turn: Turn) -> None:
+        """Begin a turn, and wait for its end unless it takes long, or the run's last one did."""
+        begun = Working(time.monotonic(), self._pool.submit(turn))
+        self._working[run_id] = begun
+        quick = run_id not in self._long
+        if self.beside_after is None or quick:
+            wait([begun.done], self.beside_after)
+        if not begun.done.done():
+            begun.done.add_done_callback(lambda _: self._wake())
+
+    def ended(self) -> dict[int, float]:
+        """Return when the next turn is due, for each run whose turn has ended since the last call.
+
+        Raises:
+            Exception: what a turn raised.
+        """
+        over = {run_id: begun for run_id, begun in self._working.items() if begun.done.done()}
+        for run_id, begun in over.items():
+            del self._working[run_id]
+            took = time.monotonic() - begun.began
+            (self._long.add if took > BESIDE_SECONDS else self._long.discard)(run_id)
+        return {run_id: begun.done.result() for run_id, begun in over.items()}
+
+    def working(self, longer_than: float = -math.inf) -> set[int]:
+        """Return the runs whose turn has begun and not ended, for longer than some seconds."""
+        since = time.monotonic() - longer_than
+        going_on = self._working.items()
+        return {run_id for run_id, turn in going_on if turn.began < since and not turn.done.done()}
+
+    def close(self, seconds: float) -> None:
+        """Wait for the turns that have begun, at most for some seconds."""
+        wait([begun.done for begun in self._working.values()], seconds)
+        self._pool.shutdown(wait=False, cancel_futures=True)
