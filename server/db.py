@@ -117,8 +117,8 @@ def connect(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Data
     """
     try:
         url = make_url(settings.url)
-    except ArgumentError as error:
-        raise _unreadable(error) from None
+    except ArgumentError:  # its text would repeat the URL, and so its password
+        raise _unreadable("this is not a URL") from None
     name = url.get_backend_name()
     if name == "sqlite":
         return Database(sqlite.open_engine(url, json_serializer=_dumps, json_deserializer=loads), clock)

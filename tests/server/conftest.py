@@ -16,7 +16,7 @@ from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, claim
 from parenting.server.settings import Settings
 from parenting.server.tables import Run
-from tests.database import migrated
+from tests.database import STORES, database_url, migrated
 
 CLIP = {
     "actions": ["up"],
@@ -42,9 +42,24 @@ class Clock:
         self.now += timedelta(seconds=seconds)
 
 
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run what uses a database on both stores, unless it is marked as being about one."""
+    if "store" in metafunc.fixturenames:
+        only = metafunc.definition.get_closest_marker("only")
+        metafunc.parametrize("store", only.args[:1] if only else STORES, indirect=True)
+
+
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return Settings(data=tmp_path, database_url=None)
+def store(request: pytest.FixtureRequest) -> str:
+    """The kind of database: sqlite or postgresql."""
+    kind: str = request.param
+    return kind
+
+
+@pytest.fixture
+def settings(tmp_path: Path, store: str) -> Iterator[Settings]:
+    with database_url(store) as url:
+        yield Settings(data=tmp_path, database_url=url)
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from parenting.server.lifeline import VARIABLE
+from parenting.server.settings import Settings
 
 PRELOADED = [
     "parenting.commands.main",
@@ -90,10 +91,15 @@ class Command:
         return bool(self.process.is_alive())
 
 
+def store_of(settings: Settings) -> dict[str, str]:
+    """The variables by which a process finds the database of these settings, besides its data folder."""
+    return {} if settings.database_url is None else {"PARENTING_DATABASE_URL": settings.database_url}
+
+
 @contextmanager
-def command(*arguments: str, data: Path, **patches: Any) -> Iterator[Command]:
-    """A command that is killed at the end if it still runs."""
-    one = Command(*arguments, data=data, patches=patches)
+def command(*arguments: str, settings: Settings, **patches: Any) -> Iterator[Command]:
+    """A command on these settings' database that is killed at the end if it still runs."""
+    one = Command(*arguments, data=settings.data, patches=patches, environment=store_of(settings))
     try:
         yield one
     finally:

@@ -10,6 +10,8 @@ import pytest
 from parenting.server.app import LARGEST_BODY
 from tests.server.test_api import WORLD, start, wrong
 
+pytestmark = pytest.mark.only("sqlite", "such bodies are refused before the store is asked")
+
 
 @pytest.mark.parametrize(
     "body",

@@ -12,6 +12,8 @@ from parenting.server.api import examples
 from parenting.server.app import TAGS
 from tests.server.test_api_questions import lease
 
+pytestmark = pytest.mark.only("sqlite", "the description says nothing of the store")
+
 Operation = tuple[str, dict[str, Any]]
 
 

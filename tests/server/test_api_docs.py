@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import httpx2
+import pytest
 
 from parenting.server import errors
 from parenting.server.api.examples import EXPORTED
@@ -20,6 +21,8 @@ from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import claim
 from tests.server.conftest import CLIPS
 from tests.tree import ROOT
+
+pytestmark = pytest.mark.only("sqlite", "the page of the API says nothing of the store")
 
 TEXT = (ROOT / "docs/api.md").read_text(encoding="utf-8")
 ROWS = [line for line in TEXT.splitlines() if line.startswith("| ")]

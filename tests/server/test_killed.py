@@ -16,16 +16,16 @@ import random
 import time
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from sqlalchemy import func, select
 
 from parenting.server.db import Database
+from parenting.server.settings import Settings
 from parenting.server.tables import Answer
 from tests.lengths import length
-from tests.server.processes import Command
+from tests.server.processes import Command, store_of
 from tests.server.raising import Begun
 from tests.server.serving import free_port
 from tests.server.test_same_bits import GOAL, RUNS, STAGES, answering, begin, check, until_heard
@@ -43,9 +43,9 @@ PATCHES = {"parenting.server.session.CHECKPOINT_SECONDS": 0.05}
 class House:
     """Web, worker and a script for each run; what ends before its work is done is started again."""
 
-    def __init__(self, data: Path, runs: dict[int, Begun]) -> None:
-        self.data, self.url = data, f"http://127.0.0.1:{free_port()}"
-        self.receipt_files = {run: data / f"receipts-{run}.jsonl" for run in runs}
+    def __init__(self, settings: Settings, runs: dict[int, Begun]) -> None:
+        self.settings, self.url = settings, f"http://127.0.0.1:{free_port()}"
+        self.receipt_files = {run: settings.data / f"receipts-{run}.jsonl" for run in runs}
         self.orders: dict[str, tuple[str, ...]] = {
             "web": ("web", "--port", self.url.rpartition(":")[2]),
             "worker": ("worker",),
@@ -76,7 +76,9 @@ class House:
             if code == 0 and order[0] == "answer":
                 del self.orders[name]
             else:  # killed, or a script that found no server, or a server that found its port taken
-                self.commands[name] = Command(*order, data=self.data, patches=PATCHES)
+                self.commands[name] = Command(
+                    *order, data=self.settings.data, patches=PATCHES, environment=store_of(self.settings)
+                )
 
     def kill(self, kind: str, rng: random.Random) -> None:
         """One process of this kind, or of another where none of it lives."""
@@ -119,11 +121,11 @@ def disturb(db: Database, house: House, moments: Iterator[float], rng: random.Ra
 @pytest.mark.timeout(500)
 @pytest.mark.parametrize("stages", STAGES)
 @pytest.mark.parametrize("seed", range(ROUNDS))
-def test_killed_at_random_moments(tmp_path: Path, db: Database, seed: int, stages: int) -> None:
+def test_killed_at_random_moments(settings: Settings, db: Database, seed: int, stages: int) -> None:
     rng = random.Random(10 * seed + stages)
     runs = begin(db, [begun for begun in RUNS if begun.config.max_clip_length == stages])
     moments = sorted(rng.uniform(0, len(runs) * (GOAL - 2)) for _ in range(KILLS))
-    with House(tmp_path, runs) as house:
+    with House(settings, runs) as house:
         disturb(db, house, iter(moments), rng)
         assert house.killed.total() == KILLS
         assert set(house.killed) == set(KINDS)

@@ -7,23 +7,26 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, text
 
-from parenting.server.db import Database, connect
+from parenting.server.db import Database
 from parenting.server.errors import SetupError
 from parenting.server.migrate import downgrade, require_current, upgrade
 from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 from parenting.server.tables import Table
+from tests.database import database_url, unmigrated
 
 
 @pytest.fixture
 def empty(settings: Settings) -> Iterator[Database]:
-    database = connect(settings)
+    database = unmigrated(settings)
     yield database
     database.close()
 
 
 def checks(connection: Connection) -> dict[str, list[str]]:
     """Each table's and index's own SQL by parts: alembic compares neither CHECKs nor partial indices."""
+    if connection.dialect.name == "postgresql":
+        return postgresql_checks(connection)
     query = "SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL AND name != 'alembic_version'"
     found = {}
     for name, sql in connection.execute(text(query)):
@@ -34,19 +37,40 @@ def checks(connection: Connection) -> dict[str, list[str]]:
     return found
 
 
+def postgresql_checks(connection: Connection) -> dict[str, list[str]]:
+    """Each table's columns, constraints and indices, as PostgreSQL writes them down."""
+    query = """
+        SELECT relname, attname || ' ' || format_type(atttypid, atttypmod) || ' ' || attnotnull
+          || coalesce(' ' || pg_get_expr(adbin, adrelid), '')
+          FROM pg_attribute JOIN pg_class ON attrelid = pg_class.oid
+          LEFT JOIN pg_attrdef ON adrelid = attrelid AND adnum = attnum
+         WHERE relkind = 'r' AND relnamespace = 'public'::regnamespace AND attnum > 0 AND NOT attisdropped
+        UNION ALL SELECT conrelid::regclass::text, conname || ' ' || pg_get_constraintdef(oid)
+          FROM pg_constraint WHERE connamespace = 'public'::regnamespace
+        UNION ALL SELECT tablename, indexdef FROM pg_indexes WHERE schemaname = 'public'
+        UNION ALL SELECT sequencename, data_type::text FROM pg_sequences WHERE schemaname = 'public'
+        """
+    found: dict[str, list[str]] = {}
+    for name, part in sorted(map(tuple, connection.execute(text(query)))):
+        if name != "alembic_version":
+            found.setdefault(name, []).append(part)
+    return found
+
+
 def test_migrations_make_the_tables(db: Database) -> None:
     with db.read() as session:
         context = MigrationContext.configure(session.connection(), opts={"compare_type": True})
         assert compare_metadata(context, Table.metadata) == []
 
 
-def test_migrations_make_the_same_checks_and_indices(db: Database, settings: Settings) -> None:
-    other = connect(Settings(data=settings.data / "other", database_url=None))
-    with other.write() as session:
-        Table.metadata.create_all(session.connection())
-    with db.read() as migrated, other.read() as created:
-        assert checks(migrated.connection()) == checks(created.connection())
-    other.close()
+def test_migrations_make_the_same_checks_and_indices(db: Database, settings: Settings, store: str) -> None:
+    with database_url(store) as url:
+        other = unmigrated(Settings(data=settings.data / "other", database_url=url))
+        with other.write() as session:
+            Table.metadata.create_all(session.connection())
+        with db.read() as migrated, other.read() as created:
+            assert checks(migrated.connection()) == checks(created.connection())
+        other.close()
 
 
 def test_twice_is_once(empty: Database) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import time
 from contextlib import ExitStack
-from pathlib import Path
 
 import pytest
 
@@ -16,6 +15,7 @@ from parenting.envs import registry
 from parenting.server.db import Database
 from parenting.server.new_run import start
 from parenting.server.replay import relive
+from parenting.server.settings import Settings
 from tests.server.heard import heard_answers
 from tests.server.processes import Command, command
 from tests.server.raising import Begun, Inline, last, same_bits
@@ -68,7 +68,7 @@ def check(db: Database, run: int, begun: Begun) -> None:
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("stages", STAGES)
-def test_raised_through_http(tmp_path: Path, db: Database, stages: int) -> None:
+def test_raised_through_http(settings: Settings, db: Database, stages: int) -> None:
     runs, url = (
         begin(db, [begun for begun in RUNS if begun.config.max_clip_length == stages]),
         f"http://127.0.0.1:{free_port()}",
@@ -76,7 +76,7 @@ def test_raised_through_http(tmp_path: Path, db: Database, stages: int) -> None:
     with ExitStack() as stack:
 
         def run(*arguments: str) -> Command:
-            return stack.enter_context(command(*arguments, data=tmp_path))
+            return stack.enter_context(command(*arguments, settings=settings))
 
         run("web", "--port", url.rpartition(":")[2])
         worker = run("worker")

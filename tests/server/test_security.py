@@ -5,6 +5,8 @@ import pytest
 
 from parenting.server.tables import Run
 
+pytestmark = pytest.mark.only("sqlite", "such requests are refused before the store is asked")
+
 
 @pytest.mark.parametrize(
     "host", ["localhost", "localhost:8765", "127.0.0.1:80", "[::1]", "[::1]:8765", "LOCALHOST"]

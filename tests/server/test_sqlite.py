@@ -28,6 +28,8 @@ from parenting.server.store.sqlite import sqlite_module
 from parenting.server.tables import Answer, Query, Run
 from tests.tree import ROOT
 
+pytestmark = pytest.mark.only("sqlite", "the settings of SQLite itself")
+
 NORMAL, FULL = 1, 2
 
 

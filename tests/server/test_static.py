@@ -6,6 +6,8 @@ import pytest
 from parenting.server.errors import NotFound
 from parenting.server.static import VENDOR, OthersFiles
 
+pytestmark = pytest.mark.only("sqlite", "files of the pages")
+
 
 @pytest.mark.parametrize("path", ["site.css", "live.js", *(f"vendor/{name}" for name in VENDOR)])
 def test_a_copy_is_asked_about_and_not_sent_again(client: httpx2.Client, path: str) -> None:
