@@ -69,7 +69,7 @@ def answer(
         stack.callback(client.close)
         found = _first_look(client, run)
         optimal = _until(found["world"], until, limit) == "optimal"
-        order = Order(run, client_id, limit, optimal, timeout, end_episodes)
+        order = Order(found["public_id"], client_id, limit, optimal, timeout, end_episodes)
         keep = _receipts(receipts, stack)
         show = stack.enter_context(bar("answers"))
         from parenting._process import (

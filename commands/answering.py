@@ -38,7 +38,7 @@ EXITS = {
 class Order:
     """An order: the run whose questions to answer, the name to answer under, and when to end."""
 
-    run: int
+    run: int | str  # its number, or its public id, which no other server's run has
     client_id: str = "scripted"
     limit: int | None = None
     until_optimal: bool = True
@@ -115,13 +115,21 @@ class Answering:
         return question
 
     def _answer(self, question: dict[str, Any]) -> None:
-        """Send an answer until it is stored; the same again changes nothing."""
+        """Send an answer until it is stored; the same again changes nothing.
+
+        It names what it is meant for, since another server may come to this address meanwhile.
+
+        Raises:
+            RefusedError: another database is served there now; nothing was stored.
+        """
         choice = self.judge.choice(question)
         body = {"choice": choice, "client_id": self.order.client_id, "parent": "scripted"}
+        body |= {"database": question["database"], "run": question["run_public_id"]}
+        body["question"] = question["public_id"]
         self._asked_at = time.monotonic()
         while time.monotonic() - self._asked_at < self.order.timeout:
             try:
-                receipt = self.client.post(f"queries/{question['id']}/answer", **body)
+                receipt = self.client.post(f"queries/{question['public_id']}/answer", **body)
             except UnavailableError as error:
                 self._why = str(error)
                 time.sleep(SHORTEST)

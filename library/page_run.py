@@ -11,7 +11,7 @@ from parenting.experiments.training import batch
 from parenting.experiments.training.counts import no_counts
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.answer_log import event_record
-from parenting.library.page_server import is_ready
+from parenting.library.page_server import database_at, is_ready
 from parenting.library.person import Person
 from parenting.library.result import TrainResult, collect
 from parenting.library.result_folder import Record
@@ -21,6 +21,7 @@ from parenting.parents.scripted import ScriptedRule
 from parenting.server import checkpoints, new_run, operator_events, runs
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError, NotFound
+from parenting.server.identity import database_id
 from parenting.server.new_run import NewRun
 from parenting.server.queue import leases
 from parenting.server.reads import answers
@@ -36,8 +37,8 @@ def begin(db: Database, settings: Settings, task: Task, rule: StopRule, seed: in
     Raises:
         ValueError: The server cannot raise such an agent, or the run is of another one.
     """
-    if person.url is not None and not is_ready(person.url.rstrip("/")):
-        raise ValueError(f"url: no server with a worker answers at {person.url}. Start one: parenting up")
+    if person.url is not None:
+        _refuse_another_server(db, settings, person.url.rstrip("/"))
     _refuse_what_no_run_holds(task)
     if person.run is not None:
         number = _resumed(db, person.run, task, seed)
@@ -58,6 +59,17 @@ def begin(db: Database, settings: Settings, task: Task, rule: StopRule, seed: in
         return new_run.start(db, new, settings.weights).id
     except InvalidFieldsError as error:
         raise ValueError(str(error)) from None
+
+
+def _refuse_another_server(db: Database, settings: Settings, url: str) -> None:
+    """Refuse a server that is away, or that has another database than the one which `train` reads."""
+    if not is_ready(url):
+        raise ValueError(f"url: no server with a worker answers at {url}. Start one: parenting up")
+    if database_at(url) != database_id(db):
+        raise ValueError(
+            f"url: the server at {url} has another database than the folder {settings.data}. "
+            "Name the folder of that server: Person(url=..., data=folder)."
+        )
 
 
 def _refuse_what_no_run_holds(task: Task) -> None:

@@ -86,6 +86,15 @@ def is_ready(url: str) -> bool:
         return False
 
 
+def database_at(url: str) -> str | None:
+    """Return the UUID of the database that a server has; None if it does not say."""
+    try:
+        said = httpx2.get(f"{url}/api/v1/runs?limit=1", timeout=5, trust_env=False).json()
+    except (httpx2.HTTPError, ValueError):
+        return None
+    return str(said["database"]) if isinstance(said, dict) and "database" in said else None
+
+
 def failure(data: Path) -> ServerFailedError:
     """Return the error that tells what the server said last."""
     log = data / "server.log"

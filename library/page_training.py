@@ -65,7 +65,7 @@ def _with_own_server(
     """Watch the run while a server of our own serves it; whether it came to its end."""
     with running_server(data) as process:
         try:
-            open_page(f"{address(process, data)}/runs/{run}/parent", person.browser)
+            open_page(address(process, data) + _path(db, run), person.browser)
 
             def check() -> None:
                 if process.poll() is not None:
@@ -86,11 +86,16 @@ def _joined(
     progress: bool | None,
 ) -> bool:
     """Watch the run while another server serves it; whether it came to its end."""
-    open_page(f"{url}/runs/{run}/parent", person.browser)
+    open_page(url + _path(db, run), person.browser)
     try:
         return _watch(db, run, rule, callback, progress, lambda: None)
     except KeyboardInterrupt:
         return False
+
+
+def _path(db: Database, run: int) -> str:
+    """Return the address of the parent's page below that of the server."""
+    return f"/runs/{runs.get_run(db, run).public_id}/parent"
 
 
 def _watch(

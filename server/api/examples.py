@@ -181,7 +181,7 @@ class Shown:
 SHOWN = {
     "healthz": Shown({"status": "ok"}),
     "readyz": Shown({"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}),
-    "list_runs": Shown(_rows(RUN)),
+    "list_runs": Shown({**_rows(RUN), "database": DATABASE}),
     "start_run": Shown(RUN, NEW_RUNS),
     "get_run": Shown(RUN),
     "list_metrics": Shown(_rows(METRIC)),

@@ -37,6 +37,9 @@ class Rows(Schema, Generic[Row]):
 class RunRows(Rows[RunSchema | DamagedSchema]):
     """Runs, newest first."""
 
+    database: str
+    """The UUID of the database whose runs these are."""
+
 
 class AskedRows(Rows[AskedSchema | DamagedSchema]):
     """Questions, oldest first."""

@@ -18,6 +18,7 @@ from parenting.server.api.lists import (
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.deps import Db, SettingsOf, notify_worker
+from parenting.server.identity import database_id
 from parenting.server.new_run import NewRun, start
 from parenting.server.reads import pagination
 from parenting.server.reads.schemas import metric_schemas, run_schema, run_schemas
@@ -30,7 +31,7 @@ router = APIRouter(tags=["runs"])
 def list_runs(db: Db, part: Annotated[RunPart, Query()]) -> RunRows:
     """List all runs, newest first. Send the `next` of a page as `before` to get the following page."""
     page = pagination.runs_before(db, part.before, part.limit)
-    return RunRows(rows=run_schemas(db, page.rows), next=page.next)
+    return RunRows(rows=run_schemas(db, page.rows), next=page.next, database=database_id(db))
 
 
 @router.post("/runs", summary="Start a run", status_code=201, responses=write_responses())

@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import httpx2
+import pytest
+from fastapi.testclient import TestClient
 
 from parenting.commands.answering import Answering, Order
-from parenting.commands.client import Client
+from parenting.commands.client import Client, RefusedError
 from parenting.commands.judge import Judge
 from parenting.server import operator_events, runs
+from parenting.server.app import create_app
 from parenting.server.db import Database
+from parenting.server.identity import renew
 from parenting.server.queue import answers
 from parenting.server.queue.worker_side import watch
 from parenting.server.reads.answers import every
 from parenting.server.session import RunSession
+from parenting.server.settings import Settings
 from tests.commands.asking import asked, begin
+from tests.database import migrated
 from tests.server.serving import free_port
 
 Stored = Callable[[dict[str, Any]], object]
@@ -99,6 +106,30 @@ def test_what_somebody_else_has_answered_is_let_go(db: Database, web: httpx2.Cli
         (first, "somebody"),
         (second, "scripted"),
     ]
+
+
+def test_an_answer_is_not_given_to_another_database_that_comes_to_the_address(
+    db: Database, web: httpx2.Client, tmp_path: Path
+) -> None:
+    """It has a run and a question of the same numbers, and is served once the question was leased."""
+    asked(db, begin(db), 1)
+    settings = Settings(data=tmp_path / "other", database_url=None)
+    other = migrated(settings)
+    renew(other)
+    asked(other, begin(other), 1)
+    with TestClient(create_app(settings, other), base_url="http://localhost") as at_other:
+
+        class Moves(Never):
+            def choice(self, question: dict[str, Any]) -> str:
+                work.client.http = at_other
+                return super().choice(question)
+
+        work = script(web, Moves())
+        with pytest.raises(RefusedError, match="meant for another database") as refused:
+            work.work()
+    assert refused.value.status == 410
+    assert list(every(db, 1)) == list(every(other, 1)) == []
+    other.close()
 
 
 def test_a_server_that_stays_away_is_given_up() -> None:

@@ -165,6 +165,32 @@ def test_a_server_that_is_not_there_cannot_be_joined(tmp_path: Path) -> None:
         pt.train(WORLD, parent=person)
 
 
+def test_a_server_of_another_data_folder_is_refused_before_a_run_is_stored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Run 1 of that server would be somebody else's."""
+    from starlette.testclient import TestClient
+
+    from parenting.server.app import create_app
+    from parenting.server.identity import renew
+    from parenting.server.runs import list_runs
+    from parenting.server.settings import Settings
+    from parenting.server.workers import sign
+    from tests.database import migrated
+
+    theirs, ours = (Settings(data=tmp_path / name, database_url=None) for name in ("theirs", "ours"))
+    there, here = migrated(theirs), migrated(ours)
+    renew(there)
+    sign(there, "worker")
+    with TestClient(create_app(theirs, there), base_url="http://localhost") as web:
+        monkeypatch.setattr("parenting.library.page_server.httpx2.get", lambda url, **_: web.get(url))
+        person = pt.Person(url="http://localhost:9", data=ours.data)
+        with pytest.raises(ValueError, match=r"url: the server at .* has another database than the folder"):
+            pt.train(WORLD, parent=person)
+    assert list_runs(here) == []
+    here.close()
+
+
 def test_pages_may_be_framed_only_by_whom_the_settings_name(tmp_path: Path) -> None:
     from starlette.testclient import TestClient
 
