@@ -144,12 +144,13 @@ class Whole(Checked[int]):
     """A whole number."""
 
     cache_ok = True
-    impl = Integer
+    # SQLite counts only what is called INTEGER.
+    impl: TypeEngine[Any] | type[TypeEngine[Any]] = BigInteger().with_variant(Integer, "sqlite")
     kind, noun = int, "a whole number"
 
 
 class Big(Whole):
-    """A whole number of 64 bits."""
+    """A whole number of 64 bits, named so in every store."""
 
     cache_ok = True
     impl = BigInteger

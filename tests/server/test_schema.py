@@ -33,8 +33,6 @@ from parenting.server.statuses import RunStatus
 from parenting.server.workers import sign
 from tests.server.conftest import CLIPS
 
-pytestmark = pytest.mark.only("sqlite", "every kind of request is in other tests")
-
 EXAMPLES = 20
 """Requests of each kind and operation, besides those that schemathesis lists itself."""
 RUNS, QUESTIONS = 4, 8
