@@ -96,7 +96,7 @@ def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None 
     with db.write() as session:
         run = hold(session, run_id)
         if run.status in OVER and run.status != status:
-            raise Conflict(f"Run {run_id} is {run.status}; it cannot become {status}.")
+            raise Conflict(f"This run is {run.status}; it cannot become {status}.")
         if run.status != status:
             _become(session, run, status, reason)
         return run
@@ -243,7 +243,7 @@ def living(session: Session, run_id: int) -> Run:
     """
     run = hold(session, run_id)
     if run.status in OVER:
-        raise Conflict(f"Run {run_id} is {run.status}; its agent cannot be changed any more.")
+        raise Conflict(f"This run is {run.status}; its agent cannot be changed any more.")
     return run
 
 

@@ -26,7 +26,7 @@ ERRORS: dict[int, ServerError] = {
     400: UnknownHostError(),
     403: Forbidden(),
     404: NotFound("There is no run 9."),
-    409: Conflict("Run 1 is stopped; its agent cannot be changed any more."),
+    409: Conflict("This run is stopped; its agent cannot be changed any more."),
     410: ElsewhereError(),
     413: TooLargeError(),
     422: InvalidFieldsError([("choice", "Input should be 'left', 'right', 'either' or 'neither'")]),
