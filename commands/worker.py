@@ -35,7 +35,7 @@ def worker(
     follow()
     with friendly_errors():
         chosen = settings()
-        set_up_log(chosen.log_level)
+        set_up_log(chosen, "worker")
         from parenting.server.worker import (
             main,  # loads torch, which takes a second, so the settings are checked before
         )

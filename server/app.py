@@ -27,9 +27,11 @@ from parenting.server.errors import (
     StoreError,
     TooLargeError,
 )
+from parenting.server.meters import TYPE, Meters
 from parenting.server.migrate import require_current
 from parenting.server.new_run import messages
 from parenting.server.notify import Notifier
+from parenting.server.requests import RequestMiddleware
 from parenting.server.security import SecurityMiddleware
 from parenting.server.settings import Settings
 from parenting.server.static import OthersFiles, OurFiles
@@ -68,6 +70,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     app.state.db, app.state.settings = db, settings
     app.state.worker_notifier = Notifier(settings.data, "worker")
     app.state.streams = Streams(db, Notifier(settings.data, "web"), settings.streams)
+    app.state.meters.watch(db, app.state.streams.number)
     return app
 
 
@@ -85,6 +88,10 @@ def bare_app() -> FastAPI:
         lifespan=_lifespan,
     )
     app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY)
+    app.state.meters = Meters()
+    app.add_middleware(
+        RequestMiddleware, meters=app.state.meters
+    )  # the outermost: refused requests count, too
     _add_errors(app)
     _add_health(app)
     app.include_router(api.router)
@@ -109,6 +116,7 @@ def _add_errors(app: FastAPI) -> None:
     def refused(request: Request, error: ServerError) -> Response:
         if error.status >= 500:
             log.warning("refused", path=request.url.path, code=error.code)
+            request.app.state.meters.refuse(error.code)
         headers = {"Retry-After": "1"} if isinstance(error, StoreError) else None
         return _reply(request, error, headers)
 
@@ -152,7 +160,7 @@ def _allowed(request: Request) -> str:
 
 
 def _reply(request: Request, error: ServerError, headers: dict[str, str] | None = None) -> Response:
-    programs = ("/api/", "/static/", "/healthz", "/readyz")
+    programs = ("/api/", "/static/", "/healthz", "/readyz", "/metrics")
     if request.url.path.startswith(programs):
         return JSONResponse(error.body(), error.status, headers)
     page = pages.error_page(request, error)
@@ -180,3 +188,8 @@ def _add_health(app: FastAPI) -> None:
         if not alive(db):
             raise NotReadyError("No worker gives a sign of life. Start one: `parenting worker`")
         return ready
+
+    @app.get("/metrics", include_in_schema=False)
+    def metrics(request: Request) -> Response:
+        """Return figures of this process and of the store in Prometheus' text format."""
+        return Response(request.app.state.meters.text(), media_type=TYPE)

@@ -62,7 +62,7 @@ def make_server(settings: Settings) -> Server:
     Raises:
         SetupError: the database cannot be used as it is.
     """
-    set_up_log(settings.log_level)
+    set_up_log(settings, "web")
     config = uvicorn.Config(
         create_app(settings),
         log_config=None,

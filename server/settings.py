@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Literal
 
 from pydantic import Field
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
@@ -61,6 +62,14 @@ class Settings(BaseSettings):
     )
     streams: int = Field(50, ge=1, description="Live streams of events that may be open at once.")
     log_level: str = Field("warning", description="debug, info, warning or error.")
+    log_format: Literal["text", "json"] = Field("text", description="text for people, or json, a line each.")
+    log_folder: Path | None = Field(
+        None, description="Folder of log files, one for each process; none is standard error."
+    )
+    log_bytes: int = Field(
+        10_000_000, ge=10_000, description="Size at which a log file is renamed and a new one begun."
+    )
+    log_files: int = Field(5, ge=1, le=1000, description="How many renamed log files are kept.")
 
     @classmethod
     def settings_customise_sources(

@@ -170,13 +170,17 @@ class Streams:
         for subscription in self.subscriptions.values():
             _tell(subscription)
 
+    def number(self) -> int:
+        """Return how many streams are open."""
+        return sum(subscription.streams for subscription in list(self.subscriptions.values()))
+
     def check_room(self) -> None:
         """Refuse one stream too many.
 
         Raises:
             TooManyStreamsError: as many as allowed are open.
         """
-        if sum(subscription.streams for subscription in self.subscriptions.values()) >= self.limit:
+        if self.number() >= self.limit:
             raise TooManyStreamsError
 
 

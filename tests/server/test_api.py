@@ -12,6 +12,7 @@ from parenting.server.log import set_up_log
 from parenting.server.metrics import write_metrics
 from parenting.server.queue.worker_side import take_operator_events
 from parenting.server.runs import Claim, get_run, report_progress
+from parenting.server.settings import Settings
 from parenting.server.tables import Run
 from tests.server.conftest import Clock
 
@@ -223,9 +224,13 @@ def test_page_that_is_not_there_is_a_page(client: httpx2.Client) -> None:
 
 
 def test_fault_of_ours_is_told_in_the_same_shape_and_without_traceback(
-    client: httpx2.Client, run: Run, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    client: httpx2.Client,
+    settings: Settings,
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    set_up_log("error")
+    set_up_log(settings.model_copy(update={"log_level": "error"}), "web")
 
     def fail(*_words: object) -> None:
         raise RuntimeError("secret detail")

@@ -1,0 +1,57 @@
+"""The outermost middleware: each request has an id, is counted by its route, and names itself in the log."""
+
+from __future__ import annotations
+
+import secrets
+import time
+
+import structlog
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from parenting.server.log_lines import request
+from parenting.server.meters import Meters
+
+NO_ROUTE = "none"
+"""The label of an address that no route has; the address itself may be anything."""
+
+log = structlog.get_logger()
+
+
+class RequestMiddleware:
+    """ASGI middleware around the whole application."""
+
+    def __init__(self, app: ASGIApp, meters: Meters) -> None:
+        self.app, self.meters = app, meters
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on; count it when its reply is complete."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        scope["request_id"] = secrets.token_hex(8)
+        request.set(scope)
+        status, began = 500, time.perf_counter()
+
+        async def counted(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                MutableHeaders(scope=message)["X-Request-Id"] = scope["request_id"]
+            await send(message)
+
+        try:
+            await self.app(scope, receive, counted)
+        finally:
+            seconds, route = time.perf_counter() - began, route_of(scope)
+            self.meters.count(scope["method"], route, status, seconds)
+            log.info(
+                "request", method=scope["method"], route=route, status=status, ms=round(1e3 * seconds, 1)
+            )
+
+
+def route_of(scope: Scope) -> str:
+    """Return the template of a request's route: a few words for all the addresses that there are."""
+    whole = scope.get("fastapi", {}).get("effective_route_context")  # with the prefix of an included router
+    path = getattr(whole or scope.get("route"), "path", None)
+    return path or scope.get("root_path") or NO_ROUTE
