@@ -12,22 +12,20 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from parenting.server import api, pages
+from parenting.server import api, health, pages
+from parenting.server.admission import Admission
 from parenting.server.api.openapi import Described
-from parenting.server.api.responses import error_responses
 from parenting.server.db import Database, connect
-from parenting.server.deps import Db
 from parenting.server.errors import (
     InvalidFieldsError,
     MethodNotAllowed,
     NotFound,
-    NotReadyError,
     ServerError,
-    SetupError,
     StoreError,
     TooLargeError,
 )
-from parenting.server.meters import TYPE, Meters
+from parenting.server.log_limit import LogLimit
+from parenting.server.meters import Meters
 from parenting.server.migrate import require_current
 from parenting.server.new_run import messages
 from parenting.server.notify import Notifier
@@ -36,7 +34,6 @@ from parenting.server.security import SecurityMiddleware
 from parenting.server.settings import Settings
 from parenting.server.static import OthersFiles, OurFiles
 from parenting.server.streams import Streams
-from parenting.server.workers import alive
 
 LARGEST_BODY = 64 * 1024
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
@@ -69,7 +66,9 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     app = bare_app()
     app.state.db, app.state.settings = db, settings
     app.state.worker_notifier = Notifier(settings.data, "worker")
-    app.state.streams = Streams(db, Notifier(settings.data, "web"), settings.streams)
+    app.state.admission, app.state.health_threads = Admission(), health.health_threads()
+    notifier = Notifier(settings.data, "web")
+    app.state.streams = Streams(db, notifier, settings.streams, app.state.admission)
     app.state.meters.watch(db, app.state.streams.number)
     return app
 
@@ -93,7 +92,7 @@ def bare_app() -> FastAPI:
         RequestMiddleware, meters=app.state.meters
     )  # the outermost: refused requests count, too
     _add_errors(app)
-    _add_health(app)
+    app.include_router(health.router)
     app.include_router(api.router)
     app.include_router(pages.router)
     app.mount("/static/vendor", OthersFiles())
@@ -110,18 +109,22 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 
 def _add_errors(app: FastAPI) -> None:
-    """Give every error one shape: JSON below /api, a page elsewhere."""
+    """Give every error one shape: JSON below /api, a page elsewhere.
+
+    Handlers are coroutines, or each would need a thread, and threads may be what is lacking.
+    """
+    limit = LogLimit()
 
     @app.exception_handler(ServerError)
-    def refused(request: Request, error: ServerError) -> Response:
+    async def refused(request: Request, error: ServerError) -> Response:
         if error.status >= 500:
-            log.warning("refused", path=request.url.path, code=error.code)
+            limit.say(error.code, log.warning, "refused", path=request.url.path, code=error.code)
             request.app.state.meters.refuse(error.code)
         headers = {"Retry-After": "1"} if isinstance(error, StoreError) else None
         return _reply(request, error, headers)
 
     @app.exception_handler(RequestValidationError)
-    def malformed(request: Request, error: RequestValidationError) -> Response:
+    async def malformed(request: Request, error: RequestValidationError) -> Response:
         of_run = any(tuple(one["loc"]) == ("path", "run_id") for one in error.errors())
         if of_run and not request.url.path.startswith("/api/"):
             return _reply(request, NotFound(f"There is no run '{request.path_params['run_id']}'."))
@@ -130,7 +133,7 @@ def _add_errors(app: FastAPI) -> None:
         )
 
     @app.exception_handler(HTTPException)
-    def http(request: Request, error: HTTPException) -> Response:
+    async def http(request: Request, error: HTTPException) -> Response:
         headers = dict(error.headers or {})
         if error.status_code == 405 and "route" in request.scope:
             headers["Allow"] = _allowed(request)
@@ -166,30 +169,3 @@ def _reply(request: Request, error: ServerError, headers: dict[str, str] | None 
     page = pages.error_page(request, error)
     page.headers.update(headers or {})
     return page
-
-
-def _add_health(app: FastAPI) -> None:
-    fine = {"status": "ok"}
-    ready = {"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}
-    errors = (400, 413, 500)
-
-    @app.get("/healthz", summary="Ask for life", tags=["health"], responses=error_responses(*errors))
-    def healthz() -> dict[str, str]:
-        """Say that this process answers."""
-        return fine
-
-    @app.get("/readyz", summary="Ask for readiness", tags=["health"], responses=error_responses(*errors, 503))
-    def readyz(db: Db) -> dict[str, str]:
-        """Check that the database answers, its tables are up to date, and a worker is alive; else 503."""
-        try:
-            require_current(db)
-        except SetupError as error:
-            raise NotReadyError(error.message) from None
-        if not alive(db):
-            raise NotReadyError("No worker gives a sign of life. Start one: `parenting worker`")
-        return ready
-
-    @app.get("/metrics", include_in_schema=False)
-    def metrics(request: Request) -> Response:
-        """Return figures of this process and of the store in Prometheus' text format."""
-        return Response(request.app.state.meters.text(), media_type=TYPE)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -20,12 +21,15 @@ from sqlalchemy.exc import ArgumentError
 from sqlalchemy.orm import Session
 
 from parenting.server.columns import loads
-from parenting.server.errors import BusyError, SetupError
+from parenting.server.errors import BusyError, SetupError, StoreError
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql, sqlite
+from parenting.server.store.patience import remaining
 from parenting.server.store.refusals import translated
 from parenting.server.store.sqlite import BUSY_SECONDS
 
+REFUSED_SECONDS = 10.0
+"""A refused write counts for this long, unless another one succeeds: a full disk lets a transaction begin."""
 Seen = TypeVar("Seen")
 
 
@@ -47,6 +51,7 @@ class Database:
         self._cache_lock = threading.Lock()
         self._watcher: PoolProxiedConnection | None = None
         self._last: tuple[int, Hashable, Any] | None = None
+        self._refused: tuple[StoreError, float] | None = None
 
     @contextmanager
     def read(self) -> Iterator[Session]:
@@ -68,10 +73,34 @@ class Database:
         Raises:
             StoreError: no turn to write within five seconds, or the store refused; nothing was stored.
         """
-        if not self._turn.acquire(timeout=BUSY_SECONDS):
+        try:
+            with self._transaction(self._writing if durable else self._hurried) as session:
+                yield session
+        except StoreError as error:
+            self._refused = (error, time.monotonic())
+            raise
+        self._refused = None
+
+    def refusal(self) -> StoreError | None:
+        """Return what the store would say to a write now, or said to the last one; None if it is willing.
+
+        A transaction is begun and given up; nothing is written. The caller's patience bounds the wait.
+        """
+        try:
+            with self._transaction(self._hurried) as session:
+                session.rollback()
+        except StoreError as error:
+            return error
+        refused = self._refused
+        if refused is None or time.monotonic() - refused[1] > REFUSED_SECONDS:
+            return None
+        return refused[0]
+
+    @contextmanager
+    def _transaction(self, engine: Engine) -> Iterator[Session]:
+        if not self._turn.acquire(timeout=remaining(BUSY_SECONDS)):
             raise BusyError
         try:
-            engine = self._writing if durable else self._hurried
             with translated(), Session(engine, expire_on_commit=False) as session, session.begin():
                 session.connection()  # BEGIN IMMEDIATE now, not at the first statement
                 yield session

@@ -8,7 +8,8 @@ Pages and API write, for example:
     def page(request: Request, run_id: int, db: Db, settings: SettingsOf) -> Response: ...
 
 `Db` is the `server.db.Database` that every verb of `server.runs` and `server.queue` takes first. Write
-`def`, not `async def`: verbs block, so they belong in the thread pool. Raise `server.errors` freely:
+`def`, not `async def`: verbs block, so they belong in the thread pool, before which
+`server.admission` lets requests wait (make routers by `admitted_router`). Raise `server.errors` freely:
 `server.app` turns them into the one JSON shape for programs (/api, /static, /healthz, /readyz), and into the
 pages' `error_page` elsewhere. After a stored answer or event call `notify_worker(request)`, so that the
 worker acts on it at once.
@@ -24,13 +25,13 @@ from parenting.server.db import Database
 from parenting.server.settings import Settings
 
 
-def database(request: Request) -> Database:
+async def database(request: Request) -> Database:
     """Return the database of this application."""
     db: Database = request.app.state.db
     return db
 
 
-def settings_of(request: Request) -> Settings:
+async def settings_of(request: Request) -> Settings:
     """Return the settings that this application was made with."""
     settings: Settings = request.app.state.settings
     return settings

@@ -7,13 +7,17 @@ one version runs a script of another.
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Mapping
+from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from fastapi.staticfiles import StaticFiles
-from starlette.responses import Response
+from starlette.exceptions import HTTPException
+from starlette.responses import FileResponse, Response
+from starlette.types import Scope
 
 from parenting.server.errors import NotFound
 
@@ -31,6 +35,22 @@ class OurFiles(StaticFiles):
 
     def __init__(self) -> None:
         super().__init__(directory=STATIC, packages=[("parenting.drawing", "style")])
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """Return the file, looked up and read in the event loop: it must not wait for a thread.
+
+        While the store is locked, requests may hold every thread. Our files are small or kept in memory.
+        """
+        if scope["method"] not in ("GET", "HEAD"):
+            raise HTTPException(405)
+        full, found = self.lookup_path(path)
+        if found is None or not stat.S_ISREG(found.st_mode):
+            raise HTTPException(404)
+        response = self.file_response(full, found, scope)
+        if isinstance(response, FileResponse):
+            content = _content(full, found.st_mtime_ns, found.st_size)
+            return Response(content, headers=dict(response.headers))
+        return response
 
     def file_response(self, full_path: Any, *more: Any, **named: Any) -> Response:
         """The file, or 304."""
@@ -58,6 +78,12 @@ class OthersFiles(OurFiles):
         if package and file is None:
             raise NotFound(f"{path} is not installed. Run: pip install {package}")
         return ("", None) if file is None else (str(file), file.stat())
+
+
+@lru_cache(maxsize=128)
+def _content(path: str, _changed: int, _size: int) -> bytes:
+    """Return the bytes of a file, read again once it has changed."""
+    return Path(path).read_bytes()
 
 
 def _find(package: str, place: str) -> Path | None:

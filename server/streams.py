@@ -16,10 +16,10 @@ from functools import partial
 from typing import Any, TypeVar
 
 from fastapi.sse import ServerSentEvent
-from starlette.concurrency import run_in_threadpool
 
+from parenting.server.admission import Admission
 from parenting.server.db import Database
-from parenting.server.errors import ServerError, TooManyStreamsError
+from parenting.server.errors import ServerError, StoreError, TooManyStreamsError
 from parenting.server.notify import Notifier
 from parenting.server.queue.leases import waiting
 from parenting.server.reads.metrics import list_metrics
@@ -50,8 +50,8 @@ class Subscription:
 class Streams:
     """All live streams of this process."""
 
-    def __init__(self, db: Database, notifier: Notifier, limit: int) -> None:
-        self.db, self.notifier, self.limit = db, notifier, limit
+    def __init__(self, db: Database, notifier: Notifier, limit: int, admission: Admission) -> None:
+        self.db, self.notifier, self.limit, self.admission = db, notifier, limit, admission
         self.subscriptions: dict[int, Subscription] = {}
         self.closed = False
         self.waiting_requests = 0  # requests for a question that lie here
@@ -101,7 +101,10 @@ class Streams:
 
     async def _metrics(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
         while after is not None:
-            rows = await run_in_threadpool(list_metrics, self.db, run_id, after, ROWS)
+            try:
+                rows = await self.admission.read(list_metrics, self.db, run_id, after, ROWS)
+            except StoreError:  # the next change of the run sends them
+                return
             shown = [row.model_dump(mode="json") for row in metric_schemas(rows)]
             ticks = [row["tick"] for row in shown if row["tick"] is not None]
             if ticks:
@@ -123,7 +126,7 @@ class Streams:
         try:
             while not await gone():
                 notified = self._notified
-                found = await run_in_threadpool(look)
+                found = await self.admission.write(look)
                 left = until - time.monotonic()
                 if found is not None or left <= 0 or self.closed:
                     return found
@@ -150,7 +153,7 @@ class Streams:
             notified = self._notified
             look = partial(_look, self.db, run_id)
             try:
-                run, question = await run_in_threadpool(look)
+                run, question = await self.admission.read(look)
             except ServerError:  # busy: the next look will tell
                 run, question = subscription.run, subscription.question
             if (run, question) != (subscription.run, subscription.question):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 
 from parenting.agent.events import Change, EndEpisode, Event, Mature
 from parenting.server import runs
+from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import write_responses
@@ -15,7 +16,7 @@ from parenting.server.reads.schemas import run_schema
 from parenting.server.schemas import RunSchema
 from parenting.server.statuses import RunStatus
 
-router = APIRouter(tags=["operator"])
+router = admitted_router(tags=["operator"])
 
 REPLIES = write_responses(404, 409)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from fastapi.responses import JSONResponse
 
+from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import AnswerBody, LeaseBody
 from parenting.server.api.lists import AskedPart, AskedRows
 from parenting.server.api.names import QueryId, QueryName, RunId
@@ -21,7 +22,7 @@ from parenting.server.reads.schemas import asked_schema, asked_schemas, leased_s
 from parenting.server.runs import get_run
 from parenting.server.schemas import AskedSchema, LeasedSchema, StoredSchema
 
-router = APIRouter(tags=["questions"])
+router = admitted_router(tags=["questions"])
 
 
 @router.get("/runs/{run_id}/queries", summary="List a run's questions", responses=read_responses(404))

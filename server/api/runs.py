@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 
+from parenting.server.admission import admitted_router
 from parenting.server.api.lists import (
     EventPart,
     MetricPart,
@@ -24,7 +25,7 @@ from parenting.server.reads import pagination
 from parenting.server.reads.schemas import metric_schemas, run_schema, run_schemas
 from parenting.server.schemas import RunSchema
 
-router = APIRouter(tags=["runs"])
+router = admitted_router(tags=["runs"])
 
 
 @router.get("/runs", summary="List the runs", responses=read_responses())

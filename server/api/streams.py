@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import AsyncIterable
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Request
+from fastapi import Depends, Header, Request
 from fastapi.responses import StreamingResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
+from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import After
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import streams
@@ -16,7 +17,7 @@ from parenting.server.deps import Db
 from parenting.server.export import lines
 from parenting.server.runs import get_run
 
-router = APIRouter(tags=["runs"])
+router = admitted_router(tags=["runs"])
 
 LINES = "application/x-ndjson"
 

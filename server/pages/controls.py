@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Form, Request, Response
+from fastapi import Form, Request, Response
 from pydantic import TypeAdapter, ValidationError
 
 from parenting.agent.events import Change, EndEpisode, Mature, Probability
 from parenting.server import operator_events, runs
+from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.deps import Db, notify_worker
 from parenting.server.new_run import Goal, Pace
@@ -22,7 +23,7 @@ from parenting.server.pages.render import redirect
 from parenting.server.pages.start import FormFields
 from parenting.server.statuses import RunStatus
 
-router = APIRouter(include_in_schema=False)
+router = admitted_router(include_in_schema=False)
 
 Back = Annotated[Literal["parent", "dashboard", "operator"], Form()]
 BACK_PATHS = {"parent": "/parent", "dashboard": "", "operator": "#operator"}

@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from fastapi import APIRouter, Response
+from fastapi import Response
 from fastapi.responses import JSONResponse
 
 from parenting.server import operator_events, runs
+from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
@@ -26,7 +27,7 @@ from parenting.server.security import policy
 from parenting.server.statuses import RunState
 from parenting.server.tables import Metric, Run
 
-router = APIRouter(include_in_schema=False)
+router = admitted_router(include_in_schema=False)
 
 STATUS = {
     **STATE_TEXTS,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 
+from parenting.server.admission import admitted_router
 from parenting.server.pages.render import page
 from parenting.server.security import policy
 
-router = APIRouter(include_in_schema=False)
+router = admitted_router(include_in_schema=False)
 
 
 @router.get("/docs")

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal, NamedTuple
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 
 from parenting.server import runs
+from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.damage import sound
 from parenting.server.deps import Db
@@ -24,7 +25,7 @@ from parenting.server.reads.answers import Answered
 from parenting.server.schemas import Choice
 from parenting.server.tables import CHOICES, KINDS, Run
 
-router = APIRouter(include_in_schema=False)
+router = admitted_router(include_in_schema=False)
 
 PAGE = 20
 """Answers on a page."""

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import re
 import secrets
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Form, Query, Request, Response
-from starlette.concurrency import run_in_threadpool
+from fastapi import Form, Query, Request, Response
 
 from parenting.server import runs, tables
+from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import Choice, ClientId
 from parenting.server.api.names import DatabaseId, PublicId, RunId, RunName, read_name
 from parenting.server.db import Database
@@ -38,7 +37,7 @@ from parenting.server.statuses import RunState
 from parenting.server.streams import Streams
 from parenting.server.tables import Run
 
-router = APIRouter(include_in_schema=False)
+router = admitted_router(include_in_schema=False)
 
 COOKIE = "parenting_client"
 YEAR = 365 * 24 * 3600
@@ -113,25 +112,26 @@ async def question(
     when the next one comes, its reply is on its way at once.
     """
     streams: Streams = request.app.state.streams
-    run = await run_in_threadpool(runs.get_run, db, run_id)
-    numbers = await run_in_threadpool(query_numbers, db, shown)
+    run = await streams.admission.read(runs.get_run, db, run_id)
+    numbers = await streams.admission.read(query_numbers, db, shown)
     lease = partial(_lease_next, db, run_id, client_id, numbers, settings.lease_seconds)
     query = await streams.wait_for(lease, wait, request.is_disconnected)
     if query is None:
         return Response(status_code=204)
     if await request.is_disconnected():  # it left while the question was looked up
-        await run_in_threadpool(leases.release, db, query.id, client_id)
-    return await run_in_threadpool(_markup, db, run, query, client_id)
+        await streams.admission.write(leases.release, db, query.id, client_id)
+    return await streams.admission.read(_markup, db, run, query, client_id)
 
 
 @router.post("/runs/{run_id}/parent/next")
 def next_question(run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField) -> Response:
     """For the form: lease the next question and go to it."""
-    return _go_on(db, runs.get_run(db, run_id), client_id, settings.lease_seconds)
+    run = runs.get_run(db, run_id)
+    return redirect(_address(run, leases.lease(db, run.id, client_id, settings.lease_seconds)))
 
 
 @router.post("/runs/{run_id}/parent/answer")
-def answer(
+async def answer(
     request: Request,
     run_id: RunName,
     db: Db,
@@ -148,9 +148,12 @@ def answer(
     if isinstance(run_id, int) or database is None or question is None:
         raise ElsewhereError(BY_NUMBER)
     names = Names(database, run_id, question)
-    stored = answers.answer(db, question, choice, client_id, "human", names)
+    streams: Streams = request.app.state.streams
+    stored = await streams.admission.write(answers.answer, db, question, choice, client_id, "human", names)
     notify_worker(request)
-    return _go_on(db, runs.get_run(db, stored.run), client_id, settings.lease_seconds, patience=PATIENCE)
+    run = await streams.admission.read(runs.get_run, db, stored.run)
+    lease = partial(leases.lease, db, run.id, client_id, settings.lease_seconds)
+    return redirect(_address(run, await streams.wait_for(lease, PATIENCE, request.is_disconnected)))
 
 
 def _lease_next(
@@ -164,14 +167,6 @@ def _lease_next(
 def _markup(db: Database, run: Run, query: tables.Query, client_id: str) -> Response:
     shown = question_view(query, run)
     return page("_question.html", shown=shown, client=client_id, database=database_id(db))
-
-
-def _go_on(db: Database, run: Run, client_id: str, seconds: float, patience: float = 0.0) -> Response:
-    """To the next question, which may come within `patience` seconds, or to the page that waits for it."""
-    until = time.monotonic() + patience
-    while (query := leases.lease(db, run.id, client_id, seconds)) is None and time.monotonic() < until:
-        time.sleep(0.02)
-    return redirect(_address(run, query))
 
 
 def _address(run: Run, query: tables.Query | None) -> str:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import Depends, Query, Request, Response
 
 from parenting.agent.config import PRESETS
 from parenting.envs.levels.spec import WorldSpec
 from parenting.envs.registry import WORLDS
+from parenting.server.admission import admitted_router
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.errors import InvalidFieldsError
@@ -27,7 +28,7 @@ from parenting.server.schemas import DamagedSchema
 from parenting.server.statuses import STATE_LABELS, RunState
 from parenting.server.tables import Metric, Run
 
-router = APIRouter(include_in_schema=False)
+router = admitted_router(include_in_schema=False)
 
 PRESET_WORDS = {
     "conservative": "asks before almost every new move; hardly ever dies",

@@ -15,6 +15,7 @@ from sqlalchemy import URL, Connection, Engine, create_engine, event
 
 from parenting.server.columns import decoded
 from parenting.server.errors import SetupError
+from parenting.server.store.patience import remaining
 
 SAFE_SQLITE = (3, 51, 3)
 """Older versions can corrupt a database in WAL mode: a race between the log's reset and a checkpoint."""
@@ -108,4 +109,15 @@ def _begin(connection: Connection) -> None:
     if (synchronous := options.get("synchronous", before)) != before:
         connection.exec_driver_sql(f"PRAGMA synchronous={synchronous}")
         connection.info["synchronous"] = synchronous
+    _set_patience(connection)
     connection.exec_driver_sql(f"BEGIN {options.get('begin', 'DEFERRED')}")
+
+
+def _set_patience(connection: Connection) -> None:
+    """Wait for the lock of the file no longer than the caller may (`server.store.patience`)."""
+    usual = int(PRAGMAS["busy_timeout"])
+    left = int(1000 * remaining(usual / 1000))
+    wanted = usual if left > 0.9 * usual else max(left, 1)  # 0 would mean: not at all
+    if connection.info.get("busy_timeout", usual) != wanted:
+        connection.exec_driver_sql(f"PRAGMA busy_timeout={wanted}")
+        connection.info["busy_timeout"] = wanted

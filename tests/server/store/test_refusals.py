@@ -110,6 +110,7 @@ def test_folder_in_place_of_the_file_is_gone(tmp_path: Path) -> None:
     database.close()
 
 
+@pytest.mark.only("sqlite", "PostgreSQL has its own states above")
 def test_write_of_a_database_opened_for_reading_is_refused(db: Database) -> None:
     def spoil() -> None:
         with db.write() as session:

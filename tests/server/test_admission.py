@@ -1,0 +1,125 @@
+"""While the store is locked: who waits, who does not, and what those who wait are told (D2, E8)."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+
+import httpx2
+import pytest
+from fastapi import FastAPI
+
+from parenting.server.admission import Admission, Gate
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect
+from parenting.server.errors import BusyError
+from parenting.server.settings import Settings
+from parenting.server.streams import Streams
+from parenting.server.workers import sign
+
+pytestmark = pytest.mark.only("sqlite", "the lock of the one file")
+
+LOCKED = 1.0
+"""The bound of a request in these tests, in seconds; five in production."""
+
+
+@contextmanager
+def locked(settings: Settings) -> Iterator[None]:
+    """Another program holds the write lock."""
+    other = connect(settings)
+    with other.write():
+        yield
+    other.close()
+
+
+@asynccontextmanager
+async def serving(app: FastAPI, admission: Admission) -> AsyncIterator[httpx2.AsyncClient]:
+    """A client of the application, which admits as the test wants."""
+    streams: Streams = app.state.streams
+    app.state.admission = streams.admission = admission
+    transport = httpx2.ASGITransport(app=app)
+    async with (
+        app.router.lifespan_context(app),
+        httpx2.AsyncClient(transport=transport, base_url="http://localhost", timeout=30) as client,
+    ):
+        yield client
+
+
+def answering(client: httpx2.AsyncClient, guidance: int) -> Awaitable[httpx2.Response]:
+    body = {"choice": "left", "client_id": "ann"}
+    return client.post(f"/api/v1/queries/{guidance}/answer", json=body)
+
+
+def in_loop(test: Callable[[httpx2.AsyncClient], Awaitable[None]], settings: Settings, db: Database) -> None:
+    async def whole() -> None:
+        async with serving(create_app(settings, db), Admission(seconds=LOCKED)) as client:
+            await test(client)
+
+    asyncio.run(whole())
+
+
+def test_two_hundred_waiting_answers_hold_up_nobody_who_reads(
+    settings: Settings, db: Database, guidance: int
+) -> None:
+    async def test(client: httpx2.AsyncClient) -> None:
+        sign(db, "worker-1")
+        with locked(settings):
+            answers = [asyncio.ensure_future(answering(client, guidance)) for _ in range(200)]
+            await asyncio.sleep(0.1)  # all of them have arrived
+            for path in ("/healthz", "/", "/static/site.css", "/api/v1/runs", "/readyz"):
+                reply = await client.get(path)
+                assert reply.status_code == (503 if path == "/readyz" else 200), path
+                assert not any(answer.done() for answer in answers), f"{path} waited for the store"
+            assert "store: busy" in reply.json()["error"]["message"]
+            replies = await asyncio.gather(*answers)
+        assert {reply.status_code for reply in replies} == {503}
+        assert {reply.headers["Retry-After"] for reply in replies} == {"1"}
+        assert {reply.json()["error"]["code"] for reply in replies} == {"busy"}
+        assert (await answering(client, guidance)).status_code == 200
+        assert (await client.get("/readyz")).status_code == 200
+
+    in_loop(test, settings, db)
+
+
+def test_answers_that_wait_are_stored_once_the_lock_is_gone(
+    settings: Settings, db: Database, guidance: int
+) -> None:
+    async def test(client: httpx2.AsyncClient) -> None:
+        with locked(settings):
+            waiting = asyncio.ensure_future(answering(client, guidance))
+            await asyncio.sleep(LOCKED / 4)
+            assert not waiting.done()
+        assert (await waiting).status_code == 200
+
+    in_loop(test, settings, db)
+
+
+def test_full_queue_refuses_at_once() -> None:
+    async def test() -> None:
+        gate = Gate(places=1, waiting=1)
+        async with gate.entered(5):
+            second = asyncio.ensure_future(_enter(gate))
+            await asyncio.sleep(0)
+            with pytest.raises(BusyError, match="Too many requests wait"):
+                await _enter(gate)
+            assert not second.done()
+        await second
+        assert gate.waiting == 0
+        await _enter(gate)  # the place was given back
+
+    asyncio.run(test())
+
+
+def test_place_that_stays_taken_is_busy() -> None:
+    async def test() -> None:
+        gate = Gate(places=1, waiting=9)
+        async with gate.entered(5):
+            with pytest.raises(BusyError):
+                await _enter(gate, 0.01)
+        await _enter(gate)
+
+    asyncio.run(test())
+
+
+async def _enter(gate: Gate, seconds: float = 5) -> None:
+    async with gate.entered(seconds):
+        return
