@@ -1,4 +1,4 @@
-"""What a store says, and which of the four kinds of refusal callers see (D2, D4, E12)."""
+"""Errors of both drivers, and the kind of refusal that callers see (D2, D4, E12)."""
 
 from pathlib import Path
 
