@@ -13,7 +13,7 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, gene
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
-from sqlalchemy import func, select
+from sqlalchemy import BigInteger, cast, func, select
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
@@ -124,7 +124,7 @@ def _gauge(name: str, about: str, value: float) -> Metric:
 
 
 _RUNS = select(Run.status, func.count()).group_by(Run.status)
-_ANSWERS = select(func.coalesce(func.sum(Run.answers), 0))
+_ANSWERS = select(cast(func.coalesce(func.sum(Run.answers), 0), BigInteger))
 _OPEN = (
     select(Query.kind, func.count().label("number"), func.min(Query.posted).label("oldest"))
     .join(Run, Run.id == Query.run_id)

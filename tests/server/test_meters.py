@@ -103,6 +103,7 @@ def test_a_store_that_refuses_is_a_figure_and_counted(
     assert found["parenting_refusals_total", ("busy",)] == 1
 
 
+@pytest.mark.only("sqlite", "it reads SQLite's plan of the query")
 def test_a_scrape_reads_no_table_of_queries_or_answers_from_end_to_end(db: Database) -> None:
     with db.read() as session:
         for statement in (_RUNS, _OPEN, _ANSWERS):
