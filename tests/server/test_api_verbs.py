@@ -108,7 +108,7 @@ def test_nothing_is_done_to_a_run_that_is_over(
     before = client.get(f"/api/v1/runs/{run.id}").json()
     refused = post(client, run.id, verb, **body)
     assert (refused.status_code, refused.json()["error"]["code"]) == (409, "conflict")
-    assert f"Run {run.id} is stopped" in refused.json()["error"]["message"]
+    assert "This run is stopped" in refused.json()["error"]["message"]
     assert client.get(f"/api/v1/runs/{run.id}").json() == before
 
 

@@ -129,6 +129,7 @@ def test_renewed_copy_refuses_what_was_meant_for_the_original(
     assert client.post(f"/api/v1/queries/{guidance}/answer", json={**body, **fresh}).status_code == 200
 
 
+@pytest.mark.only("sqlite", "PostgreSQL takes nothing for a text that is none")
 def test_a_database_that_cannot_say_which_it_is_stores_no_answer(
     client: httpx2.Client, db: Database, guidance: int
 ) -> None:
