@@ -46,26 +46,28 @@ class Database:
         self.clock = clock
         self._writing = engine.execution_options(begin="IMMEDIATE", synchronous="full")
         self._hurried = engine.execution_options(begin="IMMEDIATE", synchronous="normal")
+        self._sqlite = engine.dialect.name == "sqlite"
+        self._reading = engine if self._sqlite else postgresql.reading(engine)
         # One writer of this process at a time: fairer than many threads that sleep on SQLite's lock.
-        self._turn = threading.Lock()
+        self._turn = threading.BoundedSemaphore(1 if self._sqlite else postgresql.WRITERS)
         self._cache_lock = threading.Lock()
         self._watcher: PoolProxiedConnection | None = None
-        self._last: tuple[int, Hashable, Any] | None = None
+        self._last: tuple[int | str, Hashable, Any] | None = None
         self._refused: tuple[StoreError, float] | None = None
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """Begin a deferred transaction, for reading only; writes in it are rolled back.
+        """Begin a transaction on one snapshot, for reading only; writes in it are refused or rolled back.
 
         Raises:
             StoreError: the store was busy for five seconds, refused, is gone or is damaged.
         """
-        with translated(), Session(self.engine) as session:
+        with translated(), Session(self._reading) as session:
             yield session
 
     @contextmanager
     def write(self, durable: bool = True) -> Iterator[Session]:
-        """Begin a transaction that holds the write lock from its beginning and commits at its end.
+        """Begin a transaction that commits at its end; on SQLite it holds the write lock from its beginning.
 
         What is not `durable` may be lost with the power, but only together with all that came after it. So
         it is for what nobody was promised, or what a worker does again: leases, ticks, metrics, checkpoints.
@@ -110,25 +112,28 @@ class Database:
     def cached(self, key: Hashable, look: Callable[[], Seen]) -> Seen:
         """Return `look()`, or its last result under this key if nobody has committed since.
 
-        This is for polls: SQLite says cheaply whether anything was committed. Only the last result is kept.
+        This is for polls: a store says cheaply whether anything was committed. Only the last result is kept.
         """
         with self._cache_lock:
             version = self.data_version()  # before the look: later commits belong to the next one
-            if version is None:
-                return look()
             if self._last is None or self._last[:2] != (version, key):
                 self._last = (version, key, look())
             seen: Seen = self._last[2]
             return seen
 
-    def data_version(self) -> int | None:
-        """Return SQLite's number that changes with each commit of another connection; None elsewhere."""
-        if self.engine.dialect.name != "sqlite":
-            return None
+    def data_version(self) -> int | str:
+        """Return a value that changes with each commit, whoever made it."""
+        store = sqlite if self._sqlite else postgresql
         with translated():
             if self._watcher is None:
-                self._watcher = self.engine.raw_connection()  # never writes: every commit is another's
-            return sqlite.data_version(self._watcher)
+                self._watcher = store.watcher(self.engine)
+            try:
+                version: int | str = store.data_version(self._watcher)
+                return version
+            except BaseException:
+                watcher, self._watcher = self._watcher, None  # the next poll connects again
+                watcher.invalidate()
+                raise
 
     def close(self) -> None:
         """Close every connection."""

@@ -13,9 +13,11 @@ from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, inspect
+from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.errors import SetupError
+from parenting.server.store.postgresql import begin_migration
 
 FOLDER = Path(__file__).parents[1] / "migrations"
 
@@ -36,7 +38,7 @@ def upgrade(db: Database, keep: Keep | None = None) -> bool:
             copied first.
     """
     with db.write() as session:
-        connection = session.connection()
+        connection = _begin(session)
         before = _revision(connection)
         if before == _head():
             return False
@@ -68,10 +70,11 @@ def downgrade(db: Database, to: str, keep: Keep | None = None) -> None:
     if to not in known[1:]:
         raise SetupError(f"'{to}' is not an older revision. Use one of: {', '.join(known[:0:-1])}.")
     with db.write() as session:
+        connection = _begin(session)
         if keep is not None:
             keep(newest())
         config = _config()
-        config.attributes["connection"] = session.connection()
+        config.attributes["connection"] = connection
         command.downgrade(config, to)
 
 
@@ -106,6 +109,14 @@ def newest() -> str:
 def known_revisions() -> list[str]:
     """Return all revisions, the newest first."""
     return [script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()]
+
+
+def _begin(session: Session) -> Connection:
+    """Return the connection of a migration, once no other is under way."""
+    connection = session.connection()
+    if connection.dialect.name == "postgresql":
+        begin_migration(connection)
+    return connection
 
 
 def _revision(connection: Connection) -> str | None:

@@ -1,12 +1,38 @@
-"""PostgreSQL, by psycopg 3."""
+"""PostgreSQL, by psycopg 3: the limits of each connection, kinds of transaction, and what has been committed.
+
+Reads are read-only transactions on one snapshot, as they are on SQLite. Writes see what was committed before
+each statement and lock the row of a run before they look at what belongs to it. Every wait has a bound; a
+transaction whose process stands still is ended by the server, so that its locks hold up nobody for long.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import URL, Engine, create_engine
+from sqlalchemy import URL, Connection, Engine, PoolProxiedConnection, create_engine, event
 
 from parenting.server.errors import SetupError
+from parenting.server.store.sqlite import BUSY_SECONDS
+
+WRITERS = 16
+"""Transactions of one process that may write at once."""
+LIMITS = {
+    "lock_timeout": int(BUSY_SECONDS * 1000),
+    "statement_timeout": 15_000,
+    "idle_in_transaction_session_timeout": 10_000,
+}
+"""In milliseconds, for each connection; the URL may name others, and a migration lifts them."""
+MIGRATION = 1902_06766
+"""The number of the advisory lock that one migration at a time holds."""
+NETWORK = {
+    "connect_timeout": str(int(BUSY_SECONDS)),
+    "keepalives_idle": "5",
+    "keepalives_interval": "2",
+    "keepalives_count": "3",
+    "tcp_user_timeout": "10000",
+    "application_name": "parenting",
+}
+"""Parameters of libpq: a server that has gone is noticed within seconds. The URL may name other values."""
 
 
 def open_engine(url: URL, **options: Any) -> Engine:
@@ -17,10 +43,66 @@ def open_engine(url: URL, **options: Any) -> Engine:
     """
     if url.drivername in ("postgresql", "postgres"):
         url = url.set(drivername="postgresql+psycopg")  # SQLAlchemy means psycopg2 by the plain name
+    named = url.normalized_query.get("options", ())
+    limits = [f"-c {name}={value}" for name, value in LIMITS.items()]
+    network = {name: value for name, value in NETWORK.items() if name not in url.query}
     try:
-        return create_engine(url, pool_pre_ping=True, **options)
+        engine = create_engine(
+            url,
+            connect_args={**network, "options": " ".join([*limits, *named])},
+            isolation_level="READ COMMITTED",
+            pool_pre_ping=True,
+            pool_size=WRITERS + 4,
+            max_overflow=30,
+            pool_timeout=BUSY_SECONDS,
+            **options,
+        )
     except ImportError:
         raise SetupError(
             "PARENTING_DATABASE_URL: the driver of PostgreSQL is missing. "
             "Run: pip install 'parenting[postgres]'"
         ) from None
+    event.listen(engine, "begin", _begin)
+    return engine
+
+
+def reading(engine: Engine) -> Engine:
+    """Return the same engine for transactions that only read."""
+    return engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+
+
+def begin_migration(connection: Connection) -> None:
+    """Wait until nobody else migrates, and lift the limits of time until this transaction ends.
+
+    Locks of tables keep their limit: who waits for one holds up everybody behind it.
+    """
+    for name in LIMITS:
+        connection.exec_driver_sql(f"SET LOCAL {name} = 0")
+    connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({MIGRATION})")
+    connection.exec_driver_sql(f"SET LOCAL lock_timeout = {LIMITS['lock_timeout']}")
+
+
+def watcher(engine: Engine) -> PoolProxiedConnection:
+    """Return a connection of its own for `data_version`, which is in no transaction between two calls."""
+    connection = engine.raw_connection()
+    connection.detach()
+    connection.dbapi_connection.autocommit = True  # type: ignore[union-attr]  # psycopg's own attribute
+    return connection
+
+
+def data_version(connection: PoolProxiedConnection) -> str:
+    """Return the present snapshot in words: equal ones see the same commits, whoever made them.
+
+    A commit ends a transaction that was in progress or had not begun in every earlier snapshot, so it changes
+    them all. The position in the log would not do: it moves before a commit can be seen.
+    """
+    cursor = connection.cursor()
+    cursor.execute("SELECT pg_current_snapshot()::text")
+    snapshot: str = cursor.fetchall()[0][0]
+    cursor.close()
+    return snapshot
+
+
+def _begin(connection: Connection) -> None:
+    if connection.get_execution_options().get("synchronous") == "normal":
+        connection.exec_driver_sql("SET LOCAL synchronous_commit = off")

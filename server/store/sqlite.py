@@ -11,7 +11,7 @@ import importlib
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import URL, Connection, Engine, create_engine, event
+from sqlalchemy import URL, Connection, Engine, PoolProxiedConnection, create_engine, event
 
 from parenting.server.columns import decoded
 from parenting.server.errors import SetupError
@@ -86,6 +86,11 @@ def sqlite_module() -> Any:
         f"SQLite {found} can corrupt a database under load; {least} or newer is needed. "
         "Run: pip install 'pysqlite3>=0.6.1'"
     )
+
+
+def watcher(engine: Engine) -> PoolProxiedConnection:
+    """Return a connection for `data_version`. It never writes, so every commit is another's."""
+    return engine.raw_connection()
 
 
 def data_version(connection: Any) -> int:
