@@ -34,7 +34,7 @@ def public_id(db: Database, query: int) -> str:
 
 
 def form(db: Database, query: int, **fields: str) -> dict[str, Any]:
-    """What the form of a question sends."""
+    """The fields that the form of a question sends."""
     return {"database": database_id(db), "question": public_id(db, query), **fields}
 
 
