@@ -1,0 +1,63 @@
+"""The queue under any order of what people, worker, operator and clock do (tests/faults/queue_machine.py)."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import HealthCheck, seed
+from hypothesis import settings as hypothesis_settings
+from hypothesis.stateful import run_state_machine_as_test
+
+from parenting.server.db import Database
+from parenting.server.settings import Settings
+from tests.database import migrated
+from tests.faults.auditor import Store, audit
+from tests.faults.figures import Figures
+from tests.faults.ledger import Entries
+from tests.faults.queue_machine import Machines, Queue
+from tests.lengths import length
+from tests.server.conftest import Clock
+
+EXAMPLES, STEPS = length(150, 50_000), length(40, 100)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def db(settings: Settings, clock: Clock) -> Iterator[Database]:
+    database = migrated(settings, clock)
+    yield database
+    database.close()
+
+
+@pytest.mark.torture
+@pytest.mark.timeout(length(300, 100_000))
+def test_queue_does_what_its_model_says(
+    settings: Settings, db: Database, clock: Clock, rng: random.Random, figures: Figures
+) -> None:
+    class Shared(Queue):
+        shared = Machines(db, clock.pass_seconds)
+
+    drawn = seed(rng.randrange(2**32))(Shared)
+    run_state_machine_as_test(drawn, settings=_settings())
+    url = settings.database_url
+    store = Store(settings.data / "parenting.db" if url is None else url)
+    assert audit(store, Entries(Shared.shared.told, [])) == []
+    for name, number in Shared.shared.steps.items():
+        figures.count("steps of the queue's state machine", name, number)
+    assert len(Shared.shared.steps) == 14, f"some rules were never taken: {Shared.shared.steps}"
+
+
+def _settings() -> hypothesis_settings:
+    return hypothesis_settings(
+        max_examples=EXAMPLES,
+        stateful_step_count=STEPS,
+        deadline=None,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+    )
