@@ -14,8 +14,13 @@ from typing import Any
 
 import pytest
 
+from parenting.server.db import Database
+from parenting.server.new_run import NewRun, start
+from parenting.server.runs import Claim, claim
 from parenting.server.settings import Settings
+from tests.database import STORES, database_url, migrated
 from tests.faults import seeds
+from tests.faults.auditor import Store
 from tests.faults.figures import Figures, add_up, lines
 
 
@@ -37,15 +42,62 @@ def rng(request: pytest.FixtureRequest) -> random.Random:
 @pytest.fixture
 def figures(request: pytest.FixtureRequest) -> Iterator[Figures]:
     """Counts by group and name; those of all tests are added up and printed at the end."""
-    counted = Figures()
+    postgresql = request.node.get_closest_marker("postgresql") is not None
+    counted = Figures("PostgreSQL: " if postgresql else "")
     yield counted
     request.node.user_properties.append(("figures", counted.counts))
 
 
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run what uses a database on both stores, unless it is marked as being about one."""
+    if "store" in metafunc.fixturenames:
+        only = metafunc.definition.get_closest_marker("only")
+        metafunc.parametrize("store", only.args[:1] if only else STORES, indirect=True)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark PostgreSQL's share, which is run apart."""
+    for item in items:
+        callspec = getattr(item, "callspec", None)
+        if callspec is not None and callspec.params.get("store") == "postgresql":
+            item.add_marker("postgresql")
+
+
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    """A data folder of the test's own, with SQLite in it."""
-    return Settings(data=tmp_path, database_url=None)
+def store(request: pytest.FixtureRequest) -> str:
+    """The kind of database: sqlite or postgresql."""
+    kind: str = request.param
+    return kind
+
+
+@pytest.fixture
+def settings(tmp_path: Path, store: str) -> Iterator[Settings]:
+    """A data folder of the test's own, and a database that does not exist yet."""
+    with database_url(store) as url:
+        yield Settings(data=tmp_path, database_url=url)
+
+
+@pytest.fixture
+def db(settings: Settings) -> Iterator[Database]:
+    """The database, with tables and without rows."""
+    database = migrated(settings)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def mine(db: Database) -> Claim:
+    """The claim of one worker on one run."""
+    start(db, NewRun(world="unsafe-exploration", config={}))
+    (only,) = claim(db, "worker")
+    return only
+
+
+@pytest.fixture
+def kept(settings: Settings) -> Store:
+    """The database, for the auditor."""
+    url = settings.database_url
+    return Store(settings.data / "parenting.db" if url is None else url)
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

@@ -9,18 +9,19 @@ from collections.abc import Iterable, Iterator, Mapping
 class Figures:
     """The counts of one test. Keys are strings with a tab, for they travel between processes as JSON."""
 
-    def __init__(self) -> None:
+    def __init__(self, store: str = "") -> None:
+        self.store = store
         self.counts: dict[str, int] = {}
 
     def count(self, group: str, name: str, number: int = 1) -> None:
         """Add to the count of a name in a group."""
-        key = f"{group}\t{name}"
+        key = f"{self.store}{group}\t{name}"
         self.counts[key] = self.counts.get(key, 0) + number
 
     def of(self, group: str) -> dict[str, int]:
         """The counts of a group by name."""
         split = ((key.split("\t"), number) for key, number in self.counts.items())
-        return {name: number for (found, name), number in split if found == group}
+        return {name: number for (found, name), number in split if found == self.store + group}
 
 
 def add_up(counts: Iterable[Mapping[str, int]]) -> Counter[tuple[str, str]]:

@@ -17,6 +17,7 @@ from tests.faults.auditor import Store, audit, one_parent_at_a_time
 from tests.faults.ledger import Entries, Ledger, Offer, Told, read
 
 ANSWERS = 6
+ONLY = pytest.mark.only("sqlite", "faults are planted in a file")
 
 
 @pytest.fixture
@@ -37,12 +38,14 @@ def house(settings: Settings) -> tuple[Path, Entries]:
     return settings.data / "parenting.db", read(settings.data / "ledger")
 
 
+@ONLY
 def test_sound_database_is_sound(house: tuple[Path, Entries]) -> None:
     file, entries = house
     assert len(entries.told) == ANSWERS
     assert audit(Store(file), entries) == []
 
 
+@ONLY
 @pytest.mark.parametrize(
     ("statement", "found"),
     [

@@ -8,20 +8,17 @@ from __future__ import annotations
 import random
 import signal
 import threading
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from parenting.server.db import Database, connect
 from parenting.server.errors import Conflict
-from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease
 from parenting.server.queue.worker_side import post_query
-from parenting.server.runs import Claim, claim
+from parenting.server.runs import Claim
 from parenting.server.settings import Settings
-from tests.database import migrated
 from tests.faults.auditor import Store, audit
 from tests.faults.clients import live
 from tests.faults.figures import Figures
@@ -32,36 +29,14 @@ from tests.server.conftest import CLIPS
 from tests.server.processes import _context
 
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(300, 20000))]
-KILLS, AT_ONCE = length(100, 20_000), 3
+KILLS, AT_ONCE = {"sqlite": length(100, 20_000), "postgresql": length(40, 6000)}, 3
 MOMENTS = 160
 """A client dies within so many statements and commits: eight rounds."""
-RACES, RACERS = length(500, 20_000), 4
-
-
-@pytest.fixture
-def db(settings: Settings) -> Iterator[Database]:
-    database = migrated(settings)
-    yield database
-    database.close()
-
-
-@pytest.fixture
-def mine(db: Database) -> Claim:
-    """A run, and the claim under which all clients ask."""
-    start(db, NewRun(world="unsafe-exploration", config={}))
-    (only,) = claim(db, "worker")
-    return only
-
-
-@pytest.fixture
-def kept(settings: Settings) -> Store:
-    """The database, for the auditor."""
-    url = settings.database_url
-    return Store(settings.data / "parenting.db" if url is None else url)
+RACES, RACERS = {"sqlite": length(500, 20_000), "postgresql": length(150, 5000)}, 4
 
 
 def test_clients_killed_at_random_statements(
-    settings: Settings, mine: Claim, kept: Store, rng: random.Random, figures: Figures
+    settings: Settings, store: str, mine: Claim, kept: Store, rng: random.Random, figures: Figures
 ) -> None:
     def begin(number: int) -> Any:
         moments = rng.randint(1, MOMENTS)
@@ -70,34 +45,42 @@ def test_clients_killed_at_random_statements(
         process.start()
         return process
 
+    kills = KILLS[store]
     living = {number: begin(number) for number in range(1, AT_ONCE + 1)}
-    for number in range(1, KILLS + 1):
+    for number in range(1, kills + 1):
         place = next(iter(living))
         process = living.pop(place)
         process.join(60)
         assert process.exitcode == -signal.SIGKILL
         figures.count("SIGKILLs of database clients", marked(settings.data / f"client-{place}.mark"))
-        if number + AT_ONCE <= KILLS:
+        if number + AT_ONCE <= kills:
             living[number + AT_ONCE] = begin(number + AT_ONCE)
     ledgers = sorted(settings.data.glob("ledger-*"))
     entries = read(*ledgers)
-    assert len(entries.told) > KILLS / 5
+    assert len(entries.told) > kills / 5
     assert audit(kept, entries) == []
     fallen = figures.of("SIGKILLs of database clients")
     assert {"before COMMIT", "after COMMIT", "after INSERT", "after UPDATE"} <= set(fallen), fallen
 
 
 def test_races_for_one_query_have_one_winner(
-    settings: Settings, db: Database, mine: Claim, kept: Store, rng: random.Random, figures: Figures
+    settings: Settings,
+    store: str,
+    db: Database,
+    mine: Claim,
+    kept: Store,
+    rng: random.Random,
+    figures: Figures,
 ) -> None:
     """Two threads share a database handle, and its lock; two have handles of their own."""
     others = [db, db, connect(settings), connect(settings)]
+    races = RACES[store]
     gate, done = threading.Barrier(RACERS + 1), threading.Barrier(RACERS + 1)
     query, won = [0], list[tuple[int, str]]()
     lost: list[str] = []
 
     def race(number: int) -> None:
-        for _ in range(RACES):
+        for _ in range(races):
             gate.wait(60)
             choice = "left" if number % 2 else "right"
             try:
@@ -110,7 +93,7 @@ def test_races_for_one_query_have_one_winner(
     threads = [threading.Thread(target=race, args=(number,), daemon=True) for number in range(RACERS)]
     for thread in threads:
         thread.start()
-    for tick in range(RACES):
+    for tick in range(races):
         query[0] = post_query(db, mine, tick, "guidance", 1, CLIPS)
         gate.wait(60)
         done.wait(60)
@@ -118,19 +101,19 @@ def test_races_for_one_query_have_one_winner(
         thread.join(60)
     for other in others[2:]:
         other.close()
-    assert len(won) == RACES
-    assert len(lost) == RACES * (RACERS - 1)
+    assert len(won) == races
+    assert len(lost) == races * (RACERS - 1)
     stored = kept.rows("SELECT query_id, choice FROM answer ORDER BY query_id")
     assert [(row["query_id"], row["choice"]) for row in stored] == won
-    figures.count("races", f"one answer, {RACERS} clients", RACES)
+    figures.count("races", f"one answer, {RACERS} clients", races)
 
 
 def test_races_for_a_lease_have_one_winner(
-    settings: Settings, db: Database, mine: Claim, rng: random.Random, figures: Figures
+    settings: Settings, store: str, db: Database, mine: Claim, rng: random.Random, figures: Figures
 ) -> None:
     """One open query at a time: one client gets it, the others nothing (B1)."""
     handles = [db, connect(settings)]
-    races = RACES // 5
+    races = RACES[store] // 5
     for tick in range(races):
         query, found = post_query(db, mine, tick, "guidance", 1, CLIPS), list[int]()
         gate = threading.Barrier(RACERS)

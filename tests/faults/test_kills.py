@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Iterator
 
 import pytest
 
 from parenting.server.db import Database
 from parenting.server.new_run import start
 from parenting.server.settings import Settings
-from tests.database import migrated
 from tests.faults.figures import Figures
 from tests.faults.house import House
 from tests.faults.points import CLOSING, WEB, WORKER, Point
@@ -25,16 +23,11 @@ from tests.server.raising import ISLAND
 
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(300, 6000))]
 RUNS, PARENTS = 2, 2
-KILLS = length(60, 3000)
+KILLS = {"sqlite": length(60, 3000), "postgresql": length(15, 600)}
+SAMPLED = 6
+"""Points that a run of CI tries on PostgreSQL; on SQLite it tries all."""
 SPREAD = 0.15
 """A kill comes up to so many seconds after work has gone on."""
-
-
-@pytest.fixture
-def db(settings: Settings) -> Iterator[Database]:
-    database = migrated(settings)
-    yield database
-    database.close()
 
 
 def begin(db: Database) -> list[int]:
@@ -66,9 +59,11 @@ def kill_at(house: House, name: str, points: list[Point], rng: random.Random, fi
 
 @pytest.mark.parametrize("name", ["web", "worker 1"])
 def test_killed_at_every_named_point(
-    settings: Settings, db: Database, rng: random.Random, figures: Figures, name: str
+    settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures, name: str
 ) -> None:
     points, runs = WEB if name == "web" else WORKER, begin(db)
+    if store == "postgresql":
+        points = rng.sample(points, k=length(SAMPLED, len(points)))
     with House(settings, [*WEB, *WORKER]) as house:
         house.keep()
         house.move_in(runs, PARENTS, rng)
@@ -80,24 +75,25 @@ def test_killed_at_every_named_point(
 
 
 def test_killed_at_random_moments(
-    settings: Settings, db: Database, rng: random.Random, figures: Figures
+    settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures
 ) -> None:
     runs = begin(db)
     with House(settings, [*WEB, *WORKER]) as house:
         house.keep()
         house.move_in(runs, PARENTS, rng)
         house.until_told(2)
-        for _ in range(KILLS):
+        for _ in range(KILLS[store]):
             time.sleep(rng.uniform(0, SPREAD))
             name = rng.choice(("web", "worker 1"))
             figures.count("SIGKILLs at random moments", f"{name}: {house.kill(name)}")
             house.keep()
             house.until_told(1)
         house.move_out()
-        assert len(figures.of("SIGKILLs at random moments")) >= 5, "all kills fell into the same places"
+        assert len(figures.of("SIGKILLs at random moments")) >= 3, "all kills fell into the same places"
         hold_to_the_promises(house, runs)
 
 
+@pytest.mark.only("sqlite", "every point is tried, and PostgreSQL's share is sampled")
 def test_killed_while_it_closes(
     settings: Settings, db: Database, rng: random.Random, figures: Figures
 ) -> None:

@@ -79,6 +79,7 @@ def level(request: pytest.FixtureRequest) -> str:
     return name
 
 
+@pytest.mark.only("sqlite", "PostgreSQL's own log is its developers' to test")
 def test_power_cuts(settings: Settings, level: str, rng: random.Random, figures: Figures) -> None:
     recording = Recording(settings, level)
     assert len(recording.told) >= ANSWERS

@@ -20,7 +20,8 @@ from tests.faults.queue_machine import Machines, Queue
 from tests.lengths import length
 from tests.server.conftest import Clock
 
-EXAMPLES, STEPS = length(150, 50_000), length(40, 100)
+EXAMPLES = {"sqlite": length(150, 50_000), "postgresql": length(20, 5000)}
+STEPS = length(40, 100)
 
 
 @pytest.fixture
@@ -38,24 +39,22 @@ def db(settings: Settings, clock: Clock) -> Iterator[Database]:
 @pytest.mark.torture
 @pytest.mark.timeout(length(300, 100_000))
 def test_queue_does_what_its_model_says(
-    settings: Settings, db: Database, clock: Clock, rng: random.Random, figures: Figures
+    store: str, db: Database, clock: Clock, kept: Store, rng: random.Random, figures: Figures
 ) -> None:
     class Shared(Queue):
         shared = Machines(db, clock.pass_seconds)
 
     drawn = seed(rng.randrange(2**32))(Shared)
-    run_state_machine_as_test(drawn, settings=_settings())
-    url = settings.database_url
-    store = Store(settings.data / "parenting.db" if url is None else url)
-    assert audit(store, Entries(Shared.shared.told, [])) == []
+    run_state_machine_as_test(drawn, settings=_settings(EXAMPLES[store]))
+    assert audit(kept, Entries(Shared.shared.told, [])) == []
     for name, number in Shared.shared.steps.items():
         figures.count("steps of the queue's state machine", name, number)
     assert len(Shared.shared.steps) == 14, f"some rules were never taken: {Shared.shared.steps}"
 
 
-def _settings() -> hypothesis_settings:
+def _settings(examples: int) -> hypothesis_settings:
     return hypothesis_settings(
-        max_examples=EXAMPLES,
+        max_examples=examples,
         stateful_step_count=STEPS,
         deadline=None,
         database=None,
