@@ -6,18 +6,14 @@ or lose its claim to another worker, whose answers then are the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-
 import pytest
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError
 from parenting.server.new_run import NewRun, start
 from parenting.server.operator_events import add_operator_event
-from parenting.server.queue.answers import Stored, answer
+from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease, lease_ahead, release
 from parenting.server.queue.worker_side import (
     high_water,
@@ -29,35 +25,12 @@ from parenting.server.queue.worker_side import (
 from parenting.server.runs import Claim, claim, set_goal, set_status
 from parenting.server.statuses import RunStatus
 from tests.faults.ledger import Told
+from tests.faults.queue_model import Asked, Machines
 from tests.server.conftest import CLIPS
 
 CLIENTS, CHOICES = ("a", "b", "c"), ("left", "right", "either", "neither")
 LEASE = 60.0
 clients, choices = st.sampled_from(CLIENTS), st.sampled_from(CHOICES)
-
-
-@dataclass
-class Asked:
-    """A query in the model."""
-
-    tick: int
-    kind: str
-    status: str = "open"
-    holder: str | None = None
-    until: float = 0.0
-    told: Stored | None = None
-    by: str = ""
-    heard_at: int | None = None
-
-
-@dataclass
-class Machines:
-    """The database that all examples share, each with a run of its own, and everything that was told."""
-
-    db: Database
-    pass_seconds: Callable[[float], None]
-    told: list[Told] = field(default_factory=list)
-    steps: dict[str, int] = field(default_factory=dict)
 
 
 class Queue(RuleBasedStateMachine):

@@ -16,7 +16,8 @@ from tests.database import migrated
 from tests.faults.auditor import Store, audit
 from tests.faults.figures import Figures
 from tests.faults.ledger import Entries
-from tests.faults.queue_machine import Machines, Queue
+from tests.faults.queue_machine import Queue
+from tests.faults.queue_model import Machines
 from tests.lengths import length
 from tests.server.conftest import Clock
 
