@@ -23,6 +23,7 @@ from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError, NotFound
 from parenting.server.identity import database_id
 from parenting.server.new_run import NewRun
+from parenting.server.notes import AGENT_KINDS
 from parenting.server.queue import leases
 from parenting.server.reads import answers
 from parenting.server.settings import Settings
@@ -192,4 +193,5 @@ def _events(db: Database, number: int) -> list[Record]:
     return [
         event_record(event.applied_tick, {"kind": event.kind, **event.payload})
         for event in operator_events.list_operator_events(db, number)
+        if event.kind in AGENT_KINDS
     ]

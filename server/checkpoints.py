@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import delete, select
 
+from parenting.server.damage import sound
 from parenting.server.db import Database
 from parenting.server.runs import Claim, held
 from parenting.server.tables import Checkpoint
@@ -22,13 +23,14 @@ class StoredCheckpoint:
 
     tick: int
     blob: bytes
+    sha256: str  # of the bytes that were written
     intact: bool
 
 
 def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
     """Store the state after a tick, with its hash, and delete all but the last two.
 
-    A second checkpoint of the same tick replaces the first.
+    A second checkpoint of the same tick replaces the first, and those of later ticks: they were passed over.
 
     Raises:
         LostClaimError: another worker trains this run now.
@@ -36,7 +38,8 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
     digest = hashlib.sha256(blob).hexdigest()
     with db.write(durable=False) as session:
         run = held(session, mine)
-        session.execute(delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.tick == tick))
+        later = delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.tick >= tick)
+        session.execute(later)
         session.add(Checkpoint(run_id=run.id, tick=tick, blob=blob, sha256=digest, created=db.clock()))
         session.flush()
         newest = (
@@ -52,13 +55,15 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
 def load_checkpoints(db: Database, run_id: int) -> Sequence[StoredCheckpoint]:
     """Return the stored checkpoints, newest first.
 
-    The caller takes the first intact one, and logs each damaged one that it passes over.
+    The caller takes the first one that is intact and can be read (`server.recall`).
     """
+    rows = select(Checkpoint).where(Checkpoint.run_id == run_id).order_by(Checkpoint.id.desc())
     with db.read() as session:
-        rows = session.scalars(
-            select(Checkpoint).where(Checkpoint.run_id == run_id).order_by(Checkpoint.id.desc())
-        ).all()
-        return [
-            StoredCheckpoint(row.tick, row.blob, hashlib.sha256(row.blob).hexdigest() == row.sha256)
-            for row in rows
-        ]
+        return [_stored(row) for row in session.scalars(rows)]
+
+
+def _stored(row: Checkpoint) -> StoredCheckpoint:
+    blob, sha256 = sound(row, "blob") or b"", sound(row, "sha256") or ""
+    tick = sound(row, "tick")
+    intact = tick is not None and hashlib.sha256(blob).hexdigest() == sha256
+    return StoredCheckpoint(-1 if tick is None else tick, blob, sha256, intact)

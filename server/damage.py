@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from sqlalchemy import inspect
 
 from parenting.agent.config import Config
-from parenting.agent.events import Event
+from parenting.server import notes
 from parenting.server.columns import UNREADABLE, Damaged
 from parenting.server.errors import DamagedRowError
 from parenting.server.public_ids import is_public_id
@@ -31,7 +31,6 @@ class Brief(NamedTuple):
     danger: str
 
 
-_EVENT: TypeAdapter[Any] = TypeAdapter(Event)
 _GLYPHS: TypeAdapter[dict[str, str]] = TypeAdapter(dict[str, str])
 _NUMBERS: TypeAdapter[Any] = TypeAdapter(dict[str, int | float | None])
 
@@ -119,7 +118,7 @@ def _metric(metric: Metric) -> None:
 
 
 def _event(event: OperatorEvent) -> None:
-    _EVENT.validate_python({"kind": event.kind, **event.payload})
+    notes.read(event)
 
 
 ALWAYS_SET = ("stages", "p_guid", "p_rec", "p_pref", "p_train")

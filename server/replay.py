@@ -25,8 +25,10 @@ from parenting.server.reads.record import StoredRecord, UnreadableRecordError
 from parenting.server.runs import get_run
 from parenting.server.snapshot import (
     INFO,
+    DamagedCheckpointError,
     DivergedError,
     Snapshot,
+    changed,
     initial_snapshot,
     initial_weights,
     unpack,
@@ -104,13 +106,13 @@ def _checkpoint(db: Database, run: Run, world: Gridworld, config: Config, weight
     _same_build(run)
     try:
         return unpack(world, config, intact[0].blob, weights)
-    except (TypeError, KeyError) as error:
-        raise DivergedError(f"The checkpoint of run {run.id} does not fit its config: {error}.") from None
+    except DamagedCheckpointError as error:
+        raise DivergedError(f"The last checkpoint of run {run.id} is damaged: {error.message}.") from None
 
 
 def _same_build(run: Run) -> None:
     here, there = versions(), run.versions or versions()
-    if here != there:
+    if changed(there, here):
         raise DivergedError(
             f"Run {run.id} was trained with torch {there['torch']} and {_threads(there['threads'])}; "
             f"here are torch {here['torch']} and {_threads(here['threads'])}, which give other bits. "

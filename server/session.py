@@ -14,22 +14,24 @@ from parenting.agent.init import world_of
 from parenting.agent.query import Answer, Query, QueryKind
 from parenting.evaluation.argmax import evaluation
 from parenting.parents.scripted import ScriptedRule
-from parenting.server import checkpoints, metrics, runs
+from parenting.server import checkpoints, metrics, notes, runs
 from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
+from parenting.server.damage import readable
 from parenting.server.db import Database
+from parenting.server.machine import change, follow, followed_until
 from parenting.server.metrics_row import NOTHING_LEARNT, learnt, measure
+from parenting.server.notes import CheckpointDamaged, MachineChanged, Note
 from parenting.server.queue import worker_side
 from parenting.server.queue.queue_parent import QueueParent, ScriptedQueueParent
 from parenting.server.queue.worker_side import Watch
+from parenting.server.recall import recall
 from parenting.server.runs import Claim
 from parenting.server.snapshot import (
     DivergedError,
     Snapshot,
-    initial_snapshot,
     initial_weights,
     pack,
-    unpack,
     versions,
 )
 from parenting.server.statuses import Waiting
@@ -54,21 +56,18 @@ class RunSession:
     """A run that a worker raises, from tick 0 or its last checkpoint until something ends it."""
 
     def __init__(self, db: Database, claim: Claim, run: Run, asked: Callable[[], None]) -> None:
-        """Take up a run where its last intact checkpoint left it, or at tick 0.
-
-        Raises:
-            DivergedError: the checkpoint was written under other versions, so that the bits would differ.
-        """
+        """Take up a run where its last good checkpoint left it, or at tick 0."""
         self.db, self.claim, self.run = db, claim, run
         config = Config.model_validate(run.config)
         self.world = world_of(run.world, run.level_text, config)
         rule = ScriptedRule(self.world, config.gamma, inside=config.garden_parent)
         self.evaluation = evaluation(self.world, rule.values, config.gamma)
         self.parent = self._parent(config, rule, asked)
-        self._weights = initial_weights(db, run, self.world)
-        self.saved = self._recall(config)
-        self.record_ends = worker_side.high_water(db, claim.run_id)
+        self._recalled = recall(db, run, self.world, config, initial_weights(db, run, self.world))
+        self.saved = self._recalled.saved
+        self.record_ends = self.parent.record_ends = worker_side.high_water(db, claim.run_id)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
+        self._recalled_tick = self.last_tick
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
@@ -77,19 +76,24 @@ class RunSession:
         self._stuck_at = (
             -1
         )  # the tick that was reported as stuck: who ends episodes must see the next one too
-        runs.report_progress(db, claim, versions=versions())
+        self._take_up()
 
     def _parent(self, config: Config, rule: ScriptedRule, asked: Callable[[], None]) -> QueueParent:
         if self.run.parent == "scripted":
             return ScriptedQueueParent(self.db, self.claim, self.world, config, asked, rule)
         return QueueParent(self.db, self.claim, self.world, config, asked)
 
-    def _recall(self, config: Config) -> Snapshot:
-        for checkpoint in checkpoints.load_checkpoints(self.db, self.claim.run_id):
-            if checkpoint.intact:
-                return unpack(self.world, config, checkpoint.blob, self._weights)
-            log.warning("damaged checkpoint passed over", run=self.claim.run_id, tick=checkpoint.tick)
-        return initial_snapshot(self.world, config, self.run.seed, self._weights)
+    def _take_up(self) -> None:
+        """Say in the run's log which checkpoints were passed over, and whether the machine is another one."""
+        for passed in self._recalled.passed:
+            log.warning("checkpoint passed over", run=self.run.id, tick=passed.tick, why=passed.note.reason)
+        fresh: list[tuple[int, Note]] = [(p.tick, p.note) for p in self._recalled.passed if not p.noted]
+        known = notes.notes(self.db, self.run.id)
+        other = change(self._recalled, self.run.versions, versions(), self.record_ends, known)
+        if other is not None:
+            fresh.append((self.last_tick + 1, other))
+        self._follow_until = followed_until([*known, *fresh])
+        runs.take_up(self.db, self.claim, versions(), fresh)
 
     @property
     def last_tick(self) -> int:
@@ -169,15 +173,36 @@ class RunSession:
         return at_once
 
     def _hold_to_the_record(self, query: Query) -> None:
-        """Stop the run if a replayed tick does not ask what it asked the first time."""
+        """Compare a replayed tick with its record, which another machine may have written.
+
+        Raises:
+            DivergedError: the tick asks something else than on the same machine before. The log tells the
+                checkpoint that the run went on from, which is passed over from now on.
+        """
         stored = worker_side.asked_at(self.db, self.claim.run_id, self.last_tick)
+        recorded = None if stored is None else (stored.kind, readable(stored).clips)
         kind = kind_name(query)
-        if (stored.kind if stored else None) != kind or (
-            stored and stored.clips != encode(self.world, query)
-        ):
-            raise DivergedError(
-                f"Run {self.claim.run_id} asked another question when tick {self.last_tick} was replayed."
-            )
+        if recorded == (None if kind is None else (kind, encode(self.world, query))):
+            return
+        if self.last_tick > self._follow_until:
+            self._diverged()
+        asked = None if stored is None else self.parent.read(stored)
+        self.saved = self.saved._replace(state=follow(self.saved.state, asked, query))
+
+    def _diverged(self) -> None:
+        tick, sha256 = self.last_tick, self._recalled.sha256
+        before = self._recalled.versions or self.run.versions or {}
+        fresh: list[tuple[int, Note]] = []
+        if not before.keys() >= versions().keys():  # its CPU was not recorded: it may have been another one
+            self._follow_until = self.record_ends
+            fresh = [(tick, MachineChanged(before=before, after=versions(), until=self.record_ends))]
+            runs.take_up(self.db, self.claim, versions(), fresh)
+            return
+        if sha256 is not None:
+            reason = f"the run departed from its record at tick {tick} when it went on from here"
+            fresh = [(self._recalled_tick, CheckpointDamaged(sha256=sha256, reason=reason))]
+        runs.take_up(self.db, self.claim, versions(), fresh)
+        raise DivergedError(f"Run {self.run.id} asked another question when tick {tick} was replayed.")
 
     def _note(self, answer: Answer) -> None:
         """Keep what the next row of metrics needs of this tick."""

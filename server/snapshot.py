@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import platform
 from typing import Any, NamedTuple, TypeVar
 
 import torch
@@ -31,6 +32,10 @@ class DivergedError(ServerError):
     """The agent does not do what its record says; the run was stopped."""
 
 
+class DamagedCheckpointError(ServerError):
+    """The content of this checkpoint cannot be used."""
+
+
 class Snapshot(NamedTuple):
     """The content of a checkpoint: agent, counts, and the config as operator events have changed it."""
 
@@ -39,9 +44,29 @@ class Snapshot(NamedTuple):
     config: Config
 
 
+class Written(NamedTuple):
+    """What a checkpoint's bytes hold: the snapshot, and the machine that wrote it."""
+
+    saved: Snapshot
+    versions: dict[str, Any]
+
+
 def versions() -> dict[str, Any]:
-    """Return what the bits depend on besides the record: torch's build and its number of threads."""
-    return {"torch": str(torch.__version__), "threads": torch.get_num_threads()}
+    """Return what the bits depend on besides the record: torch's build and threads, and the machine's kind.
+
+    `cpu` names the vector instructions that torch uses: AVX2, AVX512, DEFAULT and others.
+    """
+    return {
+        "torch": str(torch.__version__),
+        "threads": torch.get_num_threads(),
+        "cpu": torch.backends.cpu.get_cpu_capability(),
+        "machine": platform.machine(),
+    }
+
+
+def changed(before: dict[str, Any] | None, after: dict[str, Any]) -> bool:
+    """Return whether bits differ between two machines. What an old version did not record counts as equal."""
+    return any(after.get(name, value) != value for name, value in (before or {}).items())
 
 
 def initial_weights(db: Database, run: Run, world: Gridworld) -> Tensor | None:
@@ -74,6 +99,11 @@ def pack(saved: Snapshot) -> bytes:
 
 
 def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None = None) -> Snapshot:
+    """Read the snapshot of a checkpoint's bytes, as `read` does."""
+    return read(world, config, blob, weights).saved
+
+
+def read(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None = None) -> Written:
     """Read a checkpoint's bytes.
 
     Args:
@@ -83,20 +113,24 @@ def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None
         weights: The pre-trained weights that the run began with.
 
     Raises:
-        DivergedError: other versions of torch or another number of threads wrote them: the bits would differ.
-        TypeError, KeyError: a piece is missing or has another shape than declared.
+        DamagedCheckpointError: they are not the content of a checkpoint, or a piece is missing or has another
+            shape than declared.
     """
-    whole = torch.load(io.BytesIO(blob), weights_only=True)
-    if whole["versions"] != versions():
-        raise DivergedError(
-            f"This run was trained with {whole['versions']}; here it would continue with {versions()}."
+    try:
+        whole = torch.load(io.BytesIO(blob), weights_only=True)
+        template = initial_snapshot(world, config, 0, weights)
+        saved = Snapshot(
+            state=_restore(template.state, current_names(whole["state"])).check(),
+            tally=_restore(template.tally, whole["tally"]).check(),
+            config=Config.model_validate_json(whole["config"]),
         )
-    template = initial_snapshot(world, config, 0, weights)
-    return Snapshot(
-        state=_restore(template.state, current_names(whole["state"])).check(),
-        tally=_restore(template.tally, whole["tally"]).check(),
-        config=Config.model_validate_json(whole["config"]),
-    )
+        return Written(saved, dict(whole["versions"]))
+    except (MemoryError, OSError):
+        raise
+    except (
+        Exception
+    ) as error:  # damaged bytes cause almost any error in torch, whose advice helps nobody here
+        raise DamagedCheckpointError(f"its content cannot be read ({type(error).__name__})") from error
 
 
 def _restore(template: S, parts: dict[str, Tensor]) -> S:

@@ -7,10 +7,10 @@ from typing import Annotated, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from parenting.agent.events import Event
 from parenting.server import tables
 from parenting.server.damage import damage
 from parenting.server.new_run import LARGEST_INT
+from parenting.server.notes import Logged
 from parenting.server.schemas import (
     AskedSchema,
     DamagedMetricSchema,
@@ -50,11 +50,11 @@ class MetricRows(Rows[MetricSchema | DamagedMetricSchema]):
 
 
 class OperatorEventSchema(Schema):
-    """An operator event, and the tick at which it took effect."""
+    """An operator event, and the tick at which it took effect; or a note on what happened to the run."""
 
     id: int
     run: int
-    event: Event
+    event: Logged
     created: datetime
     applied_tick: int | None
     """The tick before which it applied; null: not yet."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
+from parenting.server import notes
 from parenting.server.damage import damage
 from parenting.server.tables import OperatorEvent, Run
 
@@ -17,15 +18,24 @@ PROBABILITIES = {
 """The probabilities that an operator may change, in the order of Sec. 2, and the event of each."""
 
 
+NOTES = {
+    "mature": "Ended the stage",
+    "end_episode": "Ended the episode",
+    "failed": "The run failed: {reason}",
+    "resumed": "Resumed the failed run from its last good checkpoint",
+    "checkpoint_damaged": "A damaged checkpoint was passed over: {reason}",
+}
+
+
 class LogEntry(NamedTuple):
-    """One thing that the operator did."""
+    """One thing that the operator did, or that happened to the run."""
 
     what: str
     when: str
 
 
 def log_entries(events: Sequence[OperatorEvent]) -> list[LogEntry]:
-    """Return everything that the operator did, the last first."""
+    """Return the log of a run, the last entry first."""
     return [_entry(event) for event in reversed(events)]
 
 
@@ -46,7 +56,15 @@ def _entry(event: OperatorEvent) -> LogEntry:
 def _what(event: OperatorEvent) -> str:
     if event.kind == "change":
         return f"Set {event.payload['name']} to {event.payload['value']:g}"
-    return {"mature": "Ended the stage", "end_episode": "Ended the episode"}[event.kind]
+    entry = notes.read(event)
+    if isinstance(entry, notes.MachineChanged):
+        return f"The machine changed: {machine(entry.before)}, now {machine(entry.after)}"
+    return NOTES[event.kind].format(**event.payload)
+
+
+def machine(versions: Mapping[str, Any]) -> str:
+    """Return in words what a run's bits depend on besides its record."""
+    return ", ".join(f"{name} {value}" for name, value in versions.items())
 
 
 def _when(event: OperatorEvent) -> str:

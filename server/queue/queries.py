@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import ColumnElement, case, func, select, update
+from sqlalchemy import ColumnElement, case, func, or_, select, update
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.statuses import QueryStatus
-from parenting.server.tables import Query
+from parenting.server.tables import Answer, OperatorEvent, Query
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,21 @@ def withdraw_in(session: Session, run_id: int, kind: str | None = None) -> None:
     if kind is not None:
         rows = rows.where(Query.kind == kind)
     session.execute(rows.values(status=QueryStatus.WITHDRAWN))
+
+
+def reopen_in(session: Session, run_id: int) -> None:
+    """Ask again what was withdrawn when a run failed, in a transaction that is already open.
+
+    That is what has no standing answer, but for the guidance of episodes that the operator has ended.
+    """
+    ended = select(func.max(OperatorEvent.applied_tick)).where(
+        OperatorEvent.run_id == run_id, OperatorEvent.kind == "end_episode"
+    )
+    answered = select(Answer.query_id).where(Answer.run_id == run_id, Answer.standing)
+    rows = update(Query).where(Query.run_id == run_id, Query.status == QueryStatus.WITHDRAWN)
+    rows = rows.where(Query.id.not_in(answered))
+    rows = rows.where(or_(Query.kind != "guidance", Query.tick >= func.coalesce(ended.scalar_subquery(), -1)))
+    session.execute(rows.values(status=QueryStatus.OPEN, leased_by=None, leased_until=None))
 
 
 def guidance_first() -> ColumnElement[int]:

@@ -17,7 +17,9 @@ from parenting.agent.query import Answer, Query
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import ScriptedRule
+from parenting.server import tables
 from parenting.server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_name
+from parenting.server.damage import readable, reading
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
 from parenting.server.queue import answers, worker_side
@@ -39,6 +41,7 @@ class QueueParent:
         self.tick = 0
         self.policy = (1, 0)
         self.answers = self.events_wait = True
+        self.record_ends = -1  # the last tick of the record: up to it, recorded questions stand
 
     def looking(self, answers: bool, events: bool) -> Self:
         """Return the same mailbox for one tick; it reads no rows where there are known to be none."""
@@ -50,7 +53,7 @@ class QueueParent:
         """The operator's events that apply before the tick that comes."""
         self.tick = int(state.keys.tick[0]) + 1
         rows = worker_side.take_operator_events(self.db, self.mine, self.tick) if self.events_wait else ()
-        return [_EVENTS.validate_python({"kind": row.kind, **row.payload}) for row in rows]
+        return [_EVENTS.validate_python({"kind": row.kind, **readable(row).payload}) for row in rows]
 
     def take(self, state: AgentState) -> Answer:
         """The answer to be heard in the tick that comes, or none."""
@@ -58,18 +61,32 @@ class QueueParent:
         taken = worker_side.take_answer(self.db, self.mine, self.tick) if self.answers else None
         if taken is None:
             return queries.silence(queries.empty(1, self.stages, self.world.height, self.world.width))
-        row = taken.query
-        query = decode(self.world, self.stages, row.kind, row.maturity, row.clips)
-        return Answer(query=query, choice=torch.full_like(query.kind, int(CHOICES[taken.answer.choice])))
+        choice = int(CHOICES[readable(taken.answer).choice])
+        return Answer(query=self.read(taken.query), choice=torch.tensor([choice]))
 
     def post(self, query: Query) -> None:
         """Store what the agent asks in this tick; a tick that was lived before asks nothing twice."""
+        if self.tick <= self.record_ends:
+            stored = worker_side.asked_at(self.db, self.mine.run_id, self.tick)
+            if stored is not None:
+                self.posted(stored.id, self.read(stored))
+            if stored is not None or self.tick < self.record_ends:
+                return
         kind = kind_name(query)
         if kind is not None:
             clips, maturity = encode(self.world, query), int(query.maturity[0])
             number = worker_side.post_query(self.db, self.mine, self.tick, kind, maturity, clips, self.policy)
             self.posted(number, query)
             self.asked()
+
+    def read(self, row: tables.Query) -> Query:
+        """Return a stored query in tensors.
+
+        Raises:
+            DamagedRowError: its row cannot be read.
+        """
+        with reading(row):
+            return decode(self.world, self.stages, row.kind, row.maturity, row.clips)
 
     def posted(self, number: int, query: Query) -> None:
         """A query of this id is stored: somebody will see it."""
@@ -90,6 +107,15 @@ class ScriptedQueueParent(QueueParent):
         """A mailbox that is answered by `rule`."""
         super().__init__(db, mine, world, config, asked)
         self.rule = rule
+
+    def read(self, row: tables.Query) -> Query:
+        """Return a stored query in tensors.
+
+        Raises:
+            DamagedRowError: its row cannot be read.
+        """
+        with reading(row):
+            return decode(self.world, self.stages, row.kind, row.maturity, row.clips)
 
     def posted(self, number: int, query: Query) -> None:
         """Store the script's answer. A replayed tick stores the same again, which changes nothing."""

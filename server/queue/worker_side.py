@@ -20,8 +20,10 @@ from typing import Any
 from sqlalchemy import BindParameter, ColumnElement, ScalarSelect, bindparam, func, select
 from sqlalchemy.orm import Session
 
+from parenting.server.columns import Damaged
 from parenting.server.db import Database
 from parenting.server.identity import unused_number
+from parenting.server.notes import AGENT_KINDS
 from parenting.server.queue.queries import guidance_first, withdraw_in
 from parenting.server.runs import Claim, held, held_status
 from parenting.server.statuses import LIVING, QueryStatus, RunStatus
@@ -58,7 +60,9 @@ _RUN: BindParameter[int] = bindparam("run_id")
 _HIGH = select(
     select(func.max(Query.tick)).where(Query.run_id == _RUN).scalar_subquery(),
     select(func.max(Answer.applied_tick)).where(Answer.run_id == _RUN).scalar_subquery(),
-    select(func.max(OperatorEvent.applied_tick)).where(OperatorEvent.run_id == _RUN).scalar_subquery(),
+    select(func.max(OperatorEvent.applied_tick))
+    .where(OperatorEvent.run_id == _RUN, OperatorEvent.kind.in_(AGENT_KINDS))
+    .scalar_subquery(),
 )
 _PENDING = (
     select(Answer, Query)
@@ -99,10 +103,18 @@ def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
     def look() -> dict[int, Watch]:
         with db.read() as session:
             rows = session.execute(_WATCH, {"run_ids": run_ids}).all()
-        seen = {row.run_id: Watch(**row._mapping) for row in rows}
+        seen = {row.run_id: _watched(dict(row._mapping)) for row in rows}
         return {run_id: seen[run_id] for run_id in run_ids if run_id in seen}
 
     return db.cached(("watch", *run_ids), look)
+
+
+def _watched(columns: dict[str, Any]) -> Watch:
+    """Return what a worker watches. A run whose row is damaged is over for it: `runs.claim` says why."""
+    if any(isinstance(value, Damaged) for value in columns.values()):
+        sound: dict[str, Any] = {n: None if isinstance(v, Damaged) else v for n, v in columns.items()}
+        return Watch(**{**sound, "status": RunStatus.FAILED, "fencing_token": -1, "answered": 0})
+    return Watch(**columns)
 
 
 def high_water(db: Database, run_id: int) -> int:
@@ -185,7 +197,11 @@ def take_operator_events(db: Database, mine: Claim, tick: int) -> Sequence[Opera
     Raises:
         LostClaimError: another worker trains this run now.
     """
-    mine_only = select(OperatorEvent).where(OperatorEvent.run_id == mine.run_id).order_by(OperatorEvent.id)
+    mine_only = (
+        select(OperatorEvent)
+        .where(OperatorEvent.run_id == mine.run_id, OperatorEvent.kind.in_(AGENT_KINDS))
+        .order_by(OperatorEvent.id)
+    )
     recorded = mine_only.where(OperatorEvent.applied_tick == tick)
     fresh = mine_only.where(OperatorEvent.applied_tick.is_(None))
     with db.read() as session:

@@ -16,6 +16,7 @@ from parenting.parents.replay import Moment
 from parenting.server import tables
 from parenting.server.codec import CHOICES, decode
 from parenting.server.db import Database
+from parenting.server.notes import AGENT_KINDS
 
 WINDOW = 500
 """Ticks whose rows are read at once."""
@@ -57,7 +58,8 @@ class StoredRecord:
         asked = select(query).where(query.run_id == mine, query.tick.between(first, last))
         heard = select(answer, query).join(query, answer.query_id == query.id)
         heard = heard.where(answer.run_id == mine, answer.applied_tick.between(first, last))
-        came = select(event).where(event.run_id == mine, event.applied_tick.between(first, last))
+        came = select(event).where(event.run_id == mine, event.kind.in_(AGENT_KINDS))
+        came = came.where(event.applied_tick.between(first, last))
         with self.db.read() as session:
             self._asked = {row.tick: row for row in session.scalars(asked)}
             self._heard = {row[0].applied_tick or 0: (row[0], row[1]) for row in session.execute(heard)}

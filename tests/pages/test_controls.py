@@ -146,12 +146,12 @@ def test_the_last_stage_cannot_be_ended(client: httpx2.Client, db: Database, min
 
 
 def test_what_was_done_is_listed_with_its_tick(client: httpx2.Client, db: Database, mine: Claim) -> None:
-    assert "What the operator did" not in client.get("/runs/1").text
+    assert "What happened" not in client.get("/runs/1").text
     client.post("/runs/1/event", data={"kind": "mature"})
     client.post("/runs/1/event", data={"kind": "end_episode"})
     worker_side.take_operator_events(db, mine, 7)
     client.post("/runs/1/probabilities", data={**PROBABILITIES, "p_guid": "1"})
-    listed = client.get("/runs/1").text.partition("What the operator did")[2].partition("</ol>")[0]
+    listed = client.get("/runs/1").text.partition("What happened")[2].partition("</ol>")[0]
     assert [re.sub("<.*?>", "", line) for line in re.findall(r"<li.*?</li>", listed)] == [
         "Set p_guid to 1 before the next tick",
         "Ended the episode at tick 7",

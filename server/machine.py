@@ -1,0 +1,74 @@
+"""Another machine goes on with a run: its bits differ, so the record stands where the two disagree.
+
+A run is a function of its record and of the machine: of torch's build, its threads, and the CPU. Where a run
+is taken up by another machine than before, a note in its log says so, and from its last checkpoint to the end
+of the record the agent follows the record: recorded answers and events are heard at their ticks, so X is what
+the parent said; recorded questions stand, whatever the agent would ask now. After that it lives on as usual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+
+from parenting.agent.query import Query, QueryKind
+from parenting.agent.state import AgentState
+from parenting.server.notes import MachineChanged, Note
+from parenting.server.recall import Recalled
+from parenting.server.snapshot import changed
+
+
+def change(
+    recalled: Recalled,
+    before: dict[str, Any] | None,
+    here: dict[str, Any],
+    record_ends: int,
+    known: Sequence[tuple[int, Note]],
+) -> MachineChanged | None:
+    """Return the note to write when a run is taken up; None where it is the machine of before.
+
+    Args:
+        recalled: The run as its last good checkpoint left it.
+        before: The machine that raised the run last; None if none has yet.
+        here: This machine.
+        record_ends: The last tick of the record.
+        known: The notes of the run.
+    """
+    tick = int(recalled.saved.state.keys.tick[0]) + 1
+    written = recalled.versions or before
+    noted = any(isinstance(note, MachineChanged) and at == tick and note.after == here for at, note in known)
+    if changed(before, here) or (changed(written, here) and not noted):
+        last = written if changed(written, here) else before
+        return MachineChanged(before=last or {}, after=here, until=record_ends)
+    return None
+
+
+def followed_until(known: Sequence[tuple[int, Note]]) -> int:
+    """Return the last tick whose record another machine has written; -1 if there is none."""
+    return max((note.until for _, note in known if isinstance(note, MachineChanged)), default=-1)
+
+
+def follow(state: AgentState, recorded: Query | None, asked: Query) -> AgentState:
+    """Return the agent as the record has it after a tick in which it asked otherwise.
+
+    Where the record has guidance, the agent stands where that question was asked and waits for its answer:
+    nothing is ever approved for another place. Where the record has none, it does not wait.
+
+    Args:
+        state: The agent after its own tick.
+        recorded: The question that the record has at this tick.
+        asked: The question that the agent asked itself.
+    """
+    if recorded is not None and bool(recorded.kind[0] == QueryKind.GUIDANCE):
+        place = state.world.replace(
+            board=recorded.board[:, 0, 0].to(state.world.board),
+            agent=recorded.agent[:, 0, 0].to(state.world.agent),
+            box=recorded.box[:, 0, 0].to(state.world.box),
+            terminated=torch.zeros_like(state.world.terminated),
+        )
+        return state.replace(world=place, waiting=torch.ones_like(state.waiting))
+    if bool(asked.kind[0] == QueryKind.GUIDANCE):
+        return state.replace(waiting=torch.zeros_like(state.waiting), refused=torch.zeros_like(state.refused))
+    return state
