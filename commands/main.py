@@ -25,6 +25,7 @@ COMMANDS = {
     "worlds": "List the worlds and their levels, print random levels, draw pictures.",
     "answer": "Answer a run as the scripted parent, over the HTTP API.",
     "runs": "List the runs, and who waits for whom.",
+    "resume": "Let a paused or failed run go on.",
     "export": "Write the answers of a run as JSON lines.",
     "replay": "Replay a stored run and compare it bit for bit.",
     "doctor": "Examine the installation, the data folder and the database.",

@@ -11,13 +11,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import structlog
 import torch
 
 from parenting.agent.query import Query, QueryKind
 from parenting.agent.state import AgentState
-from parenting.server.notes import MachineChanged, Note
+from parenting.server.db import Database
+from parenting.server.notes import CheckpointDamaged, MachineChanged, Note, add_note, notes
 from parenting.server.recall import Recalled
-from parenting.server.snapshot import changed
+from parenting.server.runs import Claim, held
+from parenting.server.snapshot import DivergedError, changed, versions
+from parenting.server.tables import Run
+
+log = structlog.get_logger()
 
 
 def change(
@@ -36,13 +42,63 @@ def change(
         record_ends: The last tick of the record.
         known: The notes of the run.
     """
-    tick = int(recalled.saved.state.keys.tick[0]) + 1
+    tick = recalled.tick + 1
     written = recalled.versions or before
     noted = any(isinstance(note, MachineChanged) and at == tick and note.after == here for at, note in known)
     if changed(before, here) or (changed(written, here) and not noted):
         last = written if changed(written, here) else before
         return MachineChanged(before=last or {}, after=here, until=record_ends)
     return None
+
+
+def take_up(db: Database, mine: Claim, run: Run, recalled: Recalled, record_ends: int) -> int:
+    """Say in a run's log which checkpoints were passed over, and whether this is another machine than before.
+
+    Returns:
+        The last tick whose record another machine has written; -1 if there is none.
+
+    Raises:
+        LostClaimError: another worker trains this run now.
+    """
+    for passed in recalled.passed:
+        log.warning("checkpoint passed over", run=run.id, tick=passed.tick, why=passed.note.reason)
+    known = notes(db, run.id)
+    fresh: list[tuple[int, Note]] = [(one.tick, one.note) for one in recalled.passed if not one.noted]
+    other = change(recalled, run.versions, versions(), record_ends, known)
+    if other is not None:
+        fresh.append((recalled.tick + 1, other))
+    write(db, mine, fresh)
+    return followed_until([*known, *fresh])
+
+
+def diverged(db: Database, mine: Claim, run: Run, recalled: Recalled, tick: int, record_ends: int) -> None:
+    """Judge a run that departed from its record on what seems to be the machine that wrote it.
+
+    If the CPU of before was not recorded, it may have been another one, and the run follows its record.
+
+    Raises:
+        DivergedError: it is the same machine. The checkpoint that the run went on from is passed over from
+            now on, as the log says.
+        LostClaimError: another worker trains this run now.
+    """
+    here, before = versions(), recalled.versions or run.versions or {}
+    if not before.keys() >= here.keys():
+        write(db, mine, [(tick, MachineChanged(before=before, after=here, until=record_ends))])
+        return
+    if recalled.sha256 is not None:
+        reason = f"the run that went on from here departed from its record at tick {tick}"
+        begun = CheckpointDamaged(sha256=recalled.sha256, reason=reason)
+        write(db, mine, [(recalled.tick, begun)])
+    raise DivergedError(f"Run {run.id} asked another question when tick {tick} was replayed.")
+
+
+def write(db: Database, mine: Claim, fresh: Sequence[tuple[int, Note]]) -> None:
+    """Store this machine as the one that raises a run, and notes at their ticks, in one transaction."""
+    with db.write() as session:
+        run = held(session, mine)
+        run.heartbeat, run.versions = db.clock(), versions()
+        for tick, note in fresh:
+            add_note(session, db, run.id, tick, note)
 
 
 def followed_until(known: Sequence[tuple[int, Note]]) -> int:

@@ -39,6 +39,7 @@ class Recalled:
     saved: Snapshot
     versions: dict[str, Any] | None  # of the machine that wrote the checkpoint
     sha256: str | None  # of the checkpoint; None: the run begins again at tick 0
+    tick: int
     passed: list[Passed] = field(default_factory=list)
 
 
@@ -59,11 +60,11 @@ def recall(db: Database, run: Run, world: Gridworld, config: Config, weights: Te
             passed.append(Passed(kept.tick, known[kept.sha256], noted=True))
             continue
         try:
-            return Recalled(*_read(kept, run, world, config, weights), kept.sha256, passed)
+            return Recalled(*_read(kept, run, world, config, weights), kept.sha256, kept.tick, passed)
         except DamagedCheckpointError as error:
             note = CheckpointDamaged(sha256=kept.sha256, reason=error.message)
             passed.append(Passed(kept.tick, note, noted=False))
-    return Recalled(initial_snapshot(world, config, run.seed, weights), None, None, passed)
+    return Recalled(initial_snapshot(world, config, run.seed, weights), None, None, 0, passed)
 
 
 def _read(

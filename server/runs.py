@@ -15,12 +15,12 @@ from typing import Any
 from sqlalchemy import ColumnElement, bindparam, or_, select, tuple_, update
 from sqlalchemy.orm import Session
 
-from parenting.server.damage import damage, readable, sound
+from parenting.server.damage import readable, sound
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
+from parenting.server.failures import fail_if_damaged, note_failure, resume_in
 from parenting.server.identity import unused_number
-from parenting.server.notes import Failed, Note, Resumed, add_note
-from parenting.server.queue.queries import reopen_in, withdraw_in
+from parenting.server.queue.queries import withdraw_in
 from parenting.server.statuses import LIVING, OVER, RunStatus
 from parenting.server.tables import Run
 
@@ -99,9 +99,7 @@ def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None 
     with db.write() as session:
         run = hold(session, run_id)
         if (run.status, status) == (RunStatus.FAILED, RunStatus.ACTIVE):
-            reopen_in(session, readable(run).id)
-            add_note(session, db, run_id, run.tick, Resumed())
-            run.status, run.reason = RunStatus.ACTIVE, None
+            resume_in(session, db, run)
         if run.status in OVER and run.status != status:
             raise Conflict(f"This run is {run.status}; it cannot become {status}.")
         if run.status != status:
@@ -158,7 +156,7 @@ def claim(
             return []
     with db.write() as session:
         rows = select(Run).where(*free).order_by(Run.id).limit(most).with_for_update()
-        runs = [run for run in session.scalars(rows) if not _failed_as_damaged(db, session, run)]
+        runs = [run for run in session.scalars(rows) if not fail_if_damaged(session, db, run)]
         for run in runs:
             run.worker, run.fencing_token, run.heartbeat = worker, run.fencing_token + 1, db.clock()
         return [Claim(run.id, worker, run.fencing_token) for run in runs]
@@ -203,19 +201,6 @@ def report_progress(db: Database, mine: Claim, **fields: Any) -> Run:
         return run
 
 
-def take_up(db: Database, mine: Claim, versions: dict[str, Any], notes: Sequence[tuple[int, Note]]) -> None:
-    """Store the machine that raises a run now, and notes in the run's log at their ticks, in one transaction.
-
-    Raises:
-        LostClaimError: another worker trains this run now.
-    """
-    with db.write() as session:
-        run = held(session, mine)
-        run.heartbeat, run.versions = db.clock(), versions
-        for tick, note in notes:
-            add_note(session, db, run.id, tick, note)
-
-
 def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str | None = None) -> Run:
     """End a run as `finished` or `failed`, with a sentence for people and, if it failed, the details.
 
@@ -230,7 +215,7 @@ def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str
             _become(session, run, status, reason)
             run.error = error
             if status is RunStatus.FAILED:
-                add_note(session, db, run.id, sound(run, "tick") or 0, Failed(reason=reason))
+                note_failure(session, db, run, reason)
         return run
 
 
@@ -285,19 +270,6 @@ def held_status(session: Session, mine: Claim) -> RunStatus:
     """Return the status of a claim's run, locked, if the claim still holds."""
     status: RunStatus | None = session.execute(_MINE, vars(mine)).scalar()
     return held(session, mine).status if status is None else status
-
-
-def _failed_as_damaged(db: Database, session: Session, run: Run) -> bool:
-    """End a run whose row cannot be read, with that reason; return whether it was so."""
-    found = damage(run)
-    if found is not None:
-        reason = f"Its stored row is damaged: {found}."
-        _become(session, run, RunStatus.FAILED, reason)
-        add_note(session, db, run.id, sound(run, "tick") or 0, Failed(reason=reason))
-        if sound(run, "fencing_token") is None:
-            run.fencing_token = 0
-        run.worker = run.heartbeat = None
-    return found is not None
 
 
 def _become(session: Session, run: Run, status: RunStatus, reason: str | None) -> None:

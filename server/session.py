@@ -14,25 +14,22 @@ from parenting.agent.init import world_of
 from parenting.agent.query import Answer, Query, QueryKind
 from parenting.evaluation.argmax import evaluation
 from parenting.parents.scripted import ScriptedRule
-from parenting.server import checkpoints, metrics, notes, runs
+from parenting.server import checkpoints, metrics, runs
 from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
 from parenting.server.damage import readable
 from parenting.server.db import Database
-from parenting.server.machine import change, follow, followed_until
+from parenting.server.machine import diverged, follow, take_up
 from parenting.server.metrics_row import NOTHING_LEARNT, learnt, measure
-from parenting.server.notes import CheckpointDamaged, MachineChanged, Note
 from parenting.server.queue import worker_side
 from parenting.server.queue.queue_parent import QueueParent, ScriptedQueueParent
 from parenting.server.queue.worker_side import Watch
 from parenting.server.recall import recall
 from parenting.server.runs import Claim
 from parenting.server.snapshot import (
-    DivergedError,
     Snapshot,
     initial_weights,
     pack,
-    versions,
 )
 from parenting.server.statuses import Waiting
 from parenting.server.tables import Run
@@ -67,7 +64,6 @@ class RunSession:
         self.saved = self._recalled.saved
         self.record_ends = self.parent.record_ends = worker_side.high_water(db, claim.run_id)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
-        self._recalled_tick = self.last_tick
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
@@ -76,24 +72,12 @@ class RunSession:
         self._stuck_at = (
             -1
         )  # the tick that was reported as stuck: who ends episodes must see the next one too
-        self._take_up()
+        self._follow_until = take_up(db, claim, run, self._recalled, self.record_ends)
 
     def _parent(self, config: Config, rule: ScriptedRule, asked: Callable[[], None]) -> QueueParent:
         if self.run.parent == "scripted":
             return ScriptedQueueParent(self.db, self.claim, self.world, config, asked, rule)
         return QueueParent(self.db, self.claim, self.world, config, asked)
-
-    def _take_up(self) -> None:
-        """Say in the run's log which checkpoints were passed over, and whether the machine is another one."""
-        for passed in self._recalled.passed:
-            log.warning("checkpoint passed over", run=self.run.id, tick=passed.tick, why=passed.note.reason)
-        fresh: list[tuple[int, Note]] = [(p.tick, p.note) for p in self._recalled.passed if not p.noted]
-        known = notes.notes(self.db, self.run.id)
-        other = change(self._recalled, self.run.versions, versions(), self.record_ends, known)
-        if other is not None:
-            fresh.append((self.last_tick + 1, other))
-        self._follow_until = followed_until([*known, *fresh])
-        runs.take_up(self.db, self.claim, versions(), fresh)
 
     @property
     def last_tick(self) -> int:
@@ -185,24 +169,10 @@ class RunSession:
         if recorded == (None if kind is None else (kind, encode(self.world, query))):
             return
         if self.last_tick > self._follow_until:
-            self._diverged()
+            diverged(self.db, self.claim, self.run, self._recalled, self.last_tick, self.record_ends)
+            self._follow_until = self.record_ends
         asked = None if stored is None else self.parent.read(stored)
         self.saved = self.saved._replace(state=follow(self.saved.state, asked, query))
-
-    def _diverged(self) -> None:
-        tick, sha256 = self.last_tick, self._recalled.sha256
-        before = self._recalled.versions or self.run.versions or {}
-        fresh: list[tuple[int, Note]] = []
-        if not before.keys() >= versions().keys():  # its CPU was not recorded: it may have been another one
-            self._follow_until = self.record_ends
-            fresh = [(tick, MachineChanged(before=before, after=versions(), until=self.record_ends))]
-            runs.take_up(self.db, self.claim, versions(), fresh)
-            return
-        if sha256 is not None:
-            reason = f"the run departed from its record at tick {tick} when it went on from here"
-            fresh = [(self._recalled_tick, CheckpointDamaged(sha256=sha256, reason=reason))]
-        runs.take_up(self.db, self.claim, versions(), fresh)
-        raise DivergedError(f"Run {self.run.id} asked another question when tick {tick} was replayed.")
 
     def _note(self, answer: Answer) -> None:
         """Keep what the next row of metrics needs of this tick."""

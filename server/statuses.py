@@ -53,7 +53,7 @@ RUN_STATUSES = {
     RunStatus.PAUSED: "The operator paused it; no tick passes until it is resumed.",
     RunStatus.STOPPED: "The operator stopped it for good; its open questions were withdrawn.",
     RunStatus.FINISHED: "It reached what it was started for.",
-    RunStatus.FAILED: "The worker could not go on; the reason says why.",
+    RunStatus.FAILED: "The worker could not go on; the reason says why. It can be resumed.",
 }
 
 QUERY_STATUSES = {

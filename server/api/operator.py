@@ -29,7 +29,7 @@ def pause_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
 
 @router.post("/runs/{run_id}/resume", summary="Resume a run", responses=REPLIES)
 def resume_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
-    """Resume a paused run. A second call changes nothing."""
+    """Resume a paused run, or a failed one from its last good checkpoint. A second call changes nothing."""
     return _become(request, db, run_id, RunStatus.ACTIVE)
 
 

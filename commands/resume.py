@@ -1,0 +1,29 @@
+"""`parenting resume`: let a paused or failed run go on."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from parenting.commands.database import database
+from parenting.commands.errors import friendly_errors
+from parenting.server.runs import set_status
+from parenting.server.statuses import RunStatus
+
+
+def resume(
+    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+) -> None:
+    """Let a paused or failed run go on.
+
+    A failed run goes on from its last good checkpoint. The reason why it failed stays in its log, on its
+    dashboard. A worker has to run: `parenting up` or `parenting worker`.
+
+    Exit codes: 0 it goes on; 2 there is no such run, or it was stopped or has finished.
+
+    Example: parenting resume 3
+    """
+    with friendly_errors(), database() as db:
+        set_status(db, run, RunStatus.ACTIVE)
+    typer.echo(f"Run {run} goes on as soon as a worker takes it up.")
