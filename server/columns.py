@@ -79,7 +79,7 @@ def loads(text: str | bytes) -> Any:
 
 
 def decoded(text: bytes) -> str | bytes:
-    """Return SQLite's text; bytes that are no text stay bytes, which no column takes for sound."""
+    """Return SQLite's text; bytes that are not text stay bytes, which no column takes for sound."""
     try:
         return text.decode()
     except UnicodeDecodeError:

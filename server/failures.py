@@ -1,4 +1,4 @@
-"""How runs fail and are resumed, each in a transaction that holds the run. The log keeps the reasons."""
+"""Failures of runs and their end, each in a transaction that holds the run. The log keeps the reasons."""
 
 from __future__ import annotations
 

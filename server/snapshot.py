@@ -45,7 +45,7 @@ class Snapshot(NamedTuple):
 
 
 class Written(NamedTuple):
-    """What a checkpoint's bytes hold: the snapshot, and the machine that wrote it."""
+    """The content of a checkpoint: the snapshot, and the machine that wrote it."""
 
     saved: Snapshot
     versions: dict[str, Any]
