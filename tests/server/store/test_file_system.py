@@ -14,7 +14,7 @@ MOUNTS = """\
 30 21 0:40 / {0} rw - tmpfs tmpfs rw
 31 30 0:41 / {0}/far rw,relatime - nfs4 server:/far rw
 32 31 0:42 / {0}/far/a\\040b rw - fuse.sshfs me@there: rw
-33 30 0:43 / {0}/fars rw - xfs /dev/sda rw
+33 30 0:43 / {0}/farther rw - xfs /dev/sda rw
 34 30 0:44 / {0}/twice rw - xfs /dev/sda rw
 35 30 0:45 / {0}/twice rw - cifs //server/x rw
 broken line
