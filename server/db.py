@@ -24,6 +24,7 @@ from parenting.server.columns import loads
 from parenting.server.errors import BusyError, SetupError, StoreError
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql, sqlite
+from parenting.server.store.clock import Marks, boot_mark, server_mark
 from parenting.server.store.patience import remaining
 from parenting.server.store.refusals import translated
 from parenting.server.store.sqlite import BUSY_SECONDS
@@ -31,6 +32,7 @@ from parenting.server.store.sqlite import BUSY_SECONDS
 REFUSED_SECONDS = 10.0
 """A refused write counts for this long, unless another one succeeds: a full disk lets a transaction begin."""
 Seen = TypeVar("Seen")
+STORES = {"sqlite": sqlite, "postgresql": postgresql, "postgres": postgresql}
 
 
 def utc_now() -> datetime:
@@ -39,14 +41,21 @@ def utc_now() -> datetime:
 
 
 class Database:
-    """The database handle. `read()` and `write()` are transactions; `clock()` is the time."""
+    """The database handle.
 
-    def __init__(self, engine: Engine, clock: Callable[[], datetime] = utc_now) -> None:
+    `read()` and `write()` are transactions; `clock()` is the time that people see, `mark(session)` the moment
+    by which leases and claims are decided.
+    """
+
+    def __init__(
+        self, engine: Engine, clock: Callable[[], datetime] = utc_now, mark: Marks | None = None
+    ) -> None:
         self.engine = engine
         self.clock = clock
         self._writing = engine.execution_options(begin="IMMEDIATE", synchronous="full")
         self._hurried = engine.execution_options(begin="IMMEDIATE", synchronous="normal")
         self._sqlite = engine.dialect.name == "sqlite"
+        self.mark: Marks = mark or (boot_mark if self._sqlite else server_mark)
         self._reading = engine if self._sqlite else postgresql.reading(engine)
         # One writer of this process at a time: fairer than many threads that sleep on SQLite's lock.
         self._turn = threading.BoundedSemaphore(1 if self._sqlite else postgresql.WRITERS)
@@ -143,7 +152,9 @@ class Database:
         self.engine.dispose()
 
 
-def connect(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Database:
+def connect(
+    settings: Settings, clock: Callable[[], datetime] = utc_now, mark: Marks | None = None
+) -> Database:
     """Open the database of these settings. This makes the data folder, but no tables (see `server.migrate`).
 
     Raises:
@@ -154,11 +165,10 @@ def connect(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Data
     except ArgumentError:  # its text would repeat the URL, and so its password
         raise _unreadable("this is not a URL") from None
     name = url.get_backend_name()
-    if name == "sqlite":
-        return Database(sqlite.open_engine(url, json_serializer=_dumps, json_deserializer=loads), clock)
-    if name in ("postgresql", "postgres"):
-        return Database(postgresql.open_engine(url, json_serializer=_dumps, json_deserializer=loads), clock)
-    raise _unreadable(f"{name} is neither sqlite nor postgresql")
+    if name not in STORES:
+        raise _unreadable(f"{name} is neither sqlite nor postgresql")
+    engine = STORES[name].open_engine(url, json_serializer=_dumps, json_deserializer=loads)
+    return Database(engine, clock, mark)
 
 
 def _unreadable(why: object) -> SetupError:

@@ -112,10 +112,12 @@ def _figures(session: Session, db: Database) -> Iterator[Metric]:
     now = db.clock()
     waited = 0.0 if oldest is None else max(0.0, (now - oldest).total_seconds())
     yield _gauge("parenting_question_wait_seconds", "How long the oldest open question has waited.", waited)
-    signs = session.scalars(select(Worker.heartbeat)).all()
+    mark = db.mark(session)
+    found = session.scalars(select(Worker.mark).where(Worker.epoch == mark.epoch))
+    signs = [sign for sign in found if sign is not None]
     yield _gauge("parenting_workers", "Workers that have signed and not ended in order.", len(signs))
     if signs:
-        age = max(0.0, (now - max(signs)).total_seconds())
+        age = max(0.0, mark.seconds - max(signs))
         yield _gauge("parenting_worker_sign_age_seconds", "Time since a worker's last sign of life.", age)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import Any
 
 from sqlalchemy import ColumnElement, bindparam, or_, select, tuple_, update
@@ -22,6 +21,7 @@ from parenting.server.failures import fail_if_damaged, note_failure, resume_in
 from parenting.server.identity import unused_number
 from parenting.server.queue.queries import withdraw_in
 from parenting.server.statuses import LIVING, OVER, RunStatus
+from parenting.server.store.clock import is_over
 from parenting.server.tables import Run
 
 CLAIM_SECONDS = 5.0
@@ -149,23 +149,31 @@ def claim(
         most: How many runs to claim at most; None claims all.
         but: Runs to leave alone.
     """
-    late = db.clock() - timedelta(seconds=seconds)
-    free = (Run.status.in_(LIVING), or_(Run.worker.is_(None), Run.heartbeat < late), Run.id.not_in(but))
+    silent = is_over(Run.claim_epoch, Run.claim_mark, Run.claim_mark + seconds)
+    free = (Run.status.in_(LIVING), or_(Run.worker.is_(None), silent), Run.id.not_in(but))
     with db.read() as session:  # nothing to claim is the common case, and takes no lock
-        if session.scalars(select(Run.id).where(*free).limit(1)).first() is None:
+        if session.scalars(select(Run.id).where(*free).limit(1), db.mark(session).bound()).first() is None:
             return []
     with db.write() as session:
-        rows = select(Run).where(*free).order_by(Run.id).limit(most).with_for_update()
-        runs = [run for run in session.scalars(rows) if not fail_if_damaged(session, db, run)]
+        # A run that somebody has locked is in use: its turn comes with the next look.
+        rows = select(Run).where(*free).order_by(Run.id).limit(most).with_for_update(skip_locked=True)
+        mark = db.mark(session)
+        found = session.scalars(rows, mark.bound())
+        runs = [run for run in found if not fail_if_damaged(session, db, run)]
         for run in runs:
-            run.worker, run.fencing_token, run.heartbeat = worker, run.fencing_token + 1, db.clock()
+            run.worker, run.fencing_token = worker, run.fencing_token + 1
+            run.heartbeat, run.claim_epoch, run.claim_mark = db.clock(), mark.epoch, mark.seconds
         return [Claim(run.id, worker, run.fencing_token) for run in runs]
 
 
 def let_go(db: Database, claims: Sequence[Claim]) -> None:
     """Release claims, as at a worker's orderly end; runs that others have claimed since are left alone."""
     with db.write() as session:
-        session.execute(update(Run).where(_of(claims)).values(worker=None, heartbeat=None))
+        session.execute(
+            update(Run)
+            .where(_of(claims))
+            .values(worker=None, heartbeat=None, claim_epoch=None, claim_mark=None)
+        )
 
 
 def heartbeat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
@@ -173,8 +181,9 @@ def heartbeat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
     if not claims:
         return []
     with db.write(durable=False) as session:
-        rows = update(Run).where(_of(claims)).values(heartbeat=db.clock()).returning(Run.id)
-        found = set(session.scalars(rows).all())
+        mark = db.mark(session)
+        sign = {"heartbeat": db.clock(), "claim_epoch": mark.epoch, "claim_mark": mark.seconds}
+        found = set(session.scalars(update(Run).where(_of(claims)).values(sign).returning(Run.id)).all())
         return [mine for mine in claims if mine.run_id in found]
 
 
@@ -195,7 +204,7 @@ def report_progress(db: Database, mine: Claim, **fields: Any) -> Run:
         raise TypeError(f"report_progress takes {sorted(PROGRESS_FIELDS)}, not {sorted(unknown)}")
     with db.write(durable=False) as session:
         run = held(session, mine)
-        run.heartbeat = db.clock()
+        run.heartbeat, (run.claim_epoch, run.claim_mark) = db.clock(), db.mark(session)
         for name, value in fields.items():
             setattr(run, name, value)
         return run

@@ -134,7 +134,9 @@ class Run(Table):
     fencing_token: Mapped[int] = mapped_column(
         default=0
     )  # grows at each claim; checked inside every write of a worker
-    heartbeat: Mapped[datetime | None]
+    heartbeat: Mapped[datetime | None]  # its last sign of life by the wall clock, for display, and
+    claim_epoch: Mapped[str | None]  # by the clock that decides (`server.store.clock`)
+    claim_mark: Mapped[float | None]
     versions: Mapped[dict[str, Any] | None]  # torch build and threads: other ones give other bits
     error: Mapped[str | None]
     weights: Mapped[str | None]  # the sha256 of the pre-trained weights (`Weights`); none: fresh ones
@@ -175,8 +177,11 @@ class Query(Table):
     posted: Mapped[datetime]
     policy_stage: Mapped[int | None]  # which policy asked: the stage T that it was in, and
     policy_steps: Mapped[int | None]  # its gradient steps in that stage; null: asked before these were kept
-    leased_until: Mapped[datetime | None]
+    leased_until: Mapped[datetime | None]  # by the wall clock, for display
     leased_by: Mapped[str | None]
+    lease_epoch: Mapped[str | None]  # by the clock that decides (`server.store.clock`)
+    lease_begin: Mapped[float | None]
+    lease_end: Mapped[float | None]
 
 
 class Answer(Table):
@@ -248,7 +253,9 @@ class Worker(Table):
 
     name: Mapped[str] = mapped_column(primary_key=True)
     started: Mapped[datetime]
-    heartbeat: Mapped[datetime]
+    heartbeat: Mapped[datetime]  # by the wall clock, for display
+    epoch: Mapped[str | None]  # by the clock that decides (`server.store.clock`)
+    mark: Mapped[float | None]
 
 
 class Checkpoint(Table):

@@ -34,20 +34,25 @@ def unmigrated(settings: Settings, clock: Callable[[], datetime] = utc_now) -> D
     """A new database without tables: the one that `settings` name."""
     if settings.database_url is not None:
         cluster().create(_name(settings.database_url))
-    return connect(settings, clock)
+    return _connect(settings, clock)
 
 
 def migrated(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Database:
     """A new database with all tables and no rows: the one that `settings` name."""
     if settings.database_url is not None:
         cluster().create(_name(settings.database_url), _postgresql_template())
-        return connect(settings, clock)
-    database = connect(settings, clock)
+        return _connect(settings, clock)
+    database = _connect(settings, clock)
     file = settings.data / "parenting.db"
     assert not file.exists(), "there is a database already"
     file.touch(0o600)
     file.write_bytes(_sqlite_template())
     return database
+
+
+def _connect(settings: Settings, clock: Callable[[], datetime]) -> Database:
+    """Connect; the clock of a test moves leases and claims, too."""
+    return connect(settings, clock, getattr(clock, "mark", None))
 
 
 def _name(url: str) -> str:

@@ -14,7 +14,7 @@ from parenting.server.errors import SetupError
 from parenting.server.migrate import newest, revision
 from parenting.server.statuses import LIVING
 from parenting.server.tables import Answer, Checkpoint, Query, Run, Weights, Worker
-from parenting.server.workers import SILENT_SECONDS
+from parenting.server.workers import alive
 from parenting.weights.store import digest
 
 FUTURE = timedelta(seconds=5)
@@ -61,13 +61,11 @@ def clock(db: Database) -> Iterator[Finding]:
 def workers(db: Database) -> Iterator[Finding]:
     """Look for a worker that is alive, and for runs that wait for one."""
     with db.read() as session:
-        signs = session.execute(select(Worker.name, Worker.heartbeat)).all()
         living = session.execute(select(func.count()).where(Run.status.in_(LIVING))).scalar_one()
-    now = db.clock()
-    alive = [row.name for row in signs if now - row.heartbeat < timedelta(seconds=SILENT_SECONDS)]
+    names = alive(db)
     runs = f"{living} run{'' if living == 1 else 's'} to train"
-    if alive:
-        yield ok("worker", f"alive: {', '.join(sorted(alive))}; {runs}")
+    if names:
+        yield ok("worker", f"alive: {', '.join(names)}; {runs}")
     elif living:
         yield warning("worker", f"none gives a sign of life; {runs}", "parenting worker, or parenting up")
     else:

@@ -19,6 +19,7 @@ from parenting.server.queue.locks import lock_query
 from parenting.server.queue.queries import guidance_first
 from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
+from parenting.server.store.clock import holds, is_over
 from parenting.server.tables import Query, Run
 
 LEASE_SECONDS = 60.0
@@ -53,8 +54,9 @@ def lease_ahead(
 
 def may_lease(db: Database, run_id: int, client_id: str) -> bool:
     """Return whether a query is free for this client, or held for it already."""
-    asks = {"run_id": run_id, "client_id": client_id, "now": db.clock()}
+    asks = {"run_id": run_id, "client_id": client_id}
     with db.read() as session:
+        asks |= db.mark(session).bound()
         return session.execute(_OFFER.with_only_columns(Query.id), asks).first() is not None
 
 
@@ -68,18 +70,22 @@ def release(db: Database, query_id: int, client_id: str) -> None:
         query = lock_query(session, query_id)
         if query.leased_by == client_id:
             query.leased_by = query.leased_until = None
+            query.lease_epoch = query.lease_begin = query.lease_end = None
 
 
 def _hold(db: Database, offer: Any, asks: dict[str, Any], seconds: float) -> Query | None:
-    asks = {**asks, "now": db.clock()}
     with db.read() as session:  # nothing to offer is the common case, and takes no lock
-        if session.execute(offer.with_only_columns(Query.id), asks).first() is None:
+        seen = {**asks, **db.mark(session).bound()}
+        if session.execute(offer.with_only_columns(Query.id), seen).first() is None:
             return None
     with db.write(durable=False) as session:
         lock(session, asks["run_id"])
-        query = _first_readable(session, offer, asks)
+        mark = db.mark(session)  # behind the lock: nobody else's lease begins later
+        query = _first_readable(session, offer, {**asks, **mark.bound()})
         if query is not None:
-            query.leased_by, query.leased_until = asks["client_id"], asks["now"] + timedelta(seconds=seconds)
+            query.leased_by, query.leased_until = asks["client_id"], db.clock() + timedelta(seconds=seconds)
+            query.lease_epoch, query.lease_begin = mark
+            query.lease_end = mark.seconds + seconds
         return query
 
 
@@ -103,8 +109,9 @@ def _first_readable(session: Session, offer: Any, asks: dict[str, Any]) -> Query
 
 
 # Statements that every question needs are built once.
-_MINE = and_(Query.leased_by == bindparam("client_id"), Query.leased_until > bindparam("now"))
-_FREE = or_(Query.leased_until.is_(None), Query.leased_until <= bindparam("now"))
+_LEASE = (Query.lease_epoch, Query.lease_begin, Query.lease_end)
+_MINE = and_(Query.leased_by == bindparam("client_id"), holds(*_LEASE))
+_FREE = is_over(*_LEASE)
 _OPEN = (
     select(Query)
     .join(Run, Run.id == Query.run_id)

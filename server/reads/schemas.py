@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime, timedelta
+from datetime import timedelta
 from typing import Literal
 
 from sqlalchemy import select
@@ -31,6 +31,7 @@ from parenting.server.schemas import (
     WorldSchema,
 )
 from parenting.server.statuses import OVER, RunState, RunStatus, Waiting
+from parenting.server.store.clock import Mark
 from parenting.server.tables import Answer, Metric, Query, Run
 from parenting.server.workers import alive
 
@@ -49,16 +50,18 @@ def run_schema(db: Database, run_id: int) -> RunSchema:
     """
     with db.read() as session:
         run, opened, here = find(session, run_id), open_in(session, run_id), database_id_in(session)
+        now = db.mark(session)
     with reading(run):
-        return _run_schema(run, opened, _worker(run, db.clock(), _taken_soon(db, [run])), here)
+        return _run_schema(run, opened, _worker(run, now, _taken_soon(db, [run])), here)
 
 
 def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema | DamagedSchema]:
     """Return the schemas of runs, damaged or not."""
     with db.read() as session:
         opened, here = open_by_run(session, [run.id for run in runs]), database_id_in(session)
+        now = db.mark(session)
     faults = {run.id: damage(run) for run in runs}
-    now, soon = db.clock(), _taken_soon(db, [run for run in runs if faults[run.id] is None])
+    soon = _taken_soon(db, [run for run in runs if faults[run.id] is None])
     return [
         DamagedSchema(id=run.id, damaged=fault)
         if (fault := faults[run.id]) is not None
@@ -180,9 +183,10 @@ def _taken_soon(db: Database, runs: Sequence[Run]) -> bool:
     return unclaimed and bool(alive(db))
 
 
-def _worker(run: Run, now: datetime, taken_soon: bool) -> Sign:
+def _worker(run: Run, now: Mark, taken_soon: bool) -> Sign:
     if run.status in OVER:
         return "done"
     if run.worker is None:
         return "alive" if taken_soon else "silent"
-    return "silent" if run.heartbeat is None or now - run.heartbeat > SILENT_AFTER else "alive"
+    signed = now.is_recent(run.claim_epoch, run.claim_mark, SILENT_AFTER.total_seconds())
+    return "alive" if signed else "silent"

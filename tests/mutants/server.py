@@ -18,22 +18,22 @@ QUEUE = [
     Mutant(
         "a claim does not raise the fencing token",
         "server/runs.py",
-        "run.fencing_token + 1, db.clock()",
-        "run.fencing_token, db.clock()",
+        "= worker, run.fencing_token + 1",
+        "= worker, run.fencing_token",
         f"{RUNS}::test_one_worker_a_run",
     ),
     Mutant(
         "a run is taken from a worker that lives",
         "server/runs.py",
-        "Run.heartbeat < late",
-        "Run.heartbeat <= db.clock()",
+        "Run.claim_mark + seconds)",
+        "Run.claim_mark)",
         f"{RUNS}::test_sign_of_life_keeps_the_claim",
     ),
     Mutant(
         "a lease never ends",
         "server/queue/leases.py",
-        '_FREE = or_(Query.leased_until.is_(None), Query.leased_until <= bindparam("now"))',
-        "_FREE = Query.leased_until.is_(None)",
+        "_FREE = is_over(*_LEASE)",
+        "_FREE = Query.lease_end.is_(None)",
         f"{ANSWERS}::test_leased_question_is_offered_again_when_its_lease_ends",
     ),
     Mutant(

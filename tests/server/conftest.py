@@ -15,6 +15,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, claim
 from parenting.server.settings import Settings
+from parenting.server.store.clock import Mark
 from parenting.server.tables import Run
 from tests.database import STORES, database_url, migrated
 
@@ -37,6 +38,10 @@ class Clock:
 
     def __call__(self) -> datetime:
         return self.now
+
+    def mark(self, _session: object) -> Mark:
+        """The clock of leases and claims, which moves with the wall clock here."""
+        return Mark("the clock of the test", self.now.timestamp())
 
     def pass_seconds(self, seconds: float) -> None:
         self.now += timedelta(seconds=seconds)
