@@ -97,6 +97,7 @@ def write(db: Database, mine: Claim, fresh: Sequence[tuple[int, Note]]) -> None:
     with db.write() as session:
         run = held(session, mine)
         run.heartbeat, run.versions = db.clock(), versions()
+        run.claim_epoch, run.claim_mark = db.mark(session)
         for tick, note in fresh:
             add_note(session, db, run.id, tick, note)
 
