@@ -1,5 +1,7 @@
 """`make mutants`: apply each fault of tests/mutants in a copy of the tree; its test has to fail.
 
+With `--sabotage` the faults are those of tests/faults/sabotage.py, whose tests `make faults` runs first.
+
 Fails if a text is not found once, if a test fails without its mutant, or if a mutant is not caught.
 """
 
@@ -21,6 +23,8 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table
 
+from tests.faults import seeds
+from tests.faults.sabotage import SABOTAGES
 from tests.mutants import MUTANTS, Mutant
 from tests.tree import LINKS, ROOT, git_files
 
@@ -109,14 +113,21 @@ def main() -> int:
     """Try the mutants whose names contain the words given, or all of them; 0 if each was caught."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("words", nargs="*", help="try only mutants whose names contain one of these")
+    parser.add_argument("--sabotage", action="store_true", help="try tests/faults/sabotage.py instead")
+    parser.add_argument("--sample", type=int, help="try only so many, drawn by PARENTING_FAULTS_SEED")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="mutants at a time")
     asked = parser.parse_args()
-    chosen = [m for m in MUTANTS if not asked.words or any(word in m.name for word in asked.words)]
+    listed = SABOTAGES if asked.sabotage else MUTANTS
+    chosen = [m for m in listed if not asked.words or any(word in m.name for word in asked.words)]
+    if asked.sample is not None:
+        chosen = seeds.draws("sabotage").sample(chosen, min(asked.sample, len(chosen)))
     console, began = Console(width=None if sys.stdout.isatty() else 200), time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         trees = [copy_tree(Path(folder) / str(number)) for number in range(max(1, asked.jobs))]
-        unharmed = run_tests(trees[0], sorted({mutant.test for mutant in chosen}))
-        if unharmed.returncode:
+        # `make faults` has just run the tests of the fault list, and they take minutes.
+        tests = [] if asked.sabotage else sorted({mutant.test for mutant in chosen})
+        unharmed = run_tests(trees[0], tests) if tests else None
+        if unharmed is not None and unharmed.returncode:
             console.print(unharmed.stdout[-TOLD:], markup=False, highlight=False)
             console.print("A test fails without its mutant; mend it first.", style="bold red")
             return 1

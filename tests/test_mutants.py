@@ -8,23 +8,26 @@ from pathlib import Path
 import pytest
 
 from scripts.mutants import attempt
+from tests.faults.sabotage import SABOTAGES
 from tests.mutants import MUTANTS, Mutant
 from tests.tree import ROOT
 
 
 def test_there_are_enough() -> None:
     assert len(MUTANTS) >= 25
-    assert len({mutant.name for mutant in MUTANTS}) == len(MUTANTS)
+    assert len(SABOTAGES) >= 15
+    assert len({mutant.name for mutant in [*MUTANTS, *SABOTAGES]}) == len(MUTANTS) + len(SABOTAGES)
 
 
-@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
+@pytest.mark.parametrize("mutant", [*MUTANTS, *SABOTAGES], ids=lambda mutant: mutant.name)
 def test_its_text_stands_once_in_its_file(mutant: Mutant) -> None:
     source = (ROOT / mutant.file).read_text(encoding="utf-8")
     assert source.count(mutant.text) == 1
-    ast.parse(source.replace(mutant.text, mutant.replacement))
+    if mutant.file.endswith(".py"):
+        ast.parse(source.replace(mutant.text, mutant.replacement))
 
 
-@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
+@pytest.mark.parametrize("mutant", [*MUTANTS, *SABOTAGES], ids=lambda mutant: mutant.name)
 def test_its_test_is_there(mutant: Mutant) -> None:
     file, _, name = mutant.test.partition("::")
     tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))

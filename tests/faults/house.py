@@ -118,6 +118,13 @@ class House:
             time.sleep(0.002)
         assert one.process.exitcode == -signal.SIGKILL, f"{what}: {one.process.exitcode}: {one.said()}"
 
+    def until_stopped(self, name: str) -> None:
+        """Wait until a process has stopped itself (SIGSTOP)."""
+        status, end = Path(f"/proc/{self.commands[name].process.pid}/stat"), time.monotonic() + PATIENCE
+        while status.read_text().rpartition(")")[2].split()[0] != "T":
+            assert time.monotonic() < end, f"{name} did not stop: {self.commands[name].said()}"
+            time.sleep(0.01)
+
     def move_out(self) -> None:
         """Let the parents leave, and stop the processes in order."""
         for person in self._people():

@@ -29,6 +29,7 @@ class Point(NamedTuple):
     commit: bool = False  # the commit of the transaction that it is in, instead of itself
     seldom: bool = False  # a process passes it once
     passage: int = 1  # which passage kills
+    signal: signal.Signals = signal.SIGKILL
 
     def fits(self, moment: Moment) -> bool:
         """Return whether a moment is this point."""
@@ -47,7 +48,7 @@ class Trigger:
         if self.point.fits(moment):
             self.passed += 1
             if self.passed == self.point.passage:
-                os.kill(os.getpid(), signal.SIGKILL)
+                os.kill(os.getpid(), self.point.signal)
 
 
 class Mark:

@@ -103,6 +103,7 @@ def test_races_for_one_query_have_one_winner(
         other.close()
     assert len(won) == races
     assert len(lost) == races * (RACERS - 1)
+    assert all("already answered" in message for message in lost), "a loser is told why"
     stored = kept.rows("SELECT query_id, choice FROM answer ORDER BY query_id")
     assert [(row["query_id"], row["choice"]) for row in stored] == won
     figures.count("races", f"one answer, {RACERS} clients", races)

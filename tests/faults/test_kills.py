@@ -74,6 +74,21 @@ def test_killed_at_every_named_point(
         hold_to_the_promises(house, runs)
 
 
+def test_killed_as_an_answer_is_committed(
+    settings: Settings, db: Database, rng: random.Random, figures: Figures
+) -> None:
+    """The place at which a server that replies before it commits would be caught."""
+    points, runs = [point for point in WEB if point.name == "at the commit of an answer"], begin(db)
+    with House(settings, WEB) as house:
+        house.keep()
+        house.move_in(runs, PARENTS, rng)
+        house.until_told(2)
+        for _ in range(3):
+            kill_at(house, "web", points, rng, figures)
+        house.move_out()
+        hold_to_the_promises(house, runs)
+
+
 def test_killed_at_random_moments(
     settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures
 ) -> None:
