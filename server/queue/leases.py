@@ -48,7 +48,7 @@ def lease_ahead(
 
     None if nothing is free, or if the run's goal is reached once those shown are answered.
     """
-    asks = {"run_id": run_id, "client_id": client_id, "shown": list(shown)}
+    asks = {"run_id": run_id, "client_id": client_id, "shown": list(shown), "to_come": list(shown)}
     return _hold(db, _AHEAD, asks, seconds)
 
 
@@ -122,10 +122,13 @@ _OFFER = _OPEN.where(or_(Run.goal.is_(None), Run.answers < Run.goal)).order_by(
     case((_MINE, 0), else_=1), guidance_first(), Query.tick
 )
 _other = aliased(Query)
+# Two names for one list: under one name SQLAlchemy writes an empty list for IN and for NOT IN alike, which on
+# PostgreSQL offers nothing.
 _SHOWN: Any = bindparam("shown", expanding=True)
+_TO_COME: Any = bindparam("to_come", expanding=True)
 _ANSWERS_TO_COME = (
     select(func.count())
-    .where(_other.run_id == Run.id, _other.status == QueryStatus.OPEN, _other.id.in_(_SHOWN))
+    .where(_other.run_id == Run.id, _other.status == QueryStatus.OPEN, _other.id.in_(_TO_COME))
     .correlate(Run)
     .scalar_subquery()
 )

@@ -11,7 +11,7 @@ from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
 from parenting.server.queue import answers
 from parenting.server.queue.answers import answer, get_query, supersede
-from parenting.server.queue.leases import LEASE_SECONDS, lease, release
+from parenting.server.queue.leases import LEASE_SECONDS, lease, lease_ahead, release
 from parenting.server.queue.worker_side import post_query
 from parenting.server.reads import pagination
 from parenting.server.runs import Claim, get_run, set_status
@@ -200,3 +200,10 @@ def test_lease_writes_nothing_when_there_is_nothing(db: Database, run: Run) -> N
 def test_statuses_are_held_by_the_database(db: Database, guidance: int) -> None:
     with pytest.raises(IntegrityError, match=r"(?i)CHECK.*status"), db.write() as session:
         session.execute(text("UPDATE query SET status = 'lost' WHERE id = :id"), {"id": guidance})
+
+
+def test_ahead_of_nothing_is_the_most_urgent_question(db: Database, run: Run, guidance: int) -> None:
+    ahead = lease_ahead(db, run.id, "a", ())
+    assert ahead is not None
+    assert ahead.id == guidance
+    assert lease_ahead(db, run.id, "a", (guidance,)) is None
