@@ -31,8 +31,9 @@ faults: $(VENV)/.installed-dev ## Kills, power cuts, refusing stores, races, sab
 mutants: $(VENV)/.installed-dev ## Plant faults one by one; each must be caught by its test (10 minutes, nightly)
 	$(BIN)/python -m scripts.mutants $(ARGS)
 
-torture: $(VENV)/.installed-dev ## The long forms of the tests that have two lengths (20 minutes, nightly)
+torture: $(VENV)/.installed-dev ## The long forms of the tests that have two lengths (hours), and all sabotaged servers
 	PARENTING_TORTURE=1 $(BIN)/pytest -m torture tests tests/faults $(ARGS)
+	$(BIN)/python -m scripts.mutants --sabotage
 
 stress: $(VENV)/.installed-dev ## Every test, ten times over, with both cores busy (needs stress; ARGS for some)
 	scripts/stress $(ARGS)
