@@ -116,7 +116,8 @@ OLD = [
     Mutant(
         "a store that refuses ends the worker",
         "server/worker.py",
-        "self._go_on()\n            except StoreError as error:\n                self.patience.refused(error)",
+        "self._go_on()\n            except StoreError as error:\n"
+        "                self.patience.refused(error)",
         "self._go_on()\n            except StoreError as error:\n                raise",
         "tests/faults/test_stopped.py::test_worker_stopped_inside_a_write_ends_nobody[sqlite]",
     ),

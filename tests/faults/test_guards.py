@@ -16,8 +16,8 @@ COLUMNS = "query_id, run_id, number, choice, parent, client_id, supersedes, stan
 STATEMENTS = {
     "a second standing answer": f"INSERT INTO answer ({COLUMNS}) SELECT query_id, run_id, 9, choice, parent, "
     "'b', id, standing, received, 99 FROM answer WHERE number = 1",
-    "a second first answer of a client": f"INSERT INTO answer ({COLUMNS}) SELECT query_id, run_id, 9, choice, "
-    "parent, client_id, NULL, (1 = 0), received, 99 FROM answer WHERE number = 1",
+    "a second first answer of a client": f"INSERT INTO answer ({COLUMNS}) SELECT query_id, run_id, 9, "
+    "choice, parent, client_id, NULL, (1 = 0), received, 99 FROM answer WHERE number = 1",
     "a number twice": "UPDATE answer SET number = 1 WHERE number = 2",
     "a tick heard twice": "UPDATE answer SET applied_tick = 3",
     "a tick asked twice": "UPDATE query SET tick = 1",
