@@ -20,8 +20,8 @@ const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListe
 const key = ({ database, question, query }) => `${database} ${question ?? query}`;
 const meant = (answer) => !elsewhere.has(key(answer));
 
-// One attempt: "saved", "refused" (the server said no for good), "elsewhere" (it is meant for another database) or "kept"
-// (no connection, or a server in trouble).
+// One attempt: "saved", "refused" (the question has another answer, or was withdrawn), "elsewhere" (it is meant for another
+// database, or this is no server that can read it) or "kept" (no connection, or a server in trouble).
 async function send({ database, run, question, choice, client_id }) {
   if (!question) return ["elsewhere"];
   try {
@@ -30,9 +30,9 @@ async function send({ database, run, question, choice, client_id }) {
       body: JSON.stringify({ choice, client_id, database, run, question }),
     });
     if (reply.ok) return ["saved", await reply.json()];
-    if (reply.status >= 500 || reply.status === 429) return ["kept"];
+    if (reply.status >= 500 || reply.status === 429) return ["kept", reply.status === 500];
     const { error } = await reply.json();
-    return [error.code === "elsewhere" ? "elsewhere" : "refused", error];
+    return [error.code === "conflict" ? "refused" : "elsewhere", error];
   } catch {
     return ["kept"];
   }
@@ -44,6 +44,7 @@ async function drain(report) {
     if (outcome === "elsewhere") elsewhere.add(key(answer));
     report(outcome, reply, answer);
     if (outcome === "kept") {
+      if (reply) keep(answer); // the fault may be this question's alone: the others go first
       await wait(delay);
       delay = Math.min(5000, delay * 2);
       continue;

@@ -219,7 +219,7 @@ function report(outcome, reply, answer) {
   } else {
     if (!unsaved) $("saved").textContent = outcome === "elsewhere" ? "Kept here, not stored" : "";
     $("alert").textContent = outcome === "elsewhere" ? ELSEWHERE : reply.message;
-    if (outcome === "elsewhere") given.delete(answer.question); // this server may ask the same: it is a copy
+    if (outcome === "elsewhere" && given.delete(answer.question) && !current) next(); // a copy of its database asks the same
   }
 }
 
