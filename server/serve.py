@@ -6,15 +6,21 @@ import gc
 import socket
 from types import FrameType
 
+import structlog
 import uvicorn
 from fastapi import FastAPI
 
 from parenting.server.app import create_app
+from parenting.server.connections.files import room_for
+from parenting.server.connections.limits import Limits
+from parenting.server.connections.protocol import bounded
 from parenting.server.errors import SetupError
 from parenting.server.log import set_up_log
 from parenting.server.settings import Settings
 
 LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
+log = structlog.get_logger()
+
 GRACE = 1
 """Seconds that open requests may still take after the signal to stop (whole ones: uvicorn's rule)."""
 
@@ -65,6 +71,8 @@ def make_server(settings: Settings) -> Server:
     set_up_log(settings, "web")
     config = uvicorn.Config(
         create_app(settings),
+        http=bounded(_limits(settings)),
+        ws="none",
         log_config=None,
         log_level=settings.log_level.lower(),
         access_log=False,
@@ -75,3 +83,11 @@ def make_server(settings: Settings) -> Server:
     )
     gc.freeze()  # loaded modules stay: searching them for garbage takes a tenth of a second
     return Server(config)
+
+
+def _limits(settings: Settings) -> Limits:
+    """Return the bounds of connections, as many as the limit of open files has room for."""
+    fit = room_for(settings.connections)
+    if fit < settings.connections:
+        log.warning("few files may be open", connections=fit, wanted=settings.connections)
+    return Limits(connections=fit, per_client=settings.connections_per_client)

@@ -61,6 +61,14 @@ class Settings(BaseSettings):
         "them; a notebook needs http://localhost:*.",
     )
     streams: int = Field(50, ge=1, description="Live streams of events that may be open at once.")
+    connections: int = Field(
+        1000, ge=1, le=60_000, description="Connections that may be open at once; the longest idle make room."
+    )
+    connections_per_client: int = Field(
+        250,
+        ge=1,
+        description="Connections of one address at once; loopback, where a proxy stands, has no such limit.",
+    )
     log_level: str = Field("warning", description="debug, info, warning or error.")
     log_format: Literal["text", "json"] = Field("text", description="text for people, or json, a line each.")
     log_folder: Path | None = Field(
