@@ -25,6 +25,7 @@ from parenting.server.errors import BusyError, SetupError, StoreError
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql, sqlite
 from parenting.server.store.clock import Marks, boot_mark, server_mark
+from parenting.server.store.guard import confirm
 from parenting.server.store.patience import remaining
 from parenting.server.store.refusals import translated
 from parenting.server.store.sqlite import BUSY_SECONDS
@@ -112,9 +113,11 @@ class Database:
         if not self._turn.acquire(timeout=remaining(BUSY_SECONDS)):
             raise BusyError
         try:
-            with translated(), Session(engine, expire_on_commit=False) as session, session.begin():
-                session.connection()  # BEGIN IMMEDIATE now, not at the first statement
-                yield session
+            with translated(), Session(engine, expire_on_commit=False) as session:
+                with session.begin():
+                    info = session.connection().info  # BEGIN IMMEDIATE now, not at the first statement
+                    yield session
+                confirm(info)  # before anybody is told
         finally:
             self._turn.release()
 
@@ -153,12 +156,22 @@ class Database:
 
 
 def connect(
-    settings: Settings, clock: Callable[[], datetime] = utc_now, mark: Marks | None = None
+    settings: Settings,
+    clock: Callable[[], datetime] = utc_now,
+    mark: Marks | None = None,
+    reading: bool = False,
 ) -> Database:
     """Open the database of these settings. This makes the data folder, but no tables (see `server.migrate`).
 
+    Args:
+        settings: The settings that name the database.
+        clock: The time.
+        mark: The clock of leases and claims, for tests.
+        reading: The database is only read, so that a copy that is read-only will do.
+
     Raises:
-        SetupError: the URL cannot be read, a driver is missing, or SQLite is too old to be safe.
+        SetupError: the URL cannot be read, a driver is missing, SQLite is too old to be safe, or the file is
+            damaged or lacks what it held (`server.store.check`).
     """
     try:
         url = make_url(settings.url)
@@ -167,7 +180,8 @@ def connect(
     name = url.get_backend_name()
     if name not in STORES:
         raise _unreadable(f"{name} is neither sqlite nor postgresql")
-    engine = STORES[name].open_engine(url, json_serializer=_dumps, json_deserializer=loads)
+    options = {"reading": reading} if name == "sqlite" else {}
+    engine = STORES[name].open_engine(url, json_serializer=_dumps, json_deserializer=loads, **options)
     return Database(engine, clock, mark)
 
 

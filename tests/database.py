@@ -65,8 +65,7 @@ def _sqlite_template() -> bytes:
         database = connect(Settings(data=Path(folder), database_url=None))
         upgrade(database)
         database.close()  # what the log holds goes into the file
-        (file,) = Path(folder).iterdir()
-        return file.read_bytes()
+        return (Path(folder) / "parenting.db").read_bytes()
 
 
 @cache

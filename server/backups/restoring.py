@@ -18,6 +18,7 @@ from parenting.server.db import connect, utc_now
 from parenting.server.errors import SetupError
 from parenting.server.migrate import known_revisions, newest, revision, upgrade
 from parenting.server.settings import Settings
+from parenting.server.store import high_water
 from parenting.server.store.sqlite import make_folder
 
 BESIDE = ("-wal", "-shm", "-journal")
@@ -79,6 +80,7 @@ def _restore_copy(url: URL, file: Path, replace: bool) -> Restored:
         if target.exists():
             until_replaced.enter_context(alone(target))  # its log is in the file now, unless it is damaged
             aside = _put_aside(target)
+    high_water.accept(target)
     return Restored(str(target), str(holds), aside, older)
 
 

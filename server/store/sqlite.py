@@ -7,7 +7,8 @@ is lost, power included.
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,13 @@ from sqlalchemy import URL, Connection, Engine, PoolProxiedConnection, create_en
 
 from parenting.server.columns import decoded
 from parenting.server.errors import SetupError
+from parenting.server.store.check import require_usable
+from parenting.server.store.driver import BUSY_SECONDS, can_write, open_file, sqlite_module
+from parenting.server.store.guard import Guard, look
 from parenting.server.store.patience import remaining
 
-SAFE_SQLITE = (3, 51, 3)
-"""Older versions can corrupt a database in WAL mode: a race between the log's reset and a checkpoint."""
-BUSY_SECONDS = 5.0
+__all__ = ["BUSY_SECONDS", "PRAGMAS", "data_version", "make_folder", "open_engine", "sqlite_module"]
+
 PRAGMAS = {
     "journal_mode": "wal",
     "synchronous": "full",
@@ -28,28 +31,46 @@ PRAGMAS = {
 }
 
 
-def open_engine(url: URL, **options: Any) -> Engine:
+def open_engine(url: URL, reading: bool = False, **options: Any) -> Engine:
     """Open the engine of a database file, and make its folder.
 
+    Args:
+        url: The URL of the file.
+        reading: The database is only read: a copy that is read-only will do.
+        options: More arguments of `create_engine`.
+
     Raises:
-        SetupError: the URL names no file, the folder cannot be made, or SQLite is too old to be safe.
+        SetupError: the URL names no file, the folder cannot be made, the file cannot be used as it is
+            (`server.store.check`), or SQLite is too old to be safe.
     """
-    if url.database in (None, "", ":memory:"):
-        raise SetupError(
-            "PARENTING_DATABASE_URL: a database in memory is seen by one process only. Name a file."
-        )
-    make_folder(Path(str(url.database)).parent)
+    path = _path(url)
+    make_folder(path.parent)
+    module = sqlite_module()
+    require_usable(path, reading)
+    only = reading and not can_write(path)
     engine = create_engine(
         url,
-        module=sqlite_module(),
+        module=module,
         pool_size=20,
         max_overflow=30,
         pool_timeout=BUSY_SECONDS,
+        **({"creator": partial(open_file, path)} if only else {}),
         **options,
     )
-    event.listen(engine, "connect", _set_up)
+    event.listen(engine, "connect", partial(_set_up, pragmas={} if only else PRAGMAS))
+    if not only:
+        Guard(path).watch(engine)  # after the pragmas: by then each connection has its log open
     event.listen(engine, "begin", _begin)
     return engine
+
+
+def _path(url: URL) -> Path:
+    if url.database in (None, "", ":memory:") or str(url.database).startswith("file:"):
+        raise SetupError(
+            "PARENTING_DATABASE_URL: a database in memory is seen by one process only. Name a file by its "
+            "path: sqlite:////folder/parenting.db."
+        )
+    return Path(str(url.database))
 
 
 def make_folder(folder: Path) -> None:
@@ -66,45 +87,28 @@ def make_folder(folder: Path) -> None:
         ) from None
 
 
-def sqlite_module() -> Any:
-    """Return SQLite's driver: `pysqlite3`, which brings its own SQLite, or Python's if that is new enough.
-
-    Raises:
-        SetupError: neither is safe.
-    """
-    found = "none"
-    for name in ("pysqlite3.dbapi2", "sqlite3"):
-        try:
-            module = importlib.import_module(name)
-        except ImportError:
-            continue
-        if module.sqlite_version_info >= SAFE_SQLITE:
-            return module
-        found = module.sqlite_version
-    least = ".".join(map(str, SAFE_SQLITE))
-    raise SetupError(
-        f"SQLite {found} can corrupt a database under load; {least} or newer is needed. "
-        "Run: pip install 'pysqlite3>=0.6.1'"
-    )
-
-
 def watcher(engine: Engine) -> PoolProxiedConnection:
     """Return a connection for `data_version`. It never writes, so every commit is another's."""
     return engine.raw_connection()
 
 
-def data_version(connection: Any) -> int:
-    """Return SQLite's number that changes with each commit of another connection than this one."""
+def data_version(connection: PoolProxiedConnection) -> int:
+    """Return SQLite's number that changes with each commit of another connection than this one.
+
+    Raises:
+        GoneError: the file that the connection has open is not at its path any more.
+    """
+    look(connection.info)
     cursor = connection.cursor()
     cursor.execute("PRAGMA data_version")
     number: int = cursor.fetchall()[0][0]
     return number
 
 
-def _set_up(connection: Any, _record: Any) -> None:
+def _set_up(connection: Any, _record: Any, pragmas: Mapping[str, str]) -> None:
     connection.isolation_level = None  # the driver begins nothing by itself; `_begin` does
     connection.text_factory = decoded
-    for name, value in PRAGMAS.items():
+    for name, value in pragmas.items():
         connection.execute(f"PRAGMA {name}={value}").fetchall()
 
 

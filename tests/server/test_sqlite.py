@@ -148,7 +148,7 @@ def test_other_faults_are_not_hidden(db: Database) -> None:
 
 def test_old_sqlite_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     old = SimpleNamespace(sqlite_version_info=(3, 51, 2), sqlite_version="3.51.2")
-    monkeypatch.setattr("parenting.server.store.sqlite.importlib.import_module", lambda _name: old)
+    monkeypatch.setattr("parenting.server.store.driver.importlib.import_module", lambda _name: old)
     with pytest.raises(SetupError, match=r"SQLite 3\.51\.2 can corrupt .* pip install 'pysqlite3>=0\.6\.1'"):
         sqlite_module()
 

@@ -1,0 +1,175 @@
+"""The database file removed, renamed or replaced while it is in use: nobody is told of a thing not kept."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx2
+import pytest
+from sqlalchemy import event, select
+
+from parenting.server.db import Database, connect
+from parenting.server.errors import GoneError, ServerError
+from parenting.server.queue.answers import answer
+from parenting.server.queue.leases import lease
+from parenting.server.queue.worker_side import post_query
+from parenting.server.runs import Claim
+from parenting.server.settings import Settings
+from parenting.server.store.driver import sqlite_module
+from parenting.server.tables import Answer
+from tests.server.conftest import CLIPS
+
+pytestmark = pytest.mark.only("sqlite")
+
+
+def file_of(db: Database) -> Path:
+    return Path(str(db.engine.url.database))
+
+
+def copy(source: Path, target: Path) -> None:
+    """A copy of one moment, without a log."""
+    raw = sqlite_module().connect(str(source))
+    raw.execute("VACUUM INTO ?", (str(target),))
+    raw.close()
+
+
+def numbers(db: Database) -> list[int]:
+    with db.read() as session:
+        return list(session.scalars(select(Answer.number).order_by(Answer.number)))
+
+
+def away_file(file: Path) -> Callable[[], object]:
+    file.rename(file.with_suffix(".away"))
+    return lambda: file.with_suffix(".away").rename(file)
+
+
+def away_log(file: Path) -> Callable[[], object]:
+    log = Path(f"{file}-wal")
+    log.rename(file.with_suffix(".log"))
+    return lambda: file.with_suffix(".log").rename(log)
+
+
+def away_folder(file: Path) -> Callable[[], object]:
+    aside = file.parent.with_name("aside")
+    file.parent.rename(aside)
+    return lambda: aside.rename(file.parent)
+
+
+@pytest.mark.parametrize("away", [away_file, away_log, away_folder])
+def test_nothing_is_told_while_it_is_away_and_all_goes_on_once_it_is_back(
+    db: Database, mine: Claim, guidance: int, away: Callable[[Path], Callable[[], object]]
+) -> None:
+    assert lease(db, mine.run_id, "a") is not None
+    back = away(file_of(db))
+    for attempt in (
+        lambda: answer(db, guidance, "left", "a", "human"),
+        lambda: numbers(db),
+        lambda: lease(db, mine.run_id, "b"),
+        db.data_version,
+    ):
+        with pytest.raises(GoneError, match="while Parenting was running"):
+            attempt()
+    back()
+    assert numbers(db) == [], "what was refused was not stored"
+    assert answer(db, guidance, "left", "a", "human").number == 1
+    other = connect_again(db)
+    assert numbers(other) == [1]
+    other.close()
+
+
+def connect_again(db: Database) -> Database:
+    return connect(Settings(data=file_of(db).parent, database_url=None))
+
+
+@pytest.mark.parametrize("moment", ["before", "after"])
+def test_file_removed_around_the_commit_is_noticed_before_the_reply(
+    db: Database, guidance: int, moment: str
+) -> None:
+    """After the commit the answer is in a file that nobody finds; so it must not be told."""
+
+    def remove(_connection: object) -> None:
+        file_of(db).unlink()
+
+    def remove_after(connection: object) -> None:
+        real = db.engine.dialect.do_commit
+
+        def commit(raw: object) -> None:
+            real(raw)  # type: ignore[arg-type]  # the driver's connection, as the dialect gets it
+            file_of(db).unlink()
+
+        db.engine.dialect.do_commit = commit  # type: ignore[method-assign]  # for this one commit
+
+    event.listen(db.engine, "commit", remove if moment == "before" else remove_after, insert=True)
+    with pytest.raises(GoneError, match="was removed"):
+        answer(db, guidance, "left", "a", "human")
+
+
+@pytest.mark.usefixtures("guidance")
+def test_api_says_503_and_page_of_a_run_too(db: Database, client: httpx2.Client) -> None:
+    back = away_file(file_of(db))
+    for path in ("/api/v1/runs", "/api/v1/runs/1/metrics"):
+        found = client.get(path)
+        assert found.status_code == 503
+        assert found.json()["error"]["code"] == "store_gone"
+        assert "parenting restore" in found.json()["error"]["message"]
+    back()
+    assert client.get("/api/v1/runs").status_code == 200
+
+
+def test_another_database_in_its_place_is_not_taken(
+    db: Database, mine: Claim, guidance: int, tmp_path: Path
+) -> None:
+    answer(db, guidance, "left", "a", "human")
+    file, other = file_of(db), tmp_path / "other.db"
+    copy(file, other)
+    raw = sqlite_module().connect(str(other))
+    raw.execute("UPDATE database_identity SET uuid = 'another'")
+    raw.commit()
+    raw.close()
+    kept = file.with_suffix(".kept")
+    os.link(file, kept)
+    other.replace(file)
+    before = file.read_bytes()
+    for _ in range(3):
+        with pytest.raises(GoneError, match=r"was replaced .* restart"):
+            post_query(db, mine, 9, "guidance", 1, CLIPS)
+    assert file.read_bytes() == before
+    kept.replace(file)
+    assert numbers(db) == [1], "the former file is back"
+
+
+def test_older_state_of_the_same_database_is_not_taken(db: Database, guidance: int, tmp_path: Path) -> None:
+    older = tmp_path / "older.db"
+    copy(file_of(db), older)
+    answer(db, guidance, "left", "a", "human")
+    older.replace(file_of(db))
+    for _ in range(3):
+        with pytest.raises(GoneError, match="was replaced"):
+            numbers(db)
+
+
+def test_copy_with_all_that_was_told_is_taken_and_kept_in(
+    db: Database, mine: Claim, guidance: int, tmp_path: Path
+) -> None:
+    """Some programs save a file by a new one under its name. The log of the new one must not be removed."""
+    answer(db, guidance, "left", "a", "human")
+    same = tmp_path / "same.db"
+    copy(file_of(db), same)
+    for end in ("-wal", "-shm"):
+        Path(f"{file_of(db)}{end}").unlink()
+    same.replace(file_of(db))
+    told = []
+    for tick in range(10, 14):
+        try:
+            query = post_query(db, mine, tick, "guidance", 1, CLIPS)
+            told.append(answer(db, query, "left", "a", "human").number)
+        except ServerError:
+            continue
+    assert told == [2, 3, 4, 5]
+    fresh = connect_again(db)
+    assert numbers(fresh) == [1, *told]
+    fresh.close()
+    db.close()
+    fresh = connect_again(db)
+    assert numbers(fresh) == [1, *told], "also after all connections were closed"
+    fresh.close()
