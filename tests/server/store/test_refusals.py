@@ -95,16 +95,16 @@ def test_what_is_not_a_refusal_passes(error: Exception) -> None:
 
 
 def test_file_that_is_not_a_database_is_damaged(tmp_path: Path) -> None:
-    (tmp_path / "parenting.db").write_bytes(b"This is a letter. " * 400)
     database = connect(Settings(data=tmp_path, database_url=None))
+    (tmp_path / "parenting.db").write_bytes(b"This is a letter. " * 400)
     with pytest.raises(DamagedError), database.read() as session:
         session.execute(text("SELECT 1 FROM run"))
     database.close()
 
 
 def test_folder_in_place_of_the_file_is_gone(tmp_path: Path) -> None:
-    (tmp_path / "parenting.db").mkdir()
     database = connect(Settings(data=tmp_path, database_url=None))
+    (tmp_path / "parenting.db").mkdir()
     with pytest.raises(GoneError), database.read() as session:
         session.execute(text("SELECT 1"))
     database.close()
