@@ -24,7 +24,7 @@ from parenting.server.store.driver import sqlite_module
 from tests.lengths import length
 from tests.server.conftest import CLIPS
 
-pytestmark = pytest.mark.only("sqlite")
+pytestmark = pytest.mark.only("sqlite", "PostgreSQL keeps its own files")
 NOBODY = 65534
 
 

@@ -19,7 +19,7 @@ from parenting.server.store.driver import sqlite_module
 from parenting.server.tables import Answer
 from tests.server.conftest import CLIPS
 
-pytestmark = pytest.mark.only("sqlite")
+pytestmark = pytest.mark.only("sqlite", "PostgreSQL keeps its own files")
 
 
 def file_of(db: Database) -> Path:

@@ -23,7 +23,7 @@ from parenting.server.store.driver import sqlite_module
 from tests.server.conftest import CLIPS
 from tests.tree import ROOT
 
-pytestmark = pytest.mark.only("sqlite")
+pytestmark = pytest.mark.only("sqlite", "PostgreSQL keeps its own files")
 
 ANSWERING = """
 import sys
