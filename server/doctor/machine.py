@@ -12,7 +12,7 @@ from parenting.server.doctor.findings import Finding, error, ok, warning
 from parenting.server.environment import warnings
 from parenting.server.errors import SetupError
 from parenting.server.settings import FILE, Settings, names
-from parenting.server.store.sqlite import SAFE_SQLITE, sqlite_module
+from parenting.server.store.driver import SAFE_SQLITE, sqlite_module
 from parenting.weights.store import SHIPPED, SUFFIX, digest
 
 FILES_NEEDED = 4096
