@@ -184,7 +184,8 @@ def readable(file: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as outer:  # pytest's own folders are closed to others
         folder = Path(outer, "data")
         folder.mkdir()
-        shutil.copy(file, folder / "parenting.db").chmod(0o444)
+        shutil.copy(file, folder)
+        (folder / "parenting.db").chmod(0o444)
         folder.chmod(0o555)
         Path(outer).chmod(0o755)
         yield folder

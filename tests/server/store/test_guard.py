@@ -6,7 +6,7 @@ from pathlib import Path
 
 import httpx2
 import pytest
-from sqlalchemy import event, select
+from sqlalchemy import PoolProxiedConnection, event, select
 
 from parenting.server.db import Database, connect
 from parenting.server.errors import GoneError, ServerError
@@ -83,23 +83,23 @@ def connect_again(db: Database) -> Database:
 
 @pytest.mark.parametrize("moment", ["before", "after"])
 def test_file_removed_around_the_commit_is_noticed_before_the_reply(
-    db: Database, guidance: int, moment: str
+    db: Database, guidance: int, moment: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After the commit the answer is in a file that nobody finds; so it must not be told."""
 
     def remove(_connection: object) -> None:
         file_of(db).unlink()
 
-    def remove_after(connection: object) -> None:
-        real = db.engine.dialect.do_commit
+    real = db.engine.dialect.do_commit
 
-        def commit(raw: object) -> None:
-            real(raw)  # type: ignore[arg-type]  # the driver's connection, as the dialect gets it
-            file_of(db).unlink()
+    def commit(raw: PoolProxiedConnection) -> None:
+        real(raw)
+        file_of(db).unlink()
 
-        db.engine.dialect.do_commit = commit  # type: ignore[method-assign]  # for this one commit
-
-    event.listen(db.engine, "commit", remove if moment == "before" else remove_after, insert=True)
+    if moment == "before":
+        event.listen(db.engine, "commit", remove, insert=True)
+    else:
+        monkeypatch.setattr(db.engine.dialect, "do_commit", commit)
     with pytest.raises(GoneError, match="was removed"):
         answer(db, guidance, "left", "a", "human")
 

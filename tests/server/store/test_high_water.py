@@ -9,6 +9,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from sqlalchemy import PoolProxiedConnection
 
 from parenting.server import identity
 from parenting.server.db import Database, connect
@@ -61,8 +62,9 @@ def test_lost_log_is_noticed_and_accepted(db: Database, mine: Claim, settings: S
         connect(settings)
     kept.rename(log)
     again = connect(settings)
-    with again.read() as session:
-        assert high_water.count(session.connection().connection.cursor().execute).answers >= told
+    found = high_water.counted(file)
+    assert found is not None
+    assert found.answers >= told
     again.close()
     killed_after(settings.data, mine, 50_000, 2)
     log.unlink()
@@ -90,11 +92,11 @@ def test_mark_is_written_after_the_commit_and_never_by_one_that_fails(
     seen: list[object] = []
     real = db.engine.dialect.do_commit
 
-    def commit(raw: object) -> None:
+    def commit(raw: PoolProxiedConnection) -> None:
         seen.append(high_water.read(file))
         if len(seen) == 1:
             raise db.engine.dialect.dbapi.OperationalError("no")  # type: ignore[union-attr]  # there is one
-        real(raw)  # type: ignore[arg-type]  # the driver's connection, as the dialect gets it
+        real(raw)
 
     monkeypatch.setattr(db.engine.dialect, "do_commit", commit)
     with pytest.raises(Exception, match="no"):
