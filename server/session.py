@@ -68,7 +68,7 @@ class RunSession:
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
         self._save_every, self._look_cost = CHECKPOINT_SECONDS, 0.0
-        self.whole, self._told = True, False
+        self.whole, self._told, self._told_at = True, False, 0.0
         self._stuck_at = (
             -1
         )  # the tick that was reported as stuck: who ends episodes must see the next one too
@@ -192,6 +192,7 @@ class RunSession:
         late, stage = time.monotonic() - self._measured_at, int(self.saved.state.maturity[0])
         due = not hurried and (late >= METRIC_SECONDS or (self._news and not at_once))
         if stage == self.stage and (not due or late < self._look_every):
+            self._report_tick()
             return
         speed = (self.last_tick - self._measured_tick) / late if self._measured_at and late else None
         began = time.monotonic()
@@ -203,6 +204,13 @@ class RunSession:
         self.optimal, self.waiting, self.stage, self._news = optimal, None, stage, False
         self._measured_at, self._measured_tick = time.monotonic(), self.last_tick
         self._look_cost = self._measured_at - began
+
+    def _report_tick(self) -> None:
+        """Report the tick alone, once a second, where the next look at the policy is far off."""
+        now = time.monotonic()
+        if self._look_every > METRIC_SECONDS and now - self._told_at >= METRIC_SECONDS:
+            self._told_at, self.waiting = now, None
+            runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None)
 
     @property
     def _look_every(self) -> float:

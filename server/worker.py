@@ -41,6 +41,8 @@ POLL_SECONDS = 0.05
 CLAIM_EVERY = 0.5
 CLOSE_SECONDS = 3.0
 """Seconds that saving at the end may take. What is not saved by then goes on from its last checkpoint."""
+SWITCH_SECONDS = 0.001
+"""A thread that waits for Python's lock gets it after so long: a tick takes it some hundred times."""
 STOP_SECONDS = 3.5
 """A worker that has not ended so long after the signal ends anyway: a store may hold its threads."""
 
@@ -211,6 +213,7 @@ def main(settings: Settings) -> int:
         SetupError: the database cannot be used as it is.
     """
     settle()
+    sys.setswitchinterval(SWITCH_SECONDS)
     worker = Worker(connect(settings), settings, BESIDE_SECONDS)
     signal.signal(signal.SIGTERM, worker.stop)
     signal.signal(signal.SIGINT, worker.stop)
