@@ -102,14 +102,13 @@ class Worker:
             except StoreError as error:
                 self.patience.refused(error)
             else:
-                self.patience.granted()
                 return
 
     def _go_on(self) -> None:
         ticked = self._round()
-        self._sign()
+        self._sign(at_once=self.patience.doubts)
         self._claim()
-        if not ticked and not self.patience.waits:
+        if not ticked:
             self.notifier.wait(self._soonest)
 
     def _sign(self, at_once: bool = False) -> None:
@@ -125,6 +124,7 @@ class Worker:
             if claim.run_id not in kept and claim.run_id not in busy:
                 self.held.drop(claim.run_id)  # a turn that goes on finds out itself, at its next write
         self._signed_at = now
+        self.patience.granted()
 
     def _claim(self) -> None:
         """Look for runs that nobody raises, up to a fair share, and give up what is above it.
@@ -157,7 +157,7 @@ class Worker:
         now = time.monotonic()
         due = [run_id for run_id, at in self._due.items() if at <= now]
         for run_id in sorted(due, key=lambda run_id: not self._seen[run_id].answers):
-            if self.stopping or self.patience.waits:
+            if self.stopping or self.patience.doubts:
                 break
             if self.turns.may_begin(run_id, run_id not in self.sessions):
                 self._given[run_id] = self._seen[run_id]

@@ -16,7 +16,7 @@ from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
 from parenting.server.session import RunSession, goal_reached
 from parenting.server.statuses import OVER, RunStatus
-from parenting.server.work.patience import Patience
+from parenting.server.work.patience import Patience, back_off
 
 log = structlog.get_logger()
 
@@ -35,20 +35,24 @@ class HeldRuns:
         self.claims: dict[int, Claim] = {}
         self.sessions: dict[int, RunSession] = {}
         self.surplus: set[int] = set()
+        self._refusals: dict[int, int] = {}
 
     def turn(self, run_id: int, seen: Watch) -> float:
         """Give one run its turn, and return when the next is due. A store error never fails a run."""
         try:
-            return self._tried(run_id, seen)
+            due = self._tried(run_id, seen)
+            self._refusals.pop(run_id, None)
+            return due
         except LostClaimError as error:
             log.warning("run lost", run=run_id, reason=error.message)
             self.drop(run_id)
         except StoreError as error:
-            self._patience.refused(error)
+            self._patience.doubted(error, run_id)
+            self._refusals[run_id] = self._refusals.get(run_id, 0) + 1
             session = self.sessions.get(run_id)
             if session is not None and not session.whole:
                 del self.sessions[run_id]  # it goes on from its checkpoint
-            return time.monotonic() + self._patience.left()
+            return time.monotonic() + back_off(self._refusals[run_id])
         return AT_NEWS
 
     def _tried(self, run_id: int, seen: Watch) -> float:

@@ -20,16 +20,26 @@ SAY_EVERY = 1.0
 """Seconds between two lines of the log about the same refusal."""
 
 
+def back_off(refusals: int) -> float:
+    """Return the seconds to wait after so many refusals in a row, with jitter."""
+    wait = min(LONGEST_WAIT, FIRST_WAIT * 2.0 ** min(refusals - 1, 20))
+    return wait * random.uniform(0.5, 1)
+
+
 class Patience:
-    """The state of a store that may refuse, as one worker sees it; its threads share it."""
+    """The state of a store that may refuse, as one worker sees it; its threads share it.
+
+    A refusal in the worker's own loop makes all runs wait. One in the turn of a run is a doubt: it may be
+    that run's alone, such as a damaged page or a checkpoint too large for the disk, so the loop asks first.
+    """
 
     def __init__(self) -> None:
         """The store refuses nothing yet."""
         self._lock = threading.Lock()
         self._since: float | None = None
-        self._wait = self._until = 0.0
-        self._ended = -CALM_SECONDS
+        self._until, self._ended, self._refusals = 0.0, -CALM_SECONDS, 0
         self._said: dict[str, float] = {}
+        self.doubts = False
 
     @property
     def waits(self) -> bool:
@@ -41,24 +51,24 @@ class Patience:
         return max(0.0, self._until - time.monotonic())
 
     def refused(self, error: StoreError) -> None:
-        """Take note of a refusal: the next wait is longer, and the log has a line a second at most."""
+        """Take note of a refusal: the next wait is longer."""
         with self._lock:
             now = time.monotonic()
             if self._since is None:
                 self._since = now
-                self._wait = self._wait if now - self._ended < CALM_SECONDS else 0.0
-            if now >= self._until:  # refusals during a wait are of the same try
-                self._wait = min(LONGEST_WAIT, 2 * self._wait or FIRST_WAIT)
-                self._until = now + self._wait * random.uniform(0.5, 1)
-            if now - self._said.get(error.code, -SAY_EVERY) < SAY_EVERY:
-                return
-            self._said[error.code] = now
-        log.warning(
-            "store refuses; all runs wait and go on by themselves", code=error.code, why=error.message
-        )
+                self._refusals = self._refusals if now - self._ended < CALM_SECONDS else 0
+            self._refusals += 1
+            self._until = now + back_off(self._refusals)
+        self._say("store refuses; all runs wait and go on by themselves", error)
+
+    def doubted(self, error: StoreError, run: int) -> None:
+        """Take note of a refusal in the turn of one run."""
+        self.doubts = True
+        self._say("store refuses; the run waits and goes on by itself", error, run=run)
 
     def granted(self) -> None:
         """Take note of a write that the store took."""
+        self.doubts = False
         with self._lock:
             if self._since is None:
                 return
@@ -67,3 +77,12 @@ class Patience:
             often, self._ended = now - self._ended < SAY_EVERY, now
         if not often:
             log.warning(f"store is back after {seconds:.1f} s")
+
+    def _say(self, event: str, error: StoreError, **more: int) -> None:
+        """Log a refusal: a line a second at most for the same one."""
+        with self._lock:
+            now = time.monotonic()
+            if now - self._said.get(error.code, -SAY_EVERY) < SAY_EVERY:
+                return
+            self._said[error.code] = now
+        log.warning(event, code=error.code, why=error.message, **more)

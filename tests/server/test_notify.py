@@ -104,3 +104,26 @@ def test_long_folder_names_are_no_obstacle(tmp_path: Path, monkeypatch: pytest.M
         Notifier(deep, "worker").notify()
         assert notifier.wait(1)
         notifier.close()
+
+
+def test_a_folder_that_cannot_be_written_costs_the_hint_alone(tmp_path: Path) -> None:
+    """The listener waits as long as it was told to, and hears again once the folder is back."""
+    (tmp_path / "sockets").write_text("in the way")
+    listener, sender = Notifier(tmp_path, "worker"), Notifier(tmp_path, "worker")
+    assert not listener.wait(0.01)
+    sender.notify()
+    listener.wake()
+    listener.close()
+    (tmp_path / "sockets").unlink()
+    assert not listener.wait(0.01)
+    sender.notify()
+    assert listener.wait(5)
+    listener.close()
+
+
+def test_another_thread_wakes_its_own_process(tmp_path: Path) -> None:
+    listener = Notifier(tmp_path, "worker")
+    listener.listen()
+    threading.Timer(0.05, listener.wake).start()
+    assert listener.wait(5)
+    listener.close()

@@ -35,11 +35,17 @@ def test_the_wait_doubles_up_to_its_bound_with_jitter(clock: Clock) -> None:
     assert len(set(waits)) == len(waits)
 
 
-def test_refusals_during_one_wait_make_it_no_longer(clock: Clock) -> None:
+def test_the_refusal_of_one_run_makes_no_other_wait(clock: Clock) -> None:
+    """Three hundred runs may be refused at once, and the log has one line."""
     patience = Patience()
-    for _ in range(300):
-        patience.refused(BusyError())
-    assert patience.left() <= FIRST_WAIT
+    with capture_logs() as lines:
+        for run in range(300):
+            patience.doubted(BusyError(), run)
+    assert len(lines) == 1
+    assert patience.doubts
+    assert not patience.waits
+    patience.granted()
+    assert not patience.doubts
 
 
 def test_the_log_has_a_line_a_second_for_each_refusal_and_one_at_the_end(clock: Clock) -> None:
