@@ -58,6 +58,13 @@ QUEUE = [
         f"{ANSWERS}::test_same_answer_again_gets_the_same_reply",
     ),
     Mutant(
+        "the number of a deleted run or question is given again",
+        "server/identity.py",
+        "    return number + 1\n",
+        "    return None\n",
+        "tests/server/test_identity.py::test_deleted_numbers_are_never_given_again",
+    ),
+    Mutant(
         "an answer for another database is stored here",
         "server/queue/names.py",
         "if _differs(row, names) or (row.query is None and isinstance(query, str)):",

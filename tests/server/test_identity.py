@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from sqlalchemy import delete, func, select, text
+from sqlalchemy import delete, func, insert, select, text
 from sqlalchemy.exc import IntegrityError
 
 from parenting.server.db import Database
@@ -20,6 +20,9 @@ from tests.database import migrated
 from tests.server.conftest import CLIPS, Clock
 
 UUID4 = r"[0-9a-f]{8}-[0-9a-f]{4}-4[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}"
+
+MANY = 2001
+"""More questions than the migration names at a time."""
 
 
 def public_ids(db: Database) -> list[str]:
@@ -57,15 +60,16 @@ def test_ids_do_not_follow_from_numbers(db: Database, clock: Clock, tmp_path: Pa
 
 
 def test_rows_from_before_get_ids_of_their_own(db: Database, mine: Claim) -> None:
-    for tick in range(3):
-        ask(db, mine, tick)
+    row = {"run_id": mine.run_id, "kind": "preference", "maturity": 1, "clips": CLIPS, "posted": db.clock()}
+    with db.write() as session:
+        session.execute(insert(Query), [{**row, "tick": tick} for tick in range(MANY)])
     before = (database_id(db), *public_ids(db))
     downgrade(db, "0004")
     upgrade(db)
     after = (database_id(db), *public_ids(db))
     assert re.fullmatch(UUID4, after[0])
     assert all(re.fullmatch(PATTERN, one) for one in after[1:])
-    assert len(after) == 1 + 1 + 3
+    assert len(after) == 1 + 1 + MANY
     assert len({*before, *after}) == 2 * len(after), "drawn afresh: nothing follows from the rows"
 
 
