@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -81,6 +82,8 @@ class SecurityMiddleware:
             refused = self.refusal(scope["method"], Headers(scope=scope))
             answer = self.app if refused is None else JSONResponse(refused.body(), refused.status)
             await answer(scope, bounded, safely)
+        except ClientDisconnect:
+            log.debug("client left", path=scope["path"])
         except Exception:
             log.exception("request failed", path=scope["path"], method=scope["method"])
             if started:

@@ -52,6 +52,13 @@ class OurFiles(StaticFiles):
             return Response(content, headers=dict(response.headers))
         return response
 
+    def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
+        """Return the path of a file; a name that no file can have is one that is not there."""
+        try:
+            return super().lookup_path(path)
+        except (OSError, ValueError):  # too long, or with a zero byte
+            return "", None
+
     def file_response(self, full_path: Any, *more: Any, **named: Any) -> Response:
         """The file, or 304."""
         response = super().file_response(full_path, *more, **named)

@@ -23,8 +23,11 @@ class Limits:
     """From the connection, or the first byte of a later request, to the end of the head."""
     body_seconds: float = 30.0
     """From the end of the head to the end of the body. Streams send no body, so this does not end them."""
+    pause_seconds: float = 10.0
+    """Between two parts of a body."""
     unread_seconds: float = 30.0
-    """How long a client may leave a reply unread once the buffers between are full."""
+    """Once the buffers between are full, a client must read `unread_bytes` of a reply in this time."""
+    unread_bytes: int = 30 * 1024
     linger_seconds: float = 2.0
     """After a refusal: what still comes is dropped for this long, so that the client can read the reply."""
 

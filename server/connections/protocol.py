@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections import deque
 from http import HTTPStatus
 from typing import Any
 
 import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
+from parenting.server.connections.head import UnclearHeadError, check_head
 from parenting.server.connections.limits import Connections, Limits
 
 SLICE = 64 * 1024
@@ -42,6 +44,8 @@ class BoundedProtocol(HttpToolsProtocol):
         self._refused: RefusedRequestError | None = None
         self._ending = False
         self._deadline: asyncio.TimerHandle | None = None
+        self._body_end = 0.0
+        self._cycles: deque[RequestResponseCycle] = deque()  # requests without a whole reply, in their order
         self._unread: asyncio.TimerHandle | None = None
 
     # What the transport calls
@@ -60,6 +64,9 @@ class BoundedProtocol(HttpToolsProtocol):
         self.open_connections.leave(self)
         self._cancel(self._deadline)
         self._cancel(self._unread)
+        for cycle in self._cycles:  # uvicorn tells the last one only
+            cycle.disconnected = True
+            cycle.message_event.set()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -81,12 +88,22 @@ class BoundedProtocol(HttpToolsProtocol):
     def pause_writing(self) -> None:
         """Wait for a client that does not read its reply, but not for ever."""
         super().pause_writing()
-        self._unread = self.loop.call_later(self.limits.unread_seconds, self.transport.abort)
+        self._expect_reading()
 
     def resume_writing(self) -> None:
         """Go on: the client reads again."""
         super().resume_writing()
         self._cancel(self._unread)
+
+    def _expect_reading(self) -> None:
+        left = self.transport.get_write_buffer_size()
+        self._unread = self.loop.call_later(self.limits.unread_seconds, self._check_reading, left)
+
+    def _check_reading(self, left: int) -> None:
+        if self.transport.get_write_buffer_size() > left - self.limits.unread_bytes:
+            self.transport.abort()
+        else:  # a large reply on a slow line
+            self._expect_reading()
 
     # What the parser calls
 
@@ -105,11 +122,20 @@ class BoundedProtocol(HttpToolsProtocol):
 
     def on_headers_complete(self) -> None:
         """Check the head and start the application."""
-        if sum(name == b"host" for name, _ in self.headers) > 1:
-            self._stop(RefusedRequestError(400, "invalid", "A request has one Host header."))
+        try:
+            check_head(self.parser.get_method(), self.url, self.parser.get_http_version(), self.headers)
+        except UnclearHeadError as error:
+            self._stop(RefusedRequestError(400, "invalid", str(error)))
         self._in_head, self._in_body, self._head_bytes = False, True, 0
-        self._set_deadline(self.limits.body_seconds)
+        self._set_deadline(self.limits.pause_seconds)
         super().on_headers_complete()
+        self._cycles.append(self.cycle)
+        self._body_end = self.loop.time() + self.limits.body_seconds
+
+    def on_body(self, body: bytes) -> None:
+        """Take a part of a body: the next one must come soon, and the last one within the deadline."""
+        super().on_body(body)
+        self._set_deadline(min(self.limits.pause_seconds, self._body_end - self.loop.time()))
 
     def on_message_complete(self) -> None:
         """End the body."""
@@ -120,6 +146,7 @@ class BoundedProtocol(HttpToolsProtocol):
 
     def on_response_complete(self) -> None:
         """Go on with the next request, unless the reply came before the body: then the rest is not read."""
+        self._cycles.popleft()
         self.open_connections.touch(self)
         if self._in_body and not self.pipeline and not self.transport.is_closing():
             self._linger()

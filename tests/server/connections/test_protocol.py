@@ -21,7 +21,7 @@ GET = b"GET / HTTP/1.1\r\nHost: localhost\r\n"
 
 
 async def application(scope: Scope, receive: Receive, send: Send) -> None:
-    """`/stream` sends for a second, `/large` sends 50 MB, `/early` replies before the body; others echo."""
+    """Paths send for a second, 50 MB in parts, 20 MB at once, or before the body; others echo."""
     body, path = b"", scope["path"]
     while path != "/early":
         message = await receive()
@@ -30,6 +30,7 @@ async def application(scope: Scope, receive: Receive, send: Send) -> None:
         body += message.get("body", b"")
         if not message.get("more_body"):
             break
+    body = b"x" * 20_000_000 if path == "/whole" else body
     part, times = {"/large": (b"x" * 65_536, 800), "/stream": (b"x", 10)}.get(path, (b"", 0))
     await send({"type": "http.response.start", "status": 200, "headers": []})
     for _ in range(times):
@@ -148,8 +149,20 @@ def test_fifty_megabytes_of_head_are_not_read(connect: Callable[[], socket.socke
         GET + b"Content-Length: 4\r\nContent-Length: 5\r\n\r\nxxxxx",
         GET + b"X : space before the colon\r\n\r\n",
         b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nnonsense\r\n",
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"GET http://evil.example/ HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        b"GET http://user@localhost/ HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        b"CONNECT localhost:80 HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        b"GET * HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        GET.replace(b"/ ", b"/\xff ") + b"\r\n",
+        GET + b"Transfer-Encoding: chunked\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+        GET + b"Transfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n",
+        GET + b"Transfer-Encoding: xchunked\r\n\r\n0\r\n\r\n",
+        GET.replace(b"1.1", b"1.0") + b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+        GET + b"Content-Length: 4\r\nContent-Length: 4\r\n\r\nxxxx",
+        GET + b"Content-Length: +4\r\n\r\nxxxx",
+        GET + b"X: 1\r\n folded\r\n\r\n",
     ],
-    ids=["two hosts", "nonsense", "two lengths", "two content-lengths", "a space", "a chunk"],
 )
 def test_request_that_can_be_read_in_two_ways_is_refused(
     connect: Callable[[], socket.socket], request_: bytes
@@ -170,6 +183,28 @@ def test_dripping_sender_is_cut_off_all_the_same(connect: Callable[[], socket.so
     with closing(connect()) as client:
         client.sendall(GET)
         assert sent_until_cut_off(client, b"X: 1\r\n", times=90, pause=0.05) < 90
+
+
+def test_name_in_the_target_is_taken_where_it_is_the_host(connect: Callable[[], socket.socket]) -> None:
+    head = GET.replace(b"GET /", b"GET http://localhost/") + b"Connection: close\r\n\r\n"
+    assert asked(connect, head).endswith(FINE)
+
+
+def test_body_that_pauses_is_cut_off_before_its_deadline() -> None:
+    with serving(replace(SHORT, body_seconds=60, pause_seconds=0.2)) as connect:
+        reply = asked(connect, GET.replace(b"GET", b"POST") + b"Content-Length: 9\r\n\r\nxxx")
+        assert status(reply) == 408
+
+
+def test_large_reply_on_a_slow_line_comes_whole() -> None:
+    with serving(replace(SHORT, unread_seconds=0.4, unread_bytes=1)) as connect, closing(connect()) as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65_536)
+        client.sendall(b"GET /whole HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+        read = 0
+        while part := client.recv(1_000_000):
+            read += len(part)
+            time.sleep(0.005)
+        assert read > 20_000_000
 
 
 def test_silent_connection_is_closed(connect: Callable[[], socket.socket]) -> None:
