@@ -23,7 +23,6 @@ from parenting.server.pages.stages import StageRow, stage_rows
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, run_title
 from parenting.server.reads.metrics import first_metrics, latest_metrics, sampled_metrics
 from parenting.server.reads.schemas import run_schema
-from parenting.server.security import policy
 from parenting.server.statuses import RunState
 from parenting.server.tables import Metric, Run
 
@@ -117,8 +116,6 @@ def dashboard_page(
 ) -> Response:
     """The page; where a form was wrong, with what was typed and an error next to each wrong field (422).
 
-    Its styles may be inline, since Plotly writes them so; its scripts may not.
-
     Raises:
         NotFound: there is no such run.
     """
@@ -127,7 +124,6 @@ def dashboard_page(
     context = DashboardPage(run, run_title(run), state, describe_start(run), errors, focus)
     parts = {**vars(context), **vars(_numbers(db, run)), **vars(_operator(db, run, typed))}
     response = page("dashboard.html", 422 if errors else 200, **parts)
-    response.headers["Content-Security-Policy"] = policy(inline_styles=True)
     return response
 
 
