@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.text import Text
+from sqlalchemy import make_url
 
 from parenting.commands.errors import exit_on_interrupt, friendly_errors, settings
 from parenting.server.doctor.examination import examine
 from parenting.server.doctor.findings import Finding, State, worst
+from parenting.server.errors import SetupError
+from parenting.server.settings import Settings
+from parenting.server.store import high_water
 
 EXIT_CODES = {State.OK: 0, State.WARNING: 1, State.ERROR: 2}
 STYLES = {State.OK: "green", State.WARNING: "yellow", State.ERROR: "red"}
@@ -21,24 +26,45 @@ def doctor(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the findings as JSON and nothing else.")
     ] = False,
+    accept: Annotated[
+        bool,
+        typer.Option(
+            "--accept",
+            help="First accept a loss: what the database holds now counts as all that it ever held.",
+        ),
+    ] = False,
 ) -> None:
     """Examine the installation, the data folder and the database, and name a remedy for each fault.
 
-    It changes nothing, and it works where the database is missing, damaged, locked or away.
+    Without --accept it changes nothing, and it works where the database is missing, damaged, locked or away.
 
     Exit codes: 0 all is well; 1 there are warnings; 2 there are errors; 130 stopped by Ctrl-C.
 
     Example: parenting doctor
     """
     with exit_on_interrupt(), friendly_errors():
-        found = []
-        for finding in examine(settings()):
+        chosen, found = settings(), []
+        if accept:
+            _accept(chosen)
+        for finding in examine(chosen):
             found.append(finding)
             if not as_json:
                 _show(finding)
     if as_json:
         typer.echo(json.dumps([finding.row() for finding in found]))
     raise typer.Exit(EXIT_CODES[worst(found)])
+
+
+def _accept(chosen: Settings) -> None:
+    """Reset the high-water mark of the database.
+
+    Raises:
+        SetupError: the database is damaged, or is not a file.
+    """
+    url = make_url(chosen.url)
+    if url.get_backend_name() != "sqlite":
+        raise SetupError("--accept is for SQLite: a PostgreSQL database has no mark beside it.")
+    high_water.accept(Path(str(url.database)))
 
 
 def _show(finding: Finding) -> None:

@@ -27,6 +27,7 @@ from parenting.server.db import connect
 from parenting.server.lifeline import follow
 from parenting.server.serve import bind
 from parenting.server.settings import Settings
+from parenting.server.store.private import make_files_private
 
 
 def up(
@@ -42,6 +43,7 @@ def up(
     Example: parenting up --port 0 --no-browser
     """
     follow()
+    make_files_private()
     with friendly_errors():
         chosen = settings(port=port)
         listener = bind(chosen.host, chosen.port, chosen.container)

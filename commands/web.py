@@ -10,6 +10,7 @@ import typer
 from parenting.commands.errors import friendly_errors, settings
 from parenting.server.lifeline import follow
 from parenting.server.serve import bind, make_server
+from parenting.server.store.private import make_files_private
 
 Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a free one.", show_default="8765")]
 
@@ -28,6 +29,7 @@ def web(
     Example: parenting web --port 8000
     """
     follow()
+    make_files_private()
     with friendly_errors():
         chosen = settings(port=port, host=host)
         server = make_server(chosen)

@@ -13,6 +13,7 @@ from parenting.server.lifeline import follow
 from parenting.server.log import set_up_log
 from parenting.server.migrate import require_current
 from parenting.server.settings import Settings
+from parenting.server.store.private import make_files_private
 from parenting.server.workers import SILENT_SECONDS, alive
 
 
@@ -33,6 +34,7 @@ def worker(
     if check:
         raise typer.Exit(_check())
     follow()
+    make_files_private()
     with friendly_errors():
         chosen = settings()
         set_up_log(chosen, "worker")

@@ -14,6 +14,7 @@ from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
+from pathlib import Path
 from typing import Any, TypeVar
 
 from sqlalchemy import Engine, PoolProxiedConnection, make_url
@@ -24,6 +25,7 @@ from parenting.server.columns import loads
 from parenting.server.errors import BusyError, SetupError, StoreError
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql, sqlite
+from parenting.server.store.ballast import Ballast
 from parenting.server.store.clock import Marks, boot_mark, server_mark
 from parenting.server.store.guard import confirm
 from parenting.server.store.patience import remaining
@@ -64,6 +66,7 @@ class Database:
         self._watcher: PoolProxiedConnection | None = None
         self._last: tuple[int | str, Hashable, Any] | None = None
         self._refused: tuple[StoreError, float] | None = None
+        self._ballast: Ballast | None = None
 
     @contextmanager
     def read(self) -> Iterator[Session]:
@@ -90,6 +93,8 @@ class Database:
                 yield session
         except StoreError as error:
             self._refused = (error, time.monotonic())
+            if self._ballast is not None:
+                self._ballast.heed(error)
             raise
         self._refused = None
 
@@ -147,8 +152,16 @@ class Database:
                 watcher.invalidate()
                 raise
 
+    def keep_ballast(self) -> None:
+        """Keep some disk space beside a SQLite file for the day when the disk is full."""
+        if self._sqlite:
+            self._ballast = Ballast(Path(str(self.engine.url.database)))
+            self._ballast.keep()
+
     def close(self) -> None:
         """Close every connection."""
+        if self._ballast is not None:
+            self._ballast.close()
         if self._watcher is not None:
             self._watcher.close()
             self._watcher = None

@@ -69,8 +69,11 @@ def make_server(settings: Settings) -> Server:
         SetupError: the database cannot be used as it is.
     """
     set_up_log(settings, "web")
+    app = create_app(settings)
+    if settings.ballast:
+        app.state.db.keep_ballast()
     config = uvicorn.Config(
-        create_app(settings),
+        app,
         http=bounded(_limits(settings)),
         ws="none",
         log_config=None,

@@ -69,6 +69,9 @@ class Settings(BaseSettings):
         ge=1,
         description="Connections of one address at once; loopback, where a proxy stands, has no such limit.",
     )
+    ballast: bool = Field(
+        True, description="Keep 8 MB of disk space beside a SQLite database, for when the disk is full."
+    )
     log_level: str = Field("warning", description="debug, info, warning or error.")
     log_format: Literal["text", "json"] = Field("text", description="text for people, or json, a line each.")
     log_folder: Path | None = Field(

@@ -218,6 +218,8 @@ def main(settings: Settings) -> int:
     signal.signal(signal.SIGTERM, worker.stop)
     signal.signal(signal.SIGINT, worker.stop)
     worker.patient(partial(require_current, worker.db))
+    if settings.ballast:
+        worker.db.keep_ballast()
     gc.freeze()  # loaded modules stay: searching them for garbage takes a tenth of a second
     failed: list[BaseException] = []
     loop = threading.Thread(target=_keep, args=(worker.work, worker.told, failed), name="worker", daemon=True)

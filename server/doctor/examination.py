@@ -38,6 +38,10 @@ def _sqlite(settings: Settings, url: URL) -> Iterator[Finding]:
     yield from guarded("file system", partial(files.file_system, place))
     yield from guarded("space", partial(files.space, place, database))
     yield from guarded("backups", partial(files.backups, place))
+    lost = list(guarded("mark", partial(files.losses, database)))
+    yield from lost
+    if any(one.state == "error" for one in lost):
+        return
     if not database.is_file():
         remedy = "parenting up makes one; parenting restore FILE brings a backup back."
         yield error("database", f"there is none at {database}", remedy)

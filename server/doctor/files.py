@@ -13,6 +13,7 @@ from typing import Any
 from parenting.server.backups.making import FOLDER
 from parenting.server.backups.whole import size
 from parenting.server.doctor.findings import Finding, error, ok, warning
+from parenting.server.store import high_water
 from parenting.server.store.file_system import UNKNOWN, is_network, kind_of
 from parenting.server.store.sqlite import sqlite_module
 
@@ -69,6 +70,17 @@ def space(place: Path, database: Path | None) -> Iterator[Finding]:
         yield ok("space", said)
 
 
+def losses(database: Path) -> Iterator[Finding]:
+    """Compare the database with its high-water mark, before anything opens it."""
+    name = "mark"
+    if (foreign := high_water.foreign_log(database) if database.exists() else None) is not None:
+        yield error(name, *_halves(foreign))
+    elif (lost := high_water.lost(database)) is not None:
+        yield error(name, *_halves(lost))
+    else:
+        yield ok(name, "the database lacks nothing that it held at its last durable commit")
+
+
 def soundness(database: Path) -> Iterator[Finding]:
     """Read the database's file from end to end by SQLite's quick check; say how its journal is kept."""
     with closing(opened(database)) as connection:
@@ -100,6 +112,12 @@ def opened(database: Path) -> Any:
     mode = "mode=ro" if Path(f"{database}-wal").exists() else "immutable=1"
     address = f"{database.absolute().as_uri()}?{mode}"
     return sqlite_module().connect(address, uri=True, timeout=PATIENCE, check_same_thread=False)
+
+
+def _halves(sentences: str) -> tuple[str, str]:
+    """Divide a message into what happened and the remedy, which is its last sentence."""
+    said, _, remedy = sentences.rstrip(".").rpartition(". ")
+    return said, f"{remedy}."
 
 
 def _others(path: Path) -> bool:

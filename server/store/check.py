@@ -15,6 +15,7 @@ from typing import Any
 from parenting.server.errors import SetupError
 from parenting.server.store import high_water
 from parenting.server.store.driver import can_write, is_busy, open_file, sqlite_module
+from parenting.server.store.file_system import is_network, kind_of
 from parenting.server.store.held import log_of
 
 WHOLE_BYTES = 64 * 1024 * 1024
@@ -38,6 +39,8 @@ def require_usable(database: Path, reading: bool = False) -> None:
         raise SetupError(
             f"{database} is a folder, but the database is a file. Name another one: PARENTING_DATA."
         )
+    if not reading:
+        _require_local(database)
     if database.exists():
         _require_access(database, reading)
         if (sentence := high_water.foreign_log(database)) is not None:
@@ -98,6 +101,16 @@ def _lost(database: Path) -> str | None:
         if is_busy(error):
             return None
         raise _damaged(database, str(error)) from None
+
+
+def _require_local(database: Path) -> None:
+    """Refuse a network file system, whose locks do not hold."""
+    kind = kind_of(database.parent)
+    if is_network(kind):
+        raise SetupError(
+            f"{database} is on {kind}, a file system that other machines write to as well. SQLite would lose "
+            "answers there. Set PARENTING_DATA to a folder of a local disk."
+        )
 
 
 def _require_access(database: Path, reading: bool) -> None:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from parenting.server.errors import SetupError
 from parenting.server.store.driver import open_file, sqlite_module
 from parenting.server.store.held import Held, hold, log_of
 
@@ -156,10 +157,15 @@ def accept(database: Path) -> None:
     """Take what a database holds now as all that it ever held. After this no loss is reported any more.
 
     Raises:
-        OSError: the mark cannot be removed.
+        SetupError: the database is damaged, or the mark cannot be removed.
     """
-    found = counted(database) if database.exists() else None
-    mark_of(database).unlink(missing_ok=True)
+    try:
+        found = counted(database) if database.exists() and database.stat().st_size else None
+        mark_of(database).unlink(missing_ok=True)
+    except (OSError, sqlite_module().Error) as error:
+        raise SetupError(
+            f"{database} cannot be accepted: {error}. Put a backup in its place: `parenting restore`."
+        ) from None
     if found is not None:
         write(database, hold(database), found)
 

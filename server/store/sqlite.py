@@ -20,6 +20,7 @@ from parenting.server.store.check import require_usable
 from parenting.server.store.driver import BUSY_SECONDS, can_write, open_file, sqlite_module
 from parenting.server.store.guard import Guard, look
 from parenting.server.store.patience import remaining
+from parenting.server.store.private import close_to_others
 
 __all__ = ["BUSY_SECONDS", "PRAGMAS", "data_version", "make_folder", "open_engine", "sqlite_module"]
 
@@ -48,6 +49,8 @@ def open_engine(url: URL, reading: bool = False, **options: Any) -> Engine:
     module = sqlite_module()
     require_usable(path, reading)
     only = reading and not can_write(path)
+    if not reading:
+        close_to_others(path)
     engine = create_engine(
         url,
         module=module,

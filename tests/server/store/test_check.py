@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,9 +19,10 @@ from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim
 from parenting.server.settings import Settings
-from parenting.server.store import check
+from parenting.server.store import check, high_water
 from parenting.server.store.check import require_usable
 from parenting.server.store.driver import sqlite_module
+from parenting.server.store.held import hold
 from tests.lengths import length
 from tests.server.conftest import CLIPS
 
@@ -208,3 +210,31 @@ def test_read_only_copy_is_refused_for_writing_and_with_a_log(readable: Path, fi
     (readable / "parenting.db-wal").write_bytes(b"frames")
     code, output = as_nobody(readable, "runs")
     assert (code, "Copy both into a folder" in output) == (2, True), output
+
+
+@pytest.mark.parametrize(("kind", "refused"), [("nfs4", True), ("fuse.sshfs", True), ("ext4", False)])
+def test_network_file_system_is_refused(
+    file: Path, kind: str, refused: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(check, "kind_of", lambda _folder: kind)
+    if not refused:
+        require_usable(file)
+        return
+    with pytest.raises(SetupError, match=rf"is on {kind}.*PARENTING_DATA"):
+        require_usable(file)
+    require_usable(file, reading=True)
+
+
+def test_doctor_says_what_is_lost_and_accepts_it(file: Path, settings: Settings) -> None:
+    counts = high_water.counted(file)
+    assert counts is not None
+    high_water.write(file, hold(file), replace(counts, answers=9))
+    environment = {"PARENTING_DATA": str(file.parent)}
+    said = CliRunner().invoke(app, ["doctor"], env=environment)
+    assert said.exit_code == 2
+    assert "lacks the last 3 answers" in said.output
+    assert "doctor --accept" in said.output
+    accepted = CliRunner().invoke(app, ["doctor", "--accept"], env=environment)
+    assert accepted.exit_code != 2, accepted.output
+    assert "lacks nothing" in accepted.output
+    connect(settings).close()
