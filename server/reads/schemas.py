@@ -32,6 +32,7 @@ from parenting.server.schemas import (
 )
 from parenting.server.statuses import OVER, RunState, RunStatus, Waiting
 from parenting.server.store.clock import Mark
+from parenting.server.store.patience import patience
 from parenting.server.tables import Answer, Metric, Query, Run
 from parenting.server.workers import alive
 
@@ -40,6 +41,11 @@ Sign = Literal["alive", "silent", "done"]
 SILENT_AFTER = timedelta(seconds=5)
 """A run counts as not raised once its worker has been silent for this long. One that no worker has
 claimed yet, as a run that was just started, is not raised if no worker is alive at all."""
+
+FORGIVEN = timedelta(minutes=5)
+"""For so long at most a missing sign is put down to a store that refuses."""
+PROBE_SECONDS = 0.1
+"""How long a look at a run waits to learn whether the store takes signs of life at all."""
 
 
 def run_schema(db: Database, run_id: int) -> RunSchema:
@@ -52,7 +58,7 @@ def run_schema(db: Database, run_id: int) -> RunSchema:
         run, opened, here = find(session, run_id), open_in(session, run_id), database_id_in(session)
         now = db.mark(session)
     with reading(run):
-        return _run_schema(run, opened, _worker(run, now, _taken_soon(db, [run])), here)
+        return _run_schema(run, opened, _workers(db, [run], now)[run.id], here)
 
 
 def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema | DamagedSchema]:
@@ -61,11 +67,11 @@ def run_schemas(db: Database, runs: Sequence[Run]) -> list[RunSchema | DamagedSc
         opened, here = open_by_run(session, [run.id for run in runs]), database_id_in(session)
         now = db.mark(session)
     faults = {run.id: damage(run) for run in runs}
-    soon = _taken_soon(db, [run for run in runs if faults[run.id] is None])
+    workers = _workers(db, [run for run in runs if faults[run.id] is None], now)
     return [
         DamagedSchema(id=run.id, damaged=fault)
         if (fault := faults[run.id]) is not None
-        else _run_schema(run, opened[run.id], _worker(run, now, soon), here)
+        else _run_schema(run, opened[run.id], workers[run.id], here)
         for run in runs
     ]
 
@@ -177,6 +183,19 @@ def _run_state(run: Run, opened: Open, resting: bool, worker: Sign) -> RunState:
     return RunState.STUCK if run.waiting is Waiting.STUCK else RunState.EXPLORING
 
 
+def _workers(db: Database, runs: Sequence[Run], now: Mark) -> dict[int, Sign]:
+    """Return the sign of each run's worker. While the store takes no sign, none is missed."""
+    soon = _taken_soon(db, runs)
+    signs = {run.id: _worker(run, now, soon) for run in runs}
+    missed = [run.id for run in runs if signs[run.id] == "silent" and _signed(run, now, FORGIVEN)]
+    if missed:
+        with patience(PROBE_SECONDS):
+            refusal = db.refusal()
+        if refusal is not None:
+            signs.update(dict.fromkeys(missed, "alive"))
+    return signs
+
+
 def _taken_soon(db: Database, runs: Sequence[Run]) -> bool:
     """Return whether a worker is alive that claims the runs which no worker has yet, as a new run's."""
     unclaimed = any(run.worker is None and run.status not in OVER for run in runs)
@@ -188,5 +207,8 @@ def _worker(run: Run, now: Mark, taken_soon: bool) -> Sign:
         return "done"
     if run.worker is None:
         return "alive" if taken_soon else "silent"
-    signed = now.is_recent(run.claim_epoch, run.claim_mark, SILENT_AFTER.total_seconds())
-    return "alive" if signed else "silent"
+    return "alive" if _signed(run, now, SILENT_AFTER) else "silent"
+
+
+def _signed(run: Run, now: Mark, within: timedelta) -> bool:
+    return now.is_recent(run.claim_epoch, run.claim_mark, within.total_seconds())

@@ -41,7 +41,8 @@ class HeldRuns:
         """Give one run its turn, and return when the next is due. A store error never fails a run."""
         try:
             due = self._tried(run_id, seen)
-            self._refusals.pop(run_id, None)
+            if self._refusals.pop(run_id, None):
+                self._patience.dispelled()
             return due
         except LostClaimError as error:
             log.warning("run lost", run=run_id, reason=error.message)

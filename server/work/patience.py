@@ -36,7 +36,8 @@ class Patience:
     def __init__(self) -> None:
         """The store refuses nothing yet."""
         self._lock = threading.Lock()
-        self._since: float | None = None
+        self._since: float | None = None  # when the loop was refused first
+        self._first: float | None = None  # when a run was
         self._until, self._ended, self._refusals = 0.0, -CALM_SECONDS, 0
         self._said: dict[str, float] = {}
         self.doubts = False
@@ -64,19 +65,31 @@ class Patience:
     def doubted(self, error: StoreError, run: int) -> None:
         """Take note of a refusal in the turn of one run."""
         self.doubts = True
+        with self._lock:
+            self._first = self._first or time.monotonic()
         self._say("store refuses; the run waits and goes on by itself", error, run=run)
 
     def granted(self) -> None:
-        """Take note of a write that the store took."""
+        """Take note of a write of the worker's own loop that the store took."""
         self.doubts = False
+        if self.waits:
+            self._back()
+
+    def dispelled(self) -> None:
+        """Take note of a turn that the store let pass, of a run that it refused before."""
+        if self._first is not None and not self.waits:
+            self._back()
+
+    def _back(self) -> None:
         with self._lock:
-            if self._since is None:
-                return
-            now = time.monotonic()
-            seconds, self._since, self._until = now - self._since, None, 0.0
+            begun = [since for since in (self._since, self._first) if since is not None]
+            if not begun:
+                return  # another thread has noted it
+            now, began = time.monotonic(), min(begun)
+            self._since, self._first, self._until = None, None, 0.0
             often, self._ended = now - self._ended < SAY_EVERY, now
         if not often:
-            log.warning(f"store is back after {seconds:.1f} s")
+            log.warning(f"store is back after {now - began:.1f} s")
 
     def _say(self, event: str, error: StoreError, **more: int) -> None:
         """Log a refusal: a line a second at most for the same one."""

@@ -10,11 +10,13 @@ from sqlalchemy.exc import IntegrityError
 
 from parenting.server import runs, workers
 from parenting.server.db import Database
+from parenting.server.errors import BusyError
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
-from parenting.server.reads.schemas import SILENT_AFTER, run_schema
+from parenting.server.reads.schemas import FORGIVEN, SILENT_AFTER, run_schema, run_schemas
 from parenting.server.runs import Claim
+from parenting.server.schemas import RunSchema
 from parenting.server.statuses import (
     QUERY_STATUSES,
     RUN_STATES,
@@ -102,3 +104,18 @@ def test_a_living_worker_does_not_hide_that_the_one_of_a_run_is_silent(
     clock.pass_seconds(SILENT_AFTER.total_seconds() + 1)
     workers.sign(db, "somebody else")
     assert run_schema(db, mine.run_id).worker == "silent"
+
+
+def test_a_worker_that_cannot_sign_is_not_missed(
+    db: Database, mine: Claim, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While the store refuses, and for five minutes at most: a copy that nobody may write has no worker."""
+    clock.pass_seconds(SILENT_AFTER.total_seconds() + 1)
+    assert state(db, mine.run_id) is RunState.NO_WORKER
+    monkeypatch.setattr(db, "refusal", BusyError)
+    assert state(db, mine.run_id) is RunState.EXPLORING
+    (listed,) = run_schemas(db, [runs.get_run(db, mine.run_id)])
+    assert isinstance(listed, RunSchema)
+    assert listed.state is RunState.EXPLORING
+    clock.pass_seconds(FORGIVEN.total_seconds())
+    assert state(db, mine.run_id) is RunState.NO_WORKER

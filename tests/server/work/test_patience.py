@@ -48,6 +48,18 @@ def test_the_refusal_of_one_run_makes_no_other_wait(clock: Clock) -> None:
     assert not patience.doubts
 
 
+def test_the_end_of_refusals_of_runs_has_one_line(clock: Clock) -> None:
+    patience = Patience()
+    with capture_logs() as lines:
+        for run in range(300):
+            patience.doubted(BusyError(), run)
+        clock.now += 2.5
+        patience.granted()  # the loop's own writes pass, and the runs are not asked yet
+        for _ in range(300):
+            patience.dispelled()
+    assert [line["event"] for line in lines][1:] == ["store is back after 2.5 s"]
+
+
 def test_the_log_has_a_line_a_second_for_each_refusal_and_one_at_the_end(clock: Clock) -> None:
     patience = Patience()
     with capture_logs() as lines:
