@@ -38,9 +38,9 @@ def _sqlite(settings: Settings, url: URL) -> Iterator[Finding]:
     yield from guarded("file system", partial(files.file_system, place))
     yield from guarded("space", partial(files.space, place, database))
     yield from guarded("backups", partial(files.backups, place))
-    lost = list(guarded("mark", partial(files.losses, database)))
-    yield from lost
-    if any(one.state == "error" for one in lost):
+    unusable = list(guarded("mark", partial(files.beside, database)))
+    yield from unusable
+    if unusable:
         return
     if not database.is_file():
         remedy = "parenting up makes one; parenting restore FILE brings a backup back."
@@ -49,6 +49,7 @@ def _sqlite(settings: Settings, url: URL) -> Iterator[Finding]:
     found = list(guarded("database", partial(files.soundness, database)))
     yield from found
     if any(one.name == "journal" for one in found):
+        yield from guarded("mark", partial(files.losses, database))
         yield from _tables(_reading(database))
 
 

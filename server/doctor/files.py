@@ -70,15 +70,22 @@ def space(place: Path, database: Path | None) -> Iterator[Finding]:
         yield ok("space", said)
 
 
+def beside(database: Path) -> Iterator[Finding]:
+    """Look for a log of another file, and for a mark without a database, before anything is opened."""
+    if database.is_file():
+        foreign = high_water.foreign_log(database)
+        if foreign is not None:
+            yield error("mark", *_halves(foreign))
+    elif not database.exists() and (lost := high_water.lost(database)) is not None:
+        yield error("mark", *_halves(lost))
+
+
 def losses(database: Path) -> Iterator[Finding]:
-    """Compare the database with its high-water mark, before anything opens it."""
-    name = "mark"
-    if (foreign := high_water.foreign_log(database) if database.exists() else None) is not None:
-        yield error(name, *_halves(foreign))
-    elif (lost := high_water.lost(database)) is not None:
-        yield error(name, *_halves(lost))
+    """Compare a sound database with its high-water mark."""
+    if (lost := high_water.lost(database)) is not None:
+        yield error("mark", *_halves(lost))
     else:
-        yield ok(name, "the database lacks nothing that it held at its last durable commit")
+        yield ok("mark", "the database lacks nothing that it held at its last durable commit")
 
 
 def soundness(database: Path) -> Iterator[Finding]:

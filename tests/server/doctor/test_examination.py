@@ -68,7 +68,7 @@ def test_all_is_well_where_it_is_and_nothing_is_changed(settings: Settings, db: 
     assert (code, states(found)) == (0, {})
     assert snapshot(settings.data) == before
     expected = ["settings", "versions", "limits", "weights", "sqlite", "permissions", "file system", "space"]
-    expected += ["backups", "database", "journal", "migrations", "clock", "worker", "stored weights"]
+    expected += ["backups", "database", "journal", "mark", "migrations", "clock", "worker", "stored weights"]
     assert list(found) == expected
     db.close()
     before = snapshot(settings.data)
@@ -185,7 +185,7 @@ def test_little_space_few_files_and_an_old_sqlite_are_told(
     monkeypatch.setattr("parenting.server.doctor.machine.resource.getrlimit", lambda _: (1024, 1024))
     found = examined()[1]
     assert (found["space"]["state"], found["limits"]["state"]) == ("error", "warning")
-    monkeypatch.setattr("parenting.server.store.sqlite.importlib.import_module", lambda _: Old())
+    monkeypatch.setattr("parenting.server.store.driver.importlib.import_module", lambda _: Old())
     found = examined()[1]
     assert "3.40.1 can corrupt a database" in found["sqlite"]["said"]
     assert found["database"]["state"] == "error"
