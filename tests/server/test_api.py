@@ -119,7 +119,7 @@ def test_each_wrong_field_gets_its_message(
 def test_list_runs(client: httpx2.Client) -> None:
     first, second = start(client).json(), start(client).json()
     listed = client.get("/api/v1/runs").json()
-    assert listed == {"rows": [second, first], "next": None}
+    assert listed == {"rows": [second, first], "next": None, "database": first["database"]}
     assert client.get(f"/api/v1/runs/{first['id']}").json() == first
 
 
