@@ -51,7 +51,7 @@ def require_usable(database: Path, reading: bool = False) -> None:
 
 
 def require_sound(database: Path) -> None:
-    """Refuse a file that is no SQLite database or is damaged.
+    """Refuse a file that is damaged or not an SQLite database.
 
     An empty file is a database without tables only where nothing was ever in it.
 
@@ -73,7 +73,8 @@ def require_sound(database: Path) -> None:
             return  # in use, so others can read it
         if getattr(error, "sqlite_errorname", "") == "SQLITE_NOTADB":
             raise SetupError(
-                f"{database} is damaged or the file of another program: it is no SQLite database. {REMEDY}"
+                f"{database} is damaged or the file of another program: it is not an SQLite database. "
+                f"{REMEDY}"
             ) from None
         raise _damaged(database, str(error)) from None
     if faults:

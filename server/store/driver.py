@@ -49,7 +49,7 @@ def open_file(database: Path) -> Any:
     It never writes a leftover log back into the file, which may be damaged.
 
     Raises:
-        sqlite3.Error: it is no database, or cannot be opened.
+        sqlite3.Error: it is not a database, or cannot be opened.
     """
     sqlite = sqlite_module()
     for mode in _modes(database):

@@ -33,11 +33,13 @@ class Guard:
         self.path = path
         self._held: Held | None = None  # what this process has been using
         self._counts: Counts | None = None
+        self._open: set[int] = set()  # the connections, by their ids
 
     def watch(self, engine: Engine) -> None:
         """Look at every connection and transaction of an engine."""
         event.listen(engine, "do_connect", self._opening)
         event.listen(engine, "connect", self._opened)
+        event.listen(engine, "close", lambda connection, _record: self._open.discard(id(connection)))
         event.listen(engine, "checkout", self._out)
         event.listen(engine, "begin", self._begun)
         event.listen(engine, "commit", self._committing)
@@ -45,15 +47,17 @@ class Guard:
     def _opening(self, _dialect: Any, _record: Any, _args: Any, _options: Any) -> None:
         """Make the file if it is new, and refuse one that came in place of what was in use."""
         there = node(self.path)
-        if self._held is None or there == self._held.file:
+        if self._open and self._held is not None and there == self._held.file:
+            self._held.look()  # a new log beside the one that is still open would be read for it
+        elif self._held is None or there == self._held.file:
             if there is None:
                 # SQLite gives the log the mode of the file. A file that came meanwhile is as good.
                 with suppress(OSError):
                     os.close(os.open(self.path, os.O_CREAT | os.O_EXCL | os.O_RDWR | os.O_CLOEXEC, 0o600))
-            return
-        if there is None or self._held.left_behind() or not self._is_same():
+        elif there is None or self._held.left_behind() or not self._is_same():
             self._held.look()
-        self._held = None
+        else:
+            self._held = None
 
     def _opened(self, connection: Any, record: Any) -> None:
         connection.execute("SELECT 1 FROM sqlite_schema").fetchall()  # opens the log
@@ -62,10 +66,11 @@ class Guard:
             raise GoneError
         self._held = held
         record.info[GUARD], record.info[HELD] = self, held
+        self._open.add(id(connection))
         self._counts = self._counts or high_water.count(connection.execute)
 
     def _out(self, _connection: Any, record: Any, _proxy: Any) -> None:
-        """Have all connections opened anew where another file is at the path."""
+        """Have all connections opened again where another file is at the path."""
         with suppress(GoneError):
             try:
                 record.info[HELD].look()

@@ -59,7 +59,8 @@ class Held:
         if self.log is not None and node(log_of(self.path)) != self.log:
             raise GoneError(
                 f"The log {log_of(self.path)} was removed or replaced while Parenting was running. {AGAIN} "
-                "Put it back; if it is lost, restart Parenting, which says what the database lacks."
+                "Put it back. If it is lost, stop Parenting by Ctrl-C or SIGTERM: the last process to end "
+                "writes the log that it has open into the database."
             )
 
 

@@ -114,7 +114,7 @@ def lost(database: Path) -> str | None:
     except FileNotFoundError:
         return (
             f"The database {database} is missing: it held {_listed(vars(mark.counts))}. Put it back, restore "
-            f"a backup (`parenting restore`), or begin anew: `parenting doctor --accept`."
+            f"a backup (`parenting restore`), or begin with an empty one: `parenting doctor --accept`."
         )
     if inode != mark.inode:
         return None

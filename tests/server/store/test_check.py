@@ -77,12 +77,12 @@ def test_random_bytes_are_refused(file: Path, size: int) -> None:
 @pytest.mark.torture
 def test_flipped_bits_are_a_sentence_or_the_rows_own(file: Path) -> None:
     """Each flip is refused at the start, or leaves a file in which everything can be read or said."""
-    whole, dice, refused = file.read_bytes(), random.Random(7), 0
+    whole, rng, refused = file.read_bytes(), random.Random(7), 0
     flips = length(60, 5000)
     for _ in range(flips):
-        place = dice.randrange(len(whole))
+        place = rng.randrange(len(whole))
         flipped = bytearray(whole)
-        flipped[place] ^= 1 << dice.randrange(8)
+        flipped[place] ^= 1 << rng.randrange(8)
         file.write_bytes(flipped)
         try:
             opened(file)

@@ -173,3 +173,21 @@ def test_copy_with_all_that_was_told_is_taken_and_kept_in(
     fresh = connect_again(db)
     assert numbers(fresh) == [1, *told], "also after all connections were closed"
     fresh.close()
+
+
+def test_log_that_is_lost_is_written_back_by_a_stop_in_order(
+    db: Database, mine: Claim, guidance: int, settings: Settings
+) -> None:
+    assert answer(db, guidance, "left", "a", "human").number == 1
+    query = post_query(db, mine, 9, "guidance", 1, CLIPS)
+    Path(f"{file_of(db)}-wal").unlink()
+    used = db.engine.raw_connection()  # none is left in the pool, so another is to be opened
+    with pytest.raises(GoneError, match="SIGTERM"):
+        answer(db, query, "left", "a", "human")
+    used.close()
+    assert not Path(f"{file_of(db)}-wal").exists(), "no second log is begun beside the first"
+    db.close()
+    again = connect(settings)
+    assert numbers(again) == [1]
+    assert answer(again, query, "left", "a", "human").number == 2
+    again.close()
