@@ -11,6 +11,7 @@ from parenting.server.damage import readable
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
 from parenting.server.runs import living
+from parenting.server.store.relay import announce
 from parenting.server.tables import OperatorEvent
 
 
@@ -31,6 +32,7 @@ def add_operator_event(db: Database, run_id: int, kind: str, payload: dict[str, 
         event = OperatorEvent(run_id=run_id, kind=kind, payload=payload, created=db.clock())
         session.add(event)
         session.flush()
+        announce(session, "worker")
         return event
 
 

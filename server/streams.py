@@ -24,6 +24,7 @@ from parenting.server.notify import Notifier
 from parenting.server.queue.leases import waiting
 from parenting.server.reads.metrics import list_metrics
 from parenting.server.reads.schemas import metric_schemas, run_schema
+from parenting.server.store.relay import Relay
 
 POLL_SECONDS = 0.25
 """Seconds between polls, and at least between two events of the same browser, questions excepted."""
@@ -53,6 +54,7 @@ class Streams:
     def __init__(self, db: Database, notifier: Notifier, limit: int, admission: Admission) -> None:
         self.db, self.notifier, self.limit, self.admission = db, notifier, limit, admission
         self.subscriptions: dict[int, Subscription] = {}
+        self.relay = Relay(db.engine, "web", notifier.wake)
         self.closed = False
         self.waiting_requests = 0  # requests for a question that lie here
         self._notified = asyncio.Event()
@@ -62,6 +64,7 @@ class Streams:
         """Begin to listen for notifications, in the running event loop."""
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(self.notifier.listen(), self._on_notification)
+        self.relay.start()
 
     def close(self) -> None:
         """End every stream now. May be called from a signal handler or from another thread."""
@@ -72,6 +75,7 @@ class Streams:
     def end(self) -> None:
         """Stop listening, at the end of the application."""
         self.close()
+        self.relay.close()
         if self._loop is not None:
             self._loop.remove_reader(self.notifier.listen())
         self.notifier.close()

@@ -29,6 +29,7 @@ from parenting.server.notify import Notifier
 from parenting.server.queue import worker_side
 from parenting.server.queue.worker_side import Watch
 from parenting.server.settings import Settings
+from parenting.server.store.relay import Relay
 from parenting.server.work.held import AT_NEWS, NOW, HeldRuns
 from parenting.server.work.patience import Patience
 from parenting.server.work.sharing import share, surplus
@@ -61,6 +62,7 @@ class Worker:
         self.db, self.settings = db, settings
         self.name = f"{socket.gethostname()}:{os.getpid()}"
         self.notifier, self.web_notifier = Notifier(settings.data, "worker"), Notifier(settings.data, "web")
+        self.relay = Relay(db.engine, "worker", self.notifier.wake)
         self.told = threading.Event()
         self.patience, self.turns = Patience(), Turns(self.notifier.wake, beside_after)
         self.held = HeldRuns(db, self.patience, self.web_notifier.notify)
@@ -85,6 +87,7 @@ class Worker:
 
     def work(self) -> None:
         """Raise runs in turn until stopped, then save them and give them back."""
+        self.relay.start()
         while not self.stopping:
             try:
                 self._go_on()
@@ -200,6 +203,7 @@ class Worker:
             workers.sign_off(self.db, self.name)
         except StoreError as error:
             log.warning("store refuses at the end; runs go on from their checkpoints", why=error.message)
+        self.relay.close()
         self.notifier.close()
 
 

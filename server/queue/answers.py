@@ -17,6 +17,7 @@ from parenting.server.queue.locks import lock_query
 from parenting.server.queue.names import UNSTATED, Names, Place, find_place
 from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
+from parenting.server.store.relay import announce
 from parenting.server.tables import Answer, Query, Run
 
 
@@ -127,6 +128,7 @@ def _add(
     )
     session.add(row)
     session.flush()
+    announce(session, "worker")
     return row
 
 

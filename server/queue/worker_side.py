@@ -27,6 +27,7 @@ from parenting.server.notes import AGENT_KINDS
 from parenting.server.queue.queries import guidance_first, withdraw_in
 from parenting.server.runs import Claim, held, held_status
 from parenting.server.statuses import LIVING, QueryStatus, RunStatus
+from parenting.server.store.relay import announce
 from parenting.server.tables import Answer, OperatorEvent, Query, Run
 
 
@@ -160,6 +161,7 @@ def post_query(
         )
         session.add(query)
         session.flush()
+        announce(session, "web")
         return query.id
 
 

@@ -28,7 +28,7 @@ from tests.lengths import length
 from tests.server.processes import Command, store_of
 from tests.server.raising import Begun
 from tests.server.serving import free_port
-from tests.server.test_same_bits import GOAL, RUNS, STAGES, answering, begin, check, until_heard
+from tests.server.test_same_bits import GOAL, PLACES, RUNS, answering, begin, check, until_heard
 
 ROUNDS = int(os.environ.get("PARENTING_KILL_ROUNDS", length(1, 10)))
 KILLS = 12
@@ -119,7 +119,7 @@ def disturb(db: Database, house: House, moments: Iterator[float], rng: random.Ra
 
 @pytest.mark.torture
 @pytest.mark.timeout(500)
-@pytest.mark.parametrize("stages", STAGES)
+@pytest.mark.parametrize(("store", "stages"), PLACES, indirect=["store"])
 @pytest.mark.parametrize("seed", range(ROUNDS))
 def test_killed_at_random_moments(settings: Settings, db: Database, seed: int, stages: int) -> None:
     rng = random.Random(10 * seed + stages)
