@@ -29,6 +29,7 @@ COMMANDS = {
     "export": "Write the answers of a run as JSON lines.",
     "replay": "Replay a stored run and compare it bit for bit.",
     "doctor": "Examine the installation, the data folder and the database.",
+    "verify": "Verify a stored run's answers, bits and X.",
     "backup": "Write a checked copy of the database, while everything goes on.",
     "restore": "Put a backup in place of the database.",
     "web": "Serve the pages and the API.",

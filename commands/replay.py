@@ -55,11 +55,12 @@ def replay(
         settle()
         with bar("ticks") as show:
             relived = relive(db, run, show)
-    typer.echo(_as_json(relived) if as_json else _said(relived))
+    typer.echo(_as_json(relived) if as_json else said(relived))
     raise typer.Exit(0 if relived.equal else 1)
 
 
-def _said(found: Relived) -> str:
+def said(found: Relived) -> str:
+    """Return the result of a replay in a sentence or two."""
     counts = (_number(found.tick, "tick"), _number(found.answers, "answer"), _number(found.events, "event"))
     lived = f"Run {found.run}: {', '.join(counts)} replayed."
     if found.parted:
@@ -67,6 +68,8 @@ def _said(found: Relived) -> str:
     if found.differ:
         names = dict.fromkeys(_piece(name) for name in found.differ)
         return f"{lived} Not equal. After tick {found.tick} these differ: {', '.join(names)}."
+    if found.until is not None and found.tick < found.checkpoint:
+        return f"{lived} Equal questions. From tick {found.until + 1} on another machine raised it."
     return f"{lived} Equal bit for bit."
 
 

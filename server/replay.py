@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -16,22 +17,21 @@ from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.replay import ReplayMismatchError, ReplayParent
-from parenting.server.checkpoints import load_checkpoints
 from parenting.server.codec import kind_name
 from parenting.server.counters import count
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
+from parenting.server.notes import MachineChanged, notes
 from parenting.server.reads.record import StoredRecord, UnreadableRecordError
+from parenting.server.recall import Recalled, recall
 from parenting.server.runs import get_run
 from parenting.server.snapshot import (
     INFO,
-    DamagedCheckpointError,
     DivergedError,
     Snapshot,
     changed,
     initial_snapshot,
     initial_weights,
-    unpack,
     versions,
 )
 from parenting.server.tables import Run
@@ -40,7 +40,7 @@ Progress = Callable[[int, int], None]
 """A function that is called after each tick with its number and the last one's."""
 
 
-def _silent(tick: int, last: int) -> None:
+def silent(tick: int, last: int) -> None:
     """Do nothing."""
 
 
@@ -55,6 +55,7 @@ class Relived:
     checkpoint: int  # the tick of the checkpoint
     parted: str | None = None  # a sentence: where the agent left its record
     differ: Sequence[str] = field(default_factory=tuple)  # pieces of state that are not equal bit for bit
+    until: int | None = None  # the last tick before another machine went on; None: none has
 
     @property
     def equal(self) -> bool:
@@ -62,22 +63,25 @@ class Relived:
         return self.parted is None and not self.differ
 
 
-def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
-    """Replay a run from tick 0 to its last intact checkpoint, and compare all state with it.
+def relive(db: Database, run_id: int, progress: Progress = silent) -> Relived:
+    """Replay a run from tick 0 to its last good checkpoint, and compare all state with it.
 
     A run that a worker is raising can be replayed too: nothing changes any more up to its last checkpoint.
+    Where another machine went on with the run, the replay ends at the tick before: only questions are
+    compared, since there is no checkpoint of that tick.
 
     Raises:
-        NotFound: there is no such run, or no intact checkpoint of it.
-        DivergedError: it was raised by another build of torch or with other threads, so that the bits would
-            differ; or its checkpoint does not fit its config.
+        NotFound: there is no such run, or no good checkpoint of it.
+        DivergedError: it was raised by another machine or build of torch, so that the bits would differ.
     """
     run = get_run(db, run_id)
     config = Config.model_validate(run.config)
     world = world_of(run.world, run.level_text, config)
     weights = initial_weights(db, run, world)
     kept = _checkpoint(db, run, world, config, weights)
-    last, rows = int(kept.state.keys.tick[0]), StoredRecord(db, run_id, world, config.max_clip_length)
+    until = comparable_until(db, run)
+    last = kept.tick if until is None else min(until, kept.tick)
+    rows = StoredRecord(db, run_id, world, config.max_clip_length)
     lived, parent, parted = initial_snapshot(world, config, run.seed, weights), ReplayParent(rows), None
     try:
         for tick in range(1, last + 1):
@@ -85,8 +89,22 @@ def relive(db: Database, run_id: int, progress: Progress = _silent) -> Relived:
             progress(tick, last)
     except (ReplayMismatchError, UnreadableRecordError) as error:
         parted = _said(error) if isinstance(error, ReplayMismatchError) else str(error)
-    differ = () if parted else differences(lived, kept)
-    return Relived(run_id, parent.tick, rows.answers, rows.events, last, parted, differ)
+    differ = () if parted or last < kept.tick else differences(lived, kept.saved)
+    return Relived(run_id, parent.tick, rows.answers, rows.events, kept.tick, parted, differ, until)
+
+
+def comparable_until(db: Database, run: Run) -> int | None:
+    """Return the last tick up to which bits are comparable here; None: there is no such limit.
+
+    Raises:
+        DivergedError: the run began on another machine than this.
+    """
+    for tick, note in notes(db, run.id):
+        if isinstance(note, MachineChanged):
+            _same_machine(run.id, note.before)
+            return tick - 1
+    _same_machine(run.id, run.versions or {})
+    return None
 
 
 def _beat(world: Gridworld, saved: Snapshot, parent: ReplayParent) -> Snapshot:
@@ -94,30 +112,35 @@ def _beat(world: Gridworld, saved: Snapshot, parent: ReplayParent) -> Snapshot:
     return Snapshot(state, count(world, saved.tally, answer, state), config)
 
 
-def _checkpoint(db: Database, run: Run, world: Gridworld, config: Config, weights: Tensor | None) -> Snapshot:
-    found = load_checkpoints(db, run.id)
-    intact = [checkpoint for checkpoint in found if checkpoint.intact]
-    if not intact:
+def _checkpoint(db: Database, run: Run, world: Gridworld, config: Config, weights: Tensor | None) -> Recalled:
+    kept = recall(db, run, world, config, weights)
+    if kept.sha256 is None:
         raise NotFound(
             f"Every checkpoint of run {run.id} is damaged: there is nothing to compare its record with."
-            if found
+            if kept.passed
             else f"Run {run.id} has no checkpoint yet: a worker writes one every two seconds of its life."
         )
-    _same_build(run)
-    try:
-        return unpack(world, config, intact[0].blob, weights)
-    except DamagedCheckpointError as error:
-        raise DivergedError(f"The last checkpoint of run {run.id} is damaged: {error.message}.") from None
+    return kept
 
 
-def _same_build(run: Run) -> None:
-    here, there = versions(), run.versions or versions()
-    if changed(there, here):
+def _same_machine(run_id: int, there: dict[str, Any]) -> None:
+    here = versions()
+    if not changed(there, here):
+        return
+    if (there.get("torch"), there.get("threads")) == (here["torch"], here["threads"]):
         raise DivergedError(
-            f"Run {run.id} was trained with torch {there['torch']} and {_threads(there['threads'])}; "
-            f"here are torch {here['torch']} and {_threads(here['threads'])}, which give other bits. "
-            f"Install torch {there['torch']} to replay it."
+            f"Run {run_id} was trained on another CPU ({_cpu(there)}); {_cpu(here)} gives other bits. "
+            f"`parenting verify {run_id}` checks what is exact on every machine."
         )
+    raise DivergedError(
+        f"Run {run_id} was trained with torch {there.get('torch')} and {_threads(there.get('threads', 1))}; "
+        f"here are torch {here['torch']} and {_threads(here['threads'])}, which give other bits. "
+        f"Install torch {there.get('torch')} to replay it."
+    )
+
+
+def _cpu(machine: dict[str, Any]) -> str:
+    return f"{machine.get('machine')}, {machine.get('cpu')}"
 
 
 def _threads(number: int) -> str:

@@ -220,6 +220,11 @@ class Answer(Table):
     standing: Mapped[bool] = mapped_column(default=True)
     received: Mapped[datetime]
     applied_tick: Mapped[int | None]
+    # the chain of hashes (server.chain)
+    salt: Mapped[str | None]
+    digest: Mapped[str | None]
+    link: Mapped[str | None]
+    chained: Mapped[str | None]  # when it was hashed: with the answer, or by a migration
 
 
 class OperatorEvent(Table):

@@ -11,6 +11,7 @@ from datetime import datetime
 from sqlalchemy import bindparam, select, update
 from sqlalchemy.orm import Session
 
+from parenting.server.chain import chain_in
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
 from parenting.server.queue.locks import lock_query
@@ -126,6 +127,7 @@ def _add(
         standing=True,
         received=db.clock(),
     )
+    chain_in(session, row)
     session.add(row)
     session.flush()
     announce(session, "worker")
