@@ -17,7 +17,7 @@ from parenting.server.runs import Claim
 from tests.server.conftest import CLIPS, Clock
 
 NUMBER = 5
-BEFORE = "0006"
+BEFORE = "0007"
 """The revision before the chain."""
 
 

@@ -1,6 +1,6 @@
 """A chain of hashes over the answers of each run. Those that are there are hashed now, and marked so.
 
-Revision: 0007, after 0006
+Revision: 0008, after 0007
 """
 
 import itertools
@@ -20,8 +20,8 @@ from parenting.server.chain import (
 )
 from parenting.server.tables import Answer, Query
 
-revision = "0007"
-down_revision = "0006"
+revision = "0008"
+down_revision = "0007"
 branch_labels = None
 depends_on = None
 
