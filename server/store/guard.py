@@ -20,6 +20,7 @@ from parenting.server.store import high_water
 from parenting.server.store.check import require_sound
 from parenting.server.store.held import Held, ReplacedError, hold, node
 from parenting.server.store.high_water import Counts
+from parenting.server.store.rescue import rescue
 
 Info = MutableMapping[Any, Any]
 """Notes on a connection, which last as long as it does."""
@@ -69,12 +70,13 @@ class Guard:
         self._open.add(id(connection))
         self._counts = self._counts or high_water.count(connection.execute)
 
-    def _out(self, _connection: Any, record: Any, _proxy: Any) -> None:
+    def _out(self, connection: Any, record: Any, _proxy: Any) -> None:
         """Have all connections opened again where another file is at the path."""
         with suppress(GoneError):
             try:
                 record.info[HELD].look()
             except ReplacedError as error:
+                rescue(connection, record.info[HELD])  # the last moment: now they are closed
                 raise InvalidatePoolError(error.message) from error
 
     def _is_same(self) -> bool:
@@ -98,7 +100,15 @@ class Guard:
 
     def _begun(self, connection: Connection) -> None:
         connection.info.pop(COUNTED, None)  # of a commit that failed
-        look(connection.info)
+        try:
+            look(connection.info)
+        except GoneError as error:
+            kept = rescue(connection.connection.dbapi_connection, connection.info[HELD])
+            if kept is None:
+                raise
+            raise GoneError(
+                f"{error.message} What it held was copied: `parenting restore {kept} --replace`."
+            ) from error
 
     def _committing(self, connection: Connection) -> None:
         """Look once more while nothing is committed yet, and count what a durable commit will hold."""

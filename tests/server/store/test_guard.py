@@ -8,6 +8,7 @@ import httpx2
 import pytest
 from sqlalchemy import PoolProxiedConnection, event, select
 
+from parenting.server.backups.restoring import restore
 from parenting.server.db import Database, connect
 from parenting.server.errors import GoneError, ServerError
 from parenting.server.queue.answers import answer
@@ -191,3 +192,37 @@ def test_log_that_is_lost_is_written_back_by_a_stop_in_order(
     assert numbers(again) == [1]
     assert answer(again, query, "left", "a", "human").number == 2
     again.close()
+
+
+@pytest.mark.parametrize("replaced", [False, True])
+def test_what_was_told_is_copied_from_a_file_that_was_removed_for_good(
+    db: Database, mine: Claim, guidance: int, settings: Settings, tmp_path: Path, replaced: bool
+) -> None:
+    older = tmp_path / "older.db"
+    copy(file_of(db), older)
+    assert lease(db, mine.run_id, "a") is not None
+    assert answer(db, guidance, "left", "a", "human").number == 1
+    query = post_query(db, mine, 9, "guidance", 1, CLIPS)
+    if replaced:
+        older.replace(file_of(db))
+    else:
+        file_of(db).unlink()
+    for _ in range(3):
+        with pytest.raises(GoneError):
+            answer(db, query, "left", "a", "human")
+    db.close()
+    (kept,) = (settings.data / "backups").iterdir()
+    assert kept.stat().st_mode & 0o077 == 0
+    restore(settings, kept, replace=replaced)
+    again = connect(settings)
+    assert numbers(again) == [1]
+    assert answer(again, query, "left", "a", "human").number == 2
+    again.close()
+
+
+def test_file_that_was_only_renamed_is_not_copied(db: Database, guidance: int, settings: Settings) -> None:
+    back = away_file(file_of(db))
+    with pytest.raises(GoneError):
+        answer(db, guidance, "left", "a", "human")
+    assert not (settings.data / "backups").exists()
+    back()
