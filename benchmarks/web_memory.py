@@ -24,6 +24,7 @@ import tempfile
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
@@ -33,7 +34,7 @@ import httpx2
 from tests.server.serving import free_port, parenting, until_up
 
 WARM_MINUTES = 5
-CLIENT = "benchmark"
+CLIENT, CLIENTS = "benchmark", 8
 FRAMES = 6
 SECONDS_TO_START = 300.0
 TOP = 25
@@ -50,6 +51,7 @@ PATHS = (
     "/static/parent.js",
     "/healthz",
     "/readyz",
+    "/metrics",
     "/api/v1/runs/999",
     "/nothing/here",
     "/api/v1/runs/one",
@@ -90,31 +92,43 @@ def resident(pid: int) -> float:
     return int(fields[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def load(web: httpx2.Client, minutes: float, rate: float, each_minute: Callable[[int], None]) -> int:
-    """Send the mix at this rate; return the number of requests, streams included."""
-    began, sent, minute = time.monotonic(), 0, 0
-    while (passed := time.monotonic() - began) < 60 * minutes:
-        if passed >= 60 * minute:
+def load(url: str, minutes: float, rate: float, each_minute: Callable[[int], None]) -> int:
+    """Send the mix at this rate in all from a few threads; return the number of requests."""
+    end = time.monotonic() + 60 * minutes
+    with ThreadPoolExecutor(CLIENTS) as threads:
+        sent = [threads.submit(client, url, number, end, rate / CLIENTS) for number in range(CLIENTS)]
+        for minute in range(int(minutes)):
             each_minute(minute)
-            minute += 1
-        time.sleep(max(0.0, sent / rate - passed))
+            time.sleep(max(0.0, end - 60 * (minutes - minute - 1) - time.monotonic()))
+        each_minute(int(minutes))
+        return sum(one.result() for one in sent)
+
+
+def client(url: str, number: int, end: float, rate: float) -> int:
+    """Send one client's part; every other client opens a connection for each request, as scripts do."""
+    kept = number % 2 == 0
+    web, sent, began = httpx2.Client(base_url=url, timeout=30), 0, time.monotonic()
+    while (now := time.monotonic()) < end:
+        time.sleep(max(0.0, began + sent / rate - now))
         sent += 1
+        if not kept:
+            web.close()
+            web = httpx2.Client(base_url=url, timeout=30)
         with suppress(httpx2.TransportError):
             if sent % 50 == 0:
-                answer(web)
+                answer(web, f"{CLIENT}-{number}-{sent}")
             elif sent % 50 == 25:
                 look_at_stream(web)
             else:
-                web.get(PATHS[sent % len(PATHS)])
-    each_minute(minute)
+                web.get(PATHS[(sent + number) % len(PATHS)])
     return sent
 
 
-def answer(web: httpx2.Client) -> None:
+def answer(web: httpx2.Client, name: str) -> None:
     """Lease the next question and answer it, where there is one."""
-    leased = web.post("/api/v1/runs/1/queries/lease", json={"client_id": CLIENT})
+    leased = web.post("/api/v1/runs/1/queries/lease", json={"client_id": name})
     if leased.status_code == 200:
-        body = {"choice": "left", "client_id": CLIENT}
+        body = {"choice": "left", "client_id": name}
         web.post(f"/api/v1/queries/{leased.json()['id']}/answer", json=body)
 
 
@@ -145,8 +159,8 @@ def measure(minutes: float, rate: float, trace: bool) -> None:
         with started as web, parenting("worker", data=folder):
             url = f"http://localhost:{port}"
             until_up(url, SECONDS_TO_START)
-            client = httpx2.Client(base_url=url, timeout=30)
-            client.post("/api/v1/runs", json={"world": "unsafe-exploration"}).raise_for_status()
+            body = {"world": "unsafe-exploration"}
+            httpx2.post(f"{url}/api/v1/runs", json=body, timeout=30).raise_for_status()
             seen: list[float] = []
 
             def look(minute: int) -> None:
@@ -155,7 +169,7 @@ def measure(minutes: float, rate: float, trace: bool) -> None:
                 if trace and minute == min(WARM_MINUTES, int(minutes) - 1):
                     web.send_signal(signal.SIGUSR1)
 
-            sent = load(client, minutes, rate, look)
+            sent = load(url, minutes, rate, look)
             warm = seen[min(WARM_MINUTES, len(seen) - 2)]
             print(f"{sent} requests in {minutes:g} minutes; growth since minute {WARM_MINUTES}: ", end="")
             print(f"{seen[-1] - warm:+.1f} MB")

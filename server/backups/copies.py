@@ -8,18 +8,18 @@ answer that was acknowledged before the copy began.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from parenting.server.errors import SetupError
-from parenting.server.store.sqlite import BUSY_SECONDS, sqlite_module
+from parenting.server.store.driver import open_file, sqlite_module
+from parenting.server.store.sqlite import BUSY_SECONDS
 
 HEAD = b"SQLite format 3\0"
 TABLES = ("run", "query", "answer", "event", "metric", "checkpoint", "weights")
 """The tables whose rows a copy is checked for."""
-FAILED = "{} cannot be copied: {}. If it is damaged, put a backup in its place: `parenting restore`"
 
 
 @dataclass(frozen=True)
@@ -46,15 +46,19 @@ def copy(source: Path, target: Path) -> Contents:
     Raises:
         SetupError: `source` is not a database, or one of the two cannot be used.
     """
-    # Without a log beside it nobody has it open, and immutable lets SQLite read it from a read-only folder.
-    mode = "mode=rw" if Path(f"{source}-wal").exists() else "immutable=1"
-    with _connected(source, mode, FAILED) as old, _connected(target, "mode=rwc", "") as new:
-        old.execute("BEGIN")
-        told = _contents(old)
-        old.backup(new)
-        new.execute("PRAGMA journal_mode=delete").fetchall()  # one file, whatever the source's journal is
-        old.execute("ROLLBACK")
-        return told
+    try:
+        with closing(open_file(source)) as old, _connected(target, "mode=rwc") as new:
+            old.execute("BEGIN")
+            told = _contents(old)
+            old.backup(new)
+            new.execute("PRAGMA journal_mode=delete").fetchall()  # one file, whatever the source's journal is
+            old.execute("ROLLBACK")
+            return told
+    except sqlite_module().Error as error:
+        raise SetupError(
+            f"{source} cannot be copied: {error}. If it is damaged, put a backup in its place: "
+            "parenting restore FILE --replace"
+        ) from None
 
 
 def check(file: Path) -> Contents:
@@ -63,13 +67,16 @@ def check(file: Path) -> Contents:
     Raises:
         SetupError: it is not a database, or is damaged.
     """
-    with _connected(file, "immutable=1") as database:
-        faults = [row[0] for row in database.execute("PRAGMA integrity_check(3)")]
-        if faults != ["ok"]:
-            raise SetupError(f"{file} is damaged: {'; '.join(faults)}. Use another backup.")
-        if orphan := database.execute("PRAGMA foreign_key_check").fetchone():
-            raise SetupError(f"{file} is damaged: a row of {orphan[0]} names none of {orphan[2]}.")
-        return _contents(database)
+    try:
+        with _connected(file, "immutable=1") as database:
+            faults = [row[0] for row in database.execute("PRAGMA integrity_check(3)")]
+            if faults != ["ok"]:
+                raise SetupError(f"{file} is damaged: {'; '.join(faults)}. Use another backup.")
+            if orphan := database.execute("PRAGMA foreign_key_check").fetchone():
+                raise SetupError(f"{file} is damaged: a row of {orphan[0]} names none of {orphan[2]}.")
+            return _contents(database)
+    except sqlite_module().Error as error:
+        raise SetupError(f"{file} is damaged: {error}. Use another backup.") from None
 
 
 def require_database(file: Path) -> None:
@@ -101,27 +108,11 @@ def _contents(database: Any) -> Contents:
 
 
 @contextmanager
-def _connected(file: Path, mode: str, said: str = "{} cannot be used as a database: {}.") -> Iterator[Any]:
-    """Open a file without SQLAlchemy.
-
-    Args:
-        file: The file.
-        mode: Parameters of SQLite's address.
-        said: The sentence of a failure, with places for the file and the driver's words; none lets it pass.
-
-    Raises:
-        SetupError: the sentence.
-    """
-    sqlite = sqlite_module()
+def _connected(file: Path, mode: str) -> Iterator[Any]:
+    """Open a file without SQLAlchemy."""
+    address = f"{file.absolute().as_uri()}?{mode}"
+    connection = sqlite_module().connect(address, uri=True, timeout=BUSY_SECONDS, isolation_level=None)
     try:
-        connection = sqlite.connect(
-            f"{file.absolute().as_uri()}?{mode}", uri=True, timeout=BUSY_SECONDS, isolation_level=None
-        )
-        try:
-            yield connection
-        finally:
-            connection.close()
-    except sqlite.Error as error:
-        if not said:
-            raise
-        raise SetupError(said.format(file, error)) from None
+        yield connection
+    finally:
+        connection.close()

@@ -78,8 +78,10 @@ def _restore_copy(url: URL, file: Path, replace: bool) -> Restored:
         older = _is_older(holds.revision, file)
         aside = None
         if target.exists():
-            until_replaced.enter_context(alone(target))  # its log is in the file now, unless it is damaged
+            if high_water.foreign_log(target) is None:
+                until_replaced.enter_context(alone(target))  # its log is in the file now, if it is sound
             aside = _put_aside(target)
+    high_water.accept(target)
     high_water.accept(target)
     return Restored(str(target), str(holds), aside, older)
 

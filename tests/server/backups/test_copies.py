@@ -23,6 +23,8 @@ from tests.server.conftest import CLIPS
 
 TRIES = 20
 
+pytestmark = pytest.mark.only("sqlite", "PostgreSQL is dumped by its own tools: test_dumps.py")
+
 
 class Load:
     """A worker that asks and a parent that answers, without a pause; `told` are the stored answers."""

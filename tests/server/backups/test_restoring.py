@@ -20,6 +20,8 @@ from parenting.server.runs import list_runs
 from parenting.server.settings import Settings
 from parenting.server.store.sqlite import sqlite_module
 
+pytestmark = pytest.mark.only("sqlite", "PostgreSQL is dumped by its own tools: test_dumps.py")
+
 
 @pytest.fixture
 def copy(settings: Settings, db: Database, guidance: int, tmp_path: Path) -> Path:
