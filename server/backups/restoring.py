@@ -82,7 +82,6 @@ def _restore_copy(url: URL, file: Path, replace: bool) -> Restored:
                 until_replaced.enter_context(alone(target))  # its log is in the file now, if it is sound
             aside = _put_aside(target)
     high_water.accept(target)
-    high_water.accept(target)
     return Restored(str(target), str(holds), aside, older)
 
 
