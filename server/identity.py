@@ -16,6 +16,11 @@ from parenting.server.db import Database
 from parenting.server.errors import DamagedRowError
 from parenting.server.tables import Identity, Query, Run, new_uuid
 
+UNREADABLE = (
+    "The identity of this database cannot be read, so no answer can be held to be meant for it. "
+    "Restore a backup of before the damage."
+)
+
 
 def database_id(db: Database) -> str:
     """Return the UUID of a database."""
@@ -29,20 +34,17 @@ def database_id_in(session: Session) -> str:
     Raises:
         DamagedRowError: it cannot be read, so nobody can say which database this is.
     """
-    return stated(session.execute(_UUID).scalar_one())
+    return stated(session.execute(_UUID).scalar())
 
 
-def stated(found: str | Damaged) -> str:
+def stated(found: str | Damaged | None) -> str:
     """Return a UUID that was read, if it could be.
 
     Raises:
-        DamagedRowError: it could not.
+        DamagedRowError: it could not, or is not there.
     """
-    if isinstance(found, Damaged):
-        raise DamagedRowError(
-            "The identity of this database cannot be read, so no answer can be held to be meant for it. "
-            "Restore a backup of before the damage."
-        )
+    if found is None or isinstance(found, Damaged):
+        raise DamagedRowError(UNREADABLE)
     return found
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from sqlalchemy import Row, bindparam, select
 from sqlalchemy.orm import Session
 
-from parenting.server.errors import ElsewhereError, NotFound
-from parenting.server.identity import stated
+from parenting.server.errors import DamagedRowError, ElsewhereError, NotFound
+from parenting.server.identity import UNREADABLE, stated
 from parenting.server.tables import Identity, Query, Run
 
 
@@ -44,13 +44,16 @@ def find_place(session: Session, query: int | str, names: Names = UNSTATED) -> P
     """Return the question of a number or a public id, if it is the one that an answer names.
 
     Raises:
+        DamagedRowError: the identity of this database cannot be read.
         ElsewhereError: it, its run or this database is another one than what is named.
         NotFound: there is no question of this number, and nothing else was named.
     """
     if isinstance(query, str):
-        row = session.execute(_BY_PUBLIC_ID, {"query": query}).one()
+        row = session.execute(_BY_PUBLIC_ID, {"query": query}).one_or_none()
     else:
-        row = session.execute(_BY_NUMBER, {"query": query}).one()
+        row = session.execute(_BY_NUMBER, {"query": query}).one_or_none()
+    if row is None:
+        raise DamagedRowError(UNREADABLE)
     stated(row.database)
     if _differs(row, names) or (row.query is None and isinstance(query, str)):
         raise ElsewhereError
@@ -66,7 +69,7 @@ def _differs(row: Row[str, int, int, str, str], names: Names) -> bool:
     return any(name is not None and name != here for name, here in zip(stated, found, strict=True))
 
 
-# Statements that every answer needs are built once. The only row of `Identity` is always there.
+# Statements that every answer needs are built once. They join the only row of `Identity`.
 _PLACE = select(
     Identity.uuid.label("database"),
     Query.id.label("query"),

@@ -127,12 +127,15 @@ def test_renewed_copy_refuses_what_was_meant_for_the_original(
 
 
 @pytest.mark.only("sqlite", "PostgreSQL takes nothing for a text that is none")
+@pytest.mark.parametrize(
+    "damage", ["UPDATE database_identity SET uuid = x'ff00'", "DELETE FROM database_identity"]
+)
 def test_a_database_that_cannot_say_which_it_is_stores_no_answer(
-    client: httpx2.Client, db: Database, guidance: int
+    client: httpx2.Client, db: Database, guidance: int, damage: str
 ) -> None:
     body = {"choice": "left", "client_id": "me", **names_of(db)}
     with db.write() as session:
-        session.execute(text("UPDATE database_identity SET uuid = x'ff00'"))
+        session.execute(text(damage))
     reply = client.post(f"/api/v1/queries/{guidance}/answer", json=body)
     assert (reply.status_code, reply.json()["error"]["code"]) == (500, "damaged")
     assert "identity of this database" in client.get("/").text
