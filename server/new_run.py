@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -26,6 +27,7 @@ from parenting.envs.levels.spec import Level, LevelError
 from parenting.envs.names import UnknownNameError, did_you_mean
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
+from parenting.server.people_text import LONGEST, plain, read_name
 from parenting.server.runs import create_run
 from parenting.server.tables import Run
 from parenting.server.weights import put as put_weights
@@ -43,26 +45,21 @@ UNREAD = {
 """The message for a body that cannot be read, by Pydantic's type of error."""
 
 
-def _plain(text: str) -> str:
-    """Refuse control characters (except line ends) and text that UTF-8 cannot store."""
-    for character in text:
-        if (ord(character) < 32 and character not in "\n\r\t") or 0x7F <= ord(character) < 0xA0:
-            raise ValueError(f"the control character U+{ord(character):04X} is not allowed here")
-        if 0xD800 <= ord(character) < 0xE000:
-            raise ValueError("half of a surrogate pair is not allowed here")
-    return text
-
-
 def _whole(value: Any) -> Any:
     """Read JSON's 657.0 as the integer 657."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 Name = Annotated[
-    str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\r\n\t]*$"), AfterValidator(_plain)
+    str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\r\n\t]*$"), AfterValidator(plain)
 ]
 LevelText = Annotated[
-    str, StringConstraints(min_length=1, max_length=LEVEL_CHARACTERS), AfterValidator(_plain)
+    str, StringConstraints(min_length=1, max_length=LEVEL_CHARACTERS), AfterValidator(plain)
+]
+PersonsName = Annotated[
+    str,
+    StringConstraints(min_length=1, max_length=LONGEST, pattern=r"^[^\r\n\t]*$"),
+    AfterValidator(read_name),
 ]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_INT), BeforeValidator(_whole)]
 Goal = Annotated[int, Field(ge=1, le=1_000_000), BeforeValidator(_whole)]
@@ -87,7 +84,7 @@ class NewRun(BaseModel):
         default_factory=dict, max_length=100, description="Changes to the preset, by field."
     )
     seed: Seed = 0
-    name: Name | None = None
+    name: PersonsName | None = None
     goal: Goal | None = Field(None, description="Answered questions after which the run rests; null: never.")
     pace: Pace | None = Field(None, description="Ticks a second at most; null: as fast as it can.")
 
@@ -173,12 +170,15 @@ def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
     # A text without line end would be taken for a name.
     text = new.level if new.level_text is None else new.level_text.replace("\r\n", "\n") + "\n"
     try:
-        return registry.level(new.world, text)
+        level = registry.level(new.world, text)
+        return replace(level, name=read_name(level.name))
     except UnknownNameError:
         known = registry.spec(new.world).levels
         wrong.append((field, _unknown(f"level of {new.world}", str(new.level), known)))
     except LevelError as error:
         wrong.append((field, str(error)))
+    except ValueError as error:
+        wrong.append((field, f"The name of the level: {error}."))
     return None
 
 

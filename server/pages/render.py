@@ -10,11 +10,13 @@ from starlette.responses import HTMLResponse, RedirectResponse
 
 from parenting.drawing.render import environment
 from parenting.server.errors import ServerError
+from parenting.server.people_text import isolated
 from parenting.server.public_ids import ALPHABET, LENGTH
 
 WEB = Path(__file__).parent.parent.parent / "web"
 
 _templates = environment(WEB / "templates")
+_templates.filters["isolated"] = isolated
 
 
 def page(template: str, status: int = 200, **context: object) -> HTMLResponse:
