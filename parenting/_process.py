@@ -12,7 +12,7 @@ import sys
 
 import torch
 
-TRIM_THRESHOLD, MMAP_MAX = -1, -4
+TRIM_THRESHOLD, MMAP_MAX, ARENA_MAX = -1, -4, -8
 """The names of glibc's parameters in malloc.h."""
 KEPT = 1 << 30
 """Bytes at the end of the heap that are not given back."""
@@ -22,5 +22,6 @@ def settle() -> None:
     """Make this process one that raises agents; call it before the first tensor."""
     torch.set_num_threads(1)
     if sys.platform == "linux" and (mallopt := getattr(ctypes.CDLL(None), "mallopt", None)):
+        mallopt(ARENA_MAX, 1)  # threads share one heap: those of their own are small and given back
         mallopt(MMAP_MAX, 0)  # large blocks come from the heap, too,
         mallopt(TRIM_THRESHOLD, KEPT)  # and stay there
