@@ -21,7 +21,7 @@ const key = ({ database, question, query }) => `${database} ${question ?? query}
 const meant = (answer) => !elsewhere.has(key(answer));
 
 // One attempt: "saved", "refused" (the question has another answer, or was withdrawn), "elsewhere" (it is meant for another
-// database, or this is no server that can read it) or "kept" (no connection, or a server in trouble).
+// database, or the server cannot read it) or "kept" (no connection, or a server in trouble).
 async function send({ database, run, question, choice, client_id }) {
   if (!question) return ["elsewhere"];
   try {
