@@ -18,7 +18,7 @@ from sqlalchemy.exc import InvalidatePoolError
 from parenting.server.errors import GoneError, SetupError
 from parenting.server.store import high_water
 from parenting.server.store.check import require_sound
-from parenting.server.store.held import Held, ReplacedError, hold, node
+from parenting.server.store.held import Held, hold, node
 from parenting.server.store.high_water import Counts
 from parenting.server.store.rescue import rescue
 
@@ -72,12 +72,11 @@ class Guard:
 
     def _out(self, connection: Any, record: Any, _proxy: Any) -> None:
         """Have all connections opened again where another file is at the path."""
+        held: Held = record.info[HELD]
         with suppress(GoneError):
-            try:
-                record.info[HELD].look()
-            except ReplacedError as error:
-                rescue(connection, record.info[HELD])  # the last moment: now they are closed
-                raise InvalidatePoolError(error.message) from error
+            if held.replaced():
+                rescue(connection, held)  # the last moment: now they are closed
+                raise InvalidatePoolError
 
     def _is_same(self) -> bool:
         """Return whether the file at the path is this database, with all that is known to be stored.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from parenting.server.errors import GoneError
@@ -31,6 +32,19 @@ class Held:
     log: Node | None
     index: Node | None
 
+    # Text, since every transaction asks: a path costs more than the question.
+    @cached_property
+    def _name(self) -> str:
+        return str(self.path)
+
+    @cached_property
+    def _log_name(self) -> str:
+        return str(log_of(self.path))
+
+    def replaced(self) -> bool:
+        """Return whether another file is at the path."""
+        return node(self._name) not in (None, self.file)
+
     def left_behind(self) -> bool:
         """Return whether the log or index of this file is still there, beside whatever file is there now.
 
@@ -45,7 +59,7 @@ class Held:
         Raises:
             GoneError: the database file or its log was removed, renamed or replaced.
         """
-        there = node(self.path)
+        there = node(self._name)
         if there is None:
             raise GoneError(
                 f"The database file {self.path} was removed or renamed while Parenting was running. {AGAIN} "
@@ -56,7 +70,7 @@ class Held:
                 f"The database file {self.path} was replaced while Parenting was running. {AGAIN} "
                 "Put the former file back, or restart Parenting to go on with the one that is there."
             )
-        if self.log is not None and node(log_of(self.path)) != self.log:
+        if self.log is not None and node(self._log_name) != self.log:
             raise GoneError(
                 f"The log {log_of(self.path)} was removed or replaced while Parenting was running. {AGAIN} "
                 "Put it back. If it is lost, stop Parenting by Ctrl-C or SIGTERM: the last process to end "
