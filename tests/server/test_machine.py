@@ -51,7 +51,7 @@ Record = list[tuple[Any, ...]]
 
 
 def record(db: Database, until: int) -> Record:
-    """What was asked and heard up to a tick, and nothing that may change later."""
+    """Return questions and answers up to a tick, without what may change later."""
     return [
         (row.query.id, row.query.tick, row.query.clips, row.answer.choice, row.answer.applied_tick)
         for row in every(db, RUN)

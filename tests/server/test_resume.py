@@ -149,7 +149,7 @@ def test_a_checkpoint_whose_hash_fits_and_whose_content_does_not_load_is_passed_
     assert same_bits(again.saved, inline(60)) == []
     told = [(tick, note.reason) for tick, note in notes(db, RUN) if isinstance(note, CheckpointDamaged)]
     assert [tick for tick, _ in told] == sorted(spoilt, reverse=True)
-    assert "weights_only" not in str(told)  # torch's advice is no advice for a reader
+    assert "weights_only" not in str(told)  # torch's advice would not help a reader
     assert "A damaged checkpoint was passed over" in client.get(f"/runs/{RUN}").text
     again.save()
     assert max(kept.tick for kept in load_checkpoints(db, RUN)) == 60
