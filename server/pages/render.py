@@ -46,6 +46,6 @@ def error_page(request: Request, error: ServerError) -> HTMLResponse:
 
     What a run refused leads back to it; else there may be no such run.
     """
-    run = re.match(rf"/runs/([1-9][0-9]*|[{ALPHABET}]{{{LENGTH}}})(/parent)?", request.url.path)
+    run = re.match(rf"/runs/([{ALPHABET}]{{{LENGTH}}}|[1-9][0-9]*)(?![^/])(/parent)?", request.url.path)
     back = run[0] if run and error.status == 409 else "/"
     return page("error.html", error.status, message=error.message, back=back)

@@ -200,6 +200,19 @@ def test_no_number_of_a_run_or_a_question_reaches_a_parent(client: httpx2.Client
         assert not re.search(r"/runs/\d+\b", said), said
 
 
+def test_an_error_leads_back_to_a_run_whose_name_begins_with_a_digit(
+    client: httpx2.Client, counted: Database
+) -> None:
+    name = "6" * 22
+    with counted.write() as session:
+        session.execute(text(f"UPDATE run SET public_id = '{name}'"))
+    answer = form(counted, QUESTION, choice="left", client_id="client-of-mine")
+    client.post(f"/runs/{name}/parent/answer", data=answer)
+    other = client.post(f"/runs/{name}/parent/answer", data={**answer, "choice": "right"})
+    assert other.status_code == 409
+    assert f'href="/runs/{name}/parent"' in other.text
+
+
 def test_a_number_would_be_found(client: httpx2.Client, counted: Database) -> None:
     """The control: the researcher's pages have them."""
     assert str(RUN) in client.get(f"/runs/{RUN}").text
