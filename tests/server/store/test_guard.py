@@ -101,8 +101,17 @@ def test_file_removed_around_the_commit_is_noticed_before_the_reply(
         event.listen(db.engine, "commit", remove, insert=True)
     else:
         monkeypatch.setattr(db.engine.dialect, "do_commit", commit)
+    kept = file_of(db).with_suffix(".kept")
+    os.link(file_of(db), kept)
     with pytest.raises(GoneError, match="was removed"):
         answer(db, guidance, "left", "a", "human")
+    if moment == "before":
+        event.remove(db.engine, "commit", remove)
+    else:
+        monkeypatch.undo()
+    kept.rename(file_of(db))
+    assert numbers(db) == ([] if moment == "before" else [1]), "before the commit it is given up"
+    assert answer(db, guidance, "left", "a", "human").number == 1, "sent again, it gets its reply"
 
 
 @pytest.mark.usefixtures("guidance")
