@@ -48,7 +48,6 @@ class Queue(RuleBasedStateMachine):
         self.goal: int | None = None
         self.status, self.answers = "active", 0
         self.claims: list[Claim] = []
-        self.clock_was_back = False
         self._claim_it()
 
     def teardown(self) -> None:
@@ -147,20 +146,17 @@ class Queue(RuleBasedStateMachine):
     def lease_one(self, client: str) -> None:
         self._count("lease")
         found = lease(self.db, self.run, client, LEASE)
-        if self.clock_was_back:
-            return self._held(client, found.id if found else None)
         wanted = (self._mine(client) or self._urgent(client)) if self._wants_more(()) else []
         assert (found.id if found else None) == (wanted[0] if wanted else None)
-        return self._held(client, found.id if found else None)
+        self._held(client, found.id if found else None)
 
     @rule(client=clients)
     def lease_ahead_of_it(self, client: str) -> None:
         self._count("lease ahead")
         shown = tuple(self._mine(client)[:1])
         found = lease_ahead(self.db, self.run, client, shown, LEASE)
-        if not self.clock_was_back:
-            wanted = self._urgent(client, shown) if self._wants_more(shown) else []
-            assert (found.id if found else None) == (wanted[0] if wanted else None)
+        wanted = self._urgent(client, shown) if self._wants_more(shown) else []
+        assert (found.id if found else None) == (wanted[0] if wanted else None)
         self._held(client, found.id if found else None)
 
     def _wants_more(self, shown: tuple[int, ...]) -> bool:
@@ -220,15 +216,11 @@ class Queue(RuleBasedStateMachine):
         self.shared.pass_seconds(seconds)
         self.now += seconds
 
-    @rule(really=st.sampled_from((False, False, False, True)))
-    def set_the_clock_back(self, really: bool) -> None:
-        """By an hour: no answer is lost or doubled (D5); for how long leases then hold is another test's."""
-        if not really:
-            return
-        self._count("clock set back")
-        self.shared.pass_seconds(-3600)
-        self.now -= 3600
-        self.clock_was_back = True
+    @rule(seconds=st.sampled_from((-3600.0, 3600.0)))
+    def set_the_wall_clock(self, seconds: float) -> None:
+        """An hour back or on: no lease and no answer depends on it (D5)."""
+        self._count("wall clock set")
+        self.shared.set_wall_clock(seconds)
 
     @rule(status=st.sampled_from((RunStatus.PAUSED, RunStatus.ACTIVE)))
     def pause_or_resume(self, status: RunStatus) -> None:

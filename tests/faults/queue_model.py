@@ -30,5 +30,6 @@ class Machines:
 
     db: Database
     pass_seconds: Callable[[float], None]
+    set_wall_clock: Callable[[float], None]
     told: list[Told] = field(default_factory=list)
     steps: dict[str, int] = field(default_factory=dict)

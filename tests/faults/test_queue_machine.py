@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator
+from datetime import datetime, timedelta
 
 import pytest
 from hypothesis import HealthCheck, Phase, seed
@@ -25,13 +26,27 @@ EXAMPLES = {"sqlite": length(150, 50_000), "postgresql": length(20, 5000)}
 STEPS = length(40, 100)
 
 
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
+class Clocks(Clock):
+    """The wall clock may be set; the clock of leases and claims only goes on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.wrong = timedelta()
+
+    def __call__(self) -> datetime:
+        return self.now + self.wrong
+
+    def set_wall_clock(self, seconds: float) -> None:
+        self.wrong += timedelta(seconds=seconds)
 
 
 @pytest.fixture
-def db(settings: Settings, clock: Clock) -> Iterator[Database]:
+def clock() -> Clocks:
+    return Clocks()
+
+
+@pytest.fixture
+def db(settings: Settings, clock: Clocks) -> Iterator[Database]:
     database = migrated(settings, clock)
     yield database
     database.close()
@@ -40,10 +55,10 @@ def db(settings: Settings, clock: Clock) -> Iterator[Database]:
 @pytest.mark.torture
 @pytest.mark.timeout(length(300, 100_000))
 def test_queue_does_what_its_model_says(
-    store: str, db: Database, clock: Clock, kept: Store, rng: random.Random, figures: Figures
+    store: str, db: Database, clock: Clocks, kept: Store, rng: random.Random, figures: Figures
 ) -> None:
     class Shared(Queue):
-        shared = Machines(db, clock.pass_seconds)
+        shared = Machines(db, clock.pass_seconds, clock.set_wall_clock)
 
     drawn = seed(rng.randrange(2**32))(Shared)
     run_state_machine_as_test(drawn, settings=_settings(EXAMPLES[store]))
