@@ -73,7 +73,7 @@ def attempt(tree: Path, mutant: Mutant) -> Verdict:
         result = run_tests(tree, [mutant.test])
     finally:
         file.write_text(source, encoding="utf-8")
-    outcomes = {0: "not caught", FAILED: "caught"}
+    outcomes = {0: "not caught", FAILED: "timed out" if "Failed: Timeout" in result.stdout else "caught"}
     outcome = outcomes.get(result.returncode, f"pytest could not run (exit code {result.returncode})")
     return Verdict(mutant, outcome, time.monotonic() - began, result.stdout + result.stderr)
 

@@ -28,7 +28,7 @@ PATCHES = {
 }
 """Checkpoints and metrics are written often, so that kills hit them too."""
 LEASE_SECONDS = 2.0
-PATIENCE = 60.0
+PATIENCE = 180.0
 
 
 class House:

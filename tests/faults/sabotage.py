@@ -119,7 +119,8 @@ OLD = [
         "self._go_on()\n            except StoreError as error:\n"
         "                self.patience.refused(error)",
         "self._go_on()\n            except StoreError as error:\n                raise",
-        "tests/faults/test_stopped.py::test_worker_stopped_inside_a_write_ends_nobody[sqlite]",
+        "tests/server/test_worker_locked_out.py::"
+        "test_a_lock_of_another_program_neither_ends_the_worker_nor_fails_the_run",
     ),
     Mutant(
         "a deleted question's number is given again",

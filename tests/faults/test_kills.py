@@ -15,13 +15,13 @@ from parenting.server.db import Database
 from parenting.server.new_run import start
 from parenting.server.settings import Settings
 from tests.faults.figures import Figures
-from tests.faults.house import House
+from tests.faults.house import PATIENCE, House
 from tests.faults.points import CLOSING, WEB, WORKER, Point
 from tests.faults.rebuilt import entries_of_x, rebuild
 from tests.lengths import length
 from tests.server.raising import ISLAND
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(300, 6000))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 6000))]
 RUNS, PARENTS = 2, 2
 KILLS = {"sqlite": length(60, 3000), "postgresql": length(15, 600)}
 SAMPLED = 6
@@ -47,7 +47,7 @@ def kill_at(house: House, name: str, points: list[Point], rng: random.Random, fi
     for point in rng.sample(points, k=len(points)):
         house.commands[name].kill()
         house.begin(name, point._replace(passage=1 if point.seldom else rng.randint(1, 3)))
-        end = time.monotonic() + 60
+        end = time.monotonic() + PATIENCE
         while house.commands[name].alive:
             assert time.monotonic() < end, f"never hit: {point.name}"
             house.keep()

@@ -53,7 +53,7 @@ def db(settings: Settings, clock: Clocks) -> Iterator[Database]:
 
 
 @pytest.mark.torture
-@pytest.mark.timeout(length(300, 100_000))
+@pytest.mark.timeout(length(900, 100_000))
 def test_queue_does_what_its_model_says(
     store: str, db: Database, clock: Clocks, kept: Store, rng: random.Random, figures: Figures
 ) -> None:
