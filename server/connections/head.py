@@ -28,7 +28,7 @@ def check_head(method: bytes, target: bytes, version: str, headers: Sequence[tup
     if len(lengths) > 1:
         raise UnclearHeadError("Content-Length: there must be at most one.")
     if method == b"CONNECT":
-        raise UnclearHeadError("CONNECT: this is no proxy.")
+        raise UnclearHeadError("CONNECT: this server is not a proxy.")
     if not target.startswith(b"/") and _authority(target) != hosts[:1]:
         raise UnclearHeadError("The target must begin with '/', or name the same host as Host.")
 

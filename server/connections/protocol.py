@@ -86,7 +86,7 @@ class BoundedProtocol(HttpToolsProtocol):
                 self._refuse(RefusedRequestError(431, "too_large", f"A head may have {most} bytes."))
 
     def pause_writing(self) -> None:
-        """Wait for a client that does not read its reply, but not for ever."""
+        """Wait for a client that does not read its reply, for a bounded time."""
         super().pause_writing()
         self._expect_reading()
 

@@ -45,7 +45,7 @@ claimed yet, as a run that was just started, is not raised if no worker is alive
 FORGIVEN = timedelta(minutes=5)
 """For so long at most a missing sign is put down to a store that refuses."""
 PROBE_SECONDS = 0.1
-"""How long a look at a run waits to learn whether the store takes signs of life at all."""
+"""The wait of a look at a run for whether the store takes signs of life at all."""
 
 
 def run_schema(db: Database, run_id: int) -> RunSchema:

@@ -61,7 +61,7 @@ def test_every_command_is_here() -> None:
 
 
 def said_by(command: str) -> str:
-    """What the command says on a store that cannot be used."""
+    """The output of the command on a store that cannot be used."""
     done = CliRunner().invoke(app, [*command.split(), *USED[command]])
     assert isinstance(done.exception, SystemExit), done.exception
     assert done.exit_code == 2, done.output

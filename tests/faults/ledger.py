@@ -72,7 +72,7 @@ class Entries(NamedTuple):
 
 
 def read(*files: Path) -> Entries:
-    """The lines of these ledgers. A line that was cut by a kill is no promise that was kept in mind."""
+    """The lines of these ledgers. A line that was cut by a kill promised nothing."""
     return told_in(*(file.read_bytes() for file in files))
 
 

@@ -12,7 +12,7 @@ from tests.faults.tap import COMMIT, Moment
 
 
 class Refusal(NamedTuple):
-    """What a driver says, and the status with which the web has to pass it on."""
+    """Errors of the driver, and the status with which the web has to pass each on."""
 
     name: str
     message: str

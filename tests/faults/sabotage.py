@@ -15,9 +15,11 @@ BROKEN = [
     Mutant(
         "commit after the reply (A3)",
         "server/db.py",
-        "with translated(), Session(engine, expire_on_commit=False) as session, session.begin():\n"
-        "                session.connection()  # BEGIN IMMEDIATE now, not at the first statement\n"
-        "                yield session\n",
+        "with translated(), Session(engine, expire_on_commit=False) as session:\n"
+        "                with session.begin():\n"
+        "                    info = session.connection().info  # BEGIN IMMEDIATE now, not at the first statement\n"
+        "                    yield session\n"
+        "                confirm(info)  # before anybody is told\n",
         "with translated():\n"
         "                session = Session(engine, expire_on_commit=False)\n"
         "                session.connection()\n"

@@ -11,8 +11,8 @@ QUEUE = [
     Mutant(
         "a worker that slept past its claim may write (fencing)",
         "server/runs.py",
-        "if (run.worker, run.fencing_token) != (mine.worker, mine.fencing_token):",
-        "if run.worker is None:",
+        "if (worker, token) != (mine.worker, mine.fencing_token):",
+        "if worker is None:",
         f"{RUNS}::test_finish_is_fenced",
     ),
     Mutant(

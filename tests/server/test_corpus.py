@@ -97,7 +97,7 @@ def test_data_that_is_there_is_never_written_again() -> None:
 
 
 def checked(folder: Path, capability: str) -> dict[str, Any]:
-    """What this version makes of a folder's data under these instructions."""
+    """The result of this version for a folder's data under these instructions."""
     done = subprocess.run(command(folder), env=environment(capability), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     found: dict[str, Any] = json.loads(done.stdout)

@@ -1,4 +1,4 @@
-"""Who gets a connection when they are many (E8)."""
+"""The connections that are admitted when they are many (E8)."""
 
 import resource
 

@@ -84,7 +84,7 @@ def test_a_clock_that_is_off_ends_nothing_early(
 def test_a_clock_that_is_off_holds_nothing_for_longer(
     db: Database, settings: Settings, held: int, hours: float
 ) -> None:
-    """What was leased, claimed and signed with the clock off is over for everybody after its own time."""
+    """Leases, claims and signs made with the clock off are over for everybody after their own time."""
     let_pass(db, 61)
     with restarted(settings, hours) as other:
         workers.sign(other, "worker-2")
