@@ -17,7 +17,8 @@ BROKEN = [
         "server/db.py",
         "with translated(), Session(engine, expire_on_commit=False) as session:\n"
         "                with session.begin():\n"
-        "                    info = session.connection().info  # BEGIN IMMEDIATE now, not at the first statement\n"
+        "                    info = session.connection().info  "
+        "# BEGIN IMMEDIATE now, not at the first statement\n"
         "                    yield session\n"
         "                confirm(info)  # before anybody is told\n",
         "with translated():\n"

@@ -86,7 +86,7 @@ def asked(connect: Callable[[], socket.socket], *parts: bytes) -> bytes:
 
 
 def sent_until_cut_off(client: socket.socket, part: bytes, times: int, pause: float) -> int:
-    """The number of times it could be sent before the server ended the connection; `times` if it never did."""
+    """The number of times it could be sent before the connection ended; `times` if it never did."""
     for number in range(times):
         try:
             client.sendall(part)

@@ -20,7 +20,7 @@ ROWS = 40
 def followed(
     settings: Settings, write: Callable[[Database, int], object], read: Callable[[int], Sequence[int]]
 ) -> list[int]:
-    """The rows that a reader sees who asks for all after the last one, while rows 0, 1, ... are written at once."""
+    """The rows that a reader sees who asks for all after the last, while rows are written at once."""
     others = [connect(settings) for _ in range(WRITERS)]
     seen: list[int] = []
     done = threading.Event()
