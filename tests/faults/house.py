@@ -136,6 +136,13 @@ class House:
             code = self.commands[name].stop()
             assert code in (0, -signal.SIGTERM), f"{name} ended with {code}: {self.commands[name].said()}"
 
+    def state(self) -> str:
+        """Runs, open questions and what the processes said, for the message of a test that fails."""
+        runs = self.store.rows("SELECT id, status, reason, waiting, tick, answers, worker FROM run")
+        queries = self.store.rows("SELECT run_id, status, count(*) AS n FROM query GROUP BY run_id, status")
+        said = {name: one.said()[-1000:] for name, one in self.commands.items()}
+        return f"{runs} {queries} {said} people: {[one.is_alive() for one in self._people()]}"
+
     def _people(self) -> Sequence[Parent | Operator]:
         return [*self.parents, *([self.operator] if self.operator else [])]
 

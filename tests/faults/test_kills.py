@@ -49,7 +49,7 @@ def kill_at(house: House, name: str, points: list[Point], rng: random.Random, fi
         house.begin(name, point._replace(passage=1 if point.seldom else rng.randint(1, 3)))
         end = time.monotonic() + PATIENCE
         while house.commands[name].alive:
-            assert time.monotonic() < end, f"never hit: {point.name}"
+            assert time.monotonic() < end, f"never hit: {point.name}; {house.state()}"
             house.keep()
             time.sleep(0.002)
         figures.count("SIGKILLs at named points", f"{name}: {point.name}")
