@@ -83,6 +83,7 @@ def make_server(settings: Settings) -> Server:
         timeout_graceful_shutdown=GRACE,
         timeout_keep_alive=30,
         server_header=False,
+        proxy_headers=False,  # any program of this machine could send X-Forwarded-For
     )
     gc.freeze()  # loaded modules stay: searching them for garbage takes a tenth of a second
     return Server(config)

@@ -1,0 +1,132 @@
+"""The configurations in deploy/, each run by its program on a port of loopback before another port."""
+
+from __future__ import annotations
+
+import shutil
+import ssl
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from tests.server.serving import free_port
+from tests.tree import ROOT
+
+NAME = "parenting.example"
+AUTH = ("parent", "a long password")
+HASH = "$2b$04$kSuPkpgqtk4FRf337jMkHORo6IorLnWJwa5Z4SQ5o5cOY5xjfsIOm"
+"""Of the password, by bcrypt with the least cost."""
+
+NGINX = """
+user root; # said of an administrator only: the folder of the test is closed to other users
+daemon off; pid FOLDER/pid; worker_processes 1; events {}
+http {
+    access_log off; include FOLDER/site.conf;
+    client_body_temp_path FOLDER/body; proxy_temp_path FOLDER/proxy;
+    fastcgi_temp_path FOLDER/fastcgi; scgi_temp_path FOLDER/scgi; uwsgi_temp_path FOLDER/uwsgi;
+}
+"""
+
+
+def configuration(file: str, changes: dict[str, str]) -> str:
+    """A file of deploy/ with other ports and files; each of the changed texts must be there."""
+    text = (ROOT / "deploy" / file).read_text(encoding="utf-8")
+    for old, new in changes.items():
+        assert old in text, f"deploy/{file} has no {old}"
+        text = text.replace(old, new)
+    return text
+
+
+def nginx(folder: Path, port: int, upstream: int) -> list[str]:
+    """Write its files and return its command."""
+    (folder / "passwords").write_text(f"{AUTH[0]}:{HASH}\n")
+    changes = {
+        "listen 443 ": f"listen 127.0.0.1:{port} ",
+        "127.0.0.1:8765": f"127.0.0.1:{upstream}",
+        "/etc/ssl/parenting.pem": f"{folder}/certificate.pem",
+        "/etc/ssl/private/parenting.key": f"{folder}/key.pem",
+        "/etc/nginx/parenting.passwords": f"{folder}/passwords",
+    }
+    (folder / "site.conf").write_text(configuration("nginx.conf", changes))
+    (folder / "nginx.conf").write_text(NGINX.replace("FOLDER", str(folder)))
+    return ["nginx", "-c", f"{folder}/nginx.conf", "-p", str(folder), "-e", "stderr"]
+
+
+def caddy(folder: Path, port: int, upstream: int) -> list[str]:
+    """Write its file and return its command. No other port is opened, and no certificate fetched."""
+    changes = {
+        "{\n\tservers": "{\n\tadmin off\n\tauto_https off\n\tservers",
+        f"\n{NAME} {{\n": f"\n{NAME}:{port} {{\n\tbind 127.0.0.1\n"
+        f"\ttls {folder}/certificate.pem {folder}/key.pem\n",
+        "127.0.0.1:8765": f"127.0.0.1:{upstream}",
+        "$2a$14$THE_OUTPUT_OF_caddy_hash-password": HASH,
+    }
+    (folder / "Caddyfile").write_text(configuration("Caddyfile", changes))
+    return ["caddy", "run", "--config", f"{folder}/Caddyfile", "--adapter", "caddyfile"]
+
+
+COMMANDS = {"nginx": nginx, "caddy": caddy}
+
+
+@contextmanager
+def proxy(program: str, folder: Path, upstream: int) -> Iterator[httpx2.Client]:
+    """A client who knows the password and speaks to the upstream's port by way of this program."""
+    for needed in (program, "openssl"):
+        if shutil.which(needed) is None:
+            pytest.skip(f"{needed} is not installed")
+    _make_certificate(folder)
+    port = free_port()
+    command = COMMANDS[program](folder, port, upstream)
+    homes = {name: str(folder) for name in ("HOME", "XDG_DATA_HOME", "XDG_CONFIG_HOME")}
+    said = folder / "said"
+    with said.open("wb") as output:
+        child = subprocess.Popen(
+            command, cwd=folder, env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", **homes}, stderr=output
+        )
+    try:
+        with client(port, folder) as found:
+            _await(found, child, said)
+            yield found
+    finally:
+        child.terminate()
+        child.wait(20)
+
+
+def client(port: int, folder: Path) -> httpx2.Client:
+    """A client of the host that the certificate names, at a port of this machine."""
+
+    def name_host(request: httpx2.Request) -> None:
+        request.extensions["sni_hostname"] = NAME
+
+    return httpx2.Client(
+        base_url=f"https://127.0.0.1:{port}",
+        verify=ssl.create_default_context(cafile=folder / "certificate.pem"),
+        headers={"Host": f"{NAME}:{port}"},
+        auth=AUTH,
+        timeout=30,
+        trust_env=False,
+        event_hooks={"request": [name_host]},
+    )
+
+
+def _await(found: httpx2.Client, child: subprocess.Popen[bytes], said: Path) -> None:
+    end = time.monotonic() + 60
+    while True:
+        try:
+            assert found.get("/healthz").status_code == 200
+            return
+        except httpx2.TransportError:
+            assert child.poll() is None, said.read_text()
+            assert time.monotonic() < end, said.read_text()
+            time.sleep(0.05)
+
+
+def _make_certificate(folder: Path) -> None:
+    words = "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2"
+    name = ["-subj", f"/CN={NAME}", "-addext", f"subjectAltName=DNS:{NAME}"]
+    files = ["-keyout", str(folder / "key.pem"), "-out", str(folder / "certificate.pem")]
+    subprocess.run([*words.split(), *name, *files], check=True, capture_output=True)
