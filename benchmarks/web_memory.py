@@ -61,7 +61,6 @@ PATHS = (
 
 def serve(port: int, folder: Path) -> None:
     """Serve with tracemalloc; each SIGUSR1 writes a snapshot of what is held."""
-    tracemalloc.start(FRAMES)
     from parenting.server.serve import bind, make_server
     from parenting.server.settings import Settings
 
@@ -71,7 +70,9 @@ def serve(port: int, folder: Path) -> None:
         lambda *_: tracemalloc.take_snapshot().dump(str(folder / f"snapshot-{next(numbers)}")),
     )
     chosen = Settings(port=port)
-    make_server(chosen).run(sockets=[bind(chosen.host, port)])
+    server = make_server(chosen)
+    tracemalloc.start(FRAMES)  # only now: it makes the imports several times as slow
+    server.run(sockets=[bind(chosen.host, port)])
 
 
 @contextmanager

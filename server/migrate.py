@@ -6,13 +6,13 @@ The scripts are in `migrations/`, in a checkout and in an installed wheel alike.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 from alembic import command
 from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, inspect
+from sqlalchemy import Column, Connection, MetaData, String, Table, inspect, select
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
@@ -21,6 +21,8 @@ from parenting.server.store.postgresql import begin_migration
 
 FOLDER = Path(__file__).parents[1] / "migrations"
 
+VERSIONS = Table("alembic_version", MetaData(), Column("version_num", String(32)))
+"""Alembic's own table. Its `MigrationContext` would define it, and compile its query, anew for each look."""
 
 Keep = Callable[[str], Path]
 """A function that copies a database of a revision before it is migrated."""
@@ -40,7 +42,7 @@ def upgrade(db: Database, keep: Keep | None = None) -> bool:
     with db.write() as session:
         connection = _begin(session)
         before = _revision(connection)
-        if before == _head():
+        if before == newest():
             return False
         if before is None and inspect(connection).has_table("run"):
             raise SetupError(f"{_place(db)} holds tables of another program. Name another database.")
@@ -87,7 +89,7 @@ def require_current(db: Database) -> None:
     found = revision(db)
     if found is None:
         raise SetupError(f"{_place(db)} has no tables yet. Run: `parenting migrate`")
-    if found != _head():
+    if found != newest():
         raise SetupError(f"{_place(db)} is from an older version of Parenting. Run: `parenting migrate`")
 
 
@@ -103,12 +105,14 @@ def revision(db: Database) -> str | None:
 
 def newest() -> str:
     """Return the revision of this version's tables."""
-    return str(_head())
+    return known_revisions()[0]
 
 
-def known_revisions() -> list[str]:
-    """Return all revisions, the newest first."""
-    return [script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()]
+@cache
+def known_revisions() -> tuple[str, ...]:
+    """Return all revisions, the newest first. They are read once: a health check asks every few seconds."""
+    scripts = ScriptDirectory.from_config(_config()).walk_revisions()
+    return tuple(script.revision for script in scripts)
 
 
 def _begin(session: Session) -> Connection:
@@ -120,17 +124,15 @@ def _begin(session: Session) -> Connection:
 
 
 def _revision(connection: Connection) -> str | None:
-    found = MigrationContext.configure(connection).get_current_revision()
+    if not inspect(connection).has_table(VERSIONS.name):
+        return None
+    found = connection.scalars(select(VERSIONS.c.version_num)).one_or_none()
     if found is not None and found not in known_revisions():
         raise SetupError(
             f"The database is from a newer version of Parenting (revision {found}). "
             "Update Parenting, or name another database."
         )
     return found
-
-
-def _head() -> str | None:
-    return ScriptDirectory.from_config(_config()).get_current_head()
 
 
 def _config() -> Config:

@@ -1,0 +1,54 @@
+"""The memory of the web process: requests of every kind leave no objects behind."""
+
+from __future__ import annotations
+
+import gc
+from collections import Counter
+
+import httpx2
+
+from parenting.server.tables import Run
+
+WARM, ROUNDS = 2, 4
+PATHS = (
+    "/",
+    "/runs/{id}",
+    "/runs/{id}/parent",
+    "/runs/{id}/stages",
+    "/runs/{id}/history",
+    "/api/v1/runs",
+    "/api/v1/runs/{id}",
+    "/api/v1/runs/{id}/queries?limit=20",
+    "/api/v1/runs/{id}/metrics?limit=50",
+    "/static/parent.js",
+    "/healthz",
+    "/readyz",
+    "/metrics",
+    "/api/v1/runs/999",
+    "/nothing/here",
+    "/api/v1/runs/one",
+)
+
+
+def ask(client: httpx2.Client, run_id: int) -> None:
+    """Send one request of each kind, and one for a lease, of which there is none."""
+    for path in PATHS:
+        client.get(path.format(id=run_id), follow_redirects=False)
+    client.post(f"/api/v1/runs/{run_id}/queries/lease", json={"client_id": "someone"})
+
+
+def living() -> Counter[str]:
+    """The number of objects of each type that the garbage collector leaves."""
+    gc.collect()
+    return Counter(f"{type(one).__module__}.{type(one).__qualname__}" for one in gc.get_objects())
+
+
+def test_requests_leave_no_objects_behind(client: httpx2.Client, run: Run) -> None:
+    for _ in range(WARM):
+        ask(client, run.id)
+    living()  # the first count leaves a few objects itself
+    before = living()
+    for _ in range(ROUNDS):
+        ask(client, run.id)
+    grown = living() - before
+    assert {name: number for name, number in grown.items() if number >= ROUNDS} == {}
