@@ -22,7 +22,7 @@ from parenting.server.store.postgresql import begin_migration
 FOLDER = Path(__file__).parents[1] / "migrations"
 
 VERSIONS = Table("alembic_version", MetaData(), Column("version_num", String(32)))
-"""Alembic's own table. Its `MigrationContext` would define it, and compile its query, anew for each look."""
+"""Alembic's own table. Its `MigrationContext` would define it, and compile its query, again for each look."""
 
 Keep = Callable[[str], Path]
 """A function that copies a database of a revision before it is migrated."""
