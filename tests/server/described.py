@@ -1,0 +1,86 @@
+"""The API's description, as schemathesis reads it, and a database in which its requests find something."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import schemathesis
+from fastapi import FastAPI
+from schemathesis import Case
+from schemathesis.schemas import BaseSchema
+from schemathesis.specs.openapi.checks import positive_data_acceptance
+from sqlalchemy import select
+
+from parenting.server.app import bare_app
+from parenting.server.db import Database
+from parenting.server.metrics import write_metrics
+from parenting.server.new_run import LARGEST_INT, NewRun, start
+from parenting.server.operator_events import add_operator_event
+from parenting.server.public_ids import is_public_id
+from parenting.server.queue.answers import answer
+from parenting.server.queue.worker_side import post_query, take_answer, take_operator_events
+from parenting.server.runs import Claim, claim, finish, set_status
+from parenting.server.statuses import RunStatus
+from parenting.server.tables import Query, Run
+from parenting.server.workers import sign
+from tests.server.conftest import CLIPS
+
+RUNS, QUESTIONS = 4, 8
+UNTOLD: dict[str, list[Any]] = {"start_run": [positive_data_acceptance]}
+"""Rules that a schema cannot hold: which levels, presets and settings there are, and which go together."""
+
+
+def description() -> BaseSchema:
+    """The description of all operations; each caller has its own, for seeds and settings are kept in it."""
+    schema = schemathesis.openapi.from_dict(bare_app().openapi())
+    schema.config.update(base_url="http://localhost")
+    # a well-formed answer may be meant for another database
+    schema.config.checks.positive_data_acceptance.expected_statuses.append("410")
+    schema.config.max_stream_events = 1  # a live stream has no end
+    return schema
+
+
+def live(db: Database) -> None:
+    """Runs 1 and 4 live, 2 was stopped, 3 has failed. Questions of run 1 are applied, answered and open."""
+    for _ in range(RUNS):
+        start(db, NewRun(world="unsafe-exploration", config={"stages": 3}, name="schema"))
+    mine, _, third, _ = claim(db, "worker-1")
+    set_status(db, 2, RunStatus.STOPPED, "Stopped by the operator.")
+    finish(db, third, RunStatus.FAILED, "It could not go on.")
+    _live(db, mine)
+    sign(db, "worker-1")
+
+
+def _live(db: Database, mine: Claim) -> None:
+    kinds = ("guidance", "preference")
+    queries = [post_query(db, mine, tick, kinds[tick % 2], 1, CLIPS, (1, tick)) for tick in range(QUESTIONS)]
+    answer(db, queries[0], "left", "a", "human")
+    take_answer(db, mine, QUESTIONS)
+    answer(db, queries[1], "neither", "a", "human")
+    add_operator_event(db, mine.run_id, "change", {"kind": "change", "name": "p_rec", "value": 0.5})
+    take_operator_events(db, mine, QUESTIONS + 1)
+    add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
+    write_metrics(db, mine, {tick: {"deaths": 0, "loss": None} for tick in range(5)})
+
+
+def reply_to(case: Case[Any], app: FastAPI) -> int:
+    """Send a request and hold the reply to the description. The status of the reply."""
+    _lead(case, app.state.db)
+    name = str(case.operation.definition.raw["operationId"])
+    status: int = case.call_and_validate(app=app, excluded_checks=UNTOLD.get(name, [])).status_code
+    return status
+
+
+def _lead(case: Case[Any], db: Database) -> None:
+    """Well-formed ids lead to what is there, and one in so many beyond; malformed ones stay as they are."""
+    for name, count, table in (("run_id", RUNS, Run), ("query_id", QUESTIONS, Query)):
+        drawn = case.path_parameters.get(name)
+        if isinstance(drawn, str) and is_public_id(drawn) and drawn[0] not in "12345":
+            case.path_parameters[name] = _public_id(db, table, 1 + ord(drawn[0]) % count)
+        if type(drawn) is int and 0 < drawn <= LARGEST_INT:
+            case.path_parameters[name] = 1 + drawn % (count + 1)
+
+
+def _public_id(db: Database, table: type[Run] | type[Query], number: int) -> str:
+    with db.read() as session:
+        return session.execute(select(table.public_id).where(table.id == number)).scalar_one()
