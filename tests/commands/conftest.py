@@ -7,6 +7,7 @@ from pathlib import Path
 
 import httpx2
 import pytest
+import structlog
 from fastapi.testclient import TestClient
 
 from parenting.commands.client import Client
@@ -14,6 +15,14 @@ from parenting.server.app import create_app
 from parenting.server.db import Database
 from parenting.server.settings import Settings
 from tests.database import migrated
+
+
+@pytest.fixture(autouse=True)
+def quiet_log() -> Iterator[None]:
+    """The web in this process logs as a served one does, not between the lines that a command prints."""
+    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger("warning"))
+    yield
+    structlog.reset_defaults()
 
 
 @pytest.fixture

@@ -29,6 +29,8 @@ ARGUMENTS = {
     "answer": ["--run", "1"],
     "export": ["1"],
     "replay": ["1"],
+    "resume": ["1"],
+    "verify": ["1"],
     "restore": ["monday.db"],
 }
 
