@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 
 from sqlalchemy import URL, make_url
@@ -90,7 +91,7 @@ def _put_aside(target: Path) -> Path:
 
     The first name goes on until the new file replaces it: at no moment is there none.
     """
-    aside = target.parent / FOLDER / f"before-restore-{stamp(utc_now())}.db"
+    aside = _aside(target.parent / FOLDER, ".db")
     aside.parent.mkdir(exist_ok=True, mode=0o700)
     os.link(target, aside)
     aside.chmod(0o600)
@@ -111,8 +112,7 @@ def _restore_dump(settings: Settings, url: URL, file: Path, replace: bool) -> Re
             raise SetupError(
                 f"{url.render_as_string()} holds tables. Give --replace to dump them aside and restore these."
             )
-        name = f"before-restore-{stamp(utc_now())}.dump"
-        aside = back_up(settings, settings.data / FOLDER / name).file
+        aside = back_up(settings, _aside(settings.data / FOLDER, ".dump")).file
     dumps.restore(url, file)
     return Restored(url.render_as_string(), f"{number} tables", aside, revision_of(settings) != newest())
 
@@ -143,3 +143,10 @@ def _is_older(found: str | None, file: Path) -> bool:
             f"{file} is from a newer version of Parenting (revision {found}). Update Parenting first."
         )
     return found != newest()
+
+
+def _aside(folder: Path, end: str) -> Path:
+    """Return a name that is free for a former database, also for a second one within the same second."""
+    name = f"before-restore-{stamp(utc_now())}"
+    names = (folder / f"{name}{more}{end}" for more in chain([""], (f"-{n}" for n in count(2))))
+    return next(path for path in names if not path.exists())

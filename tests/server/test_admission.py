@@ -1,8 +1,10 @@
 """While the store is locked: who waits, who does not, and what those who wait are told (D2, E8)."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, contextmanager
+from typing import Any
 
 import httpx2
 import pytest
@@ -54,7 +56,7 @@ def in_loop(test: Callable[[httpx2.AsyncClient], Awaitable[None]], settings: Set
         async with serving(create_app(settings, db), Admission(seconds=LOCKED)) as client:
             await test(client)
 
-    asyncio.run(whole())
+    in_a_loop(whole())
 
 
 def test_two_hundred_waiting_answers_hold_up_nobody_who_reads(
@@ -106,7 +108,7 @@ def test_full_queue_refuses_at_once() -> None:
         assert gate.waiting == 0
         await _enter(gate)  # the place was given back
 
-    asyncio.run(test())
+    in_a_loop(test())
 
 
 def test_place_that_stays_taken_is_busy() -> None:
@@ -117,7 +119,13 @@ def test_place_that_stays_taken_is_busy() -> None:
                 await _enter(gate, 0.01)
         await _enter(gate)
 
-    asyncio.run(test())
+    in_a_loop(test())
+
+
+def in_a_loop(test: Coroutine[Any, Any, None]) -> None:
+    """Run a coroutine in a thread: a browser that another test left open has a loop in this one."""
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, test).result()
 
 
 async def _enter(gate: Gate, seconds: float = 5) -> None:
