@@ -74,6 +74,7 @@ def test_level_of_ones_own(client: httpx2.Client, db: Database, text: str) -> No
     )
 
 
+@pytest.mark.only("sqlite", "refused before a store is asked")
 @pytest.mark.parametrize(
     ("fields", "named"),
     [
@@ -203,6 +204,7 @@ def test_what_is_not_there_is_404(client: httpx2.Client, method: str, path: str)
     assert reply.json()["error"]["code"] == "not_found"
 
 
+@pytest.mark.only("sqlite", "refused before a store is asked")
 @pytest.mark.parametrize("number", ["0", "-1", "x", "1.5", str(2**53), "1" * 50])
 def test_ids_are_whole_numbers(client: httpx2.Client, number: str) -> None:
     assert wrong(client.get(f"/api/v1/runs/{number}")).keys() == {"run_id"}
