@@ -4,7 +4,6 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -14,6 +13,7 @@ from parenting.commands.main import app
 from parenting.server.db import Database, connect
 from parenting.server.migrate import upgrade
 from parenting.server.settings import Settings
+from parenting.server.store.clock import boot_mark
 from parenting.server.workers import sign, sign_off
 from tests.tree import ROOT
 
@@ -61,7 +61,8 @@ def test_a_worker_that_ended_in_order_does_not_count(db: Database) -> None:
 
 
 def test_a_worker_that_fell_silent_does_not_count(db: Database) -> None:
-    db.clock = lambda: datetime.now(UTC) - timedelta(seconds=11)
+    now = boot_mark()
+    db.mark = lambda _session: now._replace(seconds=now.seconds - 11)
     sign(db, HERE)
     assert check().exit_code == 1
 
