@@ -36,6 +36,8 @@ class BrowserTabs:
 
     def close(self) -> None:
         for context in self.contexts:
+            for page in context.pages:
+                page.unroute_all(behavior="ignoreErrors")  # what a test holds back ends with the page
             context.close()
 
     def _heard(self, message: ConsoleMessage) -> None:
