@@ -20,8 +20,8 @@ from parenting.server.workers import sign
 
 pytestmark = pytest.mark.only("sqlite", "the lock of the one file")
 
-LOCKED = 1.0
-"""The bound of a request in these tests, in seconds; five in production."""
+LOCKED = 3.0
+"""The bound of a request in these tests, in seconds; five in production. A busy machine reads slowly."""
 
 
 @contextmanager
@@ -88,7 +88,7 @@ def test_answers_that_wait_are_stored_once_the_lock_is_gone(
     async def test(client: httpx2.AsyncClient) -> None:
         with locked(settings):
             waiting = asyncio.ensure_future(answering(client, guidance))
-            await asyncio.sleep(LOCKED / 4)
+            await asyncio.sleep(0.25)
             assert not waiting.done()
         assert (await waiting).status_code == 200
 
