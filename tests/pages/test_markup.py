@@ -88,7 +88,8 @@ def test_script_and_server_know_the_same_states() -> None:
     """The state of a run comes from the server. A page adds what only it can know, and has words for each."""
     own = {"elsewhere", "away", "offline", "damaged"}
     assert {*RunState} | own == set(STATE_TEXTS)
-    script = (WEB / "static/parent.js").read_text()
+    parts = ("parent", "questions", "answers", "waiting")
+    script = "".join((WEB / f"static/{part}.js").read_text() for part in parts)
     named = set(re.findall(r'wait\("(\w+)"\)|state = "(\w+)"|\? "(\w+)" : ', script))
     named = {name for names in named for name in names if name}
     assert own <= named <= set(STATE_TEXTS)

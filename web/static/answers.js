@@ -1,0 +1,64 @@
+// Answers: takes one for the question on the stage, keeps it, sends it, and says what became of it.
+import { recordAnswer, timeLeft } from "./eta.js";
+import { flush, keep } from "./outbox.js";
+import { $, client, given, page, painted, PATIENCE, run, waiting } from "./page.js";
+import { next, show } from "./questions.js";
+import { wait } from "./waiting.js";
+
+const HASTE = 40; // ms after an answer when the next question is asked for, if the answer's reply is not there before
+const ELSEWHERE = "An answer is meant for another database than the one that is served here. It was not stored; this browser keeps it.";
+const saved = []; // replies to answers, until the stage changes
+
+export function count(number) {
+  page.answered = Math.max(page.answered, number);
+  $("count").textContent = page.answered;
+  $("goal").hidden = !page.goal;
+  $("goal").firstElementChild.textContent = page.goal ?? "";
+  $("left").textContent = timeLeft(page.goal - page.answered);
+  for (const button of waiting.querySelectorAll("[data-more]")) button.value = page.goal + Number(button.dataset.more);
+}
+
+export function answer(choice) {
+  if (!page.current) return;
+  const { database, query } = page.current.dataset;
+  given.add(query);
+  for (const button of page.current.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
+  page.current = null;
+  page.unsaved++;
+  $("saved").textContent = "Saving";
+  $("alert").textContent = "";
+  performance.mark("answer", { detail: query });
+  recordAnswer();
+  keep({ database, run, question: query, choice, client_id: client });
+  if (page.ahead) {
+    painted(() => flush(report));
+    return show(page.ahead);
+  }
+  page.player.still();
+  Promise.race([flush(report), new Promise((done) => { setTimeout(done, HASTE); })]).then(() => { if (!page.current && !page.lookout) next(PATIENCE); });
+  wait(page.state === "question" ? "exploring" : page.state);
+}
+
+// A page that changes twice is painted twice: what was saved is told together with the next question, if that comes soon.
+export function settle() {
+  for (const reply of saved.splice(0)) report("saved", reply);
+}
+
+export function report(outcome, reply, answer) {
+  if (outcome === "saved" && page.quiet) return saved.push(reply);
+  $("saved").classList.toggle("kept", outcome === "kept");
+  if (outcome === "kept") {
+    $("saved").textContent = "Kept here, not sent yet";
+    if (!page.current) wait("offline");
+    return;
+  }
+  page.unsaved = Math.max(0, page.unsaved - 1);
+  if (outcome === "saved") {
+    if (reply.run_public_id === run) count(reply.number);
+    if (!page.unsaved) $("saved").textContent = "Saved";
+  } else {
+    if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? "Kept here, not stored" : "";
+    $("alert").textContent = outcome === "elsewhere" ? ELSEWHERE : reply.message;
+    if (outcome === "elsewhere" && given.delete(answer.question) && !page.current) next(); // a copy of its database asks the same
+  }
+}

@@ -1,0 +1,29 @@
+// What the parts of the parent's page share: its elements, the names of run and client, and what stands on it now.
+export const $ = (id) => document.getElementById(id);
+export const main = $("main"), stage = $("stage"), waiting = $("waiting"), help = $("help");
+export const { run, client, name } = main.dataset;
+export const PATIENCE = 1; // seconds that a request for a question may lie at the server
+export const given = new Set(); // questions that were answered on this page
+
+export const page = {
+  current: null, // the form on the stage, until it is answered
+  player: null,
+  ahead: null, // the form after it
+  lookout: null, // aborts the request for it, which lies at the server
+  asking: false, // a request for a question is under way
+  again: false, // another one was wanted meanwhile
+  state: main.dataset.state,
+  answered: Number($("count").textContent),
+  goal: Number($("goal").firstElementChild.textContent),
+  unsaved: 0,
+  quiet: 0, // the timer after which the page says that the agent explores
+};
+
+// Do something once the stage is painted: until then the page has nothing else to do.
+const CALM = 60; // ms
+export function painted(then) {
+  let timer = 0;
+  const once = () => { clearTimeout(timer); then?.(); then = null; };
+  requestAnimationFrame(() => setTimeout(once, CALM));
+  timer = setTimeout(once, 5 * CALM); // a hidden page is never painted
+}

@@ -1,0 +1,88 @@
+// Questions: fetches them, keeps one ahead, and puts them on the stage.
+// The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
+import { settle } from "./answers.js";
+import { kept } from "./outbox.js";
+import { $, client, given, main, name, page, painted, PATIENCE, run, stage, waiting } from "./page.js";
+import { play } from "./play.js";
+import { wait } from "./waiting.js";
+
+const LOOKOUT = 5; // seconds that the request for the question after this one may lie at the server, while somebody thinks
+
+// The form of the most urgent question, besides those that were answered here; null if there is none within `seconds`.
+async function ask(shown = [], seconds = 0, signal = undefined) {
+  const body = new URLSearchParams({ client_id: client, wait: seconds });
+  for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
+  const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body, signal });
+  if (!reply.ok) throw Object.assign(new Error(reply.statusText), { status: reply.status });
+  if (reply.status === 204) return null;
+  const holder = document.createElement("template");
+  holder.innerHTML = await reply.text();
+  const form = holder.content.firstElementChild;
+  return given.has(form.dataset.query) ? null : form; // two requests may bring the same question, one of them late
+}
+
+// Fill the empty stage. One request at a time; what comes meanwhile is asked for once more.
+export async function next(seconds = 0) {
+  page.again = page.asking;
+  if (page.asking) return;
+  page.asking = true;
+  try {
+    let form;
+    do {
+      page.again = false;
+      form = await ask([], seconds);
+      seconds = 0;
+    } while (!form && page.again && !page.current);
+    if (form && !page.current) show(form);
+    else if (!page.current) wait(page.state === "question" ? "elsewhere" : page.state);
+  } catch ({ status }) {
+    if (status === 500) wait("damaged");
+    else wait(status === 404 ? "away" : "offline");
+  } finally { page.asking = false; }
+}
+
+// The question after this one: its request lies at the server while somebody thinks, so that its reply leaves as soon as
+// the agent asks.
+export async function prefetch() {
+  if (!page.current || document.hidden) return;
+  page.lookout?.abort();
+  const mine = page.lookout = new AbortController(), form = page.current, began = performance.now();
+  form.dataset.ahead = "";
+  const found = await ask([form.dataset.query], LOOKOUT, mine.signal).catch(() => null);
+  if (mine !== page.lookout) return;
+  page.lookout = null;
+  if (form === page.current) {
+    page.ahead = found;
+    form.dataset.ahead = found?.dataset.query ?? "";
+    if (!found && performance.now() - began > 1000 * PATIENCE) prefetch();
+  } else if (!page.current) {
+    if (found) show(found);
+    else next(PATIENCE);
+  }
+}
+
+// A question is held for a minute, and for longer while somebody looks at it.
+export async function renew() {
+  if (!page.current || document.hidden) return;
+  await ask().catch(() => null);
+  if (!page.lookout) prefetch();
+}
+
+export function show(form) {
+  const focused = stage.querySelector(".answers :focus-visible")?.value;
+  if (!form.isConnected) stage.replaceChildren(form);
+  clearTimeout(page.quiet);
+  page.quiet = 0;
+  page.current = form;
+  page.ahead = null;
+  waiting.hidden = true;
+  stage.hidden = false;
+  main.dataset.state = "question";
+  document.title = `● ${form.dataset.title} · ${name}`;
+  $("said").textContent = form.dataset.spoken;
+  settle();
+  page.player = play(form);
+  if (focused) form.querySelector(`.answers [value=${focused}]`).focus();
+  performance.mark("question", { detail: form.dataset.query });
+  painted(prefetch);
+}
