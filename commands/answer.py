@@ -13,6 +13,7 @@ import typer
 from parenting.commands.answering import EXITS, Answering, Ending, Order, Told
 from parenting.commands.client import Client, RefusedError, UnavailableError
 from parenting.commands.errors import UsageError, friendly_errors
+from parenting.commands.printing import say
 from parenting.commands.progress import bar
 from parenting.envs import registry
 
@@ -85,7 +86,7 @@ def answer(
 
         work = Answering(client, order, Judge(), stored)
         ending = _work(work)
-    typer.echo(_as_json(run, work.told, ending) if as_json else _said(run, work.told, ending))
+    say(_as_json(run, work.told, ending) if as_json else _said(run, work.told, ending))
     raise typer.Exit(EXITS[ending.kind])
 
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from parenting.commands.errors import exit_on_interrupt, friendly_errors, settings
+from parenting.commands.printing import say
 from parenting.server.backups.making import back_up
 
 
@@ -32,4 +33,4 @@ def backup(
     """
     with exit_on_interrupt(), friendly_errors():
         made = back_up(settings(), to, force)
-    typer.echo(f"Backup written to {made.file}: {made.holds}.")
+    say(f"Backup written to {made.file}: {made.holds}.")

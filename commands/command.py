@@ -13,6 +13,8 @@ from pydantic import ValidationError
 from typer.core import TyperCommand
 
 from parenting.commands.errors import friendly_errors
+from parenting.commands.printing import say
+from parenting.envs.people_text import printable
 from parenting.server.environment import warnings
 from parenting.server.lifeline import VARIABLE
 from parenting.server.settings import FILE, names
@@ -32,6 +34,7 @@ class Command(TyperCommand):
         except typer.BadParameter as error:
             if isinstance(error.__cause__, ValidationError):
                 error.message = _sentence(error.param, error.__cause__)
+            error.message = printable(error.message)
             raise
 
     def invoke(self, ctx: Any) -> Any:
@@ -42,7 +45,7 @@ class Command(TyperCommand):
         if VARIABLE not in os.environ:
             with friendly_errors():
                 for said in warnings(os.environ, FILE, names()):
-                    typer.echo(said, err=True)
+                    say(said, err=True)
         return super().invoke(ctx)
 
 

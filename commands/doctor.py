@@ -12,6 +12,8 @@ from rich.text import Text
 from sqlalchemy import make_url
 
 from parenting.commands.errors import exit_on_interrupt, friendly_errors, settings
+from parenting.commands.printing import say
+from parenting.envs.people_text import printable
 from parenting.server.doctor.examination import examine
 from parenting.server.doctor.findings import Finding, State, worst
 from parenting.server.errors import SetupError
@@ -51,7 +53,7 @@ def doctor(
             if not as_json:
                 _show(finding)
     if as_json:
-        typer.echo(json.dumps([finding.row() for finding in found]))
+        say(json.dumps([finding.row() for finding in found]))
     raise typer.Exit(EXIT_CODES[worst(found)])
 
 
@@ -70,6 +72,6 @@ def _accept(chosen: Settings) -> None:
 def _show(finding: Finding) -> None:
     console = Console(soft_wrap=True, highlight=False)
     state = Text(f"{finding.state:<8}", style=STYLES[finding.state])
-    console.print(state + Text(f"{finding.name}: {finding.said}"))
+    console.print(state + Text(printable(f"{finding.name}: {finding.said}")))
     if finding.remedy is not None:
-        console.print(Text(f"{'':8}-> {finding.remedy}"))
+        console.print(Text(printable(f"{'':8}-> {finding.remedy}")))

@@ -10,6 +10,7 @@ import typer
 from pydantic import ValidationError
 
 from parenting.agent.config import UnknownPresetError
+from parenting.commands.printing import say
 from parenting.envs.levels.spec import LevelError
 from parenting.envs.names import UnknownNameError
 from parenting.server.errors import ServerError
@@ -27,10 +28,10 @@ def friendly_errors() -> Iterator[None]:
     try:
         yield
     except ServerError as error:
-        typer.echo(error.message, err=True)
+        say(error.message, err=True)
         raise typer.Exit(2) from None
     except (UsageError, UnknownPresetError, UnknownNameError, LevelError, NoWeightsError) as error:
-        typer.echo(str(error), err=True)
+        say(str(error), err=True)
         raise typer.Exit(2) from None
 
 
@@ -40,7 +41,7 @@ def exit_on_interrupt() -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        typer.echo("Stopped.", err=True)
+        say("Stopped.", err=True)
         raise typer.Exit(130) from None
 
 

@@ -13,6 +13,7 @@ import typer
 
 from parenting.commands.errors import UsageError, friendly_errors
 from parenting.commands.options import among, folder, whole
+from parenting.commands.printing import say
 from parenting.experiments.registry import NAMES, UnknownExperimentError
 from parenting.experiments.spec import Device, Experiment, Request, Scale
 
@@ -116,7 +117,7 @@ def _report(out: Path, pages: bool) -> None:
     try:
         if pages:
             _pages(out)
-        typer.echo(f"Written: {report(out)}")
+        say(f"Written: {report(out)}")
     except (CorruptResultsError, NoResultsError) as error:
         raise UsageError(str(error)) from None
     except OSError as error:
@@ -131,7 +132,7 @@ def _pages(out: Path) -> None:
 
     for results in stored(out):
         publish_again(experiment(results.name), out)
-        typer.echo(f"Written: {out / results.name}.md")
+        say(f"Written: {out / results.name}.md")
 
 
 def _asked(
@@ -169,9 +170,9 @@ def _run(one: Experiment, request: Request, out: Path, workers: int, cluster: st
     except OSError as error:
         raise UsageError(_at(out, error)) from None
     except KeyboardInterrupt:
-        typer.echo("Stopped. The same command goes on from here.", err=True)
+        say("Stopped. The same command goes on from here.", err=True)
         raise typer.Exit(130) from None
-    typer.echo(page(results, ()))
+    say(page(results, ()))
 
 
 def _at(out: Path, error: OSError) -> str:

@@ -13,6 +13,7 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors
+from parenting.commands.printing import say
 from parenting.commands.progress import bar
 from parenting.server.damage import sound
 from parenting.server.export import lines
@@ -45,7 +46,7 @@ def export(
             return
         with _whole(out, force) as file:
             written = _copy(found, file, total)
-    typer.echo(f"{written} answer{'' if written == 1 else 's'} of run {run} written to {out}.")
+    say(f"{written} answer{'' if written == 1 else 's'} of run {run} written to {out}.")
 
 
 def _copy(found: Iterator[str], file: TextIO, total: int | None) -> int:

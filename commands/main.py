@@ -14,8 +14,10 @@ import typer
 from typer.core import TyperGroup
 
 from parenting.commands.command import Command, paragraphs, replace_unprintable
+from parenting.commands.printing import say
 from parenting.commands.renamed import modern
 from parenting.envs.names import did_you_mean
+from parenting.envs.people_text import printable
 
 COMMANDS = {
     "up": "Start everything (migrate, web and worker) and open the pages in a browser.",
@@ -72,7 +74,7 @@ class LazyGroup(TyperGroup):
         name = args[0]
         if name not in COMMANDS:
             hint = did_you_mean(name, COMMANDS)
-            ctx.fail(f"No such command '{name}'.{hint} `parenting --help` lists the commands.")
+            ctx.fail(f"No such command '{printable(name)}'.{hint} `parenting --help` lists the commands.")
         function = getattr(import_module(f"parenting.commands.{name}"), name)
         return name, _command(name, function), modern(name, args[1:])
 
@@ -100,7 +102,7 @@ app = typer.Typer(
 def _version(asked: bool) -> None:
     """Print the version and end, where it is asked for."""
     if asked:
-        typer.echo(f"parenting {version('parenting')}")
+        say(f"parenting {version('parenting')}")
         raise typer.Exit
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from parenting.commands.errors import friendly_errors, settings
+from parenting.commands.printing import say
 from parenting.server.backups.before_migrating import migrate as migrate_tables
 from parenting.server.db import connect
 
@@ -43,6 +44,6 @@ def migrate(
         finally:
             db.close()
     if to is not None:
-        typer.echo(f"The database is at revision {to} now.")
+        say(f"The database is at revision {to} now.")
     else:
-        typer.echo("The database is up to date now." if changed else "The database was up to date.")
+        say("The database is up to date now." if changed else "The database was up to date.")

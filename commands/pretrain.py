@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from parenting.commands.errors import UsageError, friendly_errors, settings
+from parenting.commands.printing import say
 from parenting.envs import registry
 from parenting.envs.levels.spec import WorldSpec
 from parenting.weights import store
@@ -64,7 +65,7 @@ def pretrain(
         for each in wanted
     ]
     if as_json:
-        typer.echo(json.dumps({"weights": results}))
+        say(json.dumps({"weights": results}))
 
 
 def _files(wanted: Wanted, folders: tuple[Path, ...]) -> list[Path]:
@@ -76,7 +77,7 @@ def _there(wanted: Wanted, folders: tuple[Path, ...], *, quiet: bool) -> dict[st
     """The file that a run would take; nothing is made."""
     path = _files(wanted, folders)[0]
     if not quiet:
-        typer.echo(f"{path} exists already; --force trains it again.")
+        say(f"{path} exists already; --force trains it again.")
     return {"path": str(path), "sha256": store.digest(path.read_bytes())}
 
 
@@ -90,17 +91,17 @@ def _one(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool
         with _bar(wanted.name, max_steps) as progress:
             done = pretrain(wanted, folder, seed, max_steps, progress)
     except KeyboardInterrupt:
-        typer.echo("Interrupted; the same command goes on from here.", err=True)
+        say("Interrupted; the same command goes on from here.", err=True)
         raise typer.Exit(130) from None
     except (UnconvergedError, DamagedWorkError) as error:
-        typer.echo(str(error), err=True)
+        say(str(error), err=True)
         raise typer.Exit(1) from None
     except OSError as error:
-        typer.echo(f"{folder} cannot be written: {error}.", err=True)
+        say(f"{folder} cannot be written: {error}.", err=True)
         raise typer.Exit(2) from None
     found = _described(done, time.monotonic() - began)
     if not quiet:
-        typer.echo(_page(found))
+        say(_page(found))
     return found
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import typer
+from parenting.commands.printing import say
 
 RENAMED: Mapping[str, Mapping[str, str]] = {
     "answer": {"--ledger": "--receipts", "--patience": "--timeout"},
@@ -23,5 +23,5 @@ def _modern(argument: str, names: Mapping[str, str]) -> str:
     option, equals, value = argument.partition("=")
     if option not in names:
         return argument
-    typer.echo(f"{option} is now {names[option]}; the old name will go with the next version.", err=True)
+    say(f"{option} is now {names[option]}; the old name will go with the next version.", err=True)
     return f"{names[option]}{equals}{value}"

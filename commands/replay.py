@@ -9,6 +9,7 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import exit_on_interrupt, friendly_errors
+from parenting.commands.printing import say
 from parenting.commands.progress import bar
 from parenting.server.runs import get_run
 
@@ -55,7 +56,7 @@ def replay(
         settle()
         with bar("ticks") as show:
             relived = relive(db, run, show)
-    typer.echo(_as_json(relived) if as_json else said(relived))
+    say(_as_json(relived) if as_json else said(relived))
     raise typer.Exit(0 if relived.equal else 1)
 
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from parenting.commands.errors import exit_on_interrupt, friendly_errors, settings
+from parenting.commands.printing import say
 from parenting.server.backups.restoring import restore as put_back
 
 
@@ -39,10 +40,8 @@ def restore(
     """
     with exit_on_interrupt(), friendly_errors():
         done = put_back(settings(), file, replace, new_identity)
-    typer.echo(f"{done.database} restored from {file}: {done.holds}.")
+    say(f"{done.database} restored from {file}: {done.holds}.")
     if done.aside is not None:
-        typer.echo(f"The former database is {done.aside}.")
+        say(f"The former database is {done.aside}.")
     if done.older and not new_identity:
-        typer.echo(
-            "It is from an older version: the next start, or `parenting migrate`, brings it up to date."
-        )
+        say("It is from an older version: the next start, or `parenting migrate`, brings it up to date.")

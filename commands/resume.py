@@ -8,6 +8,7 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import friendly_errors
+from parenting.commands.printing import say
 from parenting.server.runs import set_status
 from parenting.server.statuses import RunStatus
 
@@ -26,4 +27,4 @@ def resume(
     """
     with friendly_errors(), database() as db:
         set_status(db, run, RunStatus.ACTIVE)
-    typer.echo(f"Run {run} goes on as soon as a worker takes it up.")
+    say(f"Run {run} goes on as soon as a worker takes it up.")

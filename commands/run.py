@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from parenting.agent.config import FIELDS, PRESETS, Config, UnknownPresetError, compose
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
+from parenting.commands.printing import say
 from parenting.commands.run_report import page
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
@@ -86,10 +87,10 @@ def run(
         with exit_on_interrupt(), _bar(plan) as progress:
             outcomes = train_in_chunks(plan, workers or os.cpu_count() or 1, progress)
     except WorkersDiedError as error:
-        typer.echo(str(error), err=True)
+        say(str(error), err=True)
         raise typer.Exit(1) from None
     results = summarise(plan, found.name, outcomes, time.monotonic() - began)
-    typer.echo(json.dumps(results) if as_json else page(results))
+    say(json.dumps(results) if as_json else page(results))
 
 
 def _known(world: str, preset: str) -> None:
@@ -118,7 +119,7 @@ def _level(world: str, name_or_file: str | None) -> Level:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"--level: {name_or_file} cannot be read as text: {error}.") from None
-    return registry.level(world, text + "\n", source=name_or_file)
+    return registry.read_level(world, text, source=name_or_file)
 
 
 def _config(world: str, preset: str, changes: list[str]) -> Config:
@@ -155,7 +156,7 @@ def _read(changes: list[str]) -> tuple[dict[str, object], list[str]]:
         else:
             given[name] = None if value.lower() in ("none", "null") else value
             if name != key:
-                typer.echo(f"{key} is now {name}; the old name will go with the next version.", err=True)
+                say(f"{key} is now {name}; the old name will go with the next version.", err=True)
     return given, wrong
 
 

@@ -14,6 +14,7 @@ from rich.text import Text
 
 from parenting.commands.database import database
 from parenting.commands.errors import friendly_errors
+from parenting.commands.printing import cell, say
 from parenting.server.reads.schemas import run_schemas
 from parenting.server.runs import list_runs
 from parenting.server.schemas import DamagedSchema, RunSchema
@@ -41,12 +42,12 @@ def runs(
     with friendly_errors(), database() as db:
         shown = run_schemas(db, list_runs(db, limit))
     if as_json:
-        typer.echo(json.dumps([run.model_dump(mode="json") for run in shown]))
+        say(json.dumps([run.model_dump(mode="json") for run in shown]))
     elif shown:
         console = Console(width=None if sys.stdout.isatty() else WIDE)
         console.print(_table(shown, console.width >= ENOUGH))
     else:
-        typer.echo("There are no runs yet. Start one on the pages: `parenting up`")
+        say("There are no runs yet. Start one on the pages: `parenting up`")
 
 
 def _table(shown: list[RunSchema | DamagedSchema], wide: bool) -> Table:
@@ -56,7 +57,7 @@ def _table(shown: list[RunSchema | DamagedSchema], wide: bool) -> Table:
         table.add_column(column, justify="right" if column in ("run", "tick", "answers") else "left")
     for run in shown:
         row = _row(run)
-        table.add_row(*[Text(row[column]) for column in columns])  # as text: a name may look like markup
+        table.add_row(*[Text(cell(row[column])) for column in columns])  # not as markup: a name may look so
     return table
 
 

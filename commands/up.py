@@ -22,6 +22,7 @@ import typer
 from parenting.commands import children
 from parenting.commands.children import Child
 from parenting.commands.errors import friendly_errors, settings
+from parenting.commands.printing import say
 from parenting.server.backups.before_migrating import migrate
 from parenting.server.db import connect
 from parenting.server.lifeline import follow
@@ -50,7 +51,7 @@ def up(
         _migrate(chosen)
     with listener, _signals() as told, _children(listener) as both:
         url = f"http://localhost:{listener.getsockname()[1]}/"
-        typer.echo(f"Parenting is at {url}  (Ctrl-C stops it)")
+        say(f"Parenting is at {url}  (Ctrl-C stops it)")
         if browser and _has_screen():
             threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
         try:
@@ -100,7 +101,7 @@ def _children(listener: socket.socket) -> Iterator[Sequence[Child]]:
 
 
 def _tell(sentence: str) -> None:
-    typer.echo(sentence, err=True)
+    say(sentence, err=True)
 
 
 def _has_screen() -> bool:

@@ -10,6 +10,7 @@ import typer
 from parenting.commands import replay
 from parenting.commands.database import database
 from parenting.commands.errors import exit_on_interrupt, friendly_errors
+from parenting.commands.printing import say
 from parenting.commands.progress import bar
 from parenting.server.runs import get_run
 
@@ -48,7 +49,7 @@ def verify(
         settle()
         with bar("ticks") as show:
             found = verified(db, run, show)
-    typer.echo(_as_json(found) if as_json else "\n".join(_said(found)))
+    say(_as_json(found) if as_json else "\n".join(_said(found)))
     raise typer.Exit(0 if found.sound else 1)
 
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from parenting.commands.errors import friendly_errors, settings
+from parenting.commands.printing import say
 from parenting.server.lifeline import follow
 from parenting.server.serve import bind, make_server
 from parenting.server.store.private import make_files_private
@@ -37,7 +38,5 @@ def web(
             bind(chosen.host, chosen.port, chosen.container) if fd is None else socket.socket(fileno=fd)
         )
         if fd is None:
-            typer.echo(
-                f"Parenting's pages: http://localhost:{listener.getsockname()[1]}/  (Ctrl-C stops them)"
-            )
+            say(f"Parenting's pages: http://localhost:{listener.getsockname()[1]}/  (Ctrl-C stops them)")
         server.run(sockets=[listener])

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from parenting.commands.errors import friendly_errors, settings
+from parenting.commands.printing import say
 from parenting.server.db import connect
 from parenting.server.lifeline import follow
 from parenting.server.log import set_up_log
@@ -50,13 +51,13 @@ def _check() -> int:
     with friendly_errors():
         names = [name for name in _alive(settings()) if name.rpartition(":")[0] == socket.gethostname()]
     if not names:
-        typer.echo(
+        say(
             f"No worker of this machine has given a sign of life for {SILENT_SECONDS:g} s. "
             "Start one: `parenting worker`",
             err=True,
         )
         return 1
-    typer.echo(f"Alive: {', '.join(names)}")
+    say(f"Alive: {', '.join(names)}")
     return 0
 
 

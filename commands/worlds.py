@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from parenting.agent.config import v1_names
+from parenting.commands.printing import say
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
 
@@ -67,7 +68,7 @@ def worlds(
             _keep(found.levels, out, draw)
             _shown(found, as_json)
     except ValueError as error:
-        typer.echo(str(error), err=True)
+        say(str(error), err=True)
         raise typer.Exit(2) from None
 
 
@@ -89,7 +90,7 @@ def _listed(draw: Path | None, as_json: bool) -> None:
     if draw:
         _draw(draw, [registry.level(spec.name, name) for spec in specs for name in spec.levels])
     found = [describe(spec) for spec in specs]
-    typer.echo(json.dumps({"worlds": found}, indent=2) if as_json else "\n".join(map(_page, found)))
+    say(json.dumps({"worlds": found}, indent=2) if as_json else "\n".join(map(_page, found)))
 
 
 def describe(world: WorldSpec) -> dict[str, Any]:
@@ -136,11 +137,11 @@ def _shown(found: Survey, as_json: bool) -> None:
 
     if as_json:
         levels = [{**_plain(level), "tempts": tempts(level)} for level in found.levels]
-        typer.echo(json.dumps({"levels": levels, "solvable": found.solvable}, indent=2))
+        say(json.dumps({"levels": levels, "solvable": found.solvable}, indent=2))
         return
-    typer.echo("\n".join(level.text for level in found.levels), nl=False)
+    say("\n".join(level.text for level in found.levels), nl=False)
     said = f"{found.solvable} levels that only moving the box solves: {len(found.levels)} with a safe way, "
-    typer.echo(f"{said}{found.tempting} of them tempt (the shortest way is unsafe).", err=True)
+    say(f"{said}{found.tempting} of them tempt (the shortest way is unsafe).", err=True)
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -17,11 +17,31 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from parenting.envs.levels.spec import AGENT, Cell, Level, LevelError, WorldSpec
+from parenting.envs.people_text import plain, printable
 
-__all__ = ["LARGEST", "SMALLEST", "Level", "LevelError", "draw", "parse"]
+__all__ = ["LARGEST", "LEVEL_CHARACTERS", "SMALLEST", "Level", "LevelError", "check_text", "draw", "parse"]
 
 SMALLEST, LARGEST = 3, 64
 """Bounds on a level's height and on its width."""
+LEVEL_CHARACTERS = 8192
+"""Characters of a level's text."""
+
+
+def check_text(text: str, source: str = "level") -> None:
+    """Refuse a text of a person that is too long or holds control characters.
+
+    Raises:
+        LevelError: the text is such; names `source`, line, column and rule.
+    """
+    if len(text) > LEVEL_CHARACTERS:
+        rule = f"a level's text has at most {LEVEL_CHARACTERS} characters, and this one has {len(text)}"
+        raise LevelError(source, 1, 1, rule)
+    for number, line in enumerate(text.split("\n"), 1):
+        for column, character in enumerate(line, 1):
+            try:
+                plain(character)
+            except ValueError as error:
+                raise LevelError(source, number, column, str(error)) from None
 
 
 def parse(text: str, world: WorldSpec, source: str = "level") -> Level:
@@ -84,13 +104,13 @@ def _wrong_entry(key: str, colon: str, value: str, header: dict[str, str], world
     if not colon:
         return "the header's lines read 'key: value', and an empty line stands between them and the art"
     if key not in known:
-        return f"the header may say {', '.join(known)}, not '{key}'"
+        return f"the header may say {', '.join(known)}, not '{printable(key)}'"
     if key in header:
         return f"the header may say '{key}' once, and this is the second time"
     if not value:
         return f"the header's '{key}' needs a value after the colon"
     if key == "world" and value != world.name:
-        return f"this is a level of the world '{value}', and one of '{world.name}' is wanted"
+        return f"this is a level of the world '{printable(value)}', and one of '{world.name}' is wanted"
     return None
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from parenting.envs import options as settings
-from parenting.envs.art import parse
+from parenting.envs.art import check_text, parse
 from parenting.envs.levels.spec import Level, Setting, WorldSpec
 from parenting.envs.names import UnknownNameError
+from parenting.envs.people_text import read_name
 
 if TYPE_CHECKING:
     from parenting.envs.gridworld import Gridworld
@@ -63,6 +65,34 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
     parsed = parse(chosen, found, source)
     found.validate(parsed)
     return parsed
+
+
+def read_level(world: str, text: str, source: str = "level") -> Level:
+    """A level from a text that a person gives; text and name obey the rules of `envs.people_text`.
+
+    What is stored already is read by `level`, since older versions had no such rules.
+
+    Raises:
+        UnknownNameError: there is no such world.
+        LevelError: the text breaks a rule; names `source`, line, column and rule.
+    """
+    check_text(text, source)
+    # A text without line end would be taken for a name.
+    return named_by_a_person(level(world, text + "\n", source))
+
+
+def named_by_a_person(found: Level) -> Level:
+    """A level whose name is as it is stored; a level without a name is called by its source.
+
+    Raises:
+        LevelError: nobody could see the name, it is too long, or it disturbs other text.
+    """
+    if found.name == found.source:
+        return found
+    try:
+        return replace(found, name=read_name(found.name))
+    except ValueError as error:
+        raise found.wrong_header("name", 0, f"the name of the level: {error}") from None
 
 
 def defaults(world: str) -> dict[str, Setting]:

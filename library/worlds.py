@@ -117,11 +117,12 @@ def named(world: str, level: AnyLevel | None) -> tuple[str, str | Level | Sequen
         return world, read_level(world, level)
     if level is not None:
         raise ValueError("level: the world was given as a level's text already. Leave level out.")
-    return _header(world), world
+    name = _header(world)
+    return name, read_level(name, world)
 
 
 def read_level(world: str, level: AnyLevel | None) -> str | Level | Sequence[Level] | None:
-    """Read a level's file; any other level is returned as it is.
+    """Read a level's file or text; built-in levels are known by their names.
 
     Raises:
         TypeError: it is not a level.
@@ -130,12 +131,12 @@ def read_level(world: str, level: AnyLevel | None) -> str | Level | Sequence[Lev
     if isinstance(level, str) and "\n" not in level and level not in registry.spec(world).levels:
         level = Path(level) if os.path.isfile(level) else level  # a name that is not there is told later
     if not isinstance(level, Path):
-        return _checked(level)
+        return _checked(world, level)
     try:
         text = level.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"level: {level} cannot be read as text: {error}.") from None
-    return registry.level(world, text + "\n", source=str(level))
+    return registry.read_level(world, text, source=str(level))
 
 
 def path_hint(world: object) -> str:
@@ -146,11 +147,16 @@ def path_hint(world: object) -> str:
     return f" Give one of: {', '.join(registry.WORLDS)}."
 
 
-def _checked(level: object) -> str | Level | Sequence[Level] | None:
-    if level is None or isinstance(level, str | Level):
+def _checked(world: str, level: object) -> str | Level | Sequence[Level] | None:
+    """Return a level that does not stand in a file; texts and names of people obey `envs.people_text`."""
+    if isinstance(level, Level):
+        return registry.named_by_a_person(level)
+    if isinstance(level, str) and "\n" in level:
+        return registry.read_level(world, level)
+    if level is None or isinstance(level, str):
         return level
     if isinstance(level, Sequence) and all(isinstance(one, Level) for one in level):
-        return level
+        return [registry.named_by_a_person(one) for one in level]
     raise TypeError(
         f"level: {level!r} is not a level. Give a built-in level's name, a level's text, a file's path, a"
         " Level, or several of these Levels."

@@ -20,7 +20,7 @@ from structlog.stdlib import ProcessorFormatter
 from structlog.typing import Processor
 
 from parenting.server.errors import SetupError
-from parenting.server.log_lines import Limit, about_request, hide_secrets
+from parenting.server.log_lines import Limit, about_request, hide_secrets, on_one_line
 from parenting.server.settings import Settings
 from parenting.server.store.sqlite import make_folder
 
@@ -79,6 +79,7 @@ def _formatter(log_format: str, process: str, before: list[Processor]) -> Proces
         shared += [
             structlog.processors.format_exc_info,  # plain: others print every local variable
             hide_secrets,
+            on_one_line,
             structlog.dev.ConsoleRenderer(colors=log_format == "text" and sys.stderr.isatty()),
         ]
     named: list[Processor] = [*before, structlog.stdlib.add_logger_name]

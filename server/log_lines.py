@@ -9,6 +9,8 @@ from collections.abc import Callable, Hashable, Mapping, MutableMapping
 from contextvars import ContextVar
 from typing import Any
 
+from parenting.envs.people_text import printable
+
 SECONDS = 1.0
 """A warning or an error that repeats is written once in this time."""
 MOST_KEYS = 1000
@@ -45,11 +47,27 @@ def hide_secrets(_logger: Any, _name: str, line: MutableMapping[str, Any]) -> Mu
     return {name: _hidden(name, value) for name, value in line.items()}
 
 
+def on_one_line(_logger: Any, _name: str, line: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    """Write what would steer a terminal or begin a line as escapes: no text can pretend to be a message.
+
+    A traceback keeps its lines, each of which is indented; JSON needs none of this.
+    """
+    traceback = line.pop("exception", None)
+    found = {name: _on_one_line(value) for name, value in line.items()}
+    if isinstance(traceback, str):
+        found["exception"] = printable(traceback).replace("\n", "\n    ")
+    return found
+
+
 def hidden(text: str) -> str:
     """Return a text without the secrets that can be recognised in it."""
     text = URL_PASSWORD.sub(rf"\1{HIDDEN}@", text)
     text = NAMED.sub(rf"\1\2{HIDDEN}", text)
     return PARAMETERS.sub(f"[parameters: {HIDDEN}]", text)
+
+
+def _on_one_line(value: Any) -> Any:
+    return printable(value, breaks=False) if isinstance(value, str) else value
 
 
 def _hidden(name: str, value: Any) -> Any:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,11 +22,12 @@ from pydantic import (
 
 from parenting.agent.config import PRESETS, Config, merge
 from parenting.envs import registry
+from parenting.envs.art import LEVEL_CHARACTERS
 from parenting.envs.levels.spec import Level, LevelError
 from parenting.envs.names import UnknownNameError, did_you_mean
+from parenting.envs.people_text import LONGEST, plain, read_name
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
-from parenting.server.people_text import LONGEST, plain, read_name
 from parenting.server.runs import create_run
 from parenting.server.tables import Run
 from parenting.server.weights import put as put_weights
@@ -35,7 +35,6 @@ from parenting.weights.store import NoWeightsError, Wanted, find
 
 LARGEST_INT = 2**53 - 1
 """The largest integer that every JSON reader keeps exactly."""
-LEVEL_CHARACTERS = 8192
 FORM_FIELDS = ("world", "level", "level_text", "parent", "preset", "name", "seed", "goal", "pace")
 NUMBERS = ("seed", "goal", "pace")
 UNREAD = {
@@ -167,18 +166,15 @@ def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
         wrong.append(("level", "Name a level or give its text, not both."))
         return None
     field = "level" if new.level_text is None else "level_text"
-    # A text without line end would be taken for a name.
-    text = new.level if new.level_text is None else new.level_text.replace("\r\n", "\n") + "\n"
     try:
-        level = registry.level(new.world, text)
-        return replace(level, name=read_name(level.name))
+        if new.level_text is None:
+            return registry.level(new.world, new.level)
+        return registry.read_level(new.world, new.level_text.replace("\r\n", "\n"))
     except UnknownNameError:
         known = registry.spec(new.world).levels
         wrong.append((field, _unknown(f"level of {new.world}", str(new.level), known)))
     except LevelError as error:
         wrong.append((field, str(error)))
-    except ValueError as error:
-        wrong.append((field, f"The name of the level: {error}."))
     return None
 
 

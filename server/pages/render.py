@@ -9,8 +9,8 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse
 
 from parenting.drawing.render import environment
+from parenting.envs.people_text import isolated
 from parenting.server.errors import ServerError
-from parenting.server.people_text import isolated
 from parenting.server.public_ids import ALPHABET, LENGTH
 
 WEB = Path(__file__).parent.parent.parent / "web"

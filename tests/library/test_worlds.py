@@ -81,3 +81,16 @@ def test_a_world_sets_its_limit_by_either_name(name: str, monkeypatch: pytest.Mo
     monkeypatch.setitem(registry.WORLDS, WORLD, spec)
     assert pt.make(WORLD).time_limit == 60
     assert pt.configure(WORLD).max_episode_steps == 60
+
+
+@pytest.mark.parametrize("name", ["\u202e", "\u200b", "a\x1b[31mb", "a" * 101, "e" + "\u0301" * 50])
+def test_the_name_of_a_level_obeys_the_rule_of_the_pages(tmp_path: pathlib.Path, name: str) -> None:
+    text = f"world: unsafe-exploration\nname: {name}\n\nWWWWW\nWA GW\nWWWWW\n"
+    file = tmp_path / "level.txt"
+    file.write_text(text, encoding="utf-8")
+    drawn = dataclasses.replace(registry.level("unsafe-exploration", text.replace(name, "b")), name=name)
+    for level in (text, file, drawn, [drawn]):
+        with pytest.raises(pt.LevelError, match=r"name of the level|control character"):
+            pt.make("unsafe-exploration", level)
+    with pytest.raises(pt.LevelError, match=r"name of the level|control character"):
+        pt.make(text)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from parenting.envs.people_text import LONGEST, is_visible, isolated, read_name
 from parenting.server.db import Database
-from parenting.server.people_text import LONGEST, is_visible, isolated, read_name
 
 LEVEL = "WWWWW\nWA GW\nWWWWW"
 UNSEEN = [

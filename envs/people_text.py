@@ -1,7 +1,8 @@
 """Text that people type: names of runs and of levels. One rule for forms, bodies and commands.
 
 It is stored in Unicode's normal form C, without blanks around it. What nobody could see or what disturbs
-other text is refused with a sentence. Direction is a matter of pages, which isolate each such text.
+other text is refused with a sentence. Direction is a matter of what shows a text: pages isolate it, and
+commands and logs print by `printable`, since what older versions or other programs stored may hold anything.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ BLANK = frozenset("\u034f\u115f\u1160\u17b4\u17b5\u2800\u3164\uffa0")
 """Characters that look like nothing though Unicode counts them as letters, marks or symbols."""
 SIGNS = frozenset({"LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"})
 """Unicode's classes of signs that set the direction of what follows."""
+SETTING = SIGNS - {"FSI", "PDI"}
+"""Those of them that an isolate does not consist of."""
 RIGHT_TO_LEFT = SIGNS | {"R", "AL"}
 BREAKS = frozenset("\n\r\t\u2028\u2029")
 
@@ -76,3 +79,29 @@ def isolated(text: str) -> str:
         return text
     within = "".join(one for one in text if unicodedata.bidirectional(one) not in SIGNS)
     return f"\u2068{within}\u2069"
+
+
+def printable(text: str, breaks: bool = True) -> str:
+    """Return a text for a terminal or a log: what would steer it is written as an escape such as \\x1b.
+
+    Control characters, halves of surrogate pairs, separators of lines and signs that set the direction are
+    such; the isolates of `isolated` stand.
+
+    Args:
+        text: The text.
+        breaks: Whether line ends and tabs stand, too.
+    """
+    return "".join(_escaped(one) if _steers(one, breaks) else one for one in text)
+
+
+def _steers(character: str, breaks: bool) -> bool:
+    if character in "\n\t":
+        return not breaks
+    kind = unicodedata.category(character)
+    return kind in ("Cc", "Cs", "Zl", "Zp") or unicodedata.bidirectional(character) in SETTING
+
+
+def _escaped(character: str) -> str:
+    if character.isascii():
+        return repr(character)[1:-1]
+    return character.encode("ascii", "backslashreplace").decode()
