@@ -49,8 +49,9 @@ def figures(request: pytest.FixtureRequest) -> Iterator[Figures]:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run what uses a database on both stores, unless it is marked as being about one."""
-    if "store" in metafunc.fixturenames:
+    """Run what uses a database on both stores, unless it is marked as being about one or says itself which."""
+    chosen = any("store" in mark.args[0] for mark in metafunc.definition.iter_markers("parametrize"))
+    if "store" in metafunc.fixturenames and not chosen:
         only = metafunc.definition.get_closest_marker("only")
         metafunc.parametrize("store", only.args[:1] if only else STORES, indirect=True)
 

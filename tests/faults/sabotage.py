@@ -122,7 +122,7 @@ OLD = [
         "self._go_on()\n            except StoreError as error:\n"
         "                self.patience.refused(error)",
         "self._go_on()\n            except StoreError as error:\n                raise",
-        "tests/server/test_worker_locked_out.py::"
+        "tests/faults/test_worker_locked_out.py::"
         "test_a_lock_of_another_program_neither_ends_the_worker_nor_fails_the_run",
     ),
     Mutant(

@@ -16,7 +16,6 @@ from parenting.server.db import Database
 from parenting.server.new_run import start
 from parenting.server.replay import relive
 from parenting.server.settings import Settings
-from tests.lengths import length
 from tests.server.heard import heard_answers
 from tests.server.processes import Command, command
 from tests.server.raising import Begun, Inline, last, same_bits
@@ -26,8 +25,6 @@ GOAL = 24
 """Answers of each run."""
 ASKING = {"max_open_preferences": 0, "time_limit": 10, "p_guid": 0.45, "p_rec": 0.9, "p_pref": 0.9}
 STAGES = {1: {"stages": 1}, 2: {"stages": 2, "mature_every": 8}}
-PLACES = [("sqlite", 1), ("sqlite", 2), ("postgresql", 2), *length([], [("postgresql", 1)])]
-"""Stores with numbers of stages. How stores differ is the same in each stage, so that one is enough."""
 RUNS = [
     Begun(world, next(iter(registry.spec(world).levels)), {**ASKING, **stages}, seed=13)
     for world in registry.WORLDS
@@ -70,8 +67,14 @@ def check(db: Database, run: int, begun: Begun) -> None:
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize(("store", "stages"), PLACES, indirect=["store"])
+@pytest.mark.parametrize("stages", STAGES)
+@pytest.mark.only("sqlite", "tests/faults/test_same_bits.py does the same on PostgreSQL")
 def test_raised_through_http(settings: Settings, db: Database, stages: int) -> None:
+    raise_through_http(settings, db, stages)
+
+
+def raise_through_http(settings: Settings, db: Database, stages: int) -> None:
+    """Raise the runs of so many stages by processes, and hold each against the same run in tensors."""
     runs, url = (
         begin(db, [begun for begun in RUNS if begun.config.max_clip_length == stages]),
         f"http://127.0.0.1:{free_port()}",

@@ -5,7 +5,7 @@ No answer is lost, none is counted twice, and the bits are those of runs that no
 Every CI run kills 24 times; `make torture` kills 240 times, in ten rounds with other moments each. By hand, a
 hundred rounds, 2,400 kills in about an hour:
 
-    PARENTING_KILL_ROUNDS=100 pytest -n 0 tests/server/test_killed.py
+    PARENTING_KILL_ROUNDS=100 pytest -n 0 tests/faults/test_killed.py
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from sqlalchemy import func, select
 from parenting.server.db import Database
 from parenting.server.settings import Settings
 from parenting.server.tables import Answer
-from tests.lengths import TORTURE, length
+from tests.lengths import length
 from tests.server.processes import Command, store_of
 from tests.server.raising import Begun
 from tests.server.serving import free_port
-from tests.server.test_same_bits import GOAL, PLACES, RUNS, answering, begin, check, until_heard
+from tests.server.test_same_bits import GOAL, RUNS, answering, begin, check, until_heard
 
 ROUNDS = int(os.environ.get("PARENTING_KILL_ROUNDS", length(1, 10)))
+KILLED = [("sqlite", 1), ("sqlite", 2), *length([], [("postgresql", 1), ("postgresql", 2)])]
+"""Stores with numbers of stages. On PostgreSQL in torture alone: test_kills.py kills there in every run."""
 KILLS = 12
-KILLED = [place for place in PLACES if TORTURE or place[0] == "sqlite"]
-"""On PostgreSQL in torture alone: tests/faults kills there in every run."""
 """So many in a round at T = 1, and as many at T = 2."""
 KINDS = ["web", "worker", "script"]
 SOON = 0.15
