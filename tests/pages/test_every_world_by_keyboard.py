@@ -1,6 +1,6 @@
 """A person answers questions by keyboard in every world, at T = 1 and in stages up to T = 2.
 
-The processes are real, and a dashboard moves meanwhile. Each asks 14 questions, 30 in `make torture`.
+The processes are real, and a dashboard moves meanwhile. Each asks 10 questions, 30 in `make torture`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tests.lengths import length
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import create, until, up
 
-QUESTIONS = length(14, 30)
+QUESTIONS = length(10, 30)
 STAGES = {
     1: {},
     2: {
