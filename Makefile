@@ -1,7 +1,7 @@
 # Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
 # A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
 .DEFAULT_GOAL := help
-.PHONY: help run test faults mutants torture stress check types docs format coverage pictures weights corpus constraints clean wheel
+.PHONY: help run test faults mutants torture stress check types lint docs format coverage pictures weights corpus constraints clean wheel
 
 # Tests start many processes; without byte code each of them would compile a thousand modules again.
 unexport PYTHONDONTWRITEBYTECODE
@@ -39,13 +39,15 @@ stress: $(VENV)/.installed-dev ## Every test, ten times over, with both cores bu
 	scripts/stress $(ARGS)
 
 check: $(VENV)/.installed-dev ## Lint, formatting, types, layers, documentation
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/lint-imports --no-logo
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target types docs
+	@$(MAKE) --no-print-directory --jobs=2 --keep-going --output-sync=target types docs lint
 
 types: $(VENV)/.installed-dev
 	$(BIN)/mypy
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports --no-logo
 
 format: $(VENV)/.installed-dev ## Format the code and mend what lint can mend
 	$(BIN)/ruff check --fix .

@@ -1,6 +1,6 @@
-"""`parenting answer` trains an agent on PostgreSQL to the same bits as the scripted parent in tensors.
+"""`parenting answer` trains an agent to the same bits as the scripted parent in tensors: at T = 1, on PostgreSQL.
 
-tests/server/test_same_bits.py does the same on SQLite.
+tests/server/test_same_bits.py does the same on SQLite, in stages up to T = 2.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from parenting.server.settings import Settings
 from tests.lengths import length
 from tests.server.test_same_bits import raise_through_http
 
+PLACES = [("sqlite", 1), ("postgresql", 2), *length([], [("postgresql", 1)])]
+"""Stores with numbers of stages. How stores differ is the same in each stage, so that one is enough."""
+
 
 @pytest.mark.torture
 @pytest.mark.timeout(300)
-@pytest.mark.only("postgresql", "tests/server/test_same_bits.py does the same on SQLite")
-@pytest.mark.parametrize("stages", length([2], [1, 2]))
+@pytest.mark.parametrize(("store", "stages"), PLACES, indirect=["store"])
 def test_raised_through_http(settings: Settings, db: Database, stages: int) -> None:
-    """How the stores differ is the same in each stage, so that one is enough."""
     raise_through_http(settings, db, stages)

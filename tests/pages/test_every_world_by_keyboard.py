@@ -1,6 +1,7 @@
-"""A person answers questions by keyboard in every world, at T = 1 and in stages up to T = 2.
+"""A person answers questions by keyboard in every world, in stages up to T = 2, and in one of them at T = 1 alone.
 
-The processes are real, and a dashboard moves meanwhile. Each asks 10 questions, 30 in `make torture`.
+The processes are real, and a dashboard moves meanwhile. Each asks 10 questions; in `make torture` 30, and every
+world is tried at T = 1, too.
 """
 
 from __future__ import annotations
@@ -26,6 +27,12 @@ STAGES = {
         "p_guid": 0.8,
     },  # clips of two steps have to come about, too
 }
+
+
+PLACES = [(world, 2) for world in registry.WORLDS] + [
+    (world, 1) for world in length(["unsafe-exploration"], list(registry.WORLDS))
+]
+"""Worlds and last stages; what comes to have two stages begins at T = 1."""
 
 
 @pytest.fixture(scope="module")
@@ -86,8 +93,7 @@ def raised(tabs: BrowserTabs, world: str, stage: int) -> dict[str, Any]:
 
 @pytest.mark.torture
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("stage", STAGES)
-@pytest.mark.parametrize("world", registry.WORLDS)
+@pytest.mark.parametrize(("world", "stage"), PLACES)
 def test_answers_in_every_world_and_stage(browser: Browser, url: str, world: str, stage: int) -> None:
     tabs = BrowserTabs(browser, url)
     run = raised(tabs, world, stage)

@@ -79,8 +79,9 @@ def within_sight(page: Page, screen: str) -> None:
 def test_a_question_of_this_world(tabs: BrowserTabs, db: Database, world: str, level: str) -> None:
     asked(db, world, level)
     kind = registry.spec(world)
+    page = tabs.open("/runs/1/parent?query=1")
     for screen, size in SCREENS.items():
-        page = tabs.open("/runs/1/parent?query=1", viewport=size)
+        page.set_viewport_size(size)
         expect(page.locator(".card")).to_have_count(2)
         expect(page.locator(".legend li")).to_have_count(len(kind.legend) - 1)  # land needs no key
         expect(page.get_by_text(kind.brief.goal)).to_be_attached()
@@ -97,10 +98,10 @@ def test_clips_that_an_agent_lived(tabs: BrowserTabs, db: Database, world: str, 
     """The question that has the most to say, on both screens, in the dark too."""
     told = [(len(shown.spoken), clips) for clips, shown in lived(world, level) if shown.kind == "preference"]
     _, clips = max(told, key=lambda pair: pair[0])
-    path = posted(db, world, "preference", clips, level=level)
+    page = tabs.open(posted(db, world, "preference", clips, level=level), color_scheme="dark")
+    expect(page.locator(".card")).to_have_count(2)
     for screen, size in SCREENS.items():
-        page = tabs.open(path, viewport=size, color_scheme="dark")
-        expect(page.locator(".card")).to_have_count(2)
+        page.set_viewport_size(size)
         within_sight(page, screen)
         assert violations(page) == []
 
