@@ -49,7 +49,7 @@ def figures(request: pytest.FixtureRequest) -> Iterator[Figures]:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run what uses a database on both stores, unless it is marked as being about one or says itself which."""
+    """Run what uses a database on both stores, unless it is about one or says itself which."""
     chosen = any("store" in mark.args[0] for mark in metafunc.definition.iter_markers("parametrize"))
     if "store" in metafunc.fixturenames and not chosen:
         only = metafunc.definition.get_closest_marker("only")

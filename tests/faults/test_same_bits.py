@@ -1,4 +1,4 @@
-"""`parenting answer` trains an agent to the same bits as the scripted parent in tensors: at T = 1, on PostgreSQL.
+"""`parenting answer` trains an agent to the same bits as the scripted parent, at T = 1 and on PostgreSQL.
 
 tests/server/test_same_bits.py does the same on SQLite, in stages up to T = 2.
 """

@@ -69,7 +69,7 @@ def violations(page: Page, **options: Any) -> list[str]:
 
 
 def light_and_dark(page: Page) -> list[str]:
-    """The findings of all rules in the light, and of those about colours in the dark: nothing else changes."""
+    """The findings of all rules in the light, and in the dark of those about colours, which alone change."""
     page.emulate_media(color_scheme="light")
     found = violations(page)
     page.emulate_media(color_scheme="dark")

@@ -1,7 +1,7 @@
 """`parenting answer` trains an agent to the same bits as the scripted parent in tensors.
 
-It does so through HTTP, web and worker, in all five worlds, in stages up to T = 2. Runs at T = 1, and those on
-PostgreSQL, are in tests/faults/test_same_bits.py.
+It does so through HTTP, web and worker, in all five worlds, in stages up to T = 2. Runs at T = 1 and runs on
+PostgreSQL are in tests/faults/test_same_bits.py.
 """
 
 from __future__ import annotations
