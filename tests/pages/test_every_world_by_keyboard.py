@@ -1,7 +1,7 @@
 """A person answers questions by keyboard in every world, in stages up to T = 2, and in one of them at T = 1.
 
-The processes are real, and a dashboard moves meanwhile. Each asks 10 questions. In `make torture` each asks 30,
-and every world is tried at T = 1.
+The processes are real, and a dashboard moves meanwhile. Each asks 10 questions; in `make torture` each asks
+30, and every world is tried at T = 1.
 """
 
 from __future__ import annotations
