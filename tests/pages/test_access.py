@@ -8,7 +8,7 @@ from typing import Any
 import httpx2
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, ViewportSize, expect
 
 from parenting.server import operator_events, runs
 from parenting.server.db import Database
@@ -18,7 +18,10 @@ from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import until
 
-SCREENS = {"desktop": {"width": 1280, "height": 800}, "phone": {"width": 390, "height": 844}}
+SCREENS: dict[str, ViewportSize] = {
+    "desktop": {"width": 1280, "height": 800},
+    "phone": {"width": 390, "height": 844},
+}
 PATHS = (
     "/",
     "/runs/1",

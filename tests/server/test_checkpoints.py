@@ -172,7 +172,7 @@ def test_no_piece_can_be_left_out(piece: str) -> None:
 
 
 def misses(then: Moment, blob: bytes, own: str) -> bool:
-    """Whether another piece comes to differ, or at the end the one that was left out."""
+    """Compare until another piece differs, or at the end the one that was left out."""
     differ: list[str] = []
     for differ in go_on(then, blob):
         if set(differ) - {own}:
