@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -30,6 +31,8 @@ from tests.tree import LINKS, ROOT, git_files
 
 FAILED = 1
 """pytest's exit code where tests ran and failed; others mean that it could not run them."""
+TIMED_OUT = re.compile(r"^E +(Failed: Timeout|TimeoutError)", re.MULTILINE)
+"""A test that only waited in vain, by pytest-timeout or by its own bound, has caught nothing."""
 TOLD = 2000
 """Characters of pytest's output that are printed where a mutant was not caught."""
 
@@ -73,7 +76,7 @@ def attempt(tree: Path, mutant: Mutant) -> Verdict:
         result = run_tests(tree, [mutant.test])
     finally:
         file.write_text(source, encoding="utf-8")
-    outcomes = {0: "not caught", FAILED: "timed out" if "Failed: Timeout" in result.stdout else "caught"}
+    outcomes = {0: "not caught", FAILED: "timed out" if TIMED_OUT.search(result.stdout) else "caught"}
     outcome = outcomes.get(result.returncode, f"pytest could not run (exit code {result.returncode})")
     return Verdict(mutant, outcome, time.monotonic() - began, result.stdout + result.stderr)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import chain, count
 from pathlib import Path
 
 from parenting.server.backups import dumps
@@ -53,17 +54,17 @@ def keep(db: Database, data: Path, revision: str) -> Path:
     Raises:
         SetupError: there is no room, or no copy can be made. Nothing has been changed.
     """
-    url, name = db.engine.url, f"{KIND}{revision}-{stamp(utc_now())}"
-    target = _folder(db, data) / name
-    if url.get_backend_name() == "postgresql":
-        target = target.with_suffix(".dump")
+    url, postgresql = db.engine.url, db.engine.dialect.name == "postgresql"
+    name, end = f"{KIND}{revision}-{stamp(utc_now())}", ".dump" if postgresql else ".db"
+    target = _free(_folder(db, data), name, end)
+    if postgresql:
         try:
             with whole(target) as part:
                 dumps.dump(url, part)
         except SetupError as error:
             raise SetupError(f"No copy can be made before the migration. {error.message} {ROOM}") from None
         return target
-    file, target = Path(str(url.database)), target.with_suffix(".db")
+    file = Path(str(url.database))
     require_room(file.parent, 2 * size(file), ROOM)
     write_copy(file, target)
     return target
@@ -74,6 +75,12 @@ def prune(folder: Path) -> None:
     found = sorted(folder.glob(f"{KIND}*"), key=lambda copy: copy.name.rpartition("-")[2])
     for copy in found[:-KEPT]:
         copy.unlink()
+
+
+def _free(folder: Path, name: str, end: str) -> Path:
+    """Return a name that is free, also within the second in which a migration was killed."""
+    names = (folder / f"{name}{more}{end}" for more in chain([""], (f"_{n}" for n in count(2))))
+    return next(path for path in names if not path.exists())
 
 
 def _folder(db: Database, data: Path) -> Path:

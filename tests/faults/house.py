@@ -29,6 +29,18 @@ PATCHES = {
 """Checkpoints and metrics are written often, so that kills hit them too."""
 LEASE_SECONDS = 2.0
 PATIENCE = 180.0
+LOOK_SECONDS = 5.0
+"""Who waits in vain for so long looks whether a run has failed."""
+
+
+def in_time(end: float, said: Callable[[], str]) -> None:
+    """Give up waiting once a moment is over. That is no assertion: a test that waits in vain caught nothing.
+
+    Raises:
+        TimeoutError: it is over.
+    """
+    if time.monotonic() > end:
+        raise TimeoutError(said())
 
 
 class House:
@@ -105,8 +117,13 @@ class House:
     def until_told(self, more: int) -> None:
         """Wait until so many more answers were told: work goes on after whatever happened."""
         wanted, end = self.told + more, time.monotonic() + PATIENCE
+        look = time.monotonic() + LOOK_SECONDS
         while self.told < wanted:
-            assert time.monotonic() < end, {name: one.said()[-2000:] for name, one in self.commands.items()}
+            in_time(end, lambda: f"nothing was told: {self.state()}")
+            if time.monotonic() > look:
+                look += LOOK_SECONDS
+                failed = self.store.rows("SELECT id, reason FROM run WHERE status = 'failed'")
+                assert failed == [], self.state()
             self.keep()
             time.sleep(0.01)
 
@@ -114,7 +131,7 @@ class House:
         """Wait until a process has killed itself."""
         one, end = self.commands[name], time.monotonic() + PATIENCE
         while one.alive:
-            assert time.monotonic() < end, f"never hit: {what}"
+            in_time(end, lambda: f"never hit: {what}")
             time.sleep(0.002)
         assert one.process.exitcode == -signal.SIGKILL, f"{what}: {one.process.exitcode}: {one.said()}"
 
@@ -122,7 +139,7 @@ class House:
         """Wait until a process has stopped itself (SIGSTOP)."""
         status, end = Path(f"/proc/{self.commands[name].process.pid}/stat"), time.monotonic() + PATIENCE
         while status.read_text().rpartition(")")[2].split()[0] != "T":
-            assert time.monotonic() < end, f"{name} did not stop: {self.commands[name].said()}"
+            in_time(end, lambda: f"{name} did not stop: {self.commands[name].said()}")
             time.sleep(0.01)
 
     def move_out(self) -> None:
@@ -135,6 +152,15 @@ class House:
         for name in sorted(self.commands, reverse=True):  # workers before the web
             code = self.commands[name].stop()
             assert code in (0, -signal.SIGTERM), f"{name} ended with {code}: {self.commands[name].said()}"
+
+    def break_off(self) -> None:
+        """SIGKILL for all at once, and the people leave."""
+        for person in self._people():
+            person.leaving.set()
+        for one in self.commands.values():
+            one.kill()
+        for person in self._people():
+            person.join(PATIENCE)
 
     def state(self) -> str:
         """Runs, open questions and what the processes said, for the message of a test that fails."""

@@ -6,6 +6,7 @@ session's cookie that is not renewed at login, since there is no login.
 
 from __future__ import annotations
 
+from tests.faults.sabotage_files import FILES
 from tests.mutants.mutant import Mutant
 
 KILLS, CLIENTS = "tests/faults/test_kills.py", "tests/faults/test_clients.py"
@@ -76,7 +77,7 @@ BROKEN = [
         "server/snapshot.py",
         '"state": {name: part for name',
         '"state": {name: part * (name != "learner.exp_avg") for name',
-        f"{KILLS}::test_killed_at_every_named_point[sqlite-worker 1]",
+        "tests/faults/test_learner_kills.py::test_killed_learner_goes_on_with_the_same_bits[sqlite]",
     ),
     Mutant(
         "a GET that leases (E1)",
@@ -144,8 +145,8 @@ OLD = [
         "server/queue/worker_side.py",
         "        if max(_high(session, mine.run_id)) >= tick:",
         "        if max(_high(session, mine.run_id)) > tick:",
-        "tests/faults/test_kills.py::test_killed_at_every_named_point[sqlite-worker 1]",
+        "tests/server/test_worker_side.py::test_events_apply_once_and_replay",
     ),
 ]
 
-SABOTAGES = [*BROKEN, *OLD]
+SABOTAGES = [*BROKEN, *FILES, *OLD]

@@ -15,7 +15,7 @@ from parenting.server.db import Database
 from parenting.server.new_run import start
 from parenting.server.settings import Settings
 from tests.faults.figures import Figures
-from tests.faults.house import PATIENCE, House
+from tests.faults.house import PATIENCE, House, in_time
 from tests.faults.points import CLOSING, WEB, WORKER, Point
 from tests.faults.rebuilt import entries_of_x, rebuild
 from tests.lengths import length
@@ -49,7 +49,7 @@ def kill_at(house: House, name: str, points: list[Point], rng: random.Random, fi
         house.begin(name, point._replace(passage=1 if point.seldom else rng.randint(1, 3)))
         end = time.monotonic() + PATIENCE
         while house.commands[name].alive:
-            assert time.monotonic() < end, f"never hit: {point.name}; {house.state()}"
+            in_time(end, lambda: f"never hit: {point.name}; {house.state()}")  # noqa: B023  # called at once
             house.keep()
             time.sleep(0.002)
         figures.count("SIGKILLs at named points", f"{name}: {point.name}")

@@ -57,6 +57,16 @@ def test_there_is_none_where_nothing_changes(old: Settings, db: Database, tmp_pa
     assert kept(old) == []
 
 
+def test_a_second_one_within_the_same_second_is_kept_too(
+    old: Settings, db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A migration that was killed is begun again at once."""
+    monkeypatch.setattr(before_migrating, "stamp", lambda _: "20260101T000000Z")
+    first = before_migrating.keep(db, old.data, "0003")
+    assert migrate(db, old.data) is True
+    assert [copy.name for copy in kept(old)] == [first.name, "before-migration-0003-20260101T000000Z_2.db"]
+
+
 class Full:
     """A full disk."""
 

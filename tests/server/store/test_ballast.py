@@ -80,6 +80,7 @@ def test_disk_that_fills_up_costs_one_refusal_until_the_ballast_is_used_up(
 ) -> None:
     file = small_disk / "parenting.db"
     kept = Path(f"{file}-ballast")
+    assert kept.exists(), "there is a ballast"
     assert kept.stat().st_blocks * 512 == kept.stat().st_size == BYTES, "it is not sparse"
     assert kept.stat().st_mode & 0o077 == 0
     start(full, NewRun(world="unsafe-exploration"))

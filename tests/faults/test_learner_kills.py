@@ -1,0 +1,81 @@
+"""A worker that is killed while it learns goes on with the same bits (C1): equal digests after every kill.
+
+A scripted parent answers, so nothing but the kills differs from the same run in memory, which no process and
+no database disturbs. After each kill the digest of the newest checkpoint is that of this run at its tick.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import random
+import time
+
+import pytest
+
+from parenting.server.checkpoints import load_checkpoints
+from parenting.server.db import Database
+from parenting.server.new_run import start
+from parenting.server.runs import get_run
+from parenting.server.settings import Settings
+from parenting.server.snapshot import Snapshot
+from tests.faults.figures import Figures
+from tests.faults.house import PATCHES, PATIENCE, in_time
+from tests.lengths import length
+from tests.server.processes import Command, store_of
+from tests.server.raising import ISLAND, Inline, last
+
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 20000))]
+KILLS = {"sqlite": length(25, 5000), "postgresql": length(5, 500)}
+SPREAD = 0.1
+"""A kill comes up to so many seconds after a checkpoint that is newer than the kill before."""
+
+
+def digest(saved: Snapshot) -> str:
+    """All tensors of a run with its counts and its config, `info` excepted, as one hash."""
+    found = hashlib.sha256(repr(saved.config).encode())
+    for prefix, part in (("state", saved.state), ("tally", saved.tally)):
+        for name, tensor in sorted(part.tensors().items()):
+            if not name.startswith("info."):
+                found.update(f"{prefix}.{name} {tensor.dtype} {tuple(tensor.shape)}".encode())
+                found.update(tensor.contiguous().numpy().tobytes())
+    return found.hexdigest()
+
+
+def until_newer(db: Database, run: int, tick: int, worker: Command) -> None:
+    """Wait until there is a checkpoint of a later tick."""
+    end = time.monotonic() + PATIENCE
+    while not any(saved.tick > tick for saved in load_checkpoints(db, run)):
+        in_time(end, lambda: f"no checkpoint after tick {tick}: {worker.said()}")
+        assert worker.alive, worker.said()
+        assert get_run(db, run).reason is None
+        time.sleep(0.005)
+
+
+def test_killed_learner_goes_on_with_the_same_bits(
+    settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures
+) -> None:
+    run, alone = start(db, ISLAND.new("scripted")).id, Inline(ISLAND)
+    tick, digests = 0, set[str]()
+    for _ in range(KILLS[store]):
+        worker = Command("worker", data=settings.data, patches=PATCHES, environment=store_of(settings))
+        until_newer(db, run, tick, worker)
+        time.sleep(rng.uniform(0, SPREAD))
+        worker.kill()
+        saved = last(db, run)
+        tick = int(saved.state.keys.tick[0])
+        while int(alone.saved.state.keys.tick[0]) < tick:
+            alone.tick()
+        assert digest(saved) == digest(alone.saved), f"at tick {tick}"
+        digests.add(digest(saved))
+        figures.count("SIGKILLs of a learner", "digest equal")
+    assert len(digests) == KILLS[store], "every kill was followed by progress"
+
+
+def test_digest_tells_one_bit() -> None:
+    one, other = Inline(ISLAND), Inline(ISLAND)
+    for _ in range(5):
+        one.tick()
+        other.tick()
+    assert digest(one.saved) == digest(other.saved)
+    other.saved.state.learner.exp_avg.view(-1)[0] += 1e-7
+    assert digest(one.saved) != digest(other.saved)
