@@ -1,4 +1,7 @@
-"""Checkpoints in the database: save one, load the last two. Their bytes are made by `server.snapshot`."""
+"""Checkpoints in the database: save one, load the last two. Their bytes are made by `server.snapshot`.
+
+A large one is written in parts (`server.checkpoint_parts`), and exists once its row does.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
 
+from parenting.server import checkpoint_parts
+from parenting.server.checkpoint_parts import join_parts, sweep_parts, write_parts
 from parenting.server.damage import sound
 from parenting.server.db import Database
 from parenting.server.runs import Claim, held
@@ -36,11 +42,22 @@ def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
         LostClaimError: another worker trains this run now.
     """
     digest = hashlib.sha256(blob).hexdigest()
+    if len(blob) <= checkpoint_parts.PART_BYTES:
+        _store(db, mine, Checkpoint(tick=tick, blob=blob, sha256=digest))
+        return
+    sweep_parts(db, mine)
+    parcel = write_parts(db, mine, blob)
+    _store(db, mine, Checkpoint(tick=tick, blob=b"", sha256=digest, parcel=parcel))
+    sweep_parts(db, mine)
+
+
+def _store(db: Database, mine: Claim, row: Checkpoint) -> None:
     with db.write(durable=False) as session:
         run = held(session, mine)
-        later = delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.tick >= tick)
+        later = delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.tick >= row.tick)
         session.execute(later)
-        session.add(Checkpoint(run_id=run.id, tick=tick, blob=blob, sha256=digest, created=db.clock()))
+        row.run_id, row.created = run.id, db.clock()
+        session.add(row)
         session.flush()
         newest = (
             select(Checkpoint.id)
@@ -59,11 +76,13 @@ def load_checkpoints(db: Database, run_id: int) -> Sequence[StoredCheckpoint]:
     """
     rows = select(Checkpoint).where(Checkpoint.run_id == run_id).order_by(Checkpoint.id.desc())
     with db.read() as session:
-        return [_stored(row) for row in session.scalars(rows)]
+        return [_stored(session, row) for row in session.scalars(rows)]
 
 
-def _stored(row: Checkpoint) -> StoredCheckpoint:
+def _stored(session: Session, row: Checkpoint) -> StoredCheckpoint:
     blob, sha256 = sound(row, "blob") or b"", sound(row, "sha256") or ""
-    tick = sound(row, "tick")
+    tick, run_id, parcel = (sound(row, name) for name in ("tick", "run_id", "parcel"))
+    if parcel is not None and run_id is not None:
+        blob = join_parts(session, run_id, parcel)
     intact = tick is not None and hashlib.sha256(blob).hexdigest() == sha256
     return StoredCheckpoint(-1 if tick is None else tick, blob, sha256, intact)

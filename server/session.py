@@ -15,6 +15,7 @@ from parenting.agent.query import Answer, Query, QueryKind
 from parenting.evaluation.argmax import evaluation
 from parenting.parents.scripted import ScriptedRule
 from parenting.server import checkpoints, metrics, runs
+from parenting.server.checkpoint_parts import sweep_parts
 from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
 from parenting.server.damage import readable
@@ -38,8 +39,9 @@ log = structlog.get_logger()
 
 CHECKPOINT_SECONDS, LONGEST_CHECKPOINT_SECONDS = 2.0, 120.0
 """A restart repeats the ticks of this long; they replay exactly. Where checkpoints are large it is longer, so
-that they take `CHECKPOINT_SHARE` of the time at most."""
-CHECKPOINT_SHARE = 0.05
+that they take `CHECKPOINT_SHARE` of the time and `CHECKPOINT_SPEED` bytes a second at most, but never longer
+than the second: no more than that is repeated when a run is taken up again."""
+CHECKPOINT_SHARE, CHECKPOINT_SPEED = 0.05, 1e6
 TOLD_SECONDS = 5.0
 """The log tells of checkpoints that are written at longer intervals."""
 LOOK_SHARE = 0.1
@@ -72,6 +74,7 @@ class RunSession:
         self._stuck_at = (
             -1
         )  # the tick that was reported as stuck: who ends episodes must see the next one too
+        sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
         self._follow_until = take_up(db, claim, run, self._recalled, self.record_ends)
 
     def _parent(self, config: Config, rule: ScriptedRule, asked: Callable[[], None]) -> QueueParent:
@@ -243,13 +246,14 @@ class RunSession:
         began, blob = time.monotonic(), pack(self.saved)
         checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, blob)
         self._saved_tick, self._saved_at = self.last_tick, time.monotonic()
-        wanted = max(CHECKPOINT_SECONDS, (self._saved_at - began) / CHECKPOINT_SHARE)
+        by_time, by_size = (self._saved_at - began) / CHECKPOINT_SHARE, len(blob) / CHECKPOINT_SPEED
+        wanted = min(max(CHECKPOINT_SECONDS, by_time, by_size), LONGEST_CHECKPOINT_SECONDS)
         if wanted >= TOLD_SECONDS and not self._told:
             self._told = True
             log.warning(
                 f"checkpoints of {len(blob) / 1e6:.0f} MB: one every {wanted:.0f} s", run=self.claim.run_id
             )
-        self._save_every = min(wanted, LONGEST_CHECKPOINT_SECONDS)
+        self._save_every = wanted
 
 
 def goal_reached(seen: Watch) -> bool:

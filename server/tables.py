@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import Any, ClassVar
 
-from sqlalchemy import CheckConstraint, Connection, ForeignKey, Index, MetaData, UniqueConstraint, event, text
+from sqlalchemy import CheckConstraint, ForeignKey, Index, MetaData, UniqueConstraint, event, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 from parenting.server.columns import (
@@ -29,6 +29,7 @@ from parenting.server.columns import (
 )
 from parenting.server.public_ids import public_id
 from parenting.server.statuses import QUERY_STATUSES, RUN_STATUSES, WAITING, QueryStatus, RunStatus, Waiting
+from parenting.server.triggers import keep_deleted_numbers
 
 KINDS = ("guidance", "preference")
 CHOICES = ("left", "right", "either", "neither")
@@ -273,23 +274,26 @@ class Checkpoint(Table):
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
     tick: Mapped[int]
     blob: Mapped[bytes]
-    sha256: Mapped[str]
+    sha256: Mapped[str]  # of all its bytes
     created: Mapped[datetime]
+    parcel: Mapped[str | None]  # names its parts; None: `blob` holds all its bytes
+
+
+class CheckpointPart(Table):
+    """A part of a large checkpoint. Parts whose parcel no checkpoint names are of one that is not complete.
+
+    No foreign key: `pg_restore --clean` of a dump that is older than this table has to drop the run's.
+    """
+
+    __tablename__ = "checkpoint_part"
+    __table_args__ = (UniqueConstraint("parcel", "place"), Index(None, "run_id"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    run_id: Mapped[int]
+    parcel: Mapped[str]
+    place: Mapped[int]
+    blob: Mapped[bytes]
 
 
 name_places(Table.metadata)
-
-
-def _keep_deleted_number(table: str) -> str:
-    """Return SQLite's trigger that keeps the largest deleted number, so that it is given to no other row."""
-    return (
-        f"CREATE TRIGGER keep_deleted_{table} AFTER DELETE ON {table} BEGIN UPDATE database_identity "
-        f"SET last_{table} = OLD.id WHERE last_{table} < OLD.id; END"
-    )
-
-
-@event.listens_for(Table.metadata, "after_create")
-def _add_triggers(_target: Any, connection: Connection, **_more: Any) -> None:
-    if connection.dialect.name == "sqlite":
-        for table in (Run, Query):
-            connection.exec_driver_sql(_keep_deleted_number(table.__tablename__))
+event.listen(Table.metadata, "after_create", keep_deleted_numbers)

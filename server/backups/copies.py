@@ -19,7 +19,9 @@ from parenting.server.store.sqlite import BUSY_SECONDS
 
 HEAD = b"SQLite format 3\0"
 TABLES = ("run", "query", "answer", "event", "metric", "checkpoint", "weights")
-"""The tables whose rows a copy is checked for."""
+"""The tables that every backup has."""
+COUNTED = (*TABLES, "checkpoint_part")
+"""The tables whose rows a copy is checked for, where it has them: backups of older versions lack some."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ def _contents(database: Any) -> Contents:
     if "alembic_version" in there:
         found = database.execute("SELECT version_num FROM alembic_version").fetchone()
         revision = None if found is None else str(found[0])
-    counted = [name for name in TABLES if name in there]
+    counted = [name for name in COUNTED if name in there]
     rows = {name: database.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in counted}
     return Contents(revision, rows)
 

@@ -5,6 +5,7 @@ Each rule is a function that returns sentences; an empty list is what we promise
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -68,6 +69,7 @@ def audit(store: Store, entries: Entries) -> list[str]:
         *nothing_is_asked_twice(queries),
         *one_answer_a_tick(answers),
         *one_parent_at_a_time(entries.offers),
+        *checkpoints_are_whole(store),
     ]
 
 
@@ -150,6 +152,28 @@ def one_parent_at_a_time(offers: Sequence[Offer]) -> Iterator[str]:
         for one, other in pairwise(several):
             if one.client != other.client and other.since < one.until - MARGIN:
                 yield f"B1 query {query} was offered to {one.client} and to {other.client} at once"
+
+
+def checkpoints_are_whole(store: Store) -> Iterator[str]:
+    """C1: each checkpoint has all its bytes, at most two a run; what killed writers left does not pile up."""
+    rows = store.rows("SELECT * FROM checkpoint")
+    for row in rows:
+        if hashlib.sha256(checkpoint_bytes(store, row)).hexdigest() != row["sha256"]:
+            yield f"C1 the checkpoint of run {row['run_id']} at tick {row['tick']} lacks some of its bytes"
+    kept = Counter(row["run_id"] for row in rows)
+    yield from (f"C1 run {run} keeps {n} checkpoints" for run, n in kept.items() if n > 2)
+    parts = store.rows("SELECT DISTINCT run_id, parcel FROM checkpoint_part")
+    named = {(row["run_id"], row["parcel"]) for row in rows}
+    left = Counter(row["run_id"] for row in parts if (row["run_id"], row["parcel"]) not in named)
+    yield from (f"C1 run {run} has parts of {n} unfinished checkpoints" for run, n in left.items() if n > 2)
+
+
+def checkpoint_bytes(store: Store, row: Row) -> bytes:
+    """The bytes of a checkpoint, which a large one has in parts."""
+    if row["parcel"] is None:
+        return bytes(row["blob"])
+    parts = store.rows(f"SELECT blob FROM checkpoint_part WHERE parcel = '{row['parcel']}' ORDER BY place")
+    return b"".join(bytes(part["blob"]) for part in parts)
 
 
 def clips(row: Row) -> Any:

@@ -25,8 +25,9 @@ from tests.server.serving import free_port
 PATCHES = {
     "parenting.server.session.CHECKPOINT_SECONDS": 0.05,
     "parenting.server.session.METRIC_SECONDS": 0.05,
+    "parenting.server.checkpoint_parts.PART_BYTES": 200_000,
 }
-"""Checkpoints and metrics are written often, so that kills hit them too."""
+"""Checkpoints and metrics are written often, so that kills hit them too; each checkpoint has a few parts."""
 LEASE_SECONDS = 2.0
 PATIENCE = 180.0
 LOOK_SECONDS = 5.0

@@ -25,7 +25,7 @@ from parenting.agent.state import AgentState, current_names
 from parenting.drawing.query_tensors import read_clips
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
-from tests.faults.auditor import Store
+from tests.faults.auditor import Store, checkpoint_bytes
 
 _EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
 CHOICES = {name: Choice[name.upper()] for name in ("left", "right", "either", "neither")}
@@ -119,7 +119,8 @@ def _differing(state: AgentState, saved: dict[str, torch.Tensor]) -> list[str]:
 
 def _checkpoint(store: Store, run: int) -> dict[str, torch.Tensor]:
     rows = store.rows(f"SELECT * FROM checkpoint WHERE run_id = {run} ORDER BY id DESC")
-    intact = [row["blob"] for row in rows if hashlib.sha256(row["blob"]).hexdigest() == row["sha256"]]
+    blobs = [(checkpoint_bytes(store, row), row["sha256"]) for row in rows]
+    intact = [blob for blob, sha256 in blobs if hashlib.sha256(blob).hexdigest() == sha256]
     whole = torch.load(io.BytesIO(intact[0]), weights_only=True)
     named: dict[str, torch.Tensor] = dict(current_names(whole["state"]))
     return named

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from pysqlite3 import dbapi2 as sqlite
 
+from parenting.server.checkpoint_parts import PART_BYTES
+from parenting.server.checkpoints import save_checkpoint
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query, take_answer
@@ -22,7 +24,7 @@ ONLY = pytest.mark.only("sqlite", "faults are planted in a file")
 
 @pytest.fixture
 def house(settings: Settings) -> tuple[Path, Entries]:
-    """A run with six queries: three answers heard, three not yet; and the ledger of their client."""
+    """A run with six queries: three answers heard, three not yet; two checkpoints; their client's ledger."""
     db = migrated(settings)
     run = start(db, NewRun(world="unsafe-exploration", config={}))
     (mine,) = claim(db, "worker")
@@ -33,6 +35,8 @@ def house(settings: Settings) -> tuple[Path, Entries]:
         ledger.told({"query": query, "run": run.id, "number": stored.number, "choice": "left"}, "a")
     for tick in (7, 8, 9):
         take_answer(db, mine, tick)
+    for tick in (8, 9):
+        save_checkpoint(db, mine, tick, bytes(2 * PART_BYTES))
     db.close()
     ledger.close()
     return settings.data / "parenting.db", read(settings.data / "ledger")
@@ -61,13 +65,23 @@ def test_sound_database_is_sound(house: tuple[Path, Entries]) -> None:
         ("UPDATE query SET status = 'applied' WHERE id = 5", "query 5 is applied, with an answer"),
         ("UPDATE query SET tick = 1 WHERE id = 2", "C3 run 1 asked 2 times at tick 1"),
         ("UPDATE answer SET applied_tick = 7 WHERE number = 2", "C1 run 1 heard 2 answers at tick 7"),
+        ("DELETE FROM checkpoint_part WHERE id = 4", "C1 the checkpoint of run 1 at tick 9 lacks some"),
+        ("UPDATE checkpoint_part SET blob = x'00' WHERE id = 1", "checkpoint of run 1 at tick 8 lacks some"),
+        ("INSERT INTO checkpoint SELECT * FROM checkpoint", "C1 run 1 keeps 4 checkpoints"),
+        ("UPDATE checkpoint_part SET parcel = id", "C1 run 1 has parts of 4 unfinished checkpoints"),
     ],
 )
 def test_planted_fault_is_named(house: tuple[Path, Entries], statement: str, found: str) -> None:
     file, entries = house
     connection = sqlite.connect(str(file.with_name("plain.db")), isolation_level=None)
     connection.execute(f"ATTACH '{file}' AS kept")
-    for table in ("run", "query", "answer"):  # without constraints, which would be in the way
+    for table in (
+        "run",
+        "query",
+        "answer",
+        "checkpoint",
+        "checkpoint_part",
+    ):  # without constraints, which would be in the way
         connection.execute(f"CREATE TABLE {table} AS SELECT * FROM kept.{table}")
     connection.execute(statement)
     connection.close()
