@@ -15,7 +15,8 @@ from parenting.server.errors import LostClaimError
 from parenting.server.metrics import write_metrics
 from parenting.server.migrate import downgrade, upgrade
 from parenting.server.runs import Claim, claim, get_run
-from parenting.server.session import RunSession
+from parenting.server.session import CHECKPOINT_SPEED, RunSession
+from parenting.server.snapshot import pack
 from parenting.server.store.patience import patience
 from parenting.server.tables import Checkpoint, CheckpointPart, Run
 from tests.server.conftest import Clock
@@ -221,3 +222,17 @@ def test_a_checkpoint_in_parts_is_one_piece_for_an_older_version(
     assert upgrade(db)
     assert all(saved.intact for saved in load_checkpoints(db, mine.run_id))
     assert len(load_checkpoints(db, mine.run_id)) == 2
+
+
+@pytest.mark.parametrize(("seconds", "every"), [(0.5, 2.0), (30.0, 30.0), (600.0, 120.0)])
+def test_large_checkpoints_are_seldom_but_bound_what_is_repeated(
+    db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch, seconds: float, every: float
+) -> None:
+    """One megabyte a second on average, whatever the time it took; small ones keep to their two seconds."""
+    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SHARE", 1e9)
+    session = RunSession(db, mine, get_run(db, mine.run_id), lambda: None)
+    size = len(pack(session.saved))
+    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SPEED", size / seconds)
+    session.save()
+    assert session._save_every == pytest.approx(every)
+    assert 0 < size < 2 * CHECKPOINT_SPEED, "checkpoints of the built-in levels come every two seconds"
