@@ -24,6 +24,7 @@ from tests.server.serving import free_port
 
 PATCHES = {
     "parenting.server.session.CHECKPOINT_SECONDS": 0.05,
+    "parenting.server.session.CHECKPOINT_SPEED": 1e12,
     "parenting.server.session.METRIC_SECONDS": 0.05,
     "parenting.server.checkpoint_parts.PART_BYTES": 200_000,
 }
