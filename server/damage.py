@@ -138,8 +138,13 @@ def _said(error: Exception) -> str:
 
 
 def _name(row: Table) -> str:
-    key = inspect(row).identity
-    return f"{NAMES.get(type(row), row.__tablename__.capitalize())} {key[-1] if key else ''}".rstrip()
+    """Return a name without a number of the database: parents read it, too."""
+    tick = inspect(row).dict.get("tick") if isinstance(row, Query) else None
+    return f"The question of tick {tick}" if isinstance(tick, int) else NAMES.get(type(row), "A stored row")
 
 
-NAMES: dict[type[Table], str] = {Run: "Run", Query: "Question", OperatorEvent: "Operator event"}
+NAMES: dict[type[Table], str] = {
+    Run: "This run",
+    Query: "This question",
+    OperatorEvent: "An event of the operator",
+}

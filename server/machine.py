@@ -89,7 +89,7 @@ def diverged(db: Database, mine: Claim, run: Run, recalled: Recalled, tick: int,
         reason = f"the run that went on from here departed from its record at tick {tick}"
         begun = CheckpointDamaged(sha256=recalled.sha256, reason=reason)
         write(db, mine, [(recalled.tick, begun)])
-    raise DivergedError(f"Run {run.id} asked another question when tick {tick} was replayed.")
+    raise DivergedError(f"The agent asked another question when tick {tick} was replayed.")
 
 
 def write(db: Database, mine: Claim, fresh: Sequence[tuple[int, Note]]) -> None:

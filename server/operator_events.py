@@ -26,7 +26,7 @@ def add_operator_event(db: Database, run_id: int, kind: str, payload: dict[str, 
         run = readable(living(session, run_id))
         if kind == "mature" and run.maturity >= run.config["stages"]:
             raise Conflict(
-                f"Run {run_id} is in its last stage, T = {run.maturity}, which never ends. "
+                f"The run is in its last stage, T = {run.maturity}, which never ends. "
                 "The number of stages is set when a run is started (config.max_clip_length)."
             )
         event = OperatorEvent(run_id=run_id, kind=kind, payload=payload, created=db.clock())

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from fastapi import Response
+from fastapi import Request, Response
 from fastapi.responses import JSONResponse
 
 from parenting.server import operator_events, runs
@@ -18,9 +18,9 @@ from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.pages.labels import MetricLabels, describe_start, metric_labels
 from parenting.server.pages.operator_log import PROBABILITIES, LogEntry, log_entries, probabilities
-from parenting.server.pages.render import format_number, page
+from parenting.server.pages.render import format_number, moved, page
 from parenting.server.pages.stages import StageRow, stage_rows
-from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, run_title
+from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, parent_title
 from parenting.server.reads.metrics import first_metrics, latest_metrics, sampled_metrics
 from parenting.server.reads.schemas import run_schema
 from parenting.server.statuses import RunState
@@ -99,9 +99,10 @@ class OperatorForms:
 
 
 @router.get("/runs/{run_id}")
-def dashboard(run_id: RunId, db: Db) -> Response:
-    """The page."""
-    return dashboard_page(db, run_id, {}, {})
+def dashboard(request: Request, run_id: RunId, db: Db) -> Response:
+    """The page. Its address carries the run's public id; a researcher who writes the number is led there."""
+    there = moved(request, runs.get_run(db, run_id))
+    return there or dashboard_page(db, run_id, {}, {})
 
 
 @router.get("/runs/{run_id}/stages")
@@ -121,7 +122,7 @@ def dashboard_page(
     """
     run = runs.get_run(db, run_id)
     state, focus = run_schema(db, run_id).state, next(iter(errors), None)
-    context = DashboardPage(run, run_title(run), state, describe_start(run), errors, focus)
+    context = DashboardPage(run, parent_title(run), state, describe_start(run), errors, focus)
     parts = {**vars(context), **vars(_numbers(db, run)), **vars(_operator(db, run, typed))}
     response = page("dashboard.html", 422 if errors else 200, **parts)
     return response

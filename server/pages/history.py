@@ -18,8 +18,8 @@ from parenting.server.errors import DamagedRowError
 from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.parent import COOKIE
 from parenting.server.pages.question import QuestionView, question_view
-from parenting.server.pages.render import page
-from parenting.server.pages.texts import run_title
+from parenting.server.pages.render import moved, page
+from parenting.server.pages.texts import parent_title
 from parenting.server.reads import answers
 from parenting.server.reads.answers import Answered
 from parenting.server.schemas import Choice
@@ -61,7 +61,6 @@ class Entry(NamedTuple):
 class DamagedEntry(NamedTuple):
     """An answer that cannot be read, or whose question cannot."""
 
-    id: int
     number: int | None
     damaged: str  # what cannot be read, and why
 
@@ -87,11 +86,13 @@ def history_page(
 ) -> Response:
     """The page. `before` is the number of an answer; kind and choice leave out the others."""
     run = runs.get_run(db, run_id)
+    if (there := moved(request, run)) is not None:
+        return there
     rows = answers.before(db, run_id, before, PAGE + 1, kind or None, choice or None)
     kept = {name: value for name, value in (("kind", kind), ("choice", choice)) if value}
     context = HistoryPage(
         run,
-        run_title(run),
+        parent_title(run),
         _entries(rows[:PAGE], run, request.cookies.get(COOKIE, "")),
         urlencode({**kept, "before": _last_number(rows[:PAGE])}) if len(rows) > PAGE else None,
         urlencode(kept) if before is not None else None,
@@ -113,11 +114,11 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
     answer, query = row.answer, row.query
     found = row.damage
     if found is not None:
-        return DamagedEntry(answer.id, sound(answer, "number"), found)
+        return DamagedEntry(sound(answer, "number"), found)
     try:
         shown = question_view(query, run)
     except DamagedRowError as error:
-        return DamagedEntry(answer.id, answer.number, error.message)
+        return DamagedEntry(answer.number, error.message)
     return Entry(
         answer.number,
         CHOICE_TEXTS[answer.choice],

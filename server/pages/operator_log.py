@@ -49,7 +49,7 @@ def probabilities(run: Run, events: Sequence[OperatorEvent]) -> dict[str, float]
 def _entry(event: OperatorEvent) -> LogEntry:
     found = damage(event)
     if found is not None:
-        return LogEntry(f"This entry is damaged: {found}", f"event {event.id}")
+        return LogEntry(f"This entry is damaged: {found}", "")
     return LogEntry(_what(event), _when(event))
 
 

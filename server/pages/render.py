@@ -12,6 +12,7 @@ from parenting.drawing.render import environment
 from parenting.envs.people_text import isolated
 from parenting.server.errors import ServerError
 from parenting.server.public_ids import ALPHABET, LENGTH
+from parenting.server.tables import Run
 
 WEB = Path(__file__).parent.parent.parent / "web"
 
@@ -34,6 +35,18 @@ def render(template: str, **context: object) -> str:
 def format_number(number: float | None) -> str:
     """A number as a field of a form shows it: whole, or "" for none. It reads back as the same number."""
     return "" if number is None else str(number).removesuffix(".0")
+
+
+def moved(request: Request, run: Run) -> RedirectResponse | None:
+    """Return the way to a run's page by its public id, where the address names the run by its number.
+
+    Numbers are the researcher's short names; whoever opens a page of a run meets its public id alone.
+    """
+    if request.path_params["run_id"] == run.public_id:
+        return None
+    page_of_run = request.url.path.split("/", 3)[3:]
+    query = f"?{request.url.query}" if request.url.query else ""
+    return redirect("/".join((f"/runs/{run.public_id}", *page_of_run)) + query, status=307)
 
 
 def redirect(path: str, status: int = 303) -> RedirectResponse:

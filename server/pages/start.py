@@ -42,6 +42,12 @@ PAGE = 20
 
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 
+NUMBER_ERRORS = {
+    "seed": f"A seed is a whole number from 0 to {LARGEST_INT}.",
+    "goal": "A goal is a whole number of answers from 1 to 1000000; leave it empty to have none.",
+}
+"""The sentence next to a field that takes a number and holds something else."""
+
 EMPTY_FORM = {
     "world": next(iter(WORLDS)),
     "level": "",
@@ -110,7 +116,7 @@ def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> 
         return _page(db, {**EMPTY_FORM, **form}, errors)
     run = start(db, read_form(given), settings.weights)
     notify_worker(request)
-    return redirect(f"/runs/{run.public_id}/parent" if run.parent == "human" else f"/runs/{run.id}")
+    return redirect(f"/runs/{run.public_id}/parent" if run.parent == "human" else f"/runs/{run.public_id}")
 
 
 def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
@@ -122,7 +128,7 @@ def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
             plan(read_form(known), folder)
         except InvalidFieldsError as error:
             errors = {**dict(error.fields), **errors}
-    return errors
+    return {name: NUMBER_ERRORS.get(name, said) for name, said in errors.items()}
 
 
 def _page(

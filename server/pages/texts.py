@@ -48,10 +48,10 @@ GOAL_STEP = 50
 
 
 def run_title(run: Run) -> str:
-    """Return the title of a run, the same on every page of a researcher."""
+    """Return the title of a run in the researcher's list, which tells runs apart by their numbers."""
     return run.name or f"{parent_title(run)}, run {run.id}"
 
 
 def parent_title(run: Run) -> str:
-    """Return the title of a run for its parent, who knows no numbers of runs."""
+    """Return the title of a run on its own pages: its parent may open them, and knows no numbers of runs."""
     return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}"

@@ -58,8 +58,18 @@ def db(settings: Settings) -> Iterator[Database]:
 
 @pytest.fixture
 def client(site: FastAPI) -> Iterator[httpx2.Client]:
-    with TestClient(site, base_url="http://localhost", follow_redirects=False) as caller:
+    with Reader(site, base_url="http://localhost", follow_redirects=False) as caller:
         yield caller
+
+
+class Reader(TestClient):
+    """A browser without scripts: the address of a page by a run's number leads to its public id.
+
+    Where a form leads to is for each test to say.
+    """
+
+    def get(self, *arguments: Any, **named: Any) -> Any:
+        return super().get(*arguments, **{"follow_redirects": True, **named})
 
 
 @pytest.fixture

@@ -16,7 +16,9 @@ from parenting.server.tables import Query
 
 def look(client: httpx2.Client, query: int | None = None, run: int = 1) -> httpx2.Response:
     """The page, by way of the address that a researcher writes."""
-    moved = client.get(f"/runs/{run}/parent" + ("" if query is None else f"?query={query}"))
+    moved = client.get(
+        f"/runs/{run}/parent" + ("" if query is None else f"?query={query}"), follow_redirects=False
+    )
     assert moved.status_code == 307, moved.text
     return client.get(moved.headers["location"])
 

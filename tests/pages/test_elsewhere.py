@@ -168,7 +168,7 @@ def counted(db: Database) -> Database:
 
 
 def pages(client: httpx2.Client, db: Database) -> Iterator[httpx2.Response]:
-    """All that a parent gets: the page in each state, a question, and replies to the forms."""
+    """All that a parent gets: the pages of the run in each state, a question, and replies to the forms."""
     here, me = address(db, RUN), {"client_id": "client-of-mine"}
     yield look(client, run=RUN)
     yield look(client, QUESTION, run=RUN)
@@ -191,9 +191,36 @@ def pages(client: httpx2.Client, db: Database) -> Iterator[httpx2.Response]:
     yield client.post(f"{here.removesuffix('/parent')}/goal", data={"goal": "9", "back": "parent"})
 
 
+def others(client: httpx2.Client, db: Database) -> Iterator[httpx2.Response]:
+    """What the links and forms of dashboard and history lead to."""
+    dashboard = address(db, RUN).removesuffix("/parent")
+    for path in (
+        dashboard,
+        f"{dashboard}/history",
+        f"{dashboard}/history?kind=guidance",
+        f"{dashboard}/stages",
+    ):
+        yield client.get(path)
+    for path, wrong in (("goal", {"goal": "x"}), ("pace", {"pace": "x"}), ("probabilities", {"p_guid": "2"})):
+        yield client.post(f"{dashboard}/{path}", data=wrong)
+    yield client.post(f"{dashboard}/event", data={"kind": "mature"})
+    yield client.post(f"{dashboard}/status", data={"status": "paused"})
+    with db.write() as session:
+        session.execute(text("UPDATE run SET status = 'failed', reason = 'The disk was full.'"))
+        session.execute(text("UPDATE query SET clips = '[1,'"))
+    for path in (dashboard, f"{dashboard}/history", f"{dashboard}/parent"):
+        yield client.get(path)
+    yield client.get(f"{dashboard}/parent?query={public_id(db, QUESTION)}")
+    with db.write() as session:
+        session.execute(text("UPDATE run SET config = '[1,'"))
+    for path in (dashboard, f"{dashboard}/history", f"{dashboard}/parent"):
+        yield client.get(path)
+
+
 def test_no_number_of_a_run_or_a_question_reaches_a_parent(client: httpx2.Client, counted: Database) -> None:
     got = list(pages(client, counted))
     assert {reply.status_code for reply in got} == {200, 303, 409, 410}
+    got += others(client, counted)
     for reply in got:
         said = reply.text + str(reply.headers)
         assert not re.search(f"{RUN}|{QUESTION}", said), said
@@ -214,8 +241,8 @@ def test_an_error_leads_back_to_a_run_whose_name_begins_with_a_digit(
 
 
 def test_a_number_would_be_found(client: httpx2.Client, counted: Database) -> None:
-    """The control: the researcher's pages have them."""
-    assert str(RUN) in client.get(f"/runs/{RUN}").text
+    """The control: the researcher's list has them."""
+    assert f"run {RUN}</bdi>" in client.get("/").text
 
 
 @pytest.mark.parametrize("query", [None, QUESTION])
@@ -223,10 +250,14 @@ def test_an_old_address_leads_to_the_public_one(
     client: httpx2.Client, counted: Database, query: int | None
 ) -> None:
     old = f"/runs/{RUN}/parent" + (f"?query={query}" if query else "")
-    moved = client.get(old)
+    moved = client.get(old, follow_redirects=False)
     assert (moved.status_code, moved.headers["location"]) == (307, address(counted, RUN, query))
     assert client.get(moved.headers["location"]).status_code == 200
-    half = client.get(f"{address(counted, RUN)}?query={QUESTION}")
+    for page in ("", "/history", "/history?kind=guidance&choice=left"):
+        moved = client.get(f"/runs/{RUN}{page}", follow_redirects=False)
+        there = address(counted, RUN).removesuffix("/parent") + page
+        assert (moved.status_code, moved.headers["location"]) == (307, there)
+    half = client.get(f"{address(counted, RUN)}?query={QUESTION}", follow_redirects=False)
     assert (half.status_code, half.headers["location"]) == (307, address(counted, RUN, QUESTION))
 
 

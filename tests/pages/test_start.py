@@ -68,8 +68,9 @@ def test_a_run_of_mine_begins_at_the_parents_page(client: httpx2.Client, db: Dat
     assert run.config["p_guid"] == 0.95
 
 
-def test_a_scripted_run_begins_at_the_dashboard(client: httpx2.Client) -> None:
-    assert client.post("/runs", data={**FORM, "parent": "scripted"}).headers["location"] == "/runs/1"
+def test_a_scripted_run_begins_at_the_dashboard(client: httpx2.Client, db: Database) -> None:
+    there = client.post("/runs", data={**FORM, "parent": "scripted"}).headers["location"]
+    assert there == f"/runs/{get_run(db, 1).public_id}"
 
 
 def test_a_level_of_ones_own_stands_in_for_the_list(client: httpx2.Client, db: Database) -> None:
@@ -133,7 +134,7 @@ def test_the_list_says_where_every_run_is(client: httpx2.Client, db: Database) -
     assert ">optimal<" in page
     assert f'href="{address(db)}"' in page
     assert f'href="{address(db, 2)}"' not in page  # a script raises it
-    assert 'href="/runs/2"' in page
+    assert f'href="/runs/{get_run(db, 2).public_id}"' in page
 
 
 def test_the_settings_of_the_form_are_the_runs(client: httpx2.Client, db: Database) -> None:
@@ -194,7 +195,7 @@ def test_hundreds_of_runs_are_listed_page_by_page(client: httpx2.Client, db: Dat
     seen, path = [], "/"
     while path:
         page = client.get(path).text
-        seen.append([int(number) for number in re.findall(r'<h2><a href="/runs/(\d+)">', page)])
+        seen.append([int(number) for number in re.findall(r", run (\d+)</bdi></a></h2>", page)])
         older = re.search(r'href="([^"]*)">Older runs', page)
         path = older[1] if older else ""
     assert [len(part) for part in seen] == [PAGE, PAGE, 5]

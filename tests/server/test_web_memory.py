@@ -12,10 +12,10 @@ from parenting.server.tables import Run
 WARM, ROUNDS = 2, 4
 PATHS = (
     "/",
-    "/runs/{id}",
+    "/runs/{name}",
     "/runs/{id}/parent",
     "/runs/{id}/stages",
-    "/runs/{id}/history",
+    "/runs/{name}/history",
     "/api/v1/runs",
     "/api/v1/runs/{id}",
     "/api/v1/runs/{id}/queries?limit=20",
@@ -30,11 +30,11 @@ PATHS = (
 )
 
 
-def ask(client: httpx2.Client, run_id: int) -> None:
+def ask(client: httpx2.Client, run: Run) -> None:
     """Send one request of each kind, and one for a lease, of which there is none."""
     for path in PATHS:
-        client.get(path.format(id=run_id), follow_redirects=False)
-    client.post(f"/api/v1/runs/{run_id}/queries/lease", json={"client_id": "someone"})
+        client.get(path.format(id=run.id, name=run.public_id), follow_redirects=False)
+    client.post(f"/api/v1/runs/{run.id}/queries/lease", json={"client_id": "someone"})
 
 
 def living() -> Counter[str]:
@@ -48,10 +48,10 @@ def living() -> Counter[str]:
 
 def test_requests_leave_no_objects_behind(client: httpx2.Client, run: Run) -> None:
     for _ in range(WARM):
-        ask(client, run.id)
+        ask(client, run)
     living()  # the first count leaves a few objects itself
     before = living()
     for _ in range(ROUNDS):
-        ask(client, run.id)
+        ask(client, run)
     grown = living() - before
     assert {name: number for name, number in grown.items() if number >= ROUNDS} == {}
