@@ -24,6 +24,7 @@ from parenting.server.errors import (
     StoreError,
     TooLargeError,
 )
+from parenting.server.group_commit import GroupCommit
 from parenting.server.log_limit import LogLimit
 from parenting.server.meters import Meters
 from parenting.server.migrate import require_current
@@ -67,6 +68,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     app.state.db, app.state.settings = db, settings
     app.state.worker_notifier = Notifier(settings.data, "worker")
     app.state.admission, app.state.health_threads = Admission(), health.health_threads()
+    app.state.group_commit = GroupCommit(db) if db.one_writer else None
     notifier = Notifier(settings.data, "web")
     app.state.streams = Streams(db, notifier, settings.streams, app.state.admission)
     app.state.meters.watch(db, app.state.streams.number)
@@ -105,6 +107,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     app.state.streams.open()
     yield
     app.state.streams.end()
+    if app.state.group_commit is not None:
+        app.state.group_commit.close()
     app.state.db.close()
 
 

@@ -16,9 +16,6 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import bindparam, select
-from sqlalchemy.orm import Session
-
 from parenting.server.columns import Damaged
 from parenting.server.damage import sound
 from parenting.server.db import Database
@@ -66,13 +63,11 @@ def new_salt() -> str:
     return secrets.token_hex(16)
 
 
-def chain_in(session: Session, answer: Answer) -> None:
-    """Hash a new answer, in its own transaction, which holds the run's row."""
-    query = session.get_one(Query, answer.query_id)
+def hashes(answer: Mapping[str, Any], query: Mapping[str, Any], before: str) -> dict[str, str]:
+    """Return the columns of a new answer that chain it to the link before it."""
     salt = new_salt()
-    answer.salt, answer.chained = salt, AT_ANSWER
-    answer.digest = digest_of(salt, content(_columns(answer, OF_ANSWER), _columns(query, OF_QUERY)))
-    answer.link = link_after(_before(session, answer), answer.digest)
+    digest = digest_of(salt, content(answer, query))
+    return {"salt": salt, "digest": digest, "link": link_after(before, digest), "chained": AT_ANSWER}
 
 
 def check(db: Database, run_id: int) -> Checked:
@@ -115,13 +110,6 @@ def _problems(row: Answered, before: str | None) -> Iterator[str]:
         yield f"answer {number} does not follow answer {number - 1} in the chain"
 
 
-def _before(session: Session, answer: Answer) -> str:
-    if answer.number == 1:
-        return BEGIN
-    link = session.execute(_LINK, {"run_id": answer.run_id, "number": answer.number - 1}).scalar()
-    return link if isinstance(link, str) else ""
-
-
 def _columns(row: Answer | Query, names: tuple[str, ...]) -> dict[str, Any]:
     return {name: sound(row, name) for name in names}
 
@@ -131,6 +119,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, datetime):
         return value.replace(tzinfo=None).isoformat(timespec="microseconds")
     return None if isinstance(value, Damaged) else value
-
-
-_LINK = select(Answer.link).where(Answer.run_id == bindparam("run_id"), Answer.number == bindparam("number"))

@@ -47,7 +47,7 @@ class Database:
     """The database handle.
 
     `read()` and `write()` are transactions; `clock()` is the time that people see, `mark(session)` the moment
-    by which leases and claims are decided.
+    by which leases and claims are decided. With `one_writer`, a transaction that writes has the whole store.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Database:
         self.clock = clock
         self._writing = engine.execution_options(begin="IMMEDIATE", synchronous="full")
         self._hurried = engine.execution_options(begin="IMMEDIATE", synchronous="normal")
-        self._sqlite = engine.dialect.name == "sqlite"
+        self._sqlite = self.one_writer = engine.dialect.name == "sqlite"
         self.mark: Marks = mark or (boot_mark if self._sqlite else server_mark)
         self._reading = engine if self._sqlite else postgresql.reading(engine)
         # One writer of this process at a time: fairer than many threads that sleep on SQLite's lock.

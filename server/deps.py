@@ -17,12 +17,18 @@ worker acts on it at once.
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, TypeVar
 
 from fastapi import Depends, Request
+from sqlalchemy.orm import Session
 
+from parenting.server.admission import Admission
 from parenting.server.db import Database
+from parenting.server.group_commit import GroupCommit
 from parenting.server.settings import Settings
+
+Found = TypeVar("Found")
 
 
 async def database(request: Request) -> Database:
@@ -35,6 +41,44 @@ async def settings_of(request: Request) -> Settings:
     """Return the settings that this application was made with."""
     settings: Settings = request.app.state.settings
     return settings
+
+
+async def store(
+    request: Request,
+    verb: Callable[[Session], Found],
+    durable: bool = True,
+    worth: Callable[[Session], bool] | None = None,
+) -> Found | None:
+    """Call a verb in a transaction that writes, and return what it returned once that is committed.
+
+    On SQLite many requests share a transaction (`server.group_commit`).
+
+    Args:
+        request: The request.
+        verb: It writes by statements, not by changes of objects.
+        durable: It is promised to somebody (`Database.write`).
+        worth: Return whether there is anything to write; it is asked where no lock is needed otherwise.
+
+    Returns:
+        None, too, where it was not worth it.
+    """
+    state = request.app.state
+    admission: Admission = state.admission
+    group: GroupCommit | None = state.group_commit
+    if group is None:
+        return await admission.write(_alone, state.db, verb, durable, worth)
+    return await group.store(verb, admission.seconds, durable, worth)
+
+
+def _alone(
+    db: Database, verb: Callable[[Session], Found], durable: bool, worth: Callable[[Session], bool] | None
+) -> Found | None:
+    if worth is not None:
+        with db.read() as session:
+            if not worth(session):
+                return None
+    with db.write(durable) as session:
+        return verb(session)
 
 
 def notify_worker(request: Request) -> None:

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from functools import partial
 from typing import Annotated
 
 from fastapi import Query, Request, Response
-from fastapi.responses import JSONResponse
+from sqlalchemy.orm import Session
 
 from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import AnswerBody, LeaseBody
 from parenting.server.api.lists import AskedPart, AskedRows
-from parenting.server.api.names import QueryId, QueryName, RunId
+from parenting.server.api.names import QueryId, QueryName, RunId, RunName
 from parenting.server.api.responses import read_responses, write_responses
-from parenting.server.deps import Db, SettingsOf, notify_worker
-from parenting.server.queue.answers import answer
-from parenting.server.queue.leases import lease, release
+from parenting.server.db import Database
+from parenting.server.deps import Db, SettingsOf, notify_worker, store
+from parenting.server.queue.answers import Said, Stored, answer_in
+from parenting.server.queue.leases import is_offered, lease_in, release
 from parenting.server.queue.names import Names
 from parenting.server.reads import pagination
+from parenting.server.reads.names import run_number_in
 from parenting.server.reads.schemas import asked_schema, asked_schemas, leased_schema
-from parenting.server.runs import get_run
+from parenting.server.runs import find
 from parenting.server.schemas import AskedSchema, LeasedSchema, StoredSchema
+from parenting.server.tables import Run
 
 router = admitted_router(tags=["questions"])
 
@@ -41,17 +44,37 @@ def list_questions(run_id: RunId, db: Db, part: Annotated[AskedPart, Query()]) -
     response_model=LeasedSchema,
     responses={204: {"description": "No question waits."}, **write_responses(404)},
 )
-def lease_question(run_id: RunId, body: LeaseBody, db: Db, settings: SettingsOf) -> Response:
+async def lease_question(
+    request: Request, run_id: RunName, body: LeaseBody, db: Db, settings: SettingsOf
+) -> Response:
     """Lease the most urgent open question (guidance first, then the oldest) for this client, for 60 s.
 
     The reply holds all that a parent needs to answer it. Leasing again renews the lease. The status is 204 if
     no question waits or if the run has reached its goal.
     """
-    get_run(db, run_id)
-    query = lease(db, run_id, body.client_id, settings.lease_seconds)
-    if query is None:
+    asks = (db, run_id, body.client_id)
+    verb, worth = partial(_lease, *asks, settings.lease_seconds), partial(_is_worth_it, *asks)
+    leased = await store(request, verb, durable=False, worth=worth)
+    if leased is None:
         return Response(status_code=204)
-    return JSONResponse(leased_schema(db, query).model_dump(mode="json"))
+    return Response(leased.model_dump_json(), media_type="application/json")
+
+
+def _lease(
+    db: Database, name: int | str, client_id: str, seconds: float, session: Session
+) -> LeasedSchema | None:
+    run_id = run_number_in(session, name)
+    query = lease_in(session, db, run_id, client_id, seconds)
+    if query is None:
+        find(session, run_id)
+        return None
+    return leased_schema(session, query)
+
+
+def _is_worth_it(db: Database, name: int | str, client_id: str, session: Session) -> bool:
+    """Return whether a question can be leased, or the run is not there, which the verb says."""
+    run_id = run_number_in(session, name)
+    return is_offered(session, db, run_id, client_id) or session.get(Run, run_id) is None
 
 
 @router.get("/queries/{query_id}", summary="Look at a question", responses=read_responses(404))
@@ -61,9 +84,12 @@ def get_question(query_id: QueryId, db: Db) -> AskedSchema:
 
 
 @router.post(
-    "/queries/{query_id}/answer", summary="Answer a question", responses=write_responses(404, 409, 410)
+    "/queries/{query_id}/answer",
+    summary="Answer a question",
+    response_model=StoredSchema,
+    responses=write_responses(404, 409, 410),
 )
-def answer_question(request: Request, query_id: QueryName, body: AnswerBody, db: Db) -> StoredSchema:
+async def answer_question(request: Request, query_id: QueryName, body: AnswerBody, db: Db) -> Response:
     """Store an answer, once.
 
     An answer that names a database, a run or a question which is not the one here gets 410 (`elsewhere`) and
@@ -75,9 +101,14 @@ def answer_question(request: Request, query_id: QueryName, body: AnswerBody, db:
     stands.
     """
     names = Names(body.database, body.run, body.question)
-    stored = answer(db, query_id, body.choice, body.client_id, body.parent, names)
+    said = Said(body.choice, body.client_id, body.parent)
+    stored = await store(request, partial(_answer, db, query_id, said, names))
     notify_worker(request)
-    return StoredSchema(**asdict(stored))
+    return Response(StoredSchema(**vars(stored)).model_dump_json(), media_type="application/json")
+
+
+def _answer(db: Database, query: int | str, said: Said, names: Names, session: Session) -> Stored:
+    return answer_in(session, db, query, said, names)
 
 
 @router.post(

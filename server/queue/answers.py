@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
-from sqlalchemy import bindparam, select, update
+from sqlalchemy import and_, bindparam, insert, select, update
 from sqlalchemy.orm import Session
 
-from parenting.server.chain import chain_in
+from parenting.server.chain import BEGIN, OF_QUERY, hashes
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
 from parenting.server.queue.locks import lock_query
@@ -19,7 +20,7 @@ from parenting.server.queue.names import UNSTATED, Names, Place, find_place
 from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
 from parenting.server.store.relay import announce
-from parenting.server.tables import Answer, Query, Run
+from parenting.server.tables import Answer, Query, Table
 
 
 @dataclass(frozen=True)
@@ -78,18 +79,24 @@ def answer(
         NotFound: there is no such query.
         Conflict: it was answered otherwise, or by somebody else, or withdrawn; the message says which.
     """
-    said = Said(choice, client_id, parent)
     with db.write() as session:
-        place = find_place(session, query, names)
+        return answer_in(session, db, query, Said(choice, client_id, parent), names)
+
+
+def answer_in(
+    session: Session, db: Database, query: int | str, said: Said, names: Names = UNSTATED
+) -> Stored:
+    """Store an answer as `answer` does, in a transaction that is already open."""
+    place = find_place(session, query, names)
+    if not db.one_writer:
         lock(session, place.run)
-        before = _standing(session, place.query)
-        if before is not None:
-            return _again(before, said, place)
-        if session.execute(_ANSWERED, {"query_id": place.query}).scalar() is None:
-            raise Conflict(
-                "This question was withdrawn: the run or its episode was ended before an answer came."
-            )
-        return _stored(_add(session, db, place.query, place.run, said), place)
+    asked = session.execute(_ASKED, {"query_id": place.query}).one()
+    if asked.standing is not None:
+        return _again(asked, said, place)
+    if session.execute(_ANSWERED, {"query_id": place.query}).scalar() is None:
+        raise Conflict("This question was withdrawn: the run or its episode was ended before an answer came.")
+    number, received = _add(session, db, asked, said)
+    return Stored(**vars(place), number=number, choice=said.choice, received=received)
 
 
 def supersede(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Answer:
@@ -109,43 +116,43 @@ def supersede(db: Database, query_id: int, choice: str, client_id: str, parent: 
             raise Conflict(f"Question {query_id} has no answer to supersede.")
         before.standing = False
         session.flush()
-        said = Said(choice, client_id, parent)
-        return _add(session, db, query_id, query.run_id, said, supersedes=before.id)
+        asked = session.execute(_ASKED, {"query_id": query_id}).one()
+        number, _ = _add(session, db, asked, Said(choice, client_id, parent), supersedes=before.id)
+        added = select(Answer).where(Answer.run_id == query.run_id, Answer.number == number)
+        return session.scalars(added).one()
 
 
 def _add(
-    session: Session, db: Database, query_id: int, run_id: int, said: Said, supersedes: int | None = None
-) -> Answer:
+    session: Session, db: Database, asked: Any, said: Said, supersedes: int | None = None
+) -> tuple[int, datetime]:
+    """Add an answer, and return its number and time."""
+    run_id: int = asked.run_id
     # Numbered in this transaction: no reader can see number n + 1 before n.
     number = session.execute(_NUMBERED, {"run_id": run_id}).scalar_one()
-    row = Answer(
-        query_id=query_id,
-        run_id=run_id,
-        number=number,
+    row = {
+        "query_id": asked.query_id,
+        "run_id": run_id,
+        "number": number,
         **vars(said),
-        supersedes=supersedes,
-        standing=True,
-        received=db.clock(),
-    )
-    chain_in(session, row)
-    session.add(row)
-    session.flush()
+        "supersedes": supersedes,
+        "standing": True,
+        "received": db.clock(),
+    }
+    link = asked.last_link if isinstance(asked.last_link, str) else ""
+    before = BEGIN if number == 1 else link
+    session.execute(_INSERTED, row | hashes(row, asked._mapping, before))
     announce(session, "worker")
-    return row
+    return number, row["received"]
 
 
-def _again(before: Answer, said: Said, place: Place) -> Stored:
-    if before.client_id != said.client_id:
+def _again(asked: Any, said: Said, place: Place) -> Stored:
+    if asked.client_id != said.client_id:
         raise Conflict("This question was already answered by someone else; your answer was not stored.")
-    if before.choice != said.choice:
+    if asked.choice != said.choice:
         raise Conflict(
-            f"You already answered this question with {before.choice}; {said.choice} was not stored."
+            f"You already answered this question with {asked.choice}; {said.choice} was not stored."
         )
-    return _stored(before, place)
-
-
-def _stored(row: Answer, place: Place) -> Stored:
-    return Stored(**vars(place), number=row.number, choice=row.choice, received=row.received)
+    return Stored(**vars(place), number=asked.number, choice=asked.choice, received=asked.received)
 
 
 def _standing(session: Session, query_id: int) -> Answer | None:
@@ -154,17 +161,33 @@ def _standing(session: Session, query_id: int) -> Answer | None:
 
 # Statements that every answer needs are built once.
 _STANDING = select(Answer).where(Answer.query_id == bindparam("query_id"), Answer.standing)
+_RUN, _QUERY, _ANSWER = (Table.metadata.tables[name] for name in ("run", "query", "answer"))
+_run, _query, _answer, _last = _RUN.c, _QUERY.c, _ANSWER.c, _ANSWER.alias()
+_ASKED = (
+    select(
+        _query.id.label("query_id"),
+        *(_query[name] for name in ("run_id", *OF_QUERY)),
+        _answer.id.label("standing"),
+        *(_answer[name] for name in ("client_id", "choice", "number", "received")),
+        _last.c.link.label("last_link"),
+    )
+    .select_from(_QUERY)
+    .join(_RUN, _run.id == _query.run_id)
+    .outerjoin(_ANSWER, and_(_answer.query_id == _query.id, _answer.standing))
+    .outerjoin(_last, and_(_last.c.run_id == _run.id, _last.c.number == _run.answers))
+    .where(_query.id == bindparam("query_id"))
+)
+"""A question as it is hashed, with the answer that stands and the last link of its run's chain."""
 _ANSWERED = (
-    update(Query)
-    .where(Query.id == bindparam("query_id"), Query.status == QueryStatus.OPEN)
+    update(_QUERY)
+    .where(_query.id == bindparam("query_id"), _query.status == QueryStatus.OPEN)
     .values(status=QueryStatus.ANSWERED)
-    .returning(Query.id)
-    .execution_options(synchronize_session=False)
+    .returning(_query.id)
 )
 _NUMBERED = (
-    update(Run)
-    .where(Run.id == bindparam("run_id"))
-    .values(answers=Run.answers + 1)
-    .returning(Run.answers)
-    .execution_options(synchronize_session=False)
+    update(_RUN)
+    .where(_run.id == bindparam("run_id"))
+    .values(answers=_run.answers + 1)
+    .returning(_run.answers)
 )
+_INSERTED = insert(_ANSWER)

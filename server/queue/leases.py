@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import and_, bindparam, case, func, or_, select
+from sqlalchemy import and_, bindparam, case, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
+from sqlalchemy.orm.attributes import set_committed_value
 
 from parenting.server.damage import damage, readable
 from parenting.server.db import Database
@@ -20,7 +21,7 @@ from parenting.server.queue.queries import guidance_first
 from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
 from parenting.server.store.clock import holds, is_over
-from parenting.server.tables import Query, Run
+from parenting.server.tables import Query, Run, Table
 
 LEASE_SECONDS = 60.0
 
@@ -54,10 +55,8 @@ def lease_ahead(
 
 def may_lease(db: Database, run_id: int, client_id: str) -> bool:
     """Return whether a query is free for this client, or held for it already."""
-    asks = {"run_id": run_id, "client_id": client_id}
     with db.read() as session:
-        asks |= db.mark(session).bound()
-        return session.execute(_OFFER.with_only_columns(Query.id), asks).first() is not None
+        return is_offered(session, db, run_id, client_id)
 
 
 def release(db: Database, query_id: int, client_id: str) -> None:
@@ -73,20 +72,48 @@ def release(db: Database, query_id: int, client_id: str) -> None:
             query.lease_epoch = query.lease_begin = query.lease_end = None
 
 
+def is_offered(session: Session, db: Database, run_id: int, client_id: str) -> bool:
+    """Return whether a query is free for this client, or held for it already, in an open transaction."""
+    return _is_offered(session, db, _OFFER, {"run_id": run_id, "client_id": client_id})
+
+
+def lease_in(session: Session, db: Database, run_id: int, client_id: str, seconds: float) -> Query | None:
+    """Hold a query as `lease` does, in a transaction that is already open; not durable by itself."""
+    return _hold_in(session, db, _OFFER, {"run_id": run_id, "client_id": client_id}, seconds)
+
+
 def _hold(db: Database, offer: Any, asks: dict[str, Any], seconds: float) -> Query | None:
     with db.read() as session:  # nothing to offer is the common case, and takes no lock
-        seen = {**asks, **db.mark(session).bound()}
-        if session.execute(offer.with_only_columns(Query.id), seen).first() is None:
+        if not _is_offered(session, db, offer, asks):
             return None
     with db.write(durable=False) as session:
+        return _hold_in(session, db, offer, asks, seconds)
+
+
+def _is_offered(session: Session, db: Database, offer: Any, asks: dict[str, Any]) -> bool:
+    seen = {**asks, **db.mark(session).bound()}
+    return session.execute(offer.with_only_columns(Query.id), seen).first() is not None
+
+
+def _hold_in(
+    session: Session, db: Database, offer: Any, asks: dict[str, Any], seconds: float
+) -> Query | None:
+    if not db.one_writer:
         lock(session, asks["run_id"])
-        mark = db.mark(session)  # behind the lock: nobody else's lease begins later
-        query = _first_readable(session, offer, {**asks, **mark.bound()})
-        if query is not None:
-            query.leased_by, query.leased_until = asks["client_id"], db.clock() + timedelta(seconds=seconds)
-            query.lease_epoch, query.lease_begin = mark
-            query.lease_end = mark.seconds + seconds
-        return query
+    mark = db.mark(session)  # behind the lock: nobody else's lease begins later
+    query = _first_readable(session, offer, {**asks, **mark.bound()})
+    if query is not None:
+        held = {
+            "leased_by": asks["client_id"],
+            "leased_until": db.clock() + timedelta(seconds=seconds),
+            "lease_epoch": mark.epoch,
+            "lease_begin": mark.seconds,
+            "lease_end": mark.seconds + seconds,
+        }
+        session.execute(_HELD, {"query_id": query.id, **held})
+        for name, value in held.items():
+            set_committed_value(query, name, value)
+    return query
 
 
 def _first_readable(session: Session, offer: Any, asks: dict[str, Any]) -> Query | None:
@@ -109,6 +136,8 @@ def _first_readable(session: Session, offer: Any, asks: dict[str, Any]) -> Query
 
 
 # Statements that every question needs are built once.
+_QUERY = Table.metadata.tables["query"]
+_HELD = update(_QUERY).where(_QUERY.c.id == bindparam("query_id"))
 _LEASE = (Query.lease_epoch, Query.lease_begin, Query.lease_end)
 _MINE = and_(Query.leased_by == bindparam("client_id"), holds(*_LEASE))
 _FREE = is_over(*_LEASE)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import timedelta
-from typing import Literal
+from typing import Any, Literal
 
-from sqlalchemy import select
+from sqlalchemy import bindparam, func, select
+from sqlalchemy.orm import Session
 
 from parenting.agent.config import Config
 from parenting.server.damage import damage, readable, reading, sound
 from parenting.server.db import Database
-from parenting.server.identity import database_id_in
+from parenting.server.identity import database_id_in, stated
 from parenting.server.queue.queries import Open, open_by_run, open_in
 from parenting.server.reads.pagination import Asked
 from parenting.server.runs import find
@@ -30,10 +31,10 @@ from parenting.server.schemas import (
     RunSchema,
     WorldSchema,
 )
-from parenting.server.statuses import OVER, RunState, RunStatus, Waiting
+from parenting.server.statuses import OVER, QueryStatus, RunState, RunStatus, Waiting
 from parenting.server.store.clock import Mark
 from parenting.server.store.patience import patience
-from parenting.server.tables import Answer, Metric, Query, Run
+from parenting.server.tables import KINDS, Answer, Identity, Metric, Query, Run
 from parenting.server.workers import alive
 
 Sign = Literal["alive", "silent", "done"]
@@ -111,21 +112,33 @@ def _asked_schema(row: Asked, names: tuple[str, dict[int, str]]) -> AskedSchema:
     return AskedSchema(**shown, answer=None if row.answer is None else _answer_schema(row.answer))
 
 
-def leased_schema(db: Database, query: Query) -> LeasedSchema:
-    """Return the schema of a leased query: with its world, the parent's settings and progress."""
-    with db.read() as session:
-        run, here = readable(find(session, readable(query).run_id)), database_id_in(session)
-        opened = open_in(session, run.id)
-    config = Config.model_validate(run.config)
-    world = WorldSchema(
-        name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
-    )
+def leased_schema(session: Session, query: Query) -> LeasedSchema:
+    """Return the schema of a leased query: with its world, the parent's settings and progress.
+
+    Raises:
+        DamagedRowError: its run cannot be read.
+    """
+    world, parent, run_public_id = _shown_run(session, query.run_id)
+    now = session.execute(_PROGRESS, {"run_id": query.run_id}).one()
     return LeasedSchema(
-        **_query_schema(query, here, run.public_id).model_dump(),
+        **_query_fields(query, stated(now.database), run_public_id),
         world=world,
-        parent=ParentSchema(gamma=config.gamma, inside=config.garden_parent),
-        progress=ProgressSchema(answered=run.answers, open=opened.guidance + opened.preference),
+        parent=parent,
+        progress=ProgressSchema(answered=now.answers, open=now.open),
     )
+
+
+def _shown_run(session: Session, run_id: int) -> tuple[WorldSchema, ParentSchema, str]:
+    """Return what a leased query shows of its run, which never changes; a transaction reads it once."""
+    kept: dict[int, tuple[WorldSchema, ParentSchema, str]] = session.info.setdefault("shown runs", {})
+    if run_id not in kept:
+        run = readable(find(session, run_id))
+        config = Config.model_validate(run.config)
+        world = WorldSchema(
+            name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
+        )
+        kept[run_id] = world, ParentSchema(gamma=config.gamma, inside=config.garden_parent), run.public_id
+    return kept[run_id]
 
 
 def metric_schemas(rows: Sequence[Metric]) -> list[MetricSchema | DamagedMetricSchema]:
@@ -141,17 +154,19 @@ def _metric_schema(row: Metric) -> MetricSchema | DamagedMetricSchema:
 
 
 def _query_schema(query: Query, database: str, run_public_id: str) -> QuerySchema:
+    return QuerySchema(**_query_fields(query, database, run_public_id))
+
+
+def _query_fields(query: Query, database: str, run_public_id: str) -> dict[str, Any]:
     names = ("id", "public_id", "tick", "kind", "maturity", "status", "posted", "leased_until")
-    own = {name: getattr(query, name) for name in names}
-    policy = PolicySchema(stage=query.policy_stage, gradient_steps=query.policy_steps)
-    return QuerySchema(
-        run=query.run_id,
-        run_public_id=run_public_id,
-        database=database,
-        policy=policy,
-        **own,
+    return {
+        "run": query.run_id,
+        "run_public_id": run_public_id,
+        "database": database,
+        "policy": PolicySchema(stage=query.policy_stage, gradient_steps=query.policy_steps),
+        **{name: getattr(query, name) for name in names},
         **query.clips,
-    )
+    }
 
 
 def _answer_schema(answer: Answer) -> AnswerSchema:
@@ -212,3 +227,15 @@ def _worker(run: Run, now: Mark, taken_soon: bool) -> Sign:
 
 def _signed(run: Run, now: Mark, within: timedelta) -> bool:
     return now.is_recent(run.claim_epoch, run.claim_mark, within.total_seconds())
+
+
+# What every leased question needs is built once.
+_PROGRESS = select(
+    Run.answers,
+    select(func.count())
+    .where(Query.run_id == Run.id, Query.status == QueryStatus.OPEN, Query.kind.in_(KINDS))
+    .correlate(Run)
+    .scalar_subquery()
+    .label("open"),
+    select(Identity.uuid).scalar_subquery().label("database"),
+).where(Run.id == bindparam("run_id"))
