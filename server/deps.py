@@ -18,7 +18,7 @@ worker acts on it at once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Depends, Request
 from sqlalchemy.orm import Session
@@ -48,7 +48,7 @@ async def store(
     verb: Callable[[Session], Found],
     durable: bool = True,
     worth: Callable[[Session], bool] | None = None,
-) -> Found | None:
+) -> Found:
     """Call a verb in a transaction that writes, and return what it returned once that is committed.
 
     On SQLite many requests share a transaction (`server.group_commit`).
@@ -57,22 +57,21 @@ async def store(
         request: The request.
         verb: It writes by statements, not by changes of objects.
         durable: It is promised to somebody (`Database.write`).
-        worth: Return whether there is anything to write; it is asked where no lock is needed otherwise.
-
-    Returns:
-        None, too, where it was not worth it.
+        worth: Return whether there is anything to write; it is asked where no lock is needed otherwise. For
+            verbs that may return None: where it is not worth it, the result is None.
     """
     state = request.app.state
     admission: Admission = state.admission
     group: GroupCommit | None = state.group_commit
     if group is None:
-        return await admission.write(_alone, state.db, verb, durable, worth)
+        found: Found = await admission.write(_alone, state.db, verb, durable, worth)
+        return found
     return await group.store(verb, admission.seconds, durable, worth)
 
 
 def _alone(
-    db: Database, verb: Callable[[Session], Found], durable: bool, worth: Callable[[Session], bool] | None
-) -> Found | None:
+    db: Database, verb: Callable[[Session], Any], durable: bool, worth: Callable[[Session], bool] | None
+) -> Any:
     if worth is not None:
         with db.read() as session:
             if not worth(session):

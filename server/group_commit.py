@@ -73,7 +73,7 @@ class GroupCommit:
         seconds: float,
         durable: bool = True,
         worth: Callable[[Session], bool] | None = None,
-    ) -> Found | None:
+    ) -> Found:
         """Call a verb in a transaction, and return what it returned once that is committed.
 
         Args:
@@ -81,10 +81,8 @@ class GroupCommit:
             seconds: How long it may wait for its group.
             durable: It is promised to somebody (`Database.write`).
             worth: Return whether there is anything to write. It is asked in a transaction that only reads,
-                if nobody in the group writes anyway.
-
-        Returns:
-            None, too, where it was not worth it.
+                if nobody in the group writes anyway. For verbs that may return None: where it is not worth
+                it, the result is None.
 
         Raises:
             BusyError: too many wait, or its turn did not come in time; nothing was stored.
@@ -99,7 +97,7 @@ class GroupCommit:
         timer = loop.call_later(seconds, self._leave, write)
         self._queue.put(write)
         try:
-            found: Found | None = await write.told
+            found: Found = await write.told
             return found
         finally:
             timer.cancel()

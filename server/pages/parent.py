@@ -21,7 +21,7 @@ from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import Choice, ClientId
 from parenting.server.api.names import DatabaseId, PublicId, RunId, RunName, read_name
 from parenting.server.db import Database
-from parenting.server.deps import Db, SettingsOf, notify_worker
+from parenting.server.deps import Db, SettingsOf, notify_worker, store
 from parenting.server.errors import ElsewhereError, NotFound
 from parenting.server.identity import database_id
 from parenting.server.pages.question import QuestionView, question_view
@@ -149,7 +149,8 @@ async def answer(
         raise ElsewhereError(BY_NUMBER)
     names = Names(database, run_id, question)
     streams: Streams = request.app.state.streams
-    stored = await streams.admission.write(answers.answer, db, question, choice, client_id, "human", names)
+    said = answers.Said(choice, client_id, "human")
+    stored = await store(request, partial(answers.answer_in, db=db, query=question, said=said, names=names))
     notify_worker(request)
     run = await streams.admission.read(runs.get_run, db, stored.run)
     lease = partial(leases.lease, db, run.id, client_id, settings.lease_seconds)

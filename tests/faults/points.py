@@ -95,6 +95,14 @@ WEB = [
     *around("an operator's event", r"INSERT INTO event"),
     *around("a pause", r"UPDATE run SET .*status"),
 ]
+GROUP = [
+    Point("after the savepoint of a request", "after", r"SAVEPOINT request"),
+    Point("before the end of a savepoint", "before", r"RELEASE request"),
+    Point("between the savepoints and the commit of a group", "after", r"RELEASE request"),
+    Point("at the commit of a group's answer", "before", r"INSERT INTO answer", commit=True),
+    Point("between the commit of a group and its replies", "after", r"INSERT INTO answer", commit=True),
+]
+"""Where the web process stores what waits together (`server.group_commit`), on SQLite."""
 WORKER = [
     *around("a question", r'INSERT INTO "?query"?'),
     *around("an answer's tick", r"UPDATE answer SET .*applied_tick"),

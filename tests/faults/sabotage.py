@@ -31,6 +31,13 @@ BROKEN = [
         f"{KILLS}::test_killed_as_an_answer_is_committed[sqlite]",
     ),
     Mutant(
+        "who shares a transaction is told before its commit (A3)",
+        "server/group_commit.py",
+        "_call(write, session, alone=len(group) == 1)\n",
+        "_call(write, session, alone=len(group) == 1)\n                    _tell([write])\n",
+        "tests/server/test_group_commit.py::test_nobody_is_told_before_the_commit",
+    ),
+    Mutant(
         "answers are committed with synchronous NORMAL (A1)",
         "server/db.py",
         'self._writing = engine.execution_options(begin="IMMEDIATE", synchronous="full")',

@@ -16,13 +16,13 @@ from parenting.server.new_run import start
 from parenting.server.settings import Settings
 from tests.faults.figures import Figures
 from tests.faults.house import PATIENCE, House, in_time
-from tests.faults.points import CLOSING, WEB, WORKER, Point
+from tests.faults.points import CLOSING, GROUP, WEB, WORKER, Point
 from tests.faults.rebuilt import entries_of_x, rebuild
 from tests.lengths import length
 from tests.server.raising import ISLAND
 
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 6000))]
-RUNS, PARENTS = 2, 2
+RUNS, PARENTS, CROWD = 2, 2, 8
 KILLS = {"sqlite": length(66, 3000), "postgresql": length(15, 600)}
 SAMPLED = 6
 """Points that a run of CI tries on PostgreSQL; on SQLite it tries all."""
@@ -85,6 +85,22 @@ def test_killed_as_an_answer_is_committed(
         house.until_told(2)
         for _ in range(3):
             kill_at(house, "web", points, rng, figures)
+        house.move_out()
+        hold_to_the_promises(house, runs)
+
+
+@pytest.mark.only("sqlite", "the store on which requests share a transaction")
+def test_killed_within_a_group(
+    settings: Settings, db: Database, rng: random.Random, figures: Figures
+) -> None:
+    """So many parents that their requests share transactions: none is told, or its answer is stored."""
+    runs = begin(db)
+    with House(settings, GROUP) as house:
+        house.keep()
+        house.move_in(runs, CROWD, rng)
+        house.until_told(2)
+        for _ in range(length(1, 20)):
+            kill_at(house, "web", GROUP, rng, figures)
         house.move_out()
         hold_to_the_promises(house, runs)
 

@@ -118,7 +118,7 @@ def test_busy_database_says_when_to_come_again(
     def busy(*_words: object, **_more: object) -> None:
         raise BusyError
 
-    monkeypatch.setattr("parenting.server.api.queries.answer", busy)
+    monkeypatch.setattr("parenting.server.api.queries.answer_in", busy)
     refused = reply(client, guidance)
     assert (refused.status_code, refused.headers["retry-after"]) == (503, "1")
     assert "nothing was stored" in refused.json()["error"]["message"]
