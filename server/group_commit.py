@@ -14,6 +14,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from contextvars import Context, copy_context
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
@@ -42,6 +43,7 @@ class Write:
     deadline: float
     worth: Callable[[Session], bool] | None
     told: asyncio.Future[Any]
+    context: Context = field(default_factory=copy_context)  # of the request, which lines of the log name
     taken: bool = False  # a group has it, so that its end is no more than seconds away
     left: bool = False  # it waited for too long
     outcome: Any = None
@@ -185,7 +187,7 @@ class GroupCommit:
 
 def _is_worth_it(write: Write, session: Session) -> bool:
     try:
-        return write.worth is None or write.worth(session)
+        return write.worth is None or write.context.run(write.worth, session)
     except ServerError:  # the verb says the same, to this one alone
         return True
 
@@ -197,12 +199,12 @@ def _call(write: Write, session: Session, alone: bool) -> None:
         Exception: it was refused, if it is alone, or the store refused it.
     """
     if alone:
-        write.outcome = write.verb(session)
+        write.outcome = write.context.run(write.verb, session)
         return
     connection = session.connection()
     connection.exec_driver_sql("SAVEPOINT request")
     try:
-        write.outcome = write.verb(session)
+        write.outcome = write.context.run(write.verb, session)
     except Exception as error:
         if isinstance(error, StoreError) or refusal(error) is not None:
             raise

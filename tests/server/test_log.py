@@ -7,6 +7,7 @@ import logging
 import stat
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import pytest
@@ -17,9 +18,9 @@ from parenting.server.db import Database
 from parenting.server.errors import SetupError
 from parenting.server.log import set_up_log
 from parenting.server.log_lines import Limit, hidden
-from parenting.server.runs import get_run
+from parenting.server.queue.leases import lease_in
 from parenting.server.settings import Settings
-from parenting.server.tables import Run
+from parenting.server.tables import Query, Run
 
 log = structlog.get_logger()
 
@@ -53,11 +54,11 @@ def lines(file: Path) -> list[dict[str, object]]:
 def test_every_line_of_a_request_names_it_and_its_run_and_question(
     settings: Settings, client: httpx2.Client, run: Run, guidance: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def told(db: Database, run_id: int) -> Run:
+    def told(*asked: Any) -> Query | None:
         log.info("looked")
-        return get_run(db, run_id)
+        return lease_in(*asked)
 
-    monkeypatch.setattr("parenting.server.api.queries.get_run", told)
+    monkeypatch.setattr("parenting.server.api.queries.lease_in", told)
     file = logged(settings)
     reply = client.post(f"/api/v1/runs/{run.id}/queries/lease", json={"client_id": "tab"})
     looked, request = (line for line in lines(file) if line["message"] in ("looked", "request"))
