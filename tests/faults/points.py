@@ -102,7 +102,7 @@ GROUP = [
     Point("at the commit of a group's answer", "before", r"INSERT INTO answer", commit=True),
     Point("between the commit of a group and its replies", "after", r"INSERT INTO answer", commit=True),
 ]
-"""Where the web process stores what waits together (`server.group_commit`), on SQLite."""
+"""Points of the thread that stores what waits together (`server.group_commit`), on SQLite."""
 WORKER = [
     *around("a question", r'INSERT INTO "?query"?'),
     *around("an answer's tick", r"UPDATE answer SET .*applied_tick"),
