@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from parenting._plural import counted
 from parenting.commands.answering import EXITS, Answering, Ending, Order, Told
 from parenting.commands.client import Client, RefusedError, UnavailableError
 from parenting.commands.errors import UsageError, friendly_errors
@@ -151,7 +152,7 @@ def _said(run: int, told: Told, ending: Ending) -> str:
     if told.unneeded:
         lines += f"; {told.unneeded} needed no answer any more"
     if told.episodes:
-        lines += f"; ended {told.episodes} episode{'' if told.episodes == 1 else 's'}"
+        lines += f"; ended {counted(told.episodes, 'episode')}"
     return f"{lines}. {ending.sentence}"
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from parenting._plural import counted
 from parenting.commands.client import Client, RefusedError, UnavailableError
 
 if TYPE_CHECKING:
@@ -173,7 +174,7 @@ class Answering:
         if run["worker"] == "done":
             return Ending("over", f"The run is {run['status']}.")
         if run["resting"]:
-            return Ending("goal", f"The run rests at its goal of {run['goal']} answers.")
+            return Ending("goal", f"The run rests at its goal of {counted(run['goal'], 'answer')}.")
         if run["optimal"] and self.order.until_optimal:
             return Ending("optimal", "Its argmax policy is optimal.")
         return self._stuck(run) if run["waiting"] == "stuck" else None

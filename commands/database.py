@@ -12,6 +12,7 @@ from parenting.commands.errors import settings
 from parenting.server.db import Database, connect
 from parenting.server.errors import SetupError
 from parenting.server.migrate import require_current
+from parenting.server.settings import Settings
 from parenting.server.store import high_water
 
 
@@ -23,8 +24,7 @@ def database() -> Iterator[Database]:
         ServerError: a setting is wrong; there is no database yet, or it is not up to date.
     """
     chosen = settings()
-    if chosen.url.startswith("sqlite"):
-        _require_file(Path(make_url(chosen.url).database or ""))
+    require_file(chosen)
     db = connect(chosen, reading=True)
     try:
         require_current(db)
@@ -33,8 +33,15 @@ def database() -> Iterator[Database]:
         db.close()
 
 
-def _require_file(database: Path) -> None:
-    """Refuse to make a database where there is none; one that is missing is told by `connect`."""
+def require_file(chosen: Settings) -> None:
+    """Refuse to make an SQLite file where there is none: only `up` and `migrate` do.
+
+    Raises:
+        SetupError: there is none, and none was there. One that is missing is told by `connect`.
+    """
+    if not chosen.url.startswith("sqlite"):
+        return
+    database = Path(make_url(chosen.url).database or "")
     if not database.exists() and high_water.read(database) is None:
         raise SetupError(
             f"There is no database at {database}. Set PARENTING_DATA to its folder, "

@@ -11,6 +11,7 @@ from typing import Annotated, TextIO
 
 import typer
 
+from parenting._plural import counted
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors
 from parenting.commands.printing import say
@@ -46,7 +47,7 @@ def export(
             return
         with _whole(out, force) as file:
             written = _copy(found, file, total)
-    say(f"{written} answer{'' if written == 1 else 's'} of run {run} written to {out}.")
+    say(f"{counted(written, 'answer')} of run {run} written to {out}.")
 
 
 def _copy(found: Iterator[str], file: TextIO, total: int | None) -> int:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from parenting._plural import counted
 from parenting.commands.database import database
 from parenting.commands.errors import exit_on_interrupt, friendly_errors
 from parenting.commands.printing import say
@@ -62,7 +63,7 @@ def replay(
 
 def said(found: Relived) -> str:
     """Return the result of a replay in a sentence or two."""
-    counts = (_number(found.tick, "tick"), _number(found.answers, "answer"), _number(found.events, "event"))
+    counts = (counted(found.tick, "tick"), counted(found.answers, "answer"), counted(found.events, "event"))
     lived = f"Run {found.run}: {', '.join(counts)} replayed."
     if found.parted:
         return f"{lived} Not equal. {found.parted}"
@@ -72,10 +73,6 @@ def said(found: Relived) -> str:
     if found.until is not None and found.tick < found.checkpoint:
         return f"{lived} Equal questions. From tick {found.until + 1} on another machine raised it."
     return f"{lived} Equal bit for bit."
-
-
-def _number(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _piece(name: str) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from parenting._plural import counted
+
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 WORDS = {
     "optimal": "optimal",
@@ -21,7 +23,7 @@ def page(results: dict[str, Any]) -> str:
     """Format what `experiments.training.summary.summarise` returns, a line each."""
     number = len(results["trials"])
     lines = [
-        f"{results['world']}, {results['level']}: {number} trial{'' if number == 1 else 's'}"
+        f"{results['world']}, {results['level']}: {counted(number, 'trial')}"
         f" until {results['until']}, {results['seconds']} s"
     ]
     if "waterings" not in results["evaluation"]:
@@ -46,14 +48,18 @@ def _spread(mean: float | None, sd: float | None) -> str:
 def _unfinished(results: dict[str, Any]) -> str:
     stuck, rest = results["stuck"], results["unfinished"] - results["stuck"]
     said = [f"{stuck} with no acceptable action"] if stuck else []
-    said += [f"{rest} after {results['max_ticks']} ticks"] if rest else []
+    said += [f"{rest} after {counted(results['max_ticks'], 'tick')}"] if rest else []
     return f"{', '.join(said)}; not in the means"
 
 
 def _stage(name: str, found: dict[str, Any]) -> list[str]:
     if found["queries"] is None:
         return [_line(name, "no trial came to it")]
-    return _endings(name, found, f"; {found['queries']:.0f} queries")
+    return _endings(name, found, f"; {_queries(found['queries'])}")
+
+
+def _queries(mean: float) -> str:
+    return "1 query" if f"{mean:.0f}" == "1" else f"{mean:.0f} queries"
 
 
 def _endings(name: str, found: dict[str, Any], behind: str = "") -> list[str]:
@@ -67,9 +73,10 @@ def _endings(name: str, found: dict[str, Any], behind: str = "") -> list[str]:
 
 
 def _watered(found: dict[str, Any]) -> str:
+    end = "ends" if found["bucket"] == 1 else "end"
     return (
-        f"{_spread(found['waterings'], found['sd'])} waterings in {found['steps']} steps"
-        f" (the parent: {found['parent']:.2f}), {found['bucket']} steps end in the bucket"
+        f"{_spread(found['waterings'], found['sd'])} waterings in {counted(found['steps'], 'step')}"
+        f" (the parent: {found['parent']:.2f}), {counted(found['bucket'], 'step')} {end} in the bucket"
     )
 
 

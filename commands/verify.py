@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from parenting._plural import counted
 from parenting.commands import replay
 from parenting.commands.database import database
 from parenting.commands.errors import exit_on_interrupt, friendly_errors
@@ -55,7 +56,7 @@ def verify(
 
 def _said(found: Verified) -> list[str]:
     chain = found.chain
-    lines = [f"Run {found.run}: {_number(chain.answers, 'answer')}; the chain of hashes {_state(chain)}."]
+    lines = [f"Run {found.run}: {counted(chain.answers, 'answer')}; the chain of hashes {_state(chain)}."]
     lines += [f"  {problem}" for problem in chain.problems[:SHOWN]]
     if chain.erased:
         lines.append(f"  {chain.erased} erased: their content is gone, their place in the chain holds.")
@@ -70,12 +71,8 @@ def _said(found: Verified) -> list[str]:
     return [*lines, found.x or f"X is what the answers make it, up to tick {found.checkpoint}."]
 
 
-def _number(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
-
-
 def _state(chain: Checked) -> str:
-    return f"has {_number(len(chain.problems), 'fault')}" if chain.problems else "holds"
+    return f"has {counted(len(chain.problems), 'fault')}" if chain.problems else "holds"
 
 
 def _as_json(found: Verified) -> str:

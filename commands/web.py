@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from parenting.commands.database import require_file
 from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.printing import say
 from parenting.server.lifeline import follow
@@ -33,6 +34,7 @@ def web(
     make_files_private()
     with friendly_errors():
         chosen = settings(port=port, host=host)
+        require_file(chosen)
         server = make_server(chosen)
         listener = (
             bind(chosen.host, chosen.port, chosen.container) if fd is None else socket.socket(fileno=fd)

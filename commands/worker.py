@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from parenting.commands.database import require_file
 from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.printing import say
 from parenting.server.db import connect
@@ -38,6 +39,7 @@ def worker(
     make_files_private()
     with friendly_errors():
         chosen = settings()
+        require_file(chosen)
         set_up_log(chosen, "worker")
         from parenting.server.worker import (
             main,  # loads torch, which takes a second, so the settings are checked before
@@ -62,6 +64,7 @@ def _check() -> int:
 
 
 def _alive(chosen: Settings) -> list[str]:
+    require_file(chosen)
     db = connect(chosen)
     try:
         require_current(db)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from parenting._plural import counted
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.notebook import LiveLine, open_page
 from parenting.library.page_run import all_heard, begin, read_back
@@ -112,7 +113,7 @@ def _watch(
         while True:
             now = run_schema(db, run)
             done = _is_done(now, rule) and all_heard(db, run)
-            line.show(f"Run {run}: {now.state.value}, tick {now.tick}, {now.answers} answers")
+            line.show(f"Run {run}: {now.state.value}, tick {now.tick}, {counted(now.answers, 'answer')}")
             if callback and callback(Progress(int(done), 1, now.tick, now.answers)) is False:
                 return True
             if done or now.status in OVER:
@@ -147,7 +148,8 @@ def _settle(db: Database, run: int) -> None:
 
 def _how_to_go_on(result: TrainResult, data: Path, run: int, person: Person) -> str:
     where = f'url="{person.url}", ' if person.url else f'data="{data}", '
+    are = "is" if len(result.answers) == 1 else "are"
     return (
-        f"Stopped. {len(result.answers)} answers are kept in {data}, as run {run}.\n"
+        f"Stopped. {counted(len(result.answers), 'answer')} {are} kept in {data}, as run {run}.\n"
         f"To go on, train with the same arguments and parent=pt.Person({where}run={run})."
     )

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Literal
 
+from parenting._plural import counted
 from parenting.agent.config import Config
 from parenting.agent.query import Answer
 from parenting.agent.state import AgentState
@@ -136,7 +137,8 @@ class TerminalParent(Parent):
     def how_to_go_on(self) -> str:
         """Return what a person who stopped wants to know."""
         return (
-            f"Stopped after {self.answers} answers. The result holds them; result.save(folder) keeps them."
+            f"Stopped after {counted(self.answers, 'answer')}. "
+            "The result holds them; result.save(folder) keeps them."
             ' Go on with the same arguments and parent=pt.Person("terminal", after=result).'
         )
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from parenting._plural import counted
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.notebook import LiveLine, in_notebook
 
@@ -64,7 +65,7 @@ def bar(wanted: bool | None, trials: int, until: StopRule) -> Iterator[Callable[
 def _in_notebook(line: LiveLine) -> Callable[[Progress], None]:
     def show(now: Progress) -> None:
         if now.tick % TICKS == 1 or now.done == now.trials:
-            done = f"{now.done} of {now.trials} trials done"
-            line.show(f"{done}, tick {now.tick}, {now.queries} answers")
+            done = f"{now.done} of {counted(now.trials, 'trial')} done"
+            line.show(f"{done}, tick {now.tick}, {counted(now.queries, 'answer')}")
 
     return show

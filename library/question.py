@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import torch
 
+from parenting._plural import counted
 from parenting.agent import query as queries
 from parenting.agent.query import Choice, QueryKind
 from parenting.drawing.query import draw_query
@@ -76,7 +77,7 @@ class Query(queries.Query):
         return self.drawing()._repr_html_()
 
     def __repr__(self) -> str:
-        trials = f"{len(self)} trial{'' if len(self) == 1 else 's'}"
+        trials = counted(len(self), "trial")
         counts = [f"{int((self.kind == kind).sum())} {kind.name.lower()}" for kind in list(QueryKind)[1:]]
         return f"<Query of {trials}: {', '.join(counts)}>"
 

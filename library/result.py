@@ -8,6 +8,7 @@ from pathlib import Path
 
 import torch
 
+from parenting._plural import counted
 from parenting.agent.config import Config
 from parenting.evaluation.outcomes import name
 from parenting.experiments.training import batch
@@ -97,10 +98,10 @@ class TrainResult:
             counts.append(f"{stuck} stuck")
         if finished < len(self.trials) and not self.answers:
             counts.append("0 queries answered")
-        counts.append(_plural(deaths, "unsafe step"))
+        counts.append(counted(deaths, "unsafe step"))
         return (
             f"<TrainResult {self.world.name}, level {self.world.levels[0].name}: "
-            f"{_plural(len(self.trials), 'trial')}, {', '.join(counts)}>"
+            f"{counted(len(self.trials), 'trial')}, {', '.join(counts)}>"
         )
 
 
@@ -170,7 +171,3 @@ def _outcome(world: World, outcomes: Outcomes, row: int, stage: int) -> Record:
 
 def _mean(values: Sequence[float]) -> float | None:
     return sum(values) / len(values) if values else None
-
-
-def _plural(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"

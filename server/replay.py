@@ -12,6 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from parenting._plural import counted
 from parenting.agent import parenting
 from parenting.agent.config import Config
 from parenting.agent.init import world_of
@@ -144,7 +145,7 @@ def _cpu(machine: dict[str, Any]) -> str:
 
 
 def _threads(number: int) -> str:
-    return f"{number} thread{'' if number == 1 else 's'}"
+    return counted(number, "thread")
 
 
 def _said(parted: ReplayMismatchError) -> str:

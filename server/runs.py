@@ -11,7 +11,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, bindparam, or_, select, tuple_, update
+from sqlalchemy import ColumnElement, and_, bindparam, or_, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from parenting.server.damage import readable, sound
@@ -133,6 +133,12 @@ def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
         return run
 
 
+def free(seconds: Any) -> ColumnElement[bool]:
+    """Return the condition that a run may be claimed, at the mark that is bound."""
+    silent = is_over(Run.claim_epoch, Run.claim_mark, Run.claim_mark + seconds)
+    return and_(Run.status.in_(LIVING), or_(Run.worker.is_(None), silent))
+
+
 def claim(
     db: Database,
     worker: str,
@@ -142,6 +148,8 @@ def claim(
 ) -> Sequence[Claim]:
     """Claim runs that are not over and are free, or whose worker was silent for `seconds`.
 
+    This takes the write lock: `work.sharing` looks before whether there is one.
+
     Args:
         db: The database.
         worker: The name of the worker that claims them.
@@ -149,16 +157,17 @@ def claim(
         most: How many runs to claim at most; None claims all.
         but: Runs to leave alone.
     """
-    silent = is_over(Run.claim_epoch, Run.claim_mark, Run.claim_mark + seconds)
-    free = (Run.status.in_(LIVING), or_(Run.worker.is_(None), silent), Run.id.not_in(but))
-    with db.read() as session:  # nothing to claim is the common case, and takes no lock
-        if session.scalars(select(Run.id).where(*free).limit(1), db.mark(session).bound()).first() is None:
-            return []
     with db.write() as session:
         # A run that somebody has locked is in use: its turn comes with the next look.
-        rows = select(Run).where(*free).order_by(Run.id).limit(most).with_for_update(skip_locked=True)
+        rows = (
+            select(Run)
+            .where(free(seconds), Run.id.not_in(but))
+            .order_by(Run.id)
+            .limit(most)
+            .with_for_update(skip_locked=True)
+        )
         mark = db.mark(session)
-        found = session.scalars(rows, mark.bound())
+        found = session.scalars(rows.with_for_update(skip_locked=True), mark.bound())
         runs = [run for run in found if not fail_if_damaged(session, db, run)]
         for run in runs:
             run.worker, run.fencing_token = worker, run.fencing_token + 1

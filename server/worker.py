@@ -32,7 +32,7 @@ from parenting.server.settings import Settings
 from parenting.server.store.relay import Relay
 from parenting.server.work.held import AT_NEWS, NOW, HeldRuns
 from parenting.server.work.patience import Patience
-from parenting.server.work.sharing import share, surplus
+from parenting.server.work.sharing import prospect, surplus
 from parenting.server.work.turns import BESIDE_SECONDS, HUNG_SECONDS, Turns
 from parenting.server.workers import SIGN_SECONDS
 
@@ -137,11 +137,12 @@ class Worker:
         late = time.monotonic() - self._claimed_at
         if late < (CLAIM_EVERY if self._committed else self.settings.claim_seconds / 2):
             return
-        most = share(self.db, self.name, self.settings.claim_seconds)
+        seconds = self.settings.claim_seconds
+        most, free = prospect(self.db, self.name, seconds)
         self._give_up(most)
-        if (free := most - len(self.claims)) > 0:
+        if free and (more := most - len(self.claims)) > 0:
             hung = self.turns.working(HUNG_SECONDS)
-            fresh = runs.claim(self.db, self.name, self.settings.claim_seconds, free, hung)
+            fresh = runs.claim(self.db, self.name, seconds, more, hung)
             self.claims.update({claim.run_id: claim for claim in fresh})
         self._claimed_at, self._committed = time.monotonic(), False
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from parenting._plural import counted
 from parenting.server.errors import SetupError
 from parenting.server.store.driver import open_file, sqlite_module
 from parenting.server.store.sqlite import BUSY_SECONDS
@@ -33,11 +34,11 @@ class Contents:
 
     def __str__(self) -> str:
         """Return what a person wants to know of a backup."""
-        counts = ", ".join(f"{self.rows.get(name, 0)} {word}" for name, word in _WORDS.items())
+        counts = ", ".join(counted(self.rows.get(name, 0), name) for name in _SHOWN)
         return f"{counts}; revision {self.revision}"
 
 
-_WORDS = {"run": "runs", "answer": "answers", "checkpoint": "checkpoints"}
+_SHOWN = ("run", "answer", "checkpoint")
 
 
 def copy(source: Path, target: Path) -> Contents:

@@ -14,6 +14,7 @@ from typing import Any
 from sqlalchemy import URL, create_engine, text
 from sqlalchemy.exc import DBAPIError
 
+from parenting._plural import counted
 from parenting.server.errors import SetupError
 from parenting.server.notify import Notifier
 from parenting.server.store.sqlite import sqlite_module
@@ -81,7 +82,9 @@ def require_unconnected(url: URL) -> None:
     finally:
         engine.dispose()
     if others:
-        raise SetupError(f"The database is in use: {others} connections to {url.render_as_string()}. {STOP}")
+        raise SetupError(
+            f"The database is in use: {counted(others, 'connection')} to {url.render_as_string()}. {STOP}"
+        )
 
 
 _OTHERS = text(

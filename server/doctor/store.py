@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 from sqlalchemy import func, select, text
 from sqlalchemy.orm import Session
 
+from parenting._plural import counted
 from parenting.server.db import Database
 from parenting.server.doctor.findings import Finding, error, ok, warning
 from parenting.server.errors import SetupError
@@ -63,7 +64,7 @@ def workers(db: Database) -> Iterator[Finding]:
     with db.read() as session:
         living = session.execute(select(func.count()).where(Run.status.in_(LIVING))).scalar_one()
     names = alive(db)
-    runs = f"{living} run{'' if living == 1 else 's'} to train"
+    runs = f"{counted(living, 'run')} to train"
     if names:
         yield ok("worker", f"alive: {', '.join(names)}; {runs}")
     elif living:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from parenting._plural import counted as number_of
 from parenting.server.errors import SetupError
 from parenting.server.store.driver import open_file, sqlite_module
 from parenting.server.store.held import Held, hold, log_of
@@ -172,5 +173,5 @@ def accept(database: Path) -> None:
 
 def _listed(numbers: dict[str, Any]) -> str:
     said = [(numbers[name], noun) for name, noun in NOUNS.items() if numbers.get(name)]
-    named = [f"{number} {noun}{'' if number == 1 else 's'}" for number, noun in said]
+    named = [number_of(number, noun) for number, noun in said]
     return " and ".join(filter(None, [", ".join(named[:-1]), *named[-1:]])) or "nothing yet"

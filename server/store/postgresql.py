@@ -95,12 +95,23 @@ def data_version(connection: PoolProxiedConnection) -> str:
 
     A commit ends a transaction that was in progress or had not begun in every earlier snapshot, so it changes
     them all. The position in the log would not do: it moves before a commit can be seen.
+
+    A worker polls twenty times a second, so libpq is called as directly as psycopg allows: a third of the
+    processor time of a cursor.
+
+    Raises:
+        psycopg.Error: the server said no, or is gone.
     """
-    cursor = connection.cursor()
-    cursor.execute("SELECT pg_current_snapshot()::text")
-    snapshot: str = cursor.fetchall()[0][0]
-    cursor.close()
-    return snapshot
+    import psycopg  # an extra of its own: whoever has no PostgreSQL need not have it
+
+    driver: Any = connection.dbapi_connection
+    result = driver.pgconn.exec_(b"SELECT pg_current_snapshot()")
+    if result.status != psycopg.pq.ExecStatus.TUPLES_OK:
+        if result.error_field(psycopg.pq.DiagnosticField.SQLSTATE) is None:  # no word from the server
+            raise psycopg.OperationalError(result.error_message.decode(errors="replace"))
+        raise psycopg.errors.error_from_result(result)
+    snapshot: bytes = result.get_value(0, 0)
+    return snapshot.decode("ascii")
 
 
 def _begin(connection: Connection) -> None:

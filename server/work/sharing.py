@@ -3,25 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
-from sqlalchemy import func, select
+from sqlalchemy import bindparam, exists, func, select
 
 from parenting.server.db import Database
+from parenting.server.runs import free
 from parenting.server.statuses import LIVING
-from parenting.server.tables import Run
-from parenting.server.workers import alive
+from parenting.server.store.clock import holds
+from parenting.server.tables import Run, Worker
 
 
-def share(db: Database, worker: str, seconds: float) -> int:
-    """Return how many runs a worker may raise: the living ones by the living workers, rounded up.
+class Prospect(NamedTuple):
+    """The runs that a worker may raise."""
+
+    share: int
+    """The living runs by the living workers, rounded up."""
+    free: bool
+    """Whether there is a run that nobody raises."""
+
+
+def prospect(db: Database, worker: str, seconds: float) -> Prospect:
+    """Look at the runs and the other workers, in one statement: a waiting worker does it every two seconds.
 
     A worker counts as living for `seconds` after its last sign, as long as a claim holds; so what a dead one
-    raised is shared out when its claims lapse.
+    raised is shared out when its claims lapse. This takes no lock.
     """
     with db.read() as session:
-        number: int = session.execute(_LIVING).scalar_one()
-    workers = len({worker, *alive(db, seconds)})
-    return -(-number // workers)
+        asked = {"worker": worker, "seconds": seconds, **db.mark(session).bound()}
+        living, others, any_free = session.execute(_LOOK, asked).one()
+    return Prospect(-(-living // (others + 1)), bool(any_free))
 
 
 def surplus(run_ids: Sequence[int], most: int) -> Sequence[int]:
@@ -34,3 +45,10 @@ def surplus(run_ids: Sequence[int], most: int) -> Sequence[int]:
 
 
 _LIVING = select(func.count()).where(Run.status.in_(LIVING))
+_OTHERS = select(func.count()).where(
+    Worker.name != bindparam("worker"),
+    holds(Worker.epoch, Worker.mark, Worker.mark + bindparam("seconds")),
+)
+_LOOK = select(
+    _LIVING.scalar_subquery(), _OTHERS.scalar_subquery(), exists().where(free(bindparam("seconds")))
+)

@@ -11,7 +11,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.runs import get_run, set_status
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
-from parenting.server.work.sharing import share, surplus
+from parenting.server.work.sharing import prospect, surplus
 from parenting.server.worker import Worker
 from parenting.server.workers import sign
 from tests.server.conftest import Clock
@@ -42,19 +42,19 @@ def begin(db: Database, number: int) -> list[int]:
 
 def test_the_share_is_rounded_up(db: Database) -> None:
     ids = begin(db, 5)
-    assert share(db, "a", 5) == 5
+    assert prospect(db, "a", 5).share == 5
     sign(db, "b")
-    assert share(db, "a", 5) == 3
+    assert prospect(db, "a", 5).share == 3
     set_status(db, ids[0], RunStatus.STOPPED)
-    assert share(db, "a", 5) == 2
+    assert prospect(db, "a", 5).share == 2
 
 
 def test_a_dead_worker_has_no_share_once_its_claims_lapse(db: Database, clock: Clock) -> None:
     begin(db, 4)
     sign(db, "dead")
-    assert share(db, "a", 5) == 2
+    assert prospect(db, "a", 5).share == 2
     clock.pass_seconds(5.1)
-    assert share(db, "a", 5) == 4
+    assert prospect(db, "a", 5).share == 4
 
 
 @pytest.mark.parametrize(("held", "most", "given"), [(6, 3, 3), (5, 3, 2), (3, 3, 0), (2, 3, 0), (0, 0, 0)])
