@@ -26,6 +26,7 @@ from functools import partial
 from pathlib import Path
 from statistics import quantiles
 from typing import Any
+from unittest.mock import patch
 
 from parenting.server import notify
 from parenting.server.db import Database
@@ -49,8 +50,8 @@ TICK = os.sysconf("SC_CLK_TCK")
 
 def lose_hints() -> None:
     """Neither send nor hear any hint in this process."""
-    notify._send = lambda _path: None
-    Relay.start = lambda _relay: None  # type: ignore[method-assign]  # a process of the benchmark's own
+    patch.object(notify, "_send").start()
+    patch.object(Relay, "start").start()
 
 
 def note_ticks(file: str, hints: bool) -> None:
@@ -65,7 +66,7 @@ def note_ticks(file: str, hints: bool) -> None:
             os.write(out, f"{taken.query.id} {time.monotonic()}\n".encode())
         return taken
 
-    setattr(worker_side, "take_answer", noted)  # noqa: B010  (mypy would not have it otherwise)
+    patch.object(worker_side, "take_answer", noted).start()
 
 
 @contextmanager

@@ -98,6 +98,15 @@ class Database:
             raise
         self._refused = None
 
+    def outlive_crash(self, session: Session) -> None:
+        """Have a write that is not durable survive a crash of the store that its process lives through.
+
+        SQLite ends only with its processes. PostgreSQL may crash alone: a worker that goes on would have
+        heard an answer that counts as unheard again, and two parents would hold one question.
+        """
+        if not self._sqlite:
+            postgresql.wait_for_log(session)
+
     def refusal(self) -> StoreError | None:
         """Return what the store would say to a write now, or said to the last one; None if it is willing.
 

@@ -113,6 +113,7 @@ def _hold_in(
         session.execute(_HELD, {"query_id": query.id, **held})
         for name, value in held.items():
             set_committed_value(query, name, value)
+        db.outlive_crash(session)
     return query
 
 

@@ -187,6 +187,7 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
         found = _pending(session, mine.run_id)
         if found is not None:
             found.answer.applied_tick, found.query.status = tick, QueryStatus.APPLIED
+            db.outlive_crash(session)
         return found
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, PoolProxiedConnection, create_engine, event
+from sqlalchemy.orm import Session
 
 from parenting.server.errors import SetupError
 from parenting.server.store.sqlite import BUSY_SECONDS
@@ -112,6 +113,11 @@ def data_version(connection: PoolProxiedConnection) -> str:
         raise psycopg.errors.error_from_result(result)
     snapshot: bytes = result.get_value(0, 0)
     return snapshot.decode("ascii")
+
+
+def wait_for_log(session: Session) -> None:
+    """Have this transaction's commit wait until the log is on the disk."""
+    session.connection().exec_driver_sql("SET LOCAL synchronous_commit = on")
 
 
 def _begin(connection: Connection) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx2
+from sqlalchemy import make_url
 
 from parenting.server.settings import Settings
 from tests.faults.auditor import Store, audit
@@ -63,8 +64,8 @@ class House:
     @property
     def store(self) -> Store:
         """The database, for the auditor."""
-        url = self.settings.database_url
-        return Store(self.settings.data / "parenting.db" if url is None else url)
+        url = self.settings.url
+        return Store(Path(make_url(url).database or "") if url.startswith("sqlite") else url)
 
     def begin(self, name: str, point: Point | None = None) -> Command:
         """Start a process, which kills itself at the point, if there is one."""

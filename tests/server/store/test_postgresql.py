@@ -71,7 +71,7 @@ def test_a_read_is_of_one_moment(db: Database, run: Run) -> None:
         (lambda db, mine, query: answer(db, query, "left", "a", "human"), "on"),
         (lambda db, mine, query: post_query(db, mine, 9, "guidance", 1, {}), "on"),
         (lambda db, mine, query: add_operator_event(db, mine.run_id, "end_episode", {}), "on"),
-        (lambda db, mine, query: lease(db, mine.run_id, "a"), "off"),
+        (lambda db, mine, query: lease(db, mine.run_id, "a"), "on"),
         (lambda db, mine, query: take_answer(db, mine, 9), "off"),
         (lambda db, mine, query: report_progress(db, mine, tick=9), "off"),
     ],
@@ -87,6 +87,21 @@ def test_what_somebody_was_told_is_on_the_disk_at_once(
     event.listen(db.engine, "commit", look)
     verb(db, mine, guidance)
     assert found == [committing]
+
+
+def test_an_answer_that_was_heard_is_heard_after_a_crash_of_the_server(
+    db: Database, mine: Claim, guidance: int
+) -> None:
+    """The worker lives through it: it would hear the answer a second time."""
+    answer(db, guidance, "left", "a", "human")
+    found: list[object] = []
+    event.listen(
+        db.engine,
+        "commit",
+        lambda connection: found.append(connection.exec_driver_sql("SHOW synchronous_commit").scalar()),
+    )
+    assert take_answer(db, mine, 9) is not None
+    assert found == ["on"]
 
 
 def test_a_row_that_stays_locked_is_busy(
