@@ -96,4 +96,4 @@ def test_a_server_that_is_away(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, 
 def test_a_file_that_is_missing_is_not_made(settings: Settings, command: str) -> None:
     said = said_by(command)
     assert str(settings.data / "parenting.db") in said
-    assert list(settings.data.iterdir()) == []
+    assert list(settings.data.glob("*")) == []
