@@ -122,7 +122,7 @@ def heaviest_transactions(db: Database) -> Iterator[list[tuple[int, int]]]:
 def test_others_write_between_any_two_parts(
     db: Database, mine: Claim, part_bytes: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever looks for the lock in a rest finds it free, within this process and from another connection."""
+    """In a rest the lock is free, within this process and for another connection."""
     rests: list[float] = []
 
     def write_meanwhile(seconds: float) -> None:
