@@ -16,6 +16,10 @@ STATE_TEXTS = {
         "Somebody else has the question.",
         "Unless they answer it, it will appear here within a minute.",
     ),
+    "unsent": (
+        "Your answer is kept here.",
+        "The server did not take it just now. It is sent again until it is stored.",
+    ),
     "stuck": (
         "No action was acceptable.",
         "You refused all four moves, so the agent stands still. End this episode, and it starts again.",

@@ -99,6 +99,7 @@ def test_an_answer_survives_a_closed_tab(tabs: BrowserTabs, db: Database, ask: C
     page.context.route("**/answer", busy)
     page.keyboard.press("ArrowDown")
     expect(page.locator("#saved")).to_have_text("Kept here, not sent yet")
+    expect(page.locator("#waiting-unsent")).to_be_visible()  # nobody else has the question
     page.close()
     page.context.unroute("**/answer")
     again = page.context.new_page()

@@ -86,11 +86,11 @@ def test_a_static_file_is_short(path: Path) -> None:
 
 def test_script_and_server_know_the_same_states() -> None:
     """The state of a run comes from the server. A page adds what only it can know, and has words for each."""
-    own = {"elsewhere", "away", "offline", "damaged"}
+    own = {"elsewhere", "unsent", "away", "offline", "damaged"}
     assert {*RunState} | own == set(STATE_TEXTS)
     parts = ("parent", "questions", "answers", "waiting")
     script = "".join((WEB / f"static/{part}.js").read_text() for part in parts)
-    named = set(re.findall(r'wait\("(\w+)"\)|state = "(\w+)"|\? "(\w+)" : ', script))
+    named = set(re.findall(r'wait\("(\w+)"\)|state = "(\w+)"|\? "(\w+)" : (?:"(\w+)")?', script))
     named = {name for names in named for name in names if name}
     assert own <= named <= set(STATE_TEXTS)
     assert not re.findall(r'"(over|resting|paused|no_worker|stuck)"', (WEB / "static/live.js").read_text())

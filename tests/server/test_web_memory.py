@@ -9,7 +9,8 @@ import httpx2
 
 from parenting.server.tables import Run
 
-WARM, ROUNDS = 2, 4
+WARM, ROUNDS = 6, 4
+"""Libraries fill caches in their first calls; a leak goes on after that."""
 PATHS = (
     "/",
     "/runs/{name}",

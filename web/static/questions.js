@@ -34,7 +34,8 @@ export async function next(seconds = 0) {
       seconds = 0;
     } while (!form && page.again && !page.current);
     if (form && !page.current) show(form);
-    else if (!page.current) wait(page.state === "question" ? "elsewhere" : page.state);
+    else if (!page.current && page.state === "question") wait(kept().length ? "unsent" : "elsewhere");
+    else if (!page.current) wait(page.state);
   } catch ({ status }) {
     if (status === 500) wait("damaged");
     else wait(status === 404 ? "away" : "offline");
