@@ -1,0 +1,99 @@
+"""Troubles of a store that last for a while, each as a block: a disk that is full, a lock that is held."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import tempfile
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+
+import psycopg
+import pytest
+from pysqlite3 import dbapi2 as sqlite
+
+DISK_BYTES = 32 * 2**20
+WRITABLE_BYTES = 32 * 2**10
+"""Less than the log of a database has at any time."""
+REFILL_SECONDS = 0.05
+
+
+def _run(*command: str) -> str | None:
+    """Run a command of the machine; None if it went well, else why not."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True)
+    except FileNotFoundError:
+        return f"{command[0]} is not installed"
+    return (done.stderr.strip() or f"{command[0]} ended with {done.returncode}") if done.returncode else None
+
+
+def _need(*command: str) -> None:
+    """Run a command that only root may run, on machines that can do it; else skip the test."""
+    if os.geteuid() != 0:
+        pytest.skip("only root may mount file systems")
+    if (why := _run(*command)) is not None:
+        pytest.skip(f"this machine cannot do it: {' '.join(command[:3])}: {why}")
+
+
+@contextmanager
+def small_disk() -> Iterator[Path]:
+    """A file system of 32 MB, in memory."""
+    with tempfile.TemporaryDirectory() as folder:
+        _need("mount", "-t", "tmpfs", "-o", f"size={DISK_BYTES}", "tmpfs", folder)
+        try:
+            yield Path(folder)
+        finally:
+            subprocess.run(["umount", "--lazy", folder], check=True)
+
+
+@contextmanager
+def filled(folder: Path) -> Iterator[None]:
+    """Fill the file system, and fill again whatever is freed, as a program that runs wild does."""
+    told, filler = threading.Event(), folder / "filler"
+
+    def fill() -> None:
+        with filler.open("ab", buffering=0) as file:
+            while not told.wait(REFILL_SECONDS):
+                for size in (2**20, 2**12):
+                    with suppress(OSError):
+                        while not told.is_set() and file.write(b"\0" * size) == size:
+                            pass
+
+    thread = threading.Thread(target=fill, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        told.set()
+        thread.join()
+        filler.unlink()
+
+
+@contextmanager
+def files_bounded(pids: Sequence[int]) -> Iterator[None]:
+    """Let processes write no byte of a file beyond 32 kB (`ulimit -f`): they get EFBIG."""
+    before = {pid: resource.prlimit(pid, resource.RLIMIT_FSIZE) for pid in pids}
+    for pid, (_, hard) in before.items():
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (WRITABLE_BYTES, hard))
+    try:
+        yield
+    finally:
+        for pid, limits in before.items():
+            resource.prlimit(pid, resource.RLIMIT_FSIZE, limits)
+
+
+@contextmanager
+def lock_of_another(where: Path | str) -> Iterator[None]:
+    """Hold the database's write lock, as another program would; on PostgreSQL all tables, for readers too."""
+    if isinstance(where, Path):
+        with closing(sqlite.connect(where, isolation_level=None, timeout=60)) as held:
+            held.execute("BEGIN IMMEDIATE")
+            yield
+            held.execute("ROLLBACK")
+        return
+    with psycopg.connect(where) as connection, connection.transaction(force_rollback=True):
+        connection.execute("LOCK TABLE run, query, answer IN ACCESS EXCLUSIVE MODE")
+        yield
