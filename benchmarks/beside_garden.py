@@ -59,15 +59,15 @@ def begin_garden(web: httpx2.Client, store: Any) -> int:
     return number
 
 
-def measure(answers: int) -> dict[str, list[float]]:
-    """Milliseconds from each answer to the next question, by what went on beside."""
+def measure(answers: int) -> None:
+    """Print the milliseconds from an answer to the next question, by what went on beside."""
     found: dict[str, list[float]] = {"alone": [], "beside a garden": [], "in checkpoints": []}
     with tempfile.TemporaryDirectory() as name, up(Path(name)) as url, httpx2.Client(base_url=url) as web:
         file = Path(name) / "parenting.db"
         with closing(sqlite_module().connect(file, isolation_level=None, timeout=10)) as store:
             run, draws = begin(web, "unsafe-exploration", "conservative", p_pref=0.0), random.Random(SEED)
             great = begin_garden(web, store)
-            for verb in ("pause", "resume") * (answers // ROUND):
+            for verb in ("resume", "pause") * (answers // ROUND):
                 web.post(f"/api/v1/runs/{great}/{verb}").raise_for_status()
                 time.sleep(SETTLES)
                 for _ in range(ROUND):
@@ -76,7 +76,7 @@ def measure(answers: int) -> dict[str, list[float]]:
                     found["alone" if verb == "pause" else "beside a garden"].append(took)
                     if store.execute(LAST_PART).fetchone() != before:
                         found["in checkpoints"].append(took)
-    return found
+        show(found)
 
 
 def row(kind: str, times: list[float]) -> str:
@@ -88,15 +88,19 @@ def row(kind: str, times: list[float]) -> str:
     return f"{kind:16}{len(ranked):>6}{median(ranked):9.1f}{p99:9.1f}{ranked[-1]:9.1f}"
 
 
-def main() -> None:
+def show(found: dict[str, list[float]]) -> None:
     """Print a row for each kind, and the ratio."""
-    parser = argparse.ArgumentParser(description="From an answer to the next question, beside a garden.")
-    parser.add_argument("--quick", action="store_true", help="few answers")
-    found = measure(QUICK_ANSWERS if parser.parse_args().quick else ANSWERS)
     print(HEAD)
     for kind, times in found.items():
         print(row(kind, times))
-    print(f"ratio of the medians {median(found['beside a garden']) / median(found['alone']):.2f}")
+    print(f"ratio of the medians {median(found['beside a garden']) / median(found['alone']):.2f}", flush=True)
+
+
+def main() -> None:
+    """Measure as often as the command line says."""
+    parser = argparse.ArgumentParser(description="From an answer to the next question, beside a garden.")
+    parser.add_argument("--quick", action="store_true", help="few answers")
+    measure(QUICK_ANSWERS if parser.parse_args().quick else ANSWERS)
 
 
 if __name__ == "__main__":
