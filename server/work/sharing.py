@@ -20,7 +20,7 @@ class Prospect(NamedTuple):
     share: int
     """The living runs by the living workers, rounded up."""
     free: bool
-    """Whether there is a run that nobody raises."""
+    """True if there is a run that nobody raises."""
 
 
 def prospect(db: Database, worker: str, seconds: float) -> Prospect:
