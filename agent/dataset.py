@@ -82,6 +82,11 @@ def clear(x: Dataset, mask: Bool[Tensor, "N"]) -> Dataset:
     return widened.where(mask, x).replace(size=x.size)
 
 
+def blank(x: Dataset) -> Dataset:
+    """X without any entry, in every trial, with as much room as before."""
+    return clear(x, torch.ones_like(x.states, dtype=torch.bool)).replace(size=torch.zeros_like(x.size))
+
+
 def _room(x: Dataset) -> Dataset:
     """Twice the room where one more state or row would not fit. What a trial holds does not depend on it."""
     states, rows = x.s0.shape[1], x.state_index.shape[1]

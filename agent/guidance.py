@@ -46,7 +46,7 @@ def hear(config: Config, state: AgentState, answer: Answer) -> tuple[AgentState,
     guided = (query.kind == QueryKind.GUIDANCE) & (choice != Choice.NONE)
     reviewed = (query.kind == QueryKind.PREFERENCE) & (choice != Choice.NONE)
     state = state.replace(
-        x=_store(config, state, answer),
+        x=store(config, state, answer),
         answered=state.answered + (guided | (reviewed & (query.maturity == state.maturity))),
     )
     return _resolve(state, query, choice, guided & state.waiting)
@@ -56,7 +56,8 @@ def _nothing_heard(state: AgentState) -> Heard:
     return Heard(approved=torch.full_like(state.answered, NO_ACTION), redraw=torch.zeros_like(state.waiting))
 
 
-def _store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset:
+def store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset:
+    """X with the answers of this tick: Eq. (1), at the first state of the clips. *Neither* stores nothing."""
     query, choice = answer.query, answer.choice
     first = query.observation[:, 0, 0]
     learnt = (query.kind != QueryKind.NONE) & (choice != Choice.NONE) & (choice != Choice.NEITHER)

@@ -13,7 +13,7 @@ from typing import Protocol
 
 from torch import Tensor
 
-from parenting.agent.events import Event
+from parenting.agent.amendment import TickEvent
 from parenting.agent.query import Answer, Query
 from parenting.agent.state import AgentState
 
@@ -21,8 +21,8 @@ from parenting.agent.state import AgentState
 class Parent(Protocol):
     """A mailbox outside the agent. `agent.parenting.tick` calls its verbs in this order, once a tick."""
 
-    def events(self, state: AgentState) -> Sequence[Event]:
-        """Return the operator's events that apply before this tick, in order; usually there are none."""
+    def events(self, state: AgentState) -> Sequence[TickEvent]:
+        """Return what applies before this tick, in order: the operator's events, and corrected answers."""
         ...
 
     def take(self, state: AgentState) -> Answer:

@@ -9,14 +9,16 @@ tick costs what it changes. Whoever wants to keep an earlier state keeps `state.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 
-from parenting.agent import guidance, learning, maturation, pairing, pretraining, recording
+from parenting.agent import amendment, guidance, learning, maturation, pairing, pretraining, recording
 from parenting.agent import query as queries
+from parenting.agent.amendment import Amend, Reconsider, TickEvent
 from parenting.agent.config import Config
-from parenting.agent.events import Change, EndEpisode, Event, Mature
+from parenting.agent.events import Change, EndEpisode, Mature
 from parenting.agent.guidance import View
 from parenting.agent.init import init, network_of, no_info
 from parenting.agent.parent import Parent
@@ -61,6 +63,7 @@ class Tick(NamedTuple):
     query: Query  # what each trial asks in it
     answer: Answer  # what each trial heard in it
     config: Config  # as the operator's events left it
+    events: Sequence[TickEvent]  # what applied before it
 
 
 def tick(world: Gridworld, config: Config, state: AgentState, parent: Parent) -> Tick:
@@ -78,12 +81,13 @@ def tick(world: Gridworld, config: Config, state: AgentState, parent: Parent) ->
         The agents, what they ask and what they heard: N trials each. Pass `state` and `config` on to the next
         tick.
     """
-    for event in parent.events(state):
+    events = parent.events(state)
+    for event in events:
         state, config = apply(world, config, state, event)
     answer = parent.take(state)
     state, query = step(world, config, state, answer)
     parent.post(query)
-    return Tick(rehearse(world, config, state), query, answer, config)
+    return Tick(rehearse(world, config, state), query, answer, config, events)
 
 
 def rehearse(world: Gridworld, config: Config, state: AgentState) -> AgentState:
@@ -91,8 +95,8 @@ def rehearse(world: Gridworld, config: Config, state: AgentState) -> AgentState:
     return pretraining.rehearse(world, network_of(world), config, state)
 
 
-def apply(world: Gridworld, config: Config, state: AgentState, event: Event) -> tuple[AgentState, Config]:
-    """An operator's event, in every trial, before a tick."""
+def apply(world: Gridworld, config: Config, state: AgentState, event: TickEvent) -> tuple[AgentState, Config]:
+    """An operator's event or a correction, in every trial, before a tick."""
     match event:
         case Mature():
             return maturation.mature(config, state, torch.ones_like(state.waiting)), config
@@ -102,6 +106,10 @@ def apply(world: Gridworld, config: Config, state: AgentState, event: Event) -> 
             return state.replace(world=ended, waiting=calm, refused=torch.zeros_like(state.refused)), config
         case Change(name=name, value=value):
             return state, config.model_copy(update={name: value})
+        case Amend():
+            return amendment.amend(config, state, event), config
+        case Reconsider():
+            return amendment.reconsider(state, event), config
 
 
 def reset_finished(world: Gridworld, state: AgentState) -> AgentState:

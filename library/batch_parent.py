@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from parenting.agent import query as queries
+from parenting.agent.amendment import Amend, Reconsider, TickEvent
 from parenting.agent.events import Event
 from parenting.agent.parent import BatchParent
 from parenting.agent.parent import Parent as AnyParent
@@ -27,7 +28,7 @@ class LoggedParent:
         self.tick = 0
 
     def events(self, state: AgentState) -> Sequence[Event]:
-        events = self.parent.events(state)
+        events = operators_only(self.parent.events(state))
         if self.first:  # the same events apply to the trials of each batch
             self.log.applied(events, int(state.keys.tick[0]) + 1)
         return events
@@ -62,7 +63,7 @@ class WholeBatch:
         self.nothing = queries.empty(trials, *self.size)
 
     def events(self, state: AgentState) -> Sequence[Event]:
-        return self.parent.events(state)
+        return operators_only(self.parent.events(state))
 
     def take(self, state: AgentState) -> Answer:
         if isinstance(self.parent, Parent):
@@ -86,3 +87,15 @@ class WholeBatch:
     def pick(self, index: Tensor) -> None:
         """Go on with some of the trials alone."""
         self.chunk = self.chunk[index]
+
+
+def operators_only(events: Sequence[TickEvent]) -> Sequence[Event]:
+    """Return the operator's events of a tick.
+
+    Raises:
+        TypeError: an answer is corrected among them, which a batch cannot do.
+    """
+    found = [event for event in events if not isinstance(event, Amend | Reconsider)]
+    if len(found) < len(events):
+        raise TypeError("parent: events corrects an answer. Only a stored run can do that.")
+    return found

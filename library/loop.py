@@ -151,5 +151,5 @@ def tick(world: World, config: Config, state: AgentState, parent: AnyParent) -> 
     check_parent(parent)
     if isinstance(parent, Parent) and int(state.keys.tick[0]) == 0:
         parent.begin(world, config, len(state.waiting))
-    after, query, answer, config = parenting.tick(world, config, state.clone(), parent)
+    after, query, answer, config, _ = parenting.tick(world, config, state.clone(), parent)
     return Tick(after, Query.of(query, world), answer, config)

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import torch
 
+from parenting.agent import amendment
+from parenting.agent.amendment import Correction, TickEvent
 from parenting.agent.events import Event
 from parenting.agent.query import Answer, Query, QueryKind
 from parenting.agent.state import AgentState
@@ -18,6 +20,7 @@ class Moment(NamedTuple):
     events: Sequence[Event]
     answer: Answer
     asked: Query
+    correction: Correction | None = None
 
 
 Session = Callable[[int], Moment]
@@ -41,11 +44,16 @@ class ReplayParent:
         self.tick = 0
         self._moment: Moment  # of this tick; `events` comes first in every tick
 
-    def events(self, state: AgentState) -> Sequence[Event]:
-        """The events that were applied before this tick."""
+    def events(self, state: AgentState) -> Sequence[TickEvent]:
+        """The events and the correction that were applied before this tick."""
         self.tick = int(state.keys.tick[0]) + 1
         self._moment = self.session(self.tick)
-        return self._moment.events
+        if self._moment.correction is None:
+            return self._moment.events
+        event, heard = amendment.take(state, self._moment.events, self._moment.correction)
+        if heard is not None:
+            self._moment = self._moment._replace(answer=heard)
+        return [*self._moment.events, event]
 
     def take(self, state: AgentState) -> Answer:
         """The answer that was heard in this tick."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from jaxtyping import Int64
 from torch import Tensor
 
+from parenting.agent.amendment import Amend, Reconsider, TickEvent
 from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
@@ -30,16 +33,35 @@ def no_counts() -> Counters:
     return Counters(deaths=zeros(), episodes=zeros(), kinds=zeros(3), choices=zeros(5))
 
 
-def count(world: Gridworld, tally: Counters, answer: Answer, state: AgentState) -> Counters:
-    """Return the counts after one more tick, from the answer that it heard and the state after it."""
+def count(
+    world: Gridworld, tally: Counters, answer: Answer, state: AgentState, events: Sequence[TickEvent] = ()
+) -> Counters:
+    """Return the counts after one more tick, from the answer that it heard and the state after it.
+
+    Answers that a correction replaced, among the `events` before the tick, count no more.
+    """
+    for event in events:
+        tally = _corrected(tally, event)
     report, now = state.info, state.world
     died = report.moved & world.unsafe(report.before, report.action, now)
     ended = report.moved & (now.terminated | world.truncated(now))
-    heard = answer.choice != Choice.NONE
-    tally = tally.replace(deaths=tally.deaths + died, episodes=tally.episodes + ended)
-    if not bool(heard.any()):
+    return _add(tally.replace(deaths=tally.deaths + died, episodes=tally.episodes + ended), answer, 1)
+
+
+def _corrected(tally: Counters, event: TickEvent) -> Counters:
+    """Return the counts without what was replaced; what `Reconsider` precedes is heard and counted again."""
+    if not isinstance(event, Amend | Reconsider):
         return tally
+    tally = _add(tally, event.replaced, -1)
+    return _add(tally, event.answer, 1) if isinstance(event, Amend) else tally
+
+
+def _add(tally: Counters, answer: Answer, times: int) -> Counters:
+    said = answer.choice != Choice.NONE
+    if not bool(said.any()):
+        return tally
+    heard = times * said[:, None]
     return tally.replace(
-        kinds=tally.kinds + (torch.nn.functional.one_hot(answer.query.kind, len(QueryKind)) * heard[:, None]),
-        choices=tally.choices + (torch.nn.functional.one_hot(answer.choice, len(Choice)) * heard[:, None]),
+        kinds=tally.kinds + (torch.nn.functional.one_hot(answer.query.kind, len(QueryKind)) * heard),
+        choices=tally.choices + (torch.nn.functional.one_hot(answer.choice, len(Choice)) * heard),
     )

@@ -109,8 +109,8 @@ def comparable_until(db: Database, run: Run) -> int | None:
 
 
 def _beat(world: Gridworld, saved: Snapshot, parent: ReplayParent) -> Snapshot:
-    state, _, answer, config = parenting.tick(world, saved.config, saved.state, parent)
-    return Snapshot(state, count(world, saved.tally, answer, state), config)
+    state, _, answer, config, events = parenting.tick(world, saved.config, saved.state, parent)
+    return Snapshot(state, count(world, saved.tally, answer, state, events), config)
 
 
 def _checkpoint(db: Database, run: Run, world: Gridworld, config: Config, weights: Tensor | None) -> Recalled:

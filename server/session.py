@@ -93,6 +93,8 @@ class RunSession:
         """Return whether the next tick may pass: an agent never outruns its parent (docs/queue.md)."""
         if self.last_tick < self.record_ends:
             return True
+        if seen.corrections:
+            return True
         if idle(seen):
             return False
         if seen.events:
@@ -143,11 +145,15 @@ class RunSession:
         self.whole = False
         replayed = self.last_tick < self.record_ends
         parent = self.parent.looking(
-            answers=replayed or bool(seen and seen.answers), events=replayed or bool(seen and seen.events)
+            answers=replayed or bool(seen and seen.answers),
+            events=replayed or bool(seen and (seen.events or seen.corrections)),
         )
-        state, query, answer, config = parenting.tick(self.world, self.saved.config, self.saved.state, parent)
+        state, query, answer, config, events = parenting.tick(
+            self.world, self.saved.config, self.saved.state, parent
+        )
         self._lived_at = time.monotonic()
-        self.saved = Snapshot(state, count(self.world, self.saved.tally, answer, state), config)
+        tally = count(self.world, self.saved.tally, answer, state, events)
+        self.saved = Snapshot(state, tally, config)
         if self.last_tick <= self.record_ends:
             self._hold_to_the_record(query)
         self._note(answer)

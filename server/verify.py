@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from parenting.agent import guidance, maturation
+from parenting.agent import amendment, guidance, maturation
+from parenting.agent.amendment import Amend
 from parenting.agent.config import Config
 from parenting.agent.events import Change, Mature
 from parenting.agent.init import world_of
@@ -90,6 +91,8 @@ def x_of_record(begun: Snapshot, last: int, parent: ReplayParent) -> AgentState:
                     state = maturation.mature(config, state, torch.ones_like(state.waiting))
                 case Change(name=name, value=value):
                     config = config.model_copy(update={name: value})
+                case Amend():
+                    state = amendment.amend(config, state, event)
         state, _ = guidance.hear(config, state, parent.take(state))
         state = maturation.grow(config, state)
         state = state.replace(keys=state.keys.next())

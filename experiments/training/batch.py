@@ -70,7 +70,9 @@ class BatchTrainer:
     def tick(self) -> None:
         """One tick of every trial that is left."""
         stage, owed = self.state.maturity, self.state.rehearsal.owed
-        self.state, _, answer, self.config = parenting.tick(self.world, self.config, self.state, self.parent)
+        self.state, _, answer, self.config, _ = parenting.tick(
+            self.world, self.config, self.state, self.parent
+        )
         self._count(answer, stage)
         self._finish(self.state.info.trained | owed | (self.counts.ticks == 1))
 

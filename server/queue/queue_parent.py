@@ -10,7 +10,9 @@ from typing import Self
 import torch
 from pydantic import TypeAdapter
 
+from parenting.agent import amendment
 from parenting.agent import query as queries
+from parenting.agent.amendment import Correction, TickEvent
 from parenting.agent.config import Config
 from parenting.agent.events import Event
 from parenting.agent.query import Answer, Query
@@ -41,6 +43,7 @@ class QueueParent:
         self.tick = 0
         self.policy = (1, 0)
         self.answers = self.events_wait = True
+        self.corrected: amendment.Applied | None = None  # heard in this tick
         self.record_ends = -1  # the last tick of the record: up to it, recorded questions stand
 
     def looking(self, answers: bool, events: bool) -> Self:
@@ -49,20 +52,42 @@ class QueueParent:
         mailbox.answers, mailbox.events_wait = answers, events
         return mailbox
 
-    def events(self, state: AgentState) -> Sequence[Event]:
-        """The operator's events that apply before the tick that comes."""
+    def events(self, state: AgentState) -> Sequence[TickEvent]:
+        """The operator's events and the correction that apply before the tick that comes."""
         self.tick = int(state.keys.tick[0]) + 1
-        rows = worker_side.take_operator_events(self.db, self.mine, self.tick) if self.events_wait else ()
-        return [_EVENTS.validate_python({"kind": row.kind, **readable(row).payload}) for row in rows]
+        if not self.events_wait:
+            return []
+        rows = worker_side.take_operator_events(self.db, self.mine, self.tick)
+        events = [_EVENTS.validate_python({"kind": row.kind, **readable(row).payload}) for row in rows]
+        found = worker_side.take_correction(self.db, self.mine, self.tick)
+        if found is None:
+            return events
+        self.corrected = amendment.take(state, events, self._correction(found))
+        if self.corrected.heard is not None:
+            worker_side.withdraw_guidance(self.db, self.mine)
+        return [*events, self.corrected.event]
+
+    def _correction(self, found: worker_side.Corrected) -> Correction:
+        return Correction(
+            self._answer(found.answer, found.query),
+            self._answer(found.replaced, found.query),
+            [self._answer(taken.answer, taken.query) for taken in found.standing],
+        )
+
+    def _answer(self, row: tables.Answer, query: tables.Query) -> Answer:
+        choice = int(CHOICES[readable(row).choice])
+        return Answer(query=self.read(query), choice=torch.tensor([choice]))
 
     def take(self, state: AgentState) -> Answer:
         """The answer to be heard in the tick that comes, or none."""
         self.policy = int(state.maturity[0]), int(state.learner.steps[0])
-        taken = worker_side.take_answer(self.db, self.mine, self.tick) if self.answers else None
+        if self.corrected is not None and self.corrected.heard is not None:
+            return self.corrected.heard
+        asking = self.answers and self.corrected is None
+        taken = worker_side.take_answer(self.db, self.mine, self.tick) if asking else None
         if taken is None:
             return queries.silence(queries.empty(1, self.stages, self.world.height, self.world.width))
-        choice = int(CHOICES[readable(taken.answer).choice])
-        return Answer(query=self.read(taken.query), choice=torch.tensor([choice]))
+        return self._answer(taken.answer, taken.query)
 
     def post(self, query: Query) -> None:
         """Store what the agent asks in this tick; a tick that was lived before asks nothing twice."""

@@ -9,6 +9,7 @@ from pydantic import TypeAdapter
 from sqlalchemy import select
 
 from parenting.agent import query as queries
+from parenting.agent.amendment import Correction
 from parenting.agent.events import Event
 from parenting.agent.query import Answer
 from parenting.envs.gridworld import Gridworld
@@ -17,6 +18,7 @@ from parenting.server import tables
 from parenting.server.codec import CHOICES, decode
 from parenting.server.db import Database
 from parenting.server.notes import AGENT_KINDS
+from parenting.server.queue.worker_side import heard_before, standing_at
 
 WINDOW = 500
 """Ticks whose rows are read at once."""
@@ -48,7 +50,11 @@ class StoredRecord:
         if tick not in self._window:
             self._read(range(tick, tick + WINDOW))
         try:
-            return Moment(list(self._events_of(tick)), self._answer_of(tick), self._query_of(tick))
+            events, asked = list(self._events_of(tick)), self._query_of(tick)
+            correction = self._correction_of(tick)
+            if correction is not None:
+                return Moment(events, queries.silence(self.nothing), asked, correction)
+            return Moment(events, self._answer_of(tick), asked)
         except (LookupError, TypeError, ValueError) as error:
             raise UnreadableRecordError(f"The record of tick {tick} cannot be read: {error!r}.") from None
 
@@ -72,11 +78,29 @@ class StoredRecord:
                 self.events += 1
                 yield _EVENTS.validate_python({"kind": row.kind, **row.payload})
 
+    def _correction_of(self, tick: int) -> Correction | None:
+        if tick not in self._heard:
+            return None
+        answer, query = self._heard[tick]
+        with self.db.read() as session:
+            replaced = heard_before(session, answer)
+            standing = standing_at(session, self.run_id, tick) if replaced is not None else ()
+        if replaced is None:
+            return None
+        self.answers += 1
+        return Correction(
+            self._answer(answer, query),
+            self._answer(replaced, query),
+            [self._answer(taken.answer, taken.query) for taken in standing],
+        )
+
     def _answer_of(self, tick: int) -> Answer:
         if tick not in self._heard:
             return queries.silence(self.nothing)
         self.answers += 1
-        answer, query = self._heard[tick]
+        return self._answer(*self._heard[tick])
+
+    def _answer(self, answer: tables.Answer, query: tables.Query) -> Answer:
         choice = torch.tensor([int(CHOICES[answer.choice])])
         return Answer(query=self._decoded(query), choice=choice)
 

@@ -41,7 +41,7 @@ def run_batch(
     parent = ScriptedParent(Judged(judge), parenting.no_query(world, config, state))
     logs: list[list[LogEntry]] = [[] for _ in range(trials)]
     for tick in range(1, ticks + 1):
-        state, query, _, _ = parenting.tick(world, config, state, parent)
+        state, query, _, _, _ = parenting.tick(world, config, state, parent)
         for trial in (query.kind != QueryKind.NONE).nonzero().squeeze(1).tolist():
             kind = QueryKind(int(query.kind[trial])).name.lower()
             logs[trial].append((tick, kind, clip(query, trial, 0), clip(query, trial, 1)))

@@ -49,7 +49,7 @@ def test_a_tick_returns_the_answer_that_it_took_and_the_query_that_it_posted() -
     parent, config, kinds = Watched(state), CONFIG, set[int]()
     for _ in range(30):
         parent.called.clear()
-        state, query, answer, config = parenting.tick(WORLD, config, state, parent)
+        state, query, answer, config, _ = parenting.tick(WORLD, config, state, parent)
         assert parent.called == ["events", "take", "post"]
         assert answer is parent.taken
         assert query is parent.posted
@@ -62,7 +62,7 @@ def test_the_operators_events_apply_before_the_step_and_stay() -> None:
     parent, config = Watched(state), CONFIG
     found = []
     for _ in range(4):
-        state, _, _, config = parenting.tick(WORLD, config, state, parent)
+        state, _, _, config, _ = parenting.tick(WORLD, config, state, parent)
         found.append(config.p_rec)
     assert found == [0.9, 0.0, 0.0, 0.0]
 
@@ -72,7 +72,7 @@ def test_a_tick_is_a_step_on_the_answer_that_it_returns() -> None:
     parent = ScriptedParent(Judged(random_parent), parenting.no_query(WORLD, CONFIG, state))
     for _ in range(20):
         before = state.clone()
-        state, query, answer, config = parenting.tick(WORLD, CONFIG, state, parent)
+        state, query, answer, config, _ = parenting.tick(WORLD, CONFIG, state, parent)
         after, asked = parenting.step(WORLD, CONFIG, before, answer)
         assert config is CONFIG
         theirs = {**after.tensors(), **{f"query.{name}": part for name, part in asked.tensors().items()}}

@@ -95,7 +95,7 @@ def rebuild(store: Store, run: int) -> list[str]:
     )
     last = int(saved["keys.tick"][0])
     for _ in range(last):
-        state, _, _, config = parenting.tick(world, config, state, parent)
+        state, _, _, config, _ = parenting.tick(world, config, state, parent)
     late = [tick for tick in parent.asked if tick <= last and tick not in parent.kept]
     found = parent.found + [f"C2 the query stored at tick {tick} was not asked" for tick in late]
     return found + [f"A5 {name} differs from the record" for name in _differing(state, saved)]

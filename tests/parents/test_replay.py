@@ -62,7 +62,7 @@ def birth(world: Gridworld) -> AgentState:
 def lived(world: Gridworld, parent: Parent) -> AgentState:
     state, config = birth(world), CONFIG
     for _ in range(TICKS):
-        state, _, _, config = parenting.tick(world, config, state, parent)
+        state, _, _, config, _ = parenting.tick(world, config, state, parent)
     return state
 
 

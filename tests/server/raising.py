@@ -94,10 +94,10 @@ class Inline(ScriptedParent):
 
     def tick(self) -> None:
         state, tally, config = self.saved
-        state, _, answer, config = parenting.tick(self.world, config, state, self)
+        state, _, answer, config, events = parenting.tick(self.world, config, state, self)
         if bool(answer.choice != Choice.NONE):
             self.heard.append((int(state.keys.tick), CHOICE_NAMES[int(answer.choice)]))
-        self.saved = Snapshot(state, count(self.world, tally, answer, state), config)
+        self.saved = Snapshot(state, count(self.world, tally, answer, state, events), config)
 
 
 def inline(ticks: int, begun: Begun = ISLAND) -> Snapshot:
