@@ -11,6 +11,7 @@ from parenting.server.queue.worker_side import (
     high_water,
     post_query,
     take_answer,
+    take_correction,
     take_operator_events,
     watch,
 )
@@ -78,7 +79,23 @@ def test_replay_gives_back_an_answer_that_was_superseded_later(db: Database, min
     taken = take_answer(db, mine, 3)
     assert taken is not None
     assert (taken.answer.choice, taken.answer.standing) == ("left", False)
-    assert heard(db, mine, 4) is None, "a corrected answer is not heard a second time"
+    assert heard(db, mine, 4) is None, "a correction is heard as one, not as an answer"
+
+
+def test_a_correction_has_a_tick_of_its_own(db: Database, mine: Claim) -> None:
+    first, second = answered(db, mine, 2), answered(db, mine, 3)
+    assert [heard(db, mine, tick) for tick in (4, 5)] == [first, second]
+    supersede(db, first, "neither", "a", "human")
+    assert watch(db, [mine.run_id])[mine.run_id].corrections == 1
+    found = take_correction(db, mine, 6)
+    assert found is not None
+    assert (found.answer.choice, found.answer.applied_tick, found.replaced.choice) == ("neither", 6, "left")
+    assert [taken.query.id for taken in found.standing] == [second, first]
+    assert watch(db, [mine.run_id])[mine.run_id].corrections == 0
+    again = take_correction(db, mine, 6)
+    assert again is not None and again.answer.id == found.answer.id, "a replayed tick hears it again"
+    assert heard(db, mine, 6) is None
+    assert take_correction(db, mine, 7) is None
 
 
 def test_correction_before_it_was_heard_is_what_is_heard(db: Database, mine: Claim) -> None:
