@@ -38,7 +38,7 @@ class Reconsider:
 
 
 TickEvent = Event | Amend | Reconsider
-"""What applies before a tick: an operator's event, or a parent's correction."""
+"""An event before a tick: an operator's, or a parent's correction."""
 
 
 class Correction(NamedTuple):

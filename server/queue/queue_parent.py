@@ -24,7 +24,7 @@ from parenting.server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_n
 from parenting.server.damage import readable, reading
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
-from parenting.server.queue import answers, worker_side
+from parenting.server.queue import answers, corrections, worker_side
 from parenting.server.runs import Claim
 
 SCRIPT = "scripted"
@@ -59,15 +59,15 @@ class QueueParent:
             return []
         rows = worker_side.take_operator_events(self.db, self.mine, self.tick)
         events = [_EVENTS.validate_python({"kind": row.kind, **readable(row).payload}) for row in rows]
-        found = worker_side.take_correction(self.db, self.mine, self.tick)
+        found = corrections.take_correction(self.db, self.mine, self.tick)
         if found is None:
             return events
         self.corrected = amendment.take(state, events, self._correction(found))
         if self.corrected.heard is not None:
-            worker_side.withdraw_guidance(self.db, self.mine)
+            corrections.withdraw_guidance(self.db, self.mine)
         return [*events, self.corrected.event]
 
-    def _correction(self, found: worker_side.Corrected) -> Correction:
+    def _correction(self, found: corrections.Corrected) -> Correction:
         return Correction(
             self._answer(found.answer, found.query),
             self._answer(found.replaced, found.query),

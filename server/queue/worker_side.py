@@ -25,6 +25,7 @@ from parenting.server.db import Database
 from parenting.server.identity import unused_number
 from parenting.server.notes import AGENT_KINDS
 from parenting.server.queue.queries import guidance_first, withdraw_in
+from parenting.server.queue.taken import Taken, heard_before, recorded_at
 from parenting.server.runs import Claim, held, held_status
 from parenting.server.statuses import LIVING, QueryStatus, RunStatus
 from parenting.server.store.relay import announce
@@ -49,24 +50,6 @@ class Watch:
     corrections: int = 0  # of answers that were heard, themselves not yet heard
 
 
-@dataclass(frozen=True)
-class Taken:
-    """An answer that is heard at a tick, with its query."""
-
-    answer: Answer
-    query: Query
-
-
-@dataclass(frozen=True)
-class Corrected:
-    """A correction that is heard at a tick, with its query."""
-
-    answer: Answer
-    query: Query
-    replaced: Answer  # which the agent has heard
-    standing: Sequence[Taken]  # all that stand from this tick on, in the order in which they were heard
-
-
 # Statements that every tick needs are built once.
 _RUN: BindParameter[int] = bindparam("run_id")
 _HIGH = select(
@@ -81,14 +64,6 @@ _PENDING = (
     .join(Query, Answer.query_id == Query.id)
     .where(Query.run_id == _RUN, Query.status == QueryStatus.ANSWERED, Answer.standing)
     .order_by(guidance_first(), Query.tick)
-    .limit(1)
-)
-_CORRECTION = (
-    select(Answer, Query)
-    .join(Query, Answer.query_id == Query.id)
-    .where(Answer.run_id == _RUN, Answer.applied_tick.is_(None), Answer.standing)
-    .where(Query.status == QueryStatus.APPLIED)
-    .order_by(Answer.number)
     .limit(1)
 )
 _KNOWN = select(Query.id).where(Query.run_id == _RUN, Query.tick == bindparam("tick"))
@@ -202,13 +177,13 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
     """Return the answer to be heard at this tick, or None: guidance first, then the oldest query's.
 
     A new answer is marked with the tick in the same transaction. On replay the recorded answer comes back,
-    even if it was superseded later. A correction is no such answer (`take_correction`). This never waits.
+    even if it was superseded later. A correction is heard by `take_correction` alone. This never waits.
 
     Raises:
         LostClaimError: another worker trains this run now.
     """
     with db.write(durable=False) as session:
-        if _closed(session, mine.run_id, tick):
+        if closed(session, mine.run_id, tick):
             found = recorded_at(session, mine.run_id, tick)
             return None if found is None or heard_before(session, found.answer) else found
         held_status(session, mine)
@@ -217,58 +192,6 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
             found.answer.applied_tick, found.query.status = tick, QueryStatus.APPLIED
             db.outlive_crash(session)
         return found
-
-
-def take_correction(db: Database, mine: Claim, tick: int) -> Corrected | None:
-    """Return the correction to be heard at this tick, or None: the oldest, or on replay the recorded one.
-
-    A correction has a tick of its own, as an answer has. A new one is marked with it in the same transaction.
-
-    Raises:
-        LostClaimError: another worker trains this run now.
-    """
-    with db.write(durable=False) as session:
-        if _closed(session, mine.run_id, tick):
-            found = recorded_at(session, mine.run_id, tick)
-            replaced = None if found is None else heard_before(session, found.answer)
-            return None if found is None or replaced is None else _corrected(session, found, replaced, tick)
-        held_status(session, mine)
-        row = session.execute(_CORRECTION, {"run_id": mine.run_id}).first()
-        if row is None:
-            return None
-        found = Taken(*row)
-        replaced = heard_before(session, found.answer)
-        found.answer.applied_tick = tick
-        session.flush()
-        return None if replaced is None else _corrected(session, found, replaced, tick)
-
-
-def heard_before(session: Session, answer: Answer) -> Answer | None:
-    """Return the last answer to the same query that the agent heard before this one."""
-    rows = select(Answer).where(Answer.query_id == answer.query_id, Answer.id != answer.id)
-    if answer.applied_tick is not None:
-        rows = rows.where(Answer.applied_tick < answer.applied_tick)
-    rows = rows.where(Answer.applied_tick.is_not(None)).order_by(Answer.applied_tick.desc()).limit(1)
-    return session.scalars(rows).first()
-
-
-def standing_at(session: Session, run_id: int, tick: int) -> Sequence[Taken]:
-    """Return the answers that stand after a tick, by the tick at which each was heard."""
-    rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
-    rows = rows.where(Answer.run_id == run_id, Answer.applied_tick <= tick).order_by(Answer.applied_tick)
-    latest = {taken.query.id: taken for taken in (Taken(*row) for row in session.execute(rows))}
-    return sorted(latest.values(), key=lambda taken: taken.answer.applied_tick or 0)
-
-
-def withdraw_guidance(db: Database, mine: Claim) -> None:
-    """Withdraw the open guidance query of a pause that a correction has ended.
-
-    Raises:
-        LostClaimError: another worker trains this run now.
-    """
-    with db.write() as session:
-        held(session, mine)
-        withdraw_in(session, mine.run_id, "guidance")
 
 
 def take_operator_events(db: Database, mine: Claim, tick: int) -> Sequence[OperatorEvent]:
@@ -308,20 +231,10 @@ def _high(session: Session, run_id: int) -> tuple[int, int, int]:
     return tuple(-1 if tick is None else tick for tick in ticks)  # type: ignore[return-value]
 
 
-def _closed(session: Session, run_id: int, tick: int) -> bool:
+def closed(session: Session, run_id: int, tick: int) -> bool:
+    """Return whether a tick was lived already, so that nothing new is heard in it."""
     query, answer, event = _high(session, run_id)
     return query >= tick or answer >= tick or event > tick
-
-
-def recorded_at(session: Session, run_id: int, tick: int) -> Taken | None:
-    """Return the answer or correction that was heard at a tick."""
-    rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
-    row = session.execute(rows.where(Answer.run_id == run_id, Answer.applied_tick == tick)).one_or_none()
-    return None if row is None else Taken(*row)
-
-
-def _corrected(session: Session, found: Taken, replaced: Answer, tick: int) -> Corrected:
-    return Corrected(found.answer, found.query, replaced, standing_at(session, replaced.run_id, tick))
 
 
 def _pending(session: Session, run_id: int) -> Taken | None:

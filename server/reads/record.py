@@ -18,7 +18,7 @@ from parenting.server import tables
 from parenting.server.codec import CHOICES, decode
 from parenting.server.db import Database
 from parenting.server.notes import AGENT_KINDS
-from parenting.server.queue.worker_side import heard_before, standing_at
+from parenting.server.queue.taken import heard_before, standing_at
 
 WINDOW = 500
 """Ticks whose rows are read at once."""

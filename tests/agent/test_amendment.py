@@ -133,7 +133,8 @@ def test_a_refusal_that_is_taken_back_in_its_pause_approves_the_move() -> None:
     state, config = parenting.apply(WORLD, CONFIG, state, event)
     assert not bool(state.refused.any())
     state, _ = parenting.step(WORLD, config, state, heard)
-    assert bool(state.info.moved[0]) and int(state.info.action[0]) == int(first.action[0, 0, 0])
+    assert bool(state.info.moved[0])
+    assert int(state.info.action[0]) == int(first.action[0, 0, 0])
     assert int(state.answered[0]) == answered
 
 
@@ -143,11 +144,15 @@ def test_after_its_pause_a_correction_changes_x_alone() -> None:
     state, _ = parenting.step(WORLD, CONFIG, state, silence(first))
     replaced, answer = said(first, Choice.NEITHER), said(first, Choice.RIGHT)
     event, heard = amendment.take(state, [], Correction(answer, replaced, [answer]))
-    assert heard is None and isinstance(event, Amend)
+    assert heard is None
+    assert isinstance(event, Amend)
     before = state.clone()
     after, _ = parenting.apply(WORLD, CONFIG, state, event)
-    changed = {name for name, part in after.tensors().items() if not torch.equal(part, before.tensors()[name])}
-    assert changed and all(name.startswith("x.") for name in changed)
+    changed = {
+        name for name, part in after.tensors().items() if not torch.equal(part, before.tensors()[name])
+    }
+    assert changed
+    assert all(name.startswith("x.") for name in changed)
 
 
 @pytest.mark.parametrize("events", [[EndEpisode()], [Mature()]], ids=["episode ended", "stage ended"])

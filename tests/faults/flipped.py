@@ -113,7 +113,7 @@ def said(settings: Settings, run: int, told: Sequence[Told]) -> str:
 
 
 def asked(settings: Settings, db: Database, run: int) -> list[str]:
-    """What the pages complain of. An exception that no page expects is raised here."""
+    """The complaints of the pages. An exception that no page expects is raised here."""
     found = []
     with TestClient(create_app(settings, db), base_url="http://localhost") as client:
         for page in PAGES:
@@ -127,7 +127,7 @@ def asked(settings: Settings, db: Database, run: int) -> list[str]:
 
 
 def verified(db: Database, run: int) -> list[str]:
-    """What `parenting verify` says of the chain of hashes."""
+    """The words of `parenting verify` on the chain of hashes."""
     try:
         return check(db, run).problems
     except ServerError as error:

@@ -33,11 +33,11 @@ PATCHES = {
 LEASE_SECONDS = 2.0
 PATIENCE = 180.0
 LOOK_SECONDS = 5.0
-"""Who waits in vain for so long looks whether a run has failed."""
+"""After waiting in vain for so long, a test looks at whether a run has failed."""
 
 
 def in_time(end: float, said: Callable[[], str]) -> None:
-    """Give up waiting once a moment is over. That is no assertion: a test that waits in vain caught nothing.
+    """Give up waiting once a moment is over. It asserts nothing: a test that waits in vain caught nothing.
 
     Raises:
         TimeoutError: it is over.

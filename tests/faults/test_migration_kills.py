@@ -51,7 +51,7 @@ RANDOM = {"sqlite": length(8, 2000), "postgresql": length(4, 500)}
 MOMENTS = {"sqlite": 120, "postgresql": 80}
 """A migration passes more moments than these: before and after each statement and the commit."""
 KEPT = "SELECT run_id, query_id, number, choice, client_id, applied_tick FROM answer ORDER BY run_id, number"
-"""What every revision knows of answers."""
+"""The columns of answers that every revision has."""
 
 
 def dies(*_: Any, **__: Any) -> None:

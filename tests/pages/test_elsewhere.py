@@ -192,7 +192,7 @@ def pages(client: httpx2.Client, db: Database) -> Iterator[httpx2.Response]:
 
 
 def others(client: httpx2.Client, db: Database) -> Iterator[httpx2.Response]:
-    """What the links and forms of dashboard and history lead to."""
+    """The targets of links and forms of dashboard and history."""
     dashboard = address(db, RUN).removesuffix("/parent")
     for path in (
         dashboard,

@@ -6,12 +6,12 @@ from parenting.server.db import Database
 from parenting.server.errors import LostClaimError
 from parenting.server.operator_events import add_operator_event
 from parenting.server.queue.answers import answer, get_query, supersede
+from parenting.server.queue.corrections import take_correction
 from parenting.server.queue.queries import open_counts
 from parenting.server.queue.worker_side import (
     high_water,
     post_query,
     take_answer,
-    take_correction,
     take_operator_events,
     watch,
 )
@@ -93,7 +93,8 @@ def test_a_correction_has_a_tick_of_its_own(db: Database, mine: Claim) -> None:
     assert [taken.query.id for taken in found.standing] == [second, first]
     assert watch(db, [mine.run_id])[mine.run_id].corrections == 0
     again = take_correction(db, mine, 6)
-    assert again is not None and again.answer.id == found.answer.id, "a replayed tick hears it again"
+    assert again is not None
+    assert again.answer.id == found.answer.id, "a replayed tick hears it again"
     assert heard(db, mine, 6) is None
     assert take_correction(db, mine, 7) is None
 
