@@ -159,7 +159,11 @@ def test_what_was_not_recorded_counts_as_the_same() -> None:
     assert changed({**here, "machine": "aarch64"}, here)
 
 
-@pytest.mark.parametrize("name", ["torch", "threads", "cpu", "machine"])
+@pytest.mark.parametrize(
+    ("store", "name"),
+    [("sqlite", "torch"), ("sqlite", "threads"), ("sqlite", "machine"), ("postgresql", "cpu")],
+    indirect=["store"],
+)
 def test_a_run_goes_on_with_a_note_whatever_has_changed(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
