@@ -16,7 +16,7 @@ FAULTS = Path(__file__).parent / "faults"
 # Eight megabytes in each data folder would fill a disk; tests/server/store/test_ballast.py makes them.
 os.environ.setdefault("PARENTING_BALLAST", "false")
 
-# Two torch threads are slower than one here, and give other bits. The processes of pytest-xdist keep the cores busy.
+# Two torch threads are slower than one here, and give other bits. pytest-xdist keeps the cores busy.
 torch.set_num_threads(1)
 
 # A shared machine is sometimes slow. A property must not fail for that reason.
