@@ -57,6 +57,8 @@ def set_up_log(settings: Settings, process: str) -> None:
             old.close()
     root.addHandler(handler)
     root.setLevel(number)
+    # Of a connection that is lost the refusal speaks; the pool would add a traceback of its reset.
+    logging.getLogger("sqlalchemy.pool").setLevel(logging.CRITICAL)
     logging.raiseExceptions = False  # a full disk or a closed pipe loses the line, not the request
     structlog.configure(
         processors=[*before, ProcessorFormatter.wrap_for_formatter],

@@ -24,13 +24,14 @@ from tests.faults import parent
 from tests.faults.figures import Figures
 from tests.faults.house import House
 from tests.faults.rebuilt import rebuild
-from tests.faults.troubles import files_bounded, filled, lock_of_another, small_disk
+from tests.faults.troubles import Restarting, files_bounded, filled, lock_of_another, small_disk
 from tests.lengths import length
 from tests.server.raising import ISLAND
 
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(600, 3000))]
 LOCKED_SECONDS = 20.0
 FULL_SECONDS = length(10.0, 120.0)
+RESTARTS = length(3, 30)
 AWAY_SECONDS = length(5.0, 60.0)
 FIRST_LINES = 4
 """Lines that a process may write besides: one for each kind of refusal, and one that the store is back."""
@@ -145,3 +146,23 @@ def still_read(house: House, trouble: AbstractContextManager[None]) -> Iterator[
     with trouble:
         yield
         assert reader_is_served(house)
+
+
+@pytest.mark.only("postgresql", "SQLite has no server")
+@pytest.mark.parametrize("mode", ["fast", "immediate"])
+def test_postgresql_may_be_restarted(
+    store: str, tmp_path: Path, rng: random.Random, figures: Figures, mode: str
+) -> None:
+    """While parents answer: in order, and by a crash that loses what was committed without waiting."""
+    cluster = Restarting()
+    cluster.create("restarted")
+    settings = Settings(data=tmp_path, database_url=cluster.url("restarted"))
+    db = connect(settings)
+    upgrade(db)
+    with inhabited(settings, db, rng) as house:
+        for _ in range(RESTARTS):
+            house.until_told(rng.randint(1, 3))
+            endure(house, cluster.stopped(mode), rng.uniform(0, 2))
+            figures.count("restarts of PostgreSQL", mode)
+    db.close()
+    cluster.stop()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
 import subprocess
 import tempfile
 import threading
@@ -14,6 +15,8 @@ from pathlib import Path
 import psycopg
 import pytest
 from pysqlite3 import dbapi2 as sqlite
+
+from tests.postgres import Cluster, programs
 
 DISK_BYTES = 32 * 2**20
 WRITABLE_BYTES = 32 * 2**10
@@ -97,3 +100,29 @@ def lock_of_another(where: Path | str) -> Iterator[None]:
     with psycopg.connect(where) as connection, connection.transaction(force_rollback=True):
         connection.execute("LOCK TABLE run, query, answer IN ACCESS EXCLUSIVE MODE")
         yield
+
+
+class Restarting(Cluster):
+    """A PostgreSQL of its own that can be stopped and started again."""
+
+    @contextmanager
+    def stopped(self, mode: str) -> Iterator[None]:
+        """Stop it as pg_ctl does by this mode, and start it again at the end: *immediate* is a crash."""
+        self.admin.close()
+        stop = [*self.user, str(programs() / "pg_ctl"), "-D", str(self.folder), "-m", mode, "stop"]
+        subprocess.run(stop, check=True, capture_output=True, cwd=self.folder)
+        yield
+        self._ended.append(self.process)
+        self.process = self._start()
+        self.admin = self._connected()
+
+    def __init__(self) -> None:
+        self._ended: list[subprocess.Popen[bytes]] = []
+        super().__init__()
+
+    def stop(self) -> None:
+        """Stop it at once and remove its folder."""
+        super().stop()
+        for guard in self._ended:
+            guard.communicate()
+        shutil.rmtree(self.folder, ignore_errors=True)
