@@ -198,7 +198,8 @@ def test_the_charts_are_drawn_and_go_on(tabs: BrowserTabs, db: Database, lives: 
     expect(log).to_have_attribute("aria-pressed", "true")
     with page.expect_download() as saved:
         page.get_by_role("button", name="Download Deaths as an image").click()
-    assert saved.value.suggested_filename == "run-1-deaths.png"
+    public = page.locator("#main").get_attribute("data-run")
+    assert saved.value.suggested_filename == f"run-{public}-deaths.png"
 
 
 def test_the_dashboard_without_javascript_is_a_table(tabs: BrowserTabs, lives: None) -> None:
