@@ -9,6 +9,7 @@ have a thread at a time. Others wait without one, for five seconds in all (`serv
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
 from functools import partial
@@ -40,7 +41,9 @@ class Gate:
 
     def __init__(self, places: int, waiting: int) -> None:
         self._free = asyncio.Semaphore(places)
-        self._most, self.waiting = waiting, 0
+        self._most, self.waiting, self.busy = waiting, 0, 0
+        self.refused = Counter({"full": 0, "late": 0})
+        """Requests that were refused because the queue was full, or because no place was free in time."""
 
     @asynccontextmanager
     async def entered(self, seconds: float) -> AsyncIterator[None]:
@@ -50,18 +53,22 @@ class Gate:
             BusyError: the queue is full, or no place was free in time.
         """
         if self._free.locked() and self.waiting >= self._most:
+            self.refused["full"] += 1
             raise BusyError("Too many requests wait for the database; nothing was stored. Send it again.")
         with patience(seconds):
             self.waiting += 1
             try:
                 await asyncio.wait_for(self._free.acquire(), remaining(seconds))
             except TimeoutError:
+                self.refused["late"] += 1
                 raise BusyError from None
             finally:
                 self.waiting -= 1
+            self.busy += 1
             try:
                 yield
             finally:
+                self.busy -= 1
                 self._free.release()
 
 

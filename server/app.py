@@ -71,7 +71,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     app.state.group_commit = GroupCommit(db) if db.one_writer else None
     notifier = Notifier(settings.data, "web")
     app.state.streams = Streams(db, notifier, settings.streams, app.state.admission)
-    app.state.meters.watch(db, app.state.streams.number)
+    app.state.meters.watch(db, app.state.streams.number, lambda: app.state.admission)
     return app
 
 

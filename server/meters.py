@@ -16,8 +16,11 @@ from prometheus_client.registry import Collector
 from sqlalchemy import BigInteger, cast, func, select
 from sqlalchemy.orm import Session
 
+from parenting.server.admission import Admission
+from parenting.server.connections.limits import Connections
 from parenting.server.db import Database
 from parenting.server.errors import ServerError
+from parenting.server.load_figures import AdmissionFigures, ConnectionFigures
 from parenting.server.statuses import LIVING, RUN_STATUSES, QueryStatus
 from parenting.server.tables import KINDS, Query, Run, Worker
 
@@ -61,11 +64,18 @@ class Meters:
         """Count an error of the server's side by its code."""
         self._refusals.labels(code).inc()
 
-    def watch(self, db: Database, streams: Callable[[], int]) -> None:
-        """Add the figures of the store and of the open streams."""
+    def watch(
+        self, db: Database, streams: Callable[[], int], admission: Callable[[], Admission]
+    ) -> None:
+        """Add the figures of the store, of the open streams and of the queues before the threads."""
         gauge = Gauge("parenting_streams_open", "Live streams that are open.", registry=self.registry)
         gauge.set_function(streams)
+        self.registry.register(AdmissionFigures(admission))
         self.registry.register(StoreCollector(db))
+
+    def watch_connections(self, connections: Connections) -> None:
+        """Add the figures of the connections of a server that listens."""
+        self.registry.register(ConnectionFigures(connections))
 
     def text(self) -> bytes:
         """Return all figures as text."""

@@ -15,6 +15,7 @@ from parenting.server.connections.files import room_for
 from parenting.server.connections.limits import Limits
 from parenting.server.connections.protocol import bounded
 from parenting.server.errors import SetupError
+from parenting.server.heap import share_heaps
 from parenting.server.log import set_up_log
 from parenting.server.settings import Settings
 
@@ -68,13 +69,16 @@ def make_server(settings: Settings) -> Server:
     Raises:
         SetupError: the database cannot be used as it is.
     """
+    share_heaps()
     set_up_log(settings, "web")
     app = create_app(settings)
     if settings.ballast:
         app.state.db.keep_ballast()
+    protocol = bounded(_limits(settings))
+    app.state.meters.watch_connections(protocol.open_connections)
     config = uvicorn.Config(
         app,
-        http=bounded(_limits(settings)),
+        http=protocol,
         ws="none",
         log_config=None,
         log_level=settings.log_level.lower(),

@@ -7,6 +7,9 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Protocol
 
+CODES = ("too_many", "too_large", "too_slow", "invalid")
+"""The error codes of what is refused before the application sees it."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -15,7 +18,8 @@ class Limits:
     connections: int = 1000
     """Connections at once. Where all are taken, the one that has been idle longest makes room."""
     per_client: int = 250
-    """Connections of one address at once. Loopback, where a proxy stands, has no such bound."""
+    """Connections of one address at once. Where it has them, its own longest idle one makes room. Loopback,
+    where a proxy stands, has no such bound."""
     head_bytes: int = 16 * 1024
     """Bytes of a request's head: its first line and its headers."""
     headers: int = 100
@@ -49,6 +53,10 @@ class Connections:
         self.limits = limits
         self._open: dict[Connection, str] = {}  # insertion order: the oldest, or longest idle, first
         self._by_client: Counter[str] = Counter()
+        self.ended = 0
+        """Idle connections that made room."""
+        self.refused: Counter[str] = Counter(dict.fromkeys(CODES, 0))
+        """Requests and connections that were refused here, before the application, by error code."""
 
     def __len__(self) -> int:
         """Return the number of open connections."""
@@ -56,9 +64,7 @@ class Connections:
 
     def admit(self, connection: Connection, client: str) -> bool:
         """Count a new connection; False if there is no room for it, not even by ending an idle one."""
-        if not is_loopback(client) and self._by_client[client] >= self.limits.per_client:
-            return False
-        if len(self._open) >= self.limits.connections and not self._make_room():
+        if not self._has_room(client):
             return False
         self._open[connection] = client
         self._by_client[client] += 1
@@ -79,12 +85,22 @@ class Connections:
         if not self._by_client[client]:
             del self._by_client[client]
 
-    def _make_room(self) -> bool:
-        longest = next((connection for connection in self._open if connection.idle()), None)
+    def _has_room(self, client: str) -> bool:
+        """Return whether one more fits, once an idle one was ended for it where a bound is reached."""
+        if not is_loopback(client) and self._by_client[client] >= self.limits.per_client:
+            return self._make_room(client)  # its place is the new one's, in all as well
+        return len(self._open) < self.limits.connections or self._make_room()
+
+    def _make_room(self, client: str | None = None) -> bool:
+        """End the connection that has been idle longest, of this client if one is named."""
+        open_ones = self._open.items()
+        idle = (one for one, its in open_ones if client in (None, its) and one.idle())
+        longest = next(idle, None)
         if longest is None:
             return False
         self.leave(longest)
         longest.end()
+        self.ended += 1
         return True
 
 

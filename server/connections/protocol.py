@@ -191,6 +191,7 @@ class BoundedProtocol(HttpToolsProtocol):
         """Reply by ourselves, unless a reply is on its way, and end the connection."""
         if self._ending:
             return
+        self.open_connections.refused[refused.code] += 1
         cycle: RequestResponseCycle | None = self.cycle  # none before the first request
         if cycle is not None and not cycle.response_complete:
             if not self._in_body:  # a request before this one is still being answered

@@ -101,11 +101,13 @@ def test_full_queue_refuses_at_once() -> None:
         async with gate.entered(5):
             second = asyncio.ensure_future(_enter(gate))
             await asyncio.sleep(0)
+            assert (gate.busy, gate.waiting) == (1, 1)
             with pytest.raises(BusyError, match="Too many requests wait"):
                 await _enter(gate)
             assert not second.done()
         await second
-        assert gate.waiting == 0
+        assert (gate.busy, gate.waiting) == (0, 0)
+        assert gate.refused == {"full": 1, "late": 0}
         await _enter(gate)  # the place was given back
 
     in_a_loop(test())
@@ -118,6 +120,7 @@ def test_place_that_stays_taken_is_busy() -> None:
             with pytest.raises(BusyError):
                 await _enter(gate, 0.01)
         await _enter(gate)
+        assert gate.refused == {"full": 0, "late": 1}
 
     in_a_loop(test())
 

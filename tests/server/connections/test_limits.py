@@ -43,12 +43,37 @@ def test_nobody_is_let_in_while_all_are_at_work() -> None:
 
 def test_one_client_cannot_take_the_places_of_all() -> None:
     connections = Connections(Limits(per_client=2))
-    held = [Fake(idle=True) for _ in range(2)]
+    held = [Fake(idle=False) for _ in range(2)]
     assert all(connections.admit(one, "192.0.2.1") for one in held)
     assert not connections.admit(Fake(idle=True), "192.0.2.1")
     assert connections.admit(Fake(idle=True), "192.0.2.2")
     connections.leave(held[0])
     assert connections.admit(Fake(idle=True), "192.0.2.1")
+
+
+def test_own_longest_idle_connection_of_a_client_makes_room() -> None:
+    connections = Connections(Limits(per_client=3))
+    others, busy, first, second = Fake(idle=True), Fake(idle=False), Fake(idle=True), Fake(idle=True)
+    assert connections.admit(others, "192.0.2.2")  # idle for longer, but not its own
+    assert all(connections.admit(one, "192.0.2.1") for one in (busy, first, second))
+    connections.touch(first)  # used since
+    assert connections.admit(Fake(idle=False), "192.0.2.1")
+    assert [one.ended for one in (others, busy, first, second)] == [False, False, False, True]
+    assert len(connections) == 4
+    assert connections.admit(Fake(idle=False), "192.0.2.1")
+    assert first.ended
+    assert not connections.admit(Fake(idle=False), "192.0.2.1"), "all three are at work"
+    assert (others.ended, connections.ended) == (False, 2)
+
+
+def test_client_at_its_bound_ends_nobody_elses_connection() -> None:
+    connections = Connections(Limits(connections=2, per_client=1))
+    others, own = Fake(idle=True), Fake(idle=True)
+    assert connections.admit(others, "192.0.2.2")
+    assert connections.admit(own, "192.0.2.1")
+    assert connections.admit(Fake(idle=True), "192.0.2.1")
+    assert (others.ended, own.ended) == (False, True)
+    assert len(connections) == 2
 
 
 def test_proxy_on_loopback_speaks_for_many() -> None:
