@@ -22,7 +22,7 @@ from sqlalchemy.exc import ArgumentError
 from sqlalchemy.orm import Session
 
 from parenting.server.columns import loads
-from parenting.server.errors import BusyError, SetupError, StoreError
+from parenting.server.errors import BusyError, GoneError, SetupError, StoreError
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql, sqlite
 from parenting.server.store.ballast import Ballast
@@ -34,6 +34,8 @@ from parenting.server.store.sqlite import BUSY_SECONDS
 
 REFUSED_SECONDS = 10.0
 """A refused write counts for this long, unless another one succeeds: a full disk lets a transaction begin."""
+SEEN_AT_ONCE = (BusyError, GoneError)
+"""What the beginning of a transaction meets as well, so that it need not be remembered."""
 Seen = TypeVar("Seen")
 STORES = {"sqlite": sqlite, "postgresql": postgresql, "postgres": postgresql}
 
@@ -108,15 +110,21 @@ class Database:
             postgresql.wait_for_log(session)
 
     def refusal(self) -> StoreError | None:
-        """Return what the store would say to a write now, or said to the last one; None if it is willing.
+        """Return what the store would say to a write now; None if it is willing.
 
-        A transaction is begun and given up; nothing is written. The caller's patience bounds the wait.
+        A transaction is begun and given up; nothing is written. The caller's patience bounds the wait. What
+        only a write would meet, such as a full disk, is what the last write met.
         """
         try:
             with self._transaction(self._hurried) as session:
                 session.rollback()
         except StoreError as error:
             return error
+        met = self.last_refusal()
+        return None if isinstance(met, SEEN_AT_ONCE) else met
+
+    def last_refusal(self) -> StoreError | None:
+        """Return what the store said to the last write, if that is not long ago."""
         refused = self._refused
         if refused is None or time.monotonic() - refused[1] > REFUSED_SECONDS:
             return None

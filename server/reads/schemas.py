@@ -205,7 +205,7 @@ def _workers(db: Database, runs: Sequence[Run], now: Mark) -> dict[int, Sign]:
     missed = [run.id for run in runs if signs[run.id] == "silent" and _signed(run, now, FORGIVEN)]
     if missed:
         with patience(PROBE_SECONDS):
-            refusal = db.refusal()
+            refusal = db.refusal() or db.last_refusal()  # a worker may wait a little longer
         if refusal is not None:
             signs.update(dict.fromkeys(missed, "alive"))
     return signs

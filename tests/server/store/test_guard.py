@@ -10,7 +10,7 @@ from sqlalchemy import PoolProxiedConnection, event, select
 
 from parenting.server.backups.restoring import restore
 from parenting.server.db import Database, connect
-from parenting.server.errors import GoneError, ServerError
+from parenting.server.errors import DiskFullError, GoneError, ServerError
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease
 from parenting.server.queue.worker_side import post_query
@@ -18,6 +18,7 @@ from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 from parenting.server.store.driver import sqlite_module
 from parenting.server.tables import Answer
+from parenting.server.workers import sign
 from tests.server.conftest import CLIPS
 
 pytestmark = pytest.mark.only("sqlite", "PostgreSQL keeps its own files")
@@ -125,6 +126,36 @@ def test_api_says_503_and_page_of_a_run_too(db: Database, client: httpx2.Client)
         assert "parenting restore" in found.json()["error"]["message"]
     back()
     assert client.get("/api/v1/runs").status_code == 200
+
+
+def test_it_is_ready_as_soon_as_the_file_is_back(
+    db: Database, client: httpx2.Client, guidance: int
+) -> None:
+    """A write was refused meanwhile; only what the beginning of a write cannot meet is remembered."""
+    sign(db, "worker")
+    back = away_file(file_of(db))
+    body = {"choice": "left", "client_id": "ann"}
+    assert client.post(f"/api/v1/queries/{guidance}/answer", json=body).status_code == 503
+    assert "store: store_gone" in client.get("/readyz").json()["error"]["message"]
+    back()
+    assert client.get("/readyz").status_code == 200
+
+
+def test_it_is_not_ready_while_the_last_write_met_a_full_disk(
+    db: Database, client: httpx2.Client, guidance: int
+) -> None:
+    sign(db, "worker")
+
+    def fill(*_arguments: object) -> None:
+        raise DiskFullError
+
+    event.listen(db.engine, "before_cursor_execute", fill)
+    with pytest.raises(DiskFullError):
+        answer(db, guidance, "left", "a", "human")
+    event.remove(db.engine, "before_cursor_execute", fill)
+    assert "store: disk_full" in client.get("/readyz").json()["error"]["message"]
+    answer(db, guidance, "left", "a", "human")
+    assert client.get("/readyz").status_code == 200
 
 
 def test_another_database_in_its_place_is_not_taken(
