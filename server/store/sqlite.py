@@ -29,7 +29,13 @@ PRAGMAS = {
     "synchronous": "full",
     "foreign_keys": "on",
     "busy_timeout": str(int(BUSY_SECONDS * 1000)),
+    "cache_size": "-256",  # kB of pages that each connection keeps; the system's own cache holds the file
 }
+KEPT, MORE = 8, 42
+"""Connections that stay open while nobody uses them, and others at most, which are closed after use. Each one
+keeps pages and prepared statements, so idle ones cost memory; forty threads and a few others may have one."""
+CONNECT = {"cached_statements": 64}
+"""Prepared statements that a connection keeps; each holds some kilobytes."""
 
 
 def open_engine(url: URL, reading: bool = False, **options: Any) -> Engine:
@@ -54,10 +60,11 @@ def open_engine(url: URL, reading: bool = False, **options: Any) -> Engine:
     engine = create_engine(
         url,
         module=module,
-        pool_size=20,
-        max_overflow=30,
+        pool_size=KEPT,
+        max_overflow=MORE,
+        pool_use_lifo=True,  # in turn, all would fill their caches
         pool_timeout=BUSY_SECONDS,
-        **({"creator": partial(open_file, path)} if only else {}),
+        **({"creator": partial(open_file, path)} if only else {"connect_args": CONNECT}),
         **options,
     )
     event.listen(engine, "connect", partial(_set_up, pragmas={} if only else PRAGMAS))
