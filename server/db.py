@@ -35,7 +35,7 @@ from parenting.server.store.sqlite import BUSY_SECONDS
 REFUSED_SECONDS = 10.0
 """A refused write counts for this long, unless another one succeeds: a full disk lets a transaction begin."""
 SEEN_AT_ONCE = (BusyError, GoneError)
-"""What the beginning of a transaction meets as well, so that it need not be remembered."""
+"""Refusals that the beginning of a transaction meets as well, so that they need not be remembered."""
 Seen = TypeVar("Seen")
 STORES = {"sqlite": sqlite, "postgresql": postgresql, "postgres": postgresql}
 

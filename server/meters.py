@@ -64,9 +64,7 @@ class Meters:
         """Count an error of the server's side by its code."""
         self._refusals.labels(code).inc()
 
-    def watch(
-        self, db: Database, streams: Callable[[], int], admission: Callable[[], Admission]
-    ) -> None:
+    def watch(self, db: Database, streams: Callable[[], int], admission: Callable[[], Admission]) -> None:
         """Add the figures of the store, of the open streams and of the queues before the threads."""
         gauge = Gauge("parenting_streams_open", "Live streams that are open.", registry=self.registry)
         gauge.set_function(streams)

@@ -128,9 +128,7 @@ def test_api_says_503_and_page_of_a_run_too(db: Database, client: httpx2.Client)
     assert client.get("/api/v1/runs").status_code == 200
 
 
-def test_it_is_ready_as_soon_as_the_file_is_back(
-    db: Database, client: httpx2.Client, guidance: int
-) -> None:
+def test_it_is_ready_as_soon_as_the_file_is_back(db: Database, client: httpx2.Client, guidance: int) -> None:
     """A write was refused meanwhile; only what the beginning of a write cannot meet is remembered."""
     sign(db, "worker")
     back = away_file(file_of(db))
