@@ -29,8 +29,10 @@ def served(settings: Settings) -> Iterator[int]:
     server = make_server(settings)
     with ThreadPoolExecutor(1) as thread:
         ended = thread.submit(server.run, [listener])
-        yield int(listener.getsockname()[1])
-        server.should_exit = True
+        try:
+            yield int(listener.getsockname()[1])
+        finally:
+            server.should_exit = True
         ended.result()
 
 
