@@ -79,6 +79,18 @@ def require_sound(database: Path) -> None:
         raise _damaged(database, str(error)) from None
     if faults:
         raise _damaged(database, faults[0].splitlines()[-1])
+    if _ends_amid_a_page(database, log):
+        raise _damaged(database, "it ends in the middle of a page")
+
+
+def _ends_amid_a_page(database: Path, log: Path) -> bool:
+    """Return whether the last page is cut: SQLite reads zeros there. A log may hold what is missing."""
+    if log.exists() and log.stat().st_size:
+        return False
+    with database.open("rb") as file:
+        header = file.read(18)
+    page = int.from_bytes(header[16:18], "big")
+    return database.stat().st_size % (65536 if page == 1 else page) != 0
 
 
 def _faults(connection: Any, database: Path) -> list[str]:
