@@ -107,8 +107,9 @@ def _figures(session: Session, db: Database) -> Iterator[Metric]:
     for status in RUN_STATUSES:
         runs.add_metric([str(status)], numbers.get(status, 0))
     yield runs
-    answers: int = session.execute(_ANSWERS).scalar_one()
+    answers, standing = session.execute(_ANSWERS).one()
     yield _gauge("parenting_answers_stored", "Answers in the store, corrections included.", answers)
+    yield _gauge("parenting_answers_standing", "Answers that stand.", standing)
     open_now = GaugeMetricFamily(
         "parenting_questions_open", "Questions that wait for a parent.", labels=["kind"]
     )
@@ -134,7 +135,10 @@ def _gauge(name: str, about: str, value: float) -> Metric:
 
 
 _RUNS = select(Run.status, func.count()).group_by(Run.status)
-_ANSWERS = select(cast(func.coalesce(func.sum(Run.answers), 0), BigInteger))
+_ANSWERS = select(
+    cast(func.coalesce(func.sum(Run.answers), 0), BigInteger),
+    cast(func.coalesce(func.sum(Run.answers - Run.retracted), 0), BigInteger),
+)
 _OPEN = (
     select(Query.kind, func.count().label("number"), func.min(Query.posted).label("oldest"))
     .join(Run, Run.id == Query.run_id)

@@ -84,6 +84,8 @@ class RunSchema(Schema):
     """True if the argmax policy takes a shortest safe path to the goal (never in the garden)."""
     answers: int
     """The number of answers so far, superseded ones included."""
+    standing: int
+    """The number of answers that stand: goal and progress count these."""
     open: OpenSchema
     worker: Literal["alive", "silent", "done"]
     """alive, silent (none raises this run, nor will one that is alive), or done (the run is over)."""
@@ -184,6 +186,28 @@ class StoredSchema(Schema):
     """The number of the answer within its run, from 1."""
     choice: Choice
     received: datetime
+    database: str
+    run_public_id: str
+    query_public_id: str
+
+
+class ChangedSchema(StoredSchema):
+    """The reply to a change: the answer that stands now."""
+
+    heard: bool
+    """True if the agent has heard an earlier answer to this question; it hears this one as a correction."""
+
+
+class WithdrawnSchema(Schema):
+    """The reply to a withdrawal."""
+
+    outcome: Literal["withdrawn", "heard"]
+    """withdrawn: the question is open again and leased to this client. heard: the agent has heard the answer,
+    and nothing was changed; the answer can be changed instead."""
+    query: int
+    run: int
+    choice: Choice | None
+    """The answer that was taken back, or that stands; null if this client gave none."""
     database: str
     run_public_id: str
     query_public_id: str

@@ -68,6 +68,11 @@ def _one_of(column: str, words: Iterable[str], nullable: bool = False) -> CheckC
     return CheckConstraint(f"{column} IS NULL OR {rule}" if nullable else rule, name=column)
 
 
+def _unique_where(name: str, condition: str, *columns: str) -> Index:
+    only = text(condition)
+    return Index(name, *columns, unique=True, sqlite_where=only, postgresql_where=only)
+
+
 def _public_id() -> Mapped[str]:
     """Return the column of a name that means the same forever, in whatever copy of the database."""
     return mapped_column(default=public_id, server_default=text("''"), unique=True, index=True)
@@ -124,23 +129,25 @@ class Run(Table):
     optimal: Mapped[bool] = mapped_column(default=False)
     maturity: Mapped[int] = mapped_column(default=1, server_default=text("1"))  # the stage T, for display
     speed: Mapped[float | None]  # ticks a second lately, for display
-    answers: Mapped[int] = mapped_column(
-        default=0
-    )  # numbers the run's answers, in the answer's own transaction
+    answers: Mapped[int] = mapped_column(default=0)  # numbers its answers, in their own transactions
+    retracted: Mapped[int] = mapped_column(default=0, server_default=text("0"))  # those that stand no more
     # what the operator set, and may change while it lives; neither changes what the agent does
     goal: Mapped[int | None]  # answered questions after which the run rests
     pace: Mapped[float | None]  # ticks a second at most, for those who want to watch
     # which worker raises it
     worker: Mapped[str | None]
-    fencing_token: Mapped[int] = mapped_column(
-        default=0
-    )  # grows at each claim; checked inside every write of a worker
+    fencing_token: Mapped[int] = mapped_column(default=0)  # grows at each claim; every write checks it
     heartbeat: Mapped[datetime | None]  # its last sign of life by the wall clock, for display, and
     claim_epoch: Mapped[str | None]  # by the clock that decides (`server.store.clock`)
     claim_mark: Mapped[float | None]
     versions: Mapped[dict[str, Any] | None]  # torch build and threads: other ones give other bits
     error: Mapped[str | None]
     weights: Mapped[str | None]  # the sha256 of the pre-trained weights (`Weights`); none: fresh ones
+
+    @property
+    def standing(self) -> int:
+        """The number of answers that stand."""
+        return self.answers - self.retracted
 
 
 class Weights(Table):
@@ -192,21 +199,9 @@ class Answer(Table):
     __table_args__ = (
         _one_of("choice", CHOICES),
         UniqueConstraint("run_id", "number"),
-        Index(
-            "uq_answer_standing",
-            "query_id",
-            unique=True,
-            sqlite_where=text("standing"),
-            postgresql_where=text("standing"),
-        ),
-        Index(
-            "uq_answer_first",
-            "query_id",
-            "client_id",
-            unique=True,
-            sqlite_where=text("supersedes IS NULL"),
-            postgresql_where=text("supersedes IS NULL"),
-        ),
+        _unique_where("uq_answer_standing", "standing", "query_id"),
+        _unique_where("uq_answer_first", "supersedes IS NULL", "query_id", "client_id"),
+        Index(None, "query_id"),
         Index(None, "run_id", "applied_tick", unique=True),  # at most one answer is heard in a tick
     )
 

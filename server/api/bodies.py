@@ -45,6 +45,14 @@ class AnswerBody(Strict):
     question: PublicId | None = Field(None, description="The `public_id` of the question.")
 
 
+class WithdrawBody(LeaseBody):
+    """The client that takes its answer back, and the names of the question."""
+
+    database: DatabaseId | None = Field(None, description="The `database` that came with the question.")
+    run: PublicId | None = Field(None, description="The `run_public_id` that came with it.")
+    question: PublicId | None = Field(None, description="The `public_id` of the question.")
+
+
 class ChangeBody(Strict):
     """A new value for a probability of Sec. 2."""
 

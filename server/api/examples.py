@@ -74,6 +74,7 @@ RUN: dict[str, Any] = {
     "pace": None,
     "optimal": False,
     "answers": 3,
+    "standing": 3,
     "open": {"guidance": 1, "preference": 0},
     "worker": "alive",
 }
@@ -126,6 +127,8 @@ ANSWERS = {
 }
 NAMES = {"database": DATABASE, "run_public_id": RUN_ID, "query_public_id": QUESTION_ID}
 STORED = {"query": 7, "run": 1, "number": 4, "choice": "left", "received": NOON, **NAMES}
+CHANGED = {**STORED, "number": 5, "choice": "right", "heard": True}
+WITHDRAWN = {"outcome": "withdrawn", "query": 7, "run": 1, "choice": "left", **NAMES}
 METRIC = {"tick": 4, "values": {"deaths": 0, "loss": 0.6931, "entropy_global": 1.386}}
 EVENTS = [
     {"id": 1, "run": 1, "event": {"kind": "mature"}, "created": NOON, "applied_tick": 4},
@@ -198,6 +201,8 @@ SHOWN = {
     "lease_question": Shown(LEASED, {"me": LEASE}),
     "get_question": Shown(ASKED),
     "answer_question": Shown(STORED, ANSWERS),
+    "change_answer": Shown(CHANGED, {"to right": {"choice": "right", "client_id": "me"}}),
+    "withdraw_answer": Shown(WITHDRAWN, {"mine": LEASE}),
     "release_question": Shown(None, {"me": LEASE}),
     "follow_run": Shown(STREAM),
     "export_run": Shown(json.dumps(EXPORTED) + "\n"),

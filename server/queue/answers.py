@@ -1,4 +1,4 @@
-"""A parent's answers: store one, once, or supersede it. Each verb is one transaction.
+"""A parent's answers: store one, once. Each verb is one transaction; `revisions` changes an answer.
 
 Silence is never consent: no verb answers by itself.
 """
@@ -9,18 +9,17 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import and_, bindparam, insert, select, update
+from sqlalchemy import and_, bindparam, func, insert, select, update
 from sqlalchemy.orm import Session
 
 from parenting.server.chain import BEGIN, OF_QUERY, hashes
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
-from parenting.server.queue.locks import lock_query
 from parenting.server.queue.names import UNSTATED, Names, Place, find_place
 from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
 from parenting.server.store.relay import announce
-from parenting.server.tables import Answer, Query, Table
+from parenting.server.tables import Query, Table
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,8 @@ def answer(
 ) -> Stored:
     """Store an answer, once, if it is meant for this database, run and question.
 
-    The same answer by the same client gets the same reply. A late answer is taken if none stands.
+    The same answer by the same client gets the same reply. A late answer is taken if none stands. One that
+    follows an answer that was taken back names its row.
 
     Args:
         db: The database.
@@ -90,42 +90,22 @@ def answer_in(
     place = find_place(session, query, names)
     if not db.one_writer:
         lock(session, place.run)
-    asked = session.execute(_ASKED, {"query_id": place.query}).one()
+    asked = find_asked(session, place.query)
     if asked.standing is not None:
         return _again(asked, said, place)
     if session.execute(_ANSWERED, {"query_id": place.query}).scalar() is None:
         raise Conflict("This question was withdrawn: the run or its episode was ended before an answer came.")
-    number, received = _add(session, db, asked, said)
+    number, received = add(session, db, asked, said)
     return Stored(**vars(place), number=number, choice=said.choice, received=received)
 
 
-def supersede(db: Database, query_id: int, choice: str, client_id: str, parent: str) -> Answer:
-    """Put another answer in the place of the one that stands; the old row stays and keeps its tick.
-
-    No page, route or command calls this verb in this version, so no parent can correct an answer yet. Exports
-    and the history show superseded answers, and tests hold them to it by this verb.
-
-    Raises:
-        NotFound: there is no such query.
-        Conflict: there is no answer to supersede yet.
-    """
-    with db.write() as session:
-        query = lock_query(session, query_id)
-        before = _standing(session, query_id)
-        if before is None:
-            raise Conflict(f"Question {query_id} has no answer to supersede.")
-        before.standing = False
-        session.flush()
-        asked = session.execute(_ASKED, {"query_id": query_id}).one()
-        number, _ = _add(session, db, asked, Said(choice, client_id, parent), supersedes=before.id)
-        added = select(Answer).where(Answer.run_id == query.run_id, Answer.number == number)
-        return session.scalars(added).one()
+def find_asked(session: Session, query: int) -> Any:
+    """Return a question as it is hashed, with the answer that stands and the last link of its run's chain."""
+    return session.execute(_ASKED, {"query_id": query}).one()
 
 
-def _add(
-    session: Session, db: Database, asked: Any, said: Said, supersedes: int | None = None
-) -> tuple[int, datetime]:
-    """Add an answer, and return its number and time."""
+def add(session: Session, db: Database, asked: Any, said: Said) -> tuple[int, datetime]:
+    """Add an answer after the last one to its question, and return its number and time."""
     run_id: int = asked.run_id
     # Numbered in this transaction: no reader can see number n + 1 before n.
     number = session.execute(_NUMBERED, {"run_id": run_id}).scalar_one()
@@ -134,7 +114,7 @@ def _add(
         "run_id": run_id,
         "number": number,
         **vars(said),
-        "supersedes": supersedes,
+        "supersedes": asked.last,
         "standing": True,
         "received": db.clock(),
     }
@@ -155,21 +135,22 @@ def _again(asked: Any, said: Said, place: Place) -> Stored:
     return Stored(**vars(place), number=asked.number, choice=asked.choice, received=asked.received)
 
 
-def _standing(session: Session, query_id: int) -> Answer | None:
-    return session.scalars(_STANDING, {"query_id": query_id}).one_or_none()
-
-
 # Statements that every answer needs are built once.
-_STANDING = select(Answer).where(Answer.query_id == bindparam("query_id"), Answer.standing)
 _RUN, _QUERY, _ANSWER = (Table.metadata.tables[name] for name in ("run", "query", "answer"))
-_run, _query, _answer, _last = _RUN.c, _QUERY.c, _ANSWER.c, _ANSWER.alias()
+_run, _query, _answer, _last, _earlier = _RUN.c, _QUERY.c, _ANSWER.c, _ANSWER.alias(), _ANSWER.alias()
+_BEFORE = select(func.max(_earlier.c.id)).where(_earlier.c.query_id == _query.id).scalar_subquery()
 _ASKED = (
     select(
         _query.id.label("query_id"),
-        *(_query[name] for name in ("run_id", *OF_QUERY)),
+        _run.status.label("run_status"),
+        *(_query[name] for name in ("run_id", "status", *OF_QUERY)),
         _answer.id.label("standing"),
         *(_answer[name] for name in ("client_id", "choice", "number", "received")),
         _last.c.link.label("last_link"),
+        select(func.max(_earlier.c.id))
+        .where(_earlier.c.query_id == _query.id)
+        .scalar_subquery()
+        .label("last"),
     )
     .select_from(_QUERY)
     .join(_RUN, _run.id == _query.run_id)
@@ -177,7 +158,6 @@ _ASKED = (
     .outerjoin(_last, and_(_last.c.run_id == _run.id, _last.c.number == _run.answers))
     .where(_query.id == bindparam("query_id"))
 )
-"""A question as it is hashed, with the answer that stands and the last link of its run's chain."""
 _ANSWERED = (
     update(_QUERY)
     .where(_query.id == bindparam("query_id"), _query.status == QueryStatus.OPEN)

@@ -20,7 +20,7 @@ from parenting.server.queue.locks import lock_query
 from parenting.server.queue.queries import guidance_first
 from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
-from parenting.server.store.clock import holds, is_over
+from parenting.server.store.clock import Mark, holds, is_over
 from parenting.server.tables import Query, Run, Table
 
 LEASE_SECONDS = 60.0
@@ -103,18 +103,29 @@ def _hold_in(
     mark = db.mark(session)  # behind the lock: nobody else's lease begins later
     query = _first_readable(session, offer, {**asks, **mark.bound()})
     if query is not None:
-        held = {
-            "leased_by": asks["client_id"],
-            "leased_until": db.clock() + timedelta(seconds=seconds),
-            "lease_epoch": mark.epoch,
-            "lease_begin": mark.seconds,
-            "lease_end": mark.seconds + seconds,
-        }
+        held = _columns(db, mark, asks["client_id"], seconds)
         session.execute(_HELD, {"query_id": query.id, **held})
         for name, value in held.items():
             set_committed_value(query, name, value)
         db.outlive_crash(session)
     return query
+
+
+def hold_in(session: Session, db: Database, query_id: int, client_id: str, seconds: float) -> None:
+    """Hold one open query for a client, unless another holds it, in a transaction that is already open."""
+    mark = db.mark(session)
+    asks = {"query_id": query_id, "client_id": client_id, **mark.bound()}
+    session.execute(_HELD_IF_FREE, asks | _columns(db, mark, client_id, seconds))
+
+
+def _columns(db: Database, mark: Mark, client_id: str, seconds: float) -> dict[str, Any]:
+    return {
+        "leased_by": client_id,
+        "leased_until": db.clock() + timedelta(seconds=seconds),
+        "lease_epoch": mark.epoch,
+        "lease_begin": mark.seconds,
+        "lease_end": mark.seconds + seconds,
+    }
 
 
 def _first_readable(session: Session, offer: Any, asks: dict[str, Any]) -> Query | None:
@@ -142,13 +153,15 @@ _HELD = update(_QUERY).where(_QUERY.c.id == bindparam("query_id"))
 _LEASE = (Query.lease_epoch, Query.lease_begin, Query.lease_end)
 _MINE = and_(Query.leased_by == bindparam("client_id"), holds(*_LEASE))
 _FREE = is_over(*_LEASE)
+_HELD_IF_FREE = _HELD.where(_QUERY.c.status == QueryStatus.OPEN, or_(_MINE, _FREE))
+_STANDING = Run.answers - Run.retracted
 _OPEN = (
     select(Query)
     .join(Run, Run.id == Query.run_id)
     .where(Query.run_id == bindparam("run_id"), Query.status == QueryStatus.OPEN, or_(_MINE, _FREE))
     .limit(1)
 )
-_OFFER = _OPEN.where(or_(Run.goal.is_(None), Run.answers < Run.goal)).order_by(
+_OFFER = _OPEN.where(or_(Run.goal.is_(None), Run.goal > _STANDING)).order_by(
     case((_MINE, 0), else_=1), guidance_first(), Query.tick
 )
 _other = aliased(Query)
@@ -163,5 +176,5 @@ _ANSWERS_TO_COME = (
     .scalar_subquery()
 )
 _AHEAD = _OPEN.where(
-    Query.id.not_in(_SHOWN), or_(Run.goal.is_(None), Run.answers + _ANSWERS_TO_COME < Run.goal)
+    Query.id.not_in(_SHOWN), or_(Run.goal.is_(None), Run.goal > _STANDING + _ANSWERS_TO_COME)
 ).order_by(guidance_first(), Query.tick)

@@ -43,7 +43,7 @@ class Watch:
     open_guidance: int
     open_preferences: int
     answers: int  # given and not yet heard
-    answered: int  # given since its birth
+    answered: int  # given since its birth, those that stand
     goal: int | None  # answered questions after which it rests
     pace: float | None  # ticks a second at most
     events: int  # not yet applied
@@ -86,6 +86,7 @@ _WATCH = select(
     ),
     _number(Query.run_id == Run.id, Query.status == QueryStatus.ANSWERED).label("answers"),
     Run.answers.label("answered"),
+    Run.retracted,
     Run.goal,
     Run.pace,
     _number(OperatorEvent.run_id == Run.id, OperatorEvent.applied_tick.is_(None)).label("events"),
@@ -114,10 +115,11 @@ def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
 
 def _watched(columns: dict[str, Any]) -> Watch:
     """Return what a worker watches. A run whose row is damaged is over for it: `runs.claim` says why."""
-    if any(isinstance(value, Damaged) for value in columns.values()):
+    retracted = columns.pop("retracted")
+    if isinstance(retracted, Damaged) or any(isinstance(value, Damaged) for value in columns.values()):
         sound: dict[str, Any] = {n: None if isinstance(v, Damaged) else v for n, v in columns.items()}
         return Watch(**{**sound, "status": RunStatus.FAILED, "fencing_token": -1, "answered": 0})
-    return Watch(**columns)
+    return Watch(**{**columns, "answered": columns["answered"] - retracted})
 
 
 def high_water(db: Database, run_id: int) -> int:

@@ -124,7 +124,7 @@ def leased_schema(session: Session, query: Query) -> LeasedSchema:
         **_query_fields(query, stated(now.database), run_public_id),
         world=world,
         parent=parent,
-        progress=ProgressSchema(answered=now.answers, open=now.open),
+        progress=ProgressSchema(answered=now.answers - now.retracted, open=now.open),
     )
 
 
@@ -178,7 +178,7 @@ def _run_schema(run: Run, opened: Open, worker: Sign, database: str) -> RunSchem
     made = ("open", "worker", "resting", "state", "database")
     own = {name: getattr(run, name) for name in RunSchema.model_fields if name not in made}
     shown = OpenSchema(guidance=opened.guidance, preference=opened.preference)
-    resting = run.status not in OVER and run.goal is not None and run.answers >= run.goal
+    resting = run.status not in OVER and run.goal is not None and run.standing >= run.goal
     state = _run_state(run, opened, resting, worker)
     return RunSchema(**own, open=shown, worker=worker, resting=resting, state=state, database=database)
 
@@ -232,6 +232,7 @@ def _signed(run: Run, now: Mark, within: timedelta) -> bool:
 # What every leased question needs is built once.
 _PROGRESS = select(
     Run.answers,
+    Run.retracted,
     select(func.count())
     .where(Query.run_id == Run.id, Query.status == QueryStatus.OPEN, Query.kind.in_(KINDS))
     .correlate(Run)

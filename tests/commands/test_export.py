@@ -15,7 +15,8 @@ from parenting.commands.main import app
 from parenting.server.db import Database
 from parenting.server.export import lines
 from parenting.server.new_run import NewRun, start
-from parenting.server.queue.answers import answer, supersede
+from parenting.server.queue.answers import answer
+from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import claim
 from tests.server.conftest import CLIPS

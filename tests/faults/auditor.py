@@ -65,6 +65,8 @@ def audit(store: Store, entries: Entries) -> list[str]:
         *told_answers_are_stored(entries.told, runs, queries, answers),
         *one_answer_stands(queries, answers),
         *numbers_have_no_gaps(runs, answers),
+        *what_stands_no_more_is_counted(runs, answers),
+        *corrections_name_what_they_replace(answers),
         *statuses_fit(queries, answers),
         *nothing_is_asked_twice(queries),
         *one_answer_a_tick(answers),
@@ -115,6 +117,25 @@ def numbers_have_no_gaps(runs: Sequence[Row], answers: Sequence[Row]) -> Iterato
             yield f"A5 run {run['id']} has answers numbered {found}"
         if run["answers"] != len(found):
             yield f"A5 run {run['id']} counts {run['answers']} answers and has {len(found)}"
+
+
+def what_stands_no_more_is_counted(runs: Sequence[Row], answers: Sequence[Row]) -> Iterator[str]:
+    """A5: a run knows how many of its answers stand."""
+    fallen = Counter(row["run_id"] for row in answers if not row["standing"])
+    for run in runs:
+        if run["retracted"] != fallen[run["id"]]:
+            yield f"A5 run {run['id']} counts {run['retracted']} that stand no more, of {fallen[run['id']]}"
+
+
+def corrections_name_what_they_replace(answers: Sequence[Row]) -> Iterator[str]:
+    """A2: the answers to a query are a chain: each names the one before it, and the last alone may stand."""
+    chains: defaultdict[int, list[Row]] = defaultdict(list)
+    for row in sorted(answers, key=lambda row: int(row["id"])):
+        chains[row["query_id"]].append(row)
+    for query, chain in chains.items():
+        before = [None, *(row["id"] for row in chain[:-1])]
+        if [row["supersedes"] for row in chain] != before or any(row["standing"] for row in chain[:-1]):
+            yield f"A2 the answers to query {query} do not follow one another"
 
 
 def statuses_fit(queries: Sequence[Row], answers: Sequence[Row]) -> Iterator[str]:

@@ -15,8 +15,9 @@ from typing import Any
 import torch
 from pydantic import TypeAdapter
 
-from parenting.agent import parenting
+from parenting.agent import amendment, parenting
 from parenting.agent import query as queries
+from parenting.agent.amendment import Applied, Correction, TickEvent
 from parenting.agent.config import Config
 from parenting.agent.events import Event
 from parenting.agent.init import world_of
@@ -47,19 +48,45 @@ class Recorded:
         ticks = {row["id"]: row["tick"] for row in self.asked.values()}
         answers = store.rows(f"SELECT * FROM answer WHERE run_id = {run} AND applied_tick IS NOT NULL")
         self.heard = {row["applied_tick"]: (ticks[row["query_id"]], row["choice"]) for row in answers}
+        self.correction: Applied | None = None  # of this tick
         self.operator = store.rows(
             f"SELECT * FROM event WHERE run_id = {run} AND applied_tick IS NOT NULL ORDER BY id"
         )
         self.kept: dict[int, Query] = {}
         self.tick, self.found = 0, list[str]()
 
-    def events(self, state: AgentState) -> Sequence[Event]:
+    def events(self, state: AgentState) -> Sequence[TickEvent]:
         self.tick = int(state.keys.tick[0]) + 1
         rows = [row for row in self.operator if row["applied_tick"] == self.tick]
-        return [_EVENTS.validate_python({"kind": row["kind"], **read_json(row["payload"])}) for row in rows]
+        events = [_EVENTS.validate_python({"kind": row["kind"], **read_json(row["payload"])}) for row in rows]
+        correction = self._correction()
+        self.correction = None if correction is None else amendment.take(state, events, correction)
+        return events if self.correction is None else [*events, self.correction.event]
+
+    def _correction(self) -> Correction | None:
+        """The correction of this tick: an answer to a query of which another answer was heard before."""
+        asked, choice = self.heard.get(self.tick, (-1, ""))
+        last = {
+            known: (tick, said)
+            for tick, (known, said) in sorted(self.heard.items())
+            if tick < self.tick and known in self.kept
+        }
+        if asked not in last:
+            return None
+        standing = {**last, asked: (self.tick, choice)}
+        return Correction(
+            self._answer(asked, choice),
+            self._answer(asked, last[asked][1]),
+            [
+                self._answer(known, said)
+                for known, (tick, said) in sorted(standing.items(), key=lambda one: one[1])
+            ],
+        )
 
     def take(self, state: AgentState) -> Answer:
-        if self.tick not in self.heard:
+        if self.correction is not None and self.correction.heard is not None:
+            return self.correction.heard
+        if self.correction is not None or self.tick not in self.heard:
             return queries.silence(self.nothing)
         asked, choice = self.heard[self.tick]
         if asked not in self.kept:
@@ -67,6 +94,9 @@ class Recorded:
                 f"C2 at tick {self.tick} an answer to tick {asked} is heard, where nothing was asked"
             )
             return queries.silence(self.nothing)
+        return self._answer(asked, choice)
+
+    def _answer(self, asked: int, choice: str) -> Answer:
         query = self.kept[asked]
         return Answer(query=query, choice=torch.full_like(query.kind, int(CHOICES[choice])))
 
@@ -105,10 +135,11 @@ def entries_of_x(store: Store, run: int) -> tuple[int, int]:
     """The entries of X in the last checkpoint, and the answers up to its tick that may have entered it."""
     saved = _checkpoint(store, run)
     heard = store.rows(
-        f"SELECT count(*) AS n FROM answer WHERE run_id = {run} AND choice <> 'neither' "
-        f"AND applied_tick <= {int(saved['keys.tick'][0])}"
+        f"SELECT query_id, choice FROM answer WHERE run_id = {run} "
+        f"AND applied_tick <= {int(saved['keys.tick'][0])} ORDER BY applied_tick"
     )
-    return int(saved["x.size"][0]), int(heard[0]["n"])
+    standing = {row["query_id"]: row["choice"] for row in heard}
+    return int(saved["x.size"][0]), sum(choice != "neither" for choice in standing.values())
 
 
 def _differing(state: AgentState, saved: dict[str, torch.Tensor]) -> list[str]:

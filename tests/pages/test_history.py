@@ -9,7 +9,7 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.pages.history import PAGE
-from parenting.server.queue import answers, worker_side
+from parenting.server.queue import answers, revisions, worker_side
 from parenting.server.runs import Claim, get_run
 from tests.pages import island_fixtures as fixtures
 from tests.pages.parent_page import look
@@ -105,7 +105,7 @@ def test_some_of_them(client: httpx2.Client, db: Database, mine: Claim) -> None:
 
 def test_a_corrected_answer_says_so(client: httpx2.Client, db: Database, mine: Claim) -> None:
     query = answered(db, mine, 1, "left")
-    answers.supersede(db, query, "right", ME, "human")
+    revisions.supersede(db, query, "right", ME, "human")
     page = client.get("/runs/1/history").text
     assert "corrected later" in entry(page, 1)
     assert "corrected later" not in entry(page, 2)

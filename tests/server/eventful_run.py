@@ -10,7 +10,7 @@ import httpx2
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.new_run import start
-from parenting.server.queue import answers, worker_side
+from parenting.server.queue import answers, revisions, worker_side
 from parenting.server.queue.queries import open_counts
 from parenting.server.session import RunSession
 from tests.server.raising import Begun
@@ -90,7 +90,7 @@ def raise_eventful_run(db: Database, web: httpx2.Client) -> int:
     people.until_guidance_is_open()
     query = people.answer()
     people.live_to(people.life.last_tick + 3)
-    answers.supersede(db, query, "either", "tab", "human")  # too late: the agent has heard the other answer
+    revisions.supersede(db, query, "either", "tab", "human")  # too late: the agent has heard the other answer
     assert answers.get_query(db, query).status == "applied"
     people.operate("change", name="p_train", value=0.5)
     people.live_to(50)

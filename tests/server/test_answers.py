@@ -10,8 +10,9 @@ from sqlalchemy.exc import IntegrityError
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
 from parenting.server.queue import answers
-from parenting.server.queue.answers import answer, get_query, supersede
+from parenting.server.queue.answers import answer, get_query
 from parenting.server.queue.leases import LEASE_SECONDS, lease, lease_ahead, release
+from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import post_query
 from parenting.server.reads import pagination
 from parenting.server.runs import Claim, get_run, set_status

@@ -9,7 +9,8 @@ from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
 from parenting.server.new_run import NewRun, start
 from parenting.server.operator_events import add_operator_event
-from parenting.server.queue.answers import answer, supersede
+from parenting.server.queue.answers import answer
+from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.runs import Claim
 from tests.server.conftest import CLIPS

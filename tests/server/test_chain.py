@@ -10,7 +10,8 @@ from sqlalchemy import text
 from parenting.server.chain import AT_ANSWER, AT_MIGRATION, check
 from parenting.server.db import Database
 from parenting.server.migrate import downgrade, upgrade
-from parenting.server.queue.answers import answer, supersede
+from parenting.server.queue.answers import answer
+from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.reads.answers import every
 from parenting.server.runs import Claim

@@ -11,7 +11,8 @@ from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.export import MU, lines, rows
 from parenting.server.identity import database_id
-from parenting.server.queue.answers import answer, get_query, supersede
+from parenting.server.queue.answers import answer, get_query
+from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.runs import Claim, get_run
 from tests.server.conftest import CLIPS, Clock

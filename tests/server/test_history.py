@@ -6,7 +6,8 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
-from parenting.server.queue.answers import answer, supersede
+from parenting.server.queue.answers import answer
+from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import post_query
 from parenting.server.reads import answers
 from parenting.server.runs import Claim

@@ -13,6 +13,7 @@ from parenting.server.db import Database
 from parenting.server.errors import BusyError
 from parenting.server.meters import _ANSWERS, _OPEN, _RUNS
 from parenting.server.queue.answers import answer
+from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, set_status
 from parenting.server.statuses import RunStatus
@@ -72,12 +73,14 @@ def test_no_label_grows_with_what_is_asked(client: httpx2.Client) -> None:
 def test_the_store_is_told_as_it_is(client: httpx2.Client, db: Database, mine: Claim, clock: Clock) -> None:
     answered = post_query(db, mine, 1, "preference", 1, CLIPS)
     answer(db, answered, "left", "tab", "human")
+    supersede(db, answered, "right", "tab", "human")
     post_query(db, mine, 2, "guidance", 1, CLIPS)
     sign(db, "worker")
     clock.pass_seconds(7)
     found = figures(client)
     assert found["parenting_store_up", ()] == 1
-    assert found["parenting_answers_stored", ()] == 1
+    assert found["parenting_answers_stored", ()] == 2
+    assert found["parenting_answers_standing", ()] == 1
     assert found["parenting_runs", ("active",)] == 1
     assert found["parenting_runs", ("failed",)] == 0
     assert found["parenting_questions_open", ("guidance",)] == 1

@@ -5,9 +5,10 @@ import pytest
 from parenting.server.db import Database
 from parenting.server.errors import LostClaimError
 from parenting.server.operator_events import add_operator_event
-from parenting.server.queue.answers import answer, get_query, supersede
+from parenting.server.queue.answers import answer, get_query
 from parenting.server.queue.corrections import take_correction
 from parenting.server.queue.queries import open_counts
+from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import (
     high_water,
     post_query,
