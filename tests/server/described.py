@@ -75,6 +75,8 @@ def _lead(case: Case[Any], db: Database) -> None:
     """Well-formed ids lead to what is there, and one in so many beyond; malformed ones stay as they are."""
     for name, count, table in (("run_id", RUNS, Run), ("query_id", QUESTIONS, Query)):
         drawn = case.path_parameters.get(name)
+        if isinstance(drawn, list | dict):  # as text it is escaped; else a "?" in it would end the path
+            case.path_parameters[name] = str(drawn)
         if isinstance(drawn, str) and is_public_id(drawn) and drawn[0] not in "12345":
             case.path_parameters[name] = _public_id(db, table, 1 + ord(drawn[0]) % count)
         if type(drawn) is int and 0 < drawn <= LARGEST_INT:
