@@ -213,6 +213,17 @@ class WithdrawnSchema(Schema):
     query_public_id: str
 
 
+class RenewedSchema(Schema):
+    """The questions of a page by who has them, as public ids."""
+
+    yours: list[str]
+    """Held by this client, or by nobody: an answer is welcome."""
+    elsewhere: list[str]
+    """Held by somebody else."""
+    closed: list[str]
+    """Answered, withdrawn, or not of this run."""
+
+
 class AnswerSchema(Schema):
     """The answer that stands for a question."""
 

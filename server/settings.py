@@ -52,6 +52,12 @@ class Settings(BaseSettings):
     lease_seconds: float = Field(
         60.0, gt=0, description="How long a question is held for the parent who was shown it."
     )
+    attention_seconds: float = Field(
+        120.0,
+        gt=0,
+        description="How long after a parent's last sign of life (pointer, key, scroll, focus, touch) their "
+        "question is still held.",
+    )
     claim_seconds: float = Field(
         5.0, gt=0, description="How long a run stays with a worker that gives no sign of life."
     )

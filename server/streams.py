@@ -22,6 +22,7 @@ from parenting.server.db import Database
 from parenting.server.errors import ServerError, StoreError, TooManyStreamsError
 from parenting.server.notify import Notifier
 from parenting.server.queue.leases import waiting
+from parenting.server.queue.presence import held
 from parenting.server.reads.metrics import list_metrics
 from parenting.server.reads.schemas import metric_schemas, run_schema
 from parenting.server.store.relay import Relay
@@ -32,6 +33,7 @@ YIELD_SECONDS = 0.1
 """After a notification, streams wait this many seconds so that requests for a question are served first."""
 
 Found = TypeVar("Found")
+Seen = tuple[dict[str, Any], dict[str, Any] | None, list[dict[str, str]]]
 
 ROWS = 10_000
 """Metrics in one event, at most."""
@@ -44,6 +46,7 @@ class Subscription:
     streams: int = 0
     run: dict[str, Any] = field(default_factory=dict)
     question: dict[str, Any] | None = None
+    leases: list[dict[str, str]] = field(default_factory=list)
     changed: asyncio.Event = field(default_factory=asyncio.Event)
     task: asyncio.Task[None] | None = None
 
@@ -81,17 +84,21 @@ class Streams:
         self.notifier.close()
 
     async def subscribe(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
-        """The events of a run: `run`, `question`, and, unless `after` is None, `metrics` of later ticks."""
+        """The events of a run; `metrics` of the ticks after `after` are among them unless that is None."""
         subscription = self._join(run_id)
         try:
             seen: dict[str, Any] = {}
             asked: Any = ...
+            leases: Any = []
             ready = 0.0
             while not self.closed:
                 changed = subscription.changed
                 if subscription.run and subscription.question != asked:
                     asked = subscription.question
                     yield ServerSentEvent(event="question", raw_data=json.dumps(asked))  # "null" is data too
+                if subscription.leases != leases:
+                    leases = subscription.leases
+                    yield ServerSentEvent(event="leases", raw_data=json.dumps(leases))
                 now = asyncio.get_running_loop().time()
                 if subscription.run != seen and now >= ready:
                     seen, ready = subscription.run, now + POLL_SECONDS
@@ -156,14 +163,16 @@ class Streams:
         while not self.closed:
             notified = self._notified
             look = partial(_look, self.db, run_id)
+            ends_in: float | None = None
             try:
-                run, question = await self.admission.read(look)
+                now, ends_in = await self.admission.read(look)
             except ServerError:  # busy: the next look will tell
-                run, question = subscription.run, subscription.question
-            if (run, question) != (subscription.run, subscription.question):
-                subscription.run, subscription.question = run, question
+                now = subscription.run, subscription.question, subscription.leases
+            if now != (subscription.run, subscription.question, subscription.leases):
+                subscription.run, subscription.question, subscription.leases = now
                 _tell(subscription)
-            await _either(notified, POLL_SECONDS)
+            # the end of a lease is no write: nobody notifies of it
+            await _either(notified, POLL_SECONDS if ends_in is None else min(POLL_SECONDS, ends_in))
             if notified.is_set() and self.waiting_requests:
                 await asyncio.sleep(YIELD_SECONDS)
 
@@ -196,11 +205,12 @@ def _tell(subscription: Subscription) -> None:
     subscription.changed = asyncio.Event()
 
 
-def _look(db: Database, run_id: int) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """The run, and the most urgent open question, in few words."""
+def _look(db: Database, run_id: int) -> tuple[Seen, float | None]:
+    """The run, its most urgent open question, and its leases; then the seconds until one of them ends."""
     query = waiting(db, run_id)
     question = None if query is None else {"id": query.id, "public_id": query.public_id, "kind": query.kind}
-    return run_schema(db, run_id).model_dump(mode="json"), question
+    leases = held(db, run_id)
+    return (run_schema(db, run_id).model_dump(mode="json"), question, leases.leases), leases.ends_in
 
 
 async def _either(event: asyncio.Event, timeout: float | None) -> None:

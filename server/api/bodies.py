@@ -34,6 +34,13 @@ class LeaseBody(Strict):
     )
 
 
+class RenewBody(LeaseBody):
+    """The client that shows questions, and how long ago its person gave a sign of life."""
+
+    questions: list[PublicId] = Field(max_length=100, description="The `public_id` of each question.")
+    idle: float = Field(0.0, ge=0, description="Seconds since the person's last sign of life.")
+
+
 class AnswerBody(Strict):
     """The parent's choice, and who decided."""
 

@@ -203,6 +203,11 @@ SHOWN = {
     "answer_question": Shown(STORED, ANSWERS),
     "change_answer": Shown(CHANGED, {"to right": {"choice": "right", "client_id": "me"}}),
     "withdraw_answer": Shown(WITHDRAWN, {"mine": LEASE}),
+    "renew_leases": Shown(
+        {"yours": [QUESTION_ID], "elsewhere": [], "closed": []},
+        {"looking": {"client_id": "me", "questions": [QUESTION_ID], "idle": 3.5}},
+    ),
+    "leave_questions": Shown(None, {"me": LEASE}),
     "release_question": Shown(None, {"me": LEASE}),
     "follow_run": Shown(STREAM),
     "export_run": Shown(json.dumps(EXPORTED) + "\n"),

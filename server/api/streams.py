@@ -50,7 +50,9 @@ async def follow_run(
     """Follow a run by server-sent events: the state at the beginning, then every change.
 
     `run` is the run as GET returns it, at most once in 250 ms. `question` is the most urgent open question
-    (id and kind) or null, without delay. `metrics` are rows of the ticks after `after`, if it is given.
+    (id and kind) or null, without delay. `leases` says without delay who holds which open question, by a name
+    that tells nothing else, and comes again when a lease ends. `metrics` are rows of the ticks after `after`,
+    if it is given.
     """
     if (
         after is not None

@@ -53,6 +53,14 @@ def lease_ahead(
     return _hold(db, _AHEAD, asks, seconds)
 
 
+def take(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECONDS) -> Query | None:
+    """Hold a query as `lease` does; where none is free, the most urgent one that somebody else holds.
+
+    Their page says so; whoever answers first, that answer stands. None if nothing is open.
+    """
+    return _hold(db, _TAKEN, {"run_id": run_id, "client_id": client_id}, seconds)
+
+
 def may_lease(db: Database, run_id: int, client_id: str) -> bool:
     """Return whether a query is free for this client, or held for it already."""
     with db.read() as session:
@@ -155,15 +163,16 @@ _MINE = and_(Query.leased_by == bindparam("client_id"), holds(*_LEASE))
 _FREE = is_over(*_LEASE)
 _HELD_IF_FREE = _HELD.where(_QUERY.c.status == QueryStatus.OPEN, or_(_MINE, _FREE))
 _STANDING = Run.answers - Run.retracted
-_OPEN = (
+_ANY = (
     select(Query)
     .join(Run, Run.id == Query.run_id)
-    .where(Query.run_id == bindparam("run_id"), Query.status == QueryStatus.OPEN, or_(_MINE, _FREE))
+    .where(Query.run_id == bindparam("run_id"), Query.status == QueryStatus.OPEN)
     .limit(1)
 )
-_OFFER = _OPEN.where(or_(Run.goal.is_(None), Run.goal > _STANDING)).order_by(
-    case((_MINE, 0), else_=1), guidance_first(), Query.tick
-)
+_OPEN = _ANY.where(or_(_MINE, _FREE))
+_WANTED = or_(Run.goal.is_(None), Run.goal > _STANDING)
+_OFFER = _OPEN.where(_WANTED).order_by(case((_MINE, 0), else_=1), guidance_first(), Query.tick)
+_TAKEN = _ANY.where(_WANTED).order_by(case((_MINE, 0), (_FREE, 1), else_=2), guidance_first(), Query.tick)
 _other = aliased(Query)
 # Two names for one list: under one name SQLAlchemy writes an empty list for IN and for NOT IN alike, which on
 # PostgreSQL offers nothing.

@@ -180,6 +180,8 @@ ROUTES = [
     ("GET", "/api/v1/queries/9"),
     *(("POST", f"/api/v1/runs/9/{verb}") for verb in ("pause", "resume", "stop", "mature", "end-episode")),
     ("POST", "/api/v1/runs/9/queries/lease"),
+    ("POST", "/api/v1/runs/9/queries/renew"),
+    ("POST", "/api/v1/runs/9/queries/leave"),
     ("POST", "/api/v1/queries/9/answer"),
     ("POST", "/api/v1/queries/9/release"),
     ("POST", "/api/v1/runs/9/change"),
@@ -189,6 +191,8 @@ ROUTES = [
 BODIES: dict[str, dict[str, Any]] = {
     "lease": {"client_id": "a"},
     "release": {"client_id": "a"},
+    "leave": {"client_id": "a"},
+    "renew": {"client_id": "a", "questions": []},
     "answer": {"client_id": "a", "choice": "left"},
     "change": {"name": "p_rec", "value": 0.5},
     "goal": {"goal": 9},

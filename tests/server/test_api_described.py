@@ -127,7 +127,7 @@ def test_bodies_are_strict(described: dict[str, Any]) -> None:
         for _, operation in operations(described)
         if "requestBody" in operation
     }
-    assert len(sent) == 7
+    assert len(sent) == 8
     assert all(described["components"]["schemas"][name]["additionalProperties"] is False for name in sent)
 
 

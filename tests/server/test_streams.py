@@ -14,6 +14,8 @@ from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
 from parenting.server.notify import Notifier
 from parenting.server.queue.answers import answer, get_query
+from parenting.server.queue.leases import lease
+from parenting.server.queue.presence import holder, leave
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, report_progress
 from parenting.server.settings import Settings
@@ -91,6 +93,20 @@ def test_question_is_told_without_any_bell(url: str, db: Database, mine: Claim) 
     stream.wait_for("question")
     query = post_query(db, mine, 1, "preference", 1, CLIPS)
     assert stream.wait_for("question", 2)[-1] == told(db, query)
+
+
+def test_the_end_of_a_lease_is_told_without_any_bell(
+    url: str, settings: Settings, db: Database, mine: Claim, guidance: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is written and nothing is polled meanwhile: the stream itself wakes then."""
+    monkeypatch.setattr("parenting.server.streams.POLL_SECONDS", 3600)
+    lease(db, mine.run_id, "a")
+    stream = follow(url, mine)
+    name = get_query(db, guidance).public_id
+    assert stream.wait_for("leases") == [[{"question": name, "holder": holder("a")}]]
+    leave(db, mine.run_id, "a", 0.5)
+    Notifier(settings.data, "web").notify()
+    assert stream.wait_for("leases", 2)[1] == []
 
 
 def test_the_rest_is_told_four_times_a_second(
