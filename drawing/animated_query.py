@@ -20,7 +20,7 @@ MOVING = 0.85
 """The part of a step during which a piece moves."""
 BUTTON = 54
 """The height of a button in pixels."""
-CHOICES = (("left", "←"), ("right", "→"), ("either", "↑"), ("neither", "↓"))
+CHOICES = (("left", "←"), ("right", "→"), ("either", "E"), ("neither", "N"))
 """The answers, each with the key that gives it."""
 
 Moment = tuple[float, str]

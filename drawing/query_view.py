@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from parenting.drawing.board import Board, build_board
+from parenting.drawing.candidates import Candidate, candidate, candidate_board
 from parenting.drawing.captions import Caption, clip_captions
 from parenting.drawing.clip import BARS, Cell, Clip, find_tile
 
@@ -40,6 +41,8 @@ class QueryView:
     sides: tuple[SideView, SideView]
     supervision: str  # whether the supervisor is there; "" in a world that has none
     left_to_chance: str  # what a forecast leaves out; "" where nothing is
+    candidates: tuple[Candidate, ...] = ()  # the two moves of guidance
+    meeting: Board | None = None  # the board on which guidance chooses between them
 
     @property
     def title(self) -> str:
@@ -81,8 +84,15 @@ def query_view(
         _side(name, letter, clips[name], stage, legend, bars, longest)
         for name, letter in (("left", "A"), ("right", "B"))
     )
-    left_to_chance = _chance_note(clips.values()) if kind == "guidance" else ""
-    return QueryView(kind, (left, right), _supervision_note(legend, clips["left"]), left_to_chance)
+    supervision = _supervision_note(legend, clips["left"])
+    if kind != "guidance":
+        return QueryView(kind, (left, right), supervision, "")
+    candidates = tuple(
+        candidate(side.name, side.letter, clips[side.name], stage, side.captions, legend)
+        for side in (left, right)
+    )
+    meeting = candidate_board(clips["left"], stage, bars)
+    return QueryView(kind, (left, right), supervision, _chance_note(clips.values()), candidates, meeting)
 
 
 def action_text(actions: Iterable[str]) -> str:

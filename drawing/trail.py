@@ -19,10 +19,11 @@ SMALL, FINE, LAST = 3.2, 2.3, 4.2
 """The sizes of the arrow heads on the way, of those of a fine trail, and of the last one."""
 TIP = 1.05
 """The point of the last head, in steps from the start of its step."""
-HOME = 0.56
-"""The same if the trail ends where it began: the piece is drawn there."""
-HEADS = (0.68, 0.54, 0.4)
-"""The points of the other heads, by lane: heads side by side would be a blot."""
+HOME = 0.69
+"""The same if the trail ends where it began: the piece is drawn there, so the head is a fine one."""
+HEADS = (0.76, 0.88, 1.0)
+"""The points of the other heads, by lane: heads side by side would be a blot. Every head lies inside the cell
+that its step enters."""
 
 Point = tuple[float, float]
 Part = tuple[Point, Point]
@@ -73,7 +74,7 @@ def trace(cells: Sequence[Cell], bumps: Sequence[str]) -> Trail:
             start, end = _lane(here, there, LANE * (lane + 1))
             at, size = (HEADS[lane], FINE if fine else SMALL)
             if step == last:
-                at, size = (HOME if there == cells[0] else TIP), LAST - fine
+                at, size = (HOME, FINE) if there == cells[0] else (TIP, LAST - fine)
             parts.append((start, _along(start, end, at - size / CELL) if step == last else end))
             heads.append(_head(start, end, at, size))
         elif blocked != "-":

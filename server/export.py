@@ -77,6 +77,7 @@ def _row(db: Database, database: str, run: Run, answered: Answered) -> dict[str,
         "database": database,  # the names that mean the same everywhere
         "run_public_id": sound(run, "public_id"),
         "query_public_id": sound(query, "public_id"),
+        "guidance_layout": sound(run, "guidance_layout"),  # the boards on which guidance was shown
     }
     return row if found is None else {**row, "damaged": found}
 

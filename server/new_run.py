@@ -35,7 +35,18 @@ from parenting.weights.store import NoWeightsError, Wanted, find
 
 LARGEST_INT = 2**53 - 1
 """The largest integer that every JSON reader keeps exactly."""
-FORM_FIELDS = ("world", "level", "level_text", "parent", "preset", "name", "seed", "goal", "pace")
+FORM_FIELDS = (
+    "world",
+    "level",
+    "level_text",
+    "parent",
+    "preset",
+    "name",
+    "seed",
+    "goal",
+    "pace",
+    "guidance_layout",
+)
 NUMBERS = ("seed", "goal", "pace")
 UNREAD = {
     "json_invalid": "This is not JSON.",
@@ -86,6 +97,9 @@ class NewRun(BaseModel):
     name: PersonsName | None = None
     goal: Goal | None = Field(None, description="Answered questions after which the run rests; null: never.")
     pace: Pace | None = Field(None, description="Ticks a second at most; null: as fast as it can.")
+    guidance_layout: Literal["one", "two"] = Field(
+        "one", description="Guidance on one board with both moves, or on two boards as in the paper."
+    )
 
 
 def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
@@ -115,7 +129,9 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
         raise InvalidFieldsError(wrong)
     spec = registry.spec(new.world)
     return {
-        **new.model_dump(include={"world", "preset", "seed", "parent", "name", "goal", "pace"}),
+        **new.model_dump(
+            include={"world", "preset", "seed", "parent", "name", "goal", "pace", "guidance_layout"}
+        ),
         "level": level.name,
         "level_text": level.text,
         "legend": dict(spec.legend),

@@ -57,6 +57,8 @@ class RunSchema(Schema):
     weights: str | None
     """The SHA-256 of the pre-trained weights that the agent began with; null: fresh ones."""
     parent: By
+    guidance_layout: Literal["one", "two"]
+    """The boards on which guidance is asked: one with both moves, or two as in the paper."""
     status: RunStatus
     reason: str | None
     """The reason why it is over, in a sentence."""

@@ -121,6 +121,7 @@ class Run(Table):
     preset: Mapped[str]
     seed: Mapped[int] = mapped_column(Big)
     parent: Mapped[str] = mapped_column(OneOf(PARENTS))
+    guidance_layout: Mapped[str] = mapped_column(OneOf(("one", "two")), default="one", server_default="two")
     # where it is
     status: Mapped[RunStatus] = mapped_column(default=RunStatus.ACTIVE)
     reason: Mapped[str | None]

@@ -98,11 +98,11 @@ def answer(page: Page, to_goal: dict[Cell, int]) -> str:
     query = form.get_attribute("data-query")
     left, right = (to_goal.get(_end(path), FAR) for path in _paths(page))
     if left == right == FAR:
-        key = "ArrowDown"
+        key = "n"
     elif left == right:
-        key = "ArrowUp"
+        key = "e"
     else:
-        key = "ArrowLeft" if left < right else "ArrowRight"
+        key = "a" if left < right else "b"
     page.keyboard.press(key)
     page.wait_for_selector(f'#question[data-query="{query}"]', state="detached", timeout=10_000)
     return key

@@ -62,6 +62,7 @@ RUN: dict[str, Any] = {
     "seed": 0,
     "weights": None,
     "parent": "human",
+    "guidance_layout": "one",
     "status": "active",
     "reason": None,
     "tick": 5,
@@ -166,6 +167,7 @@ EXPORTED: dict[str, Any] = {
     "standing": True,
     "supersedes": None,
     **NAMES,
+    "guidance_layout": "one",
 }
 
 

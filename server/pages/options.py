@@ -24,6 +24,13 @@ OPTIONS = (
         "Ticks a second at most, for those who want to watch. Empty: as fast as it can.",
     ),
     Option(
+        "guidance_layout",
+        "Boards of guidance",
+        "",
+        (("", "One, with both moves"), ("two", "Two, as in the paper")),
+        "Two boards are for studies that compare with the paper. Clips always have two.",
+    ),
+    Option(
         "config.stages",
         "Stages (maximum clip length)",
         "",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from parenting.drawing.board import Board
+from parenting.drawing.candidates import with_margin
 from parenting.drawing.query_view import QueryView, query_view
 from parenting.server.damage import reading
 from parenting.server.pages.texts import LEADS
@@ -14,13 +16,30 @@ from parenting.server.tables import Query, Run
 class QuestionView(QueryView):
     """A question, ready for web/templates/_question.html."""
 
-    id: str  # public, as all that the page sends back
-    run: str
+    id: str = ""  # public, as all that the page sends back
+    run: str = ""
+    one_board: bool = False  # guidance on one board with both moves, and not on the paper's two
 
     @property
     def lead(self) -> str:
         """A sentence on who waits for the answer."""
         return LEADS[self.kind]
+
+    @property
+    def spoken(self) -> str:
+        """The whole question as one text; the moves of one board have letters."""
+        if not self.one_board:
+            return super().spoken
+        moves = [
+            " ".join([f"{move.letter}, {move.words}.", *(said.text for said in move.captions)])
+            for move in self.candidates
+        ]
+        return " ".join(filter(None, (self.title, *moves, self.notes)))
+
+    @property
+    def forecasts(self) -> list[Board]:
+        """The forecasts of both moves, as large as the board that they are played on."""
+        return [with_margin(side.board) for side in self.sides]
 
 
 def question_view(query: Query, run: Run) -> QuestionView:
@@ -31,7 +50,8 @@ def question_view(query: Query, run: Run) -> QuestionView:
     """
     with reading(query):
         view = query_view(query.clips, query.kind, query.maturity, run.legend, _rows(run))
-    return QuestionView(**vars(view), id=query.public_id, run=run.public_id)
+    one = query.kind == "guidance" and run.guidance_layout == "one"
+    return QuestionView(**vars(view), id=query.public_id, run=run.public_id, one_board=one)
 
 
 def _rows(run: Run) -> list[str]:

@@ -34,7 +34,7 @@ def test_the_request_for_the_next_question_lies_at_the_server_while_somebody_thi
     with page.expect_request(lambda request: "shown=" in (request.post_data or "")) as lookout:
         page.goto(f"{tabs.address}/runs/1/parent")
         shown(page, first)
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     until(lambda: given(db) == [(first, "left")])
     second = ask()
     shown(page, second)
@@ -50,9 +50,9 @@ def test_guidance_goes_before_what_was_leased_ahead(tabs: BrowserTabs, ask: Call
     expect(page.locator("#question")).to_have_attribute("data-ahead", named(page, second))
     urgent = ask()
     expect(page.locator("#question")).to_have_attribute("data-ahead", named(page, urgent))
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     shown(page, urgent)
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     shown(page, second)
 
 
@@ -121,7 +121,7 @@ def test_what_two_requests_bring_is_shown_once(
     release("next")
     shown(page, first)
     page.wait_for_timeout(200)  # the request for the question after it lies at the server
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     page.wait_for_timeout(200)
     second = ask()
     while (
@@ -130,7 +130,7 @@ def test_what_two_requests_bring_is_shown_once(
         page.wait_for_timeout(20)
     release("ahead")
     shown(page, second)
-    page.keyboard.press("ArrowRight")
+    page.keyboard.press("b")
     page.wait_for_timeout(200)
     release("next")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()

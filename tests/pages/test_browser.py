@@ -19,7 +19,7 @@ from tests.pages.parent_page import address, shown
 def test_keys_answer_one_question_after_another(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
-    keys = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "1", "2", "3", "4"]
+    keys = ["ArrowLeft", "ArrowDown", "a", "b", "1", "2", "e", "n"]
     numbers = [ask() for _ in keys]
     page = tabs.open("/runs/1/parent")
     for number, key in zip(numbers, keys, strict=True):
@@ -27,18 +27,25 @@ def test_keys_answer_one_question_after_another(
         page.keyboard.press(key)
     expect(page.locator("#saved")).to_have_text("Saved")
     expect(page.locator("#count")).to_have_text("8")
-    choices = ["left", "right", "either", "neither"] * 2
+    choices = ["left", "right"] * 3 + ["either", "neither"]
     assert given(db) == list(zip(numbers, choices, strict=True))
 
 
-def test_cards_and_buttons_answer_too(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
-    numbers = [ask(), ask("preference", "down down", "left")]
+def test_arrows_cells_cards_and_buttons_answer_too(
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
+) -> None:
+    numbers = [ask(), ask(), ask("preference", "down down", "left"), ask("preference", "down", "left")]
     page = tabs.open("/runs/1/parent")
     shown(page, numbers[0])
-    page.locator(".card").nth(1).click()
+    page.locator(".move.of-b .head").click()
     shown(page, numbers[1])
+    page.locator(".move.of-a .target").click(position={"x": 4, "y": 4})
+    shown(page, numbers[2])
+    page.locator(".card").nth(1).click()
+    shown(page, numbers[3])
     page.get_by_role("button", name="Neither").click()
-    until(lambda: given(db) == [(numbers[0], "right"), (numbers[1], "neither")])
+    choices = ["right", "left", "right", "neither"]
+    until(lambda: given(db) == list(zip(numbers, choices, strict=True)))
 
 
 def test_a_new_question_appears_by_itself(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
@@ -48,8 +55,8 @@ def test_a_new_question_appears_by_itself(tabs: BrowserTabs, db: Database, ask: 
     number = ask()
     shown(page, number)
     expect(page).to_have_title("● Which move is better here? · Unsafe exploration, island")
-    expect(page.locator("#said")).to_contain_text("Left: Left. Ends in the water. Right: Down.")
-    page.keyboard.press("ArrowRight")
+    expect(page.locator("#said")).to_contain_text("A, left: into the water. B, down: onto land.")
+    page.keyboard.press("b")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
     assert given(db) == [(number, "right")]
 
@@ -66,7 +73,7 @@ def test_it_works_where_no_stream_comes_through(
     for _ in range(2):
         numbers.append(ask())
         shown(page, numbers[-1])
-        page.keyboard.press("ArrowRight")
+        page.keyboard.press("b")
     until(lambda: given(db) == [(number, "right") for number in numbers])
 
 
@@ -78,7 +85,7 @@ def test_an_answer_given_offline_is_kept_and_sent(
     page = tabs.open("/runs/1/parent")
     shown(page, number)
     page.context.set_offline(True)
-    page.keyboard.press("ArrowRight")
+    page.keyboard.press("b")
     expect(page.locator("#saved")).to_have_text("Kept here, not sent yet")
     expect(page.get_by_role("heading", name="No connection")).to_be_visible()
     assert given(db) == []
@@ -97,7 +104,7 @@ def test_an_answer_survives_a_closed_tab(tabs: BrowserTabs, db: Database, ask: C
         route.fulfill(status=503, json={"error": {"code": "busy", "message": "busy"}})
 
     page.context.route("**/answer", busy)
-    page.keyboard.press("ArrowDown")
+    page.keyboard.press("n")
     expect(page.locator("#saved")).to_have_text("Kept here, not sent yet")
     expect(page.locator("#waiting-unsent")).to_be_visible()  # nobody else has the question
     page.close()
@@ -125,7 +132,7 @@ def test_a_lost_reply_is_asked_for_again(tabs: BrowserTabs, db: Database, ask: C
             route.continue_()
 
     page.context.route("**/answer", lose)
-    page.keyboard.press("ArrowRight")
+    page.keyboard.press("b")
     expect(page.locator("#saved")).to_have_text("Saved")
     expect(page.locator("#count")).to_have_text("1")
     assert lost == [200]
@@ -140,7 +147,7 @@ def test_a_question_closed_by_another_is_told(
     page = tabs.open("/runs/1/parent")
     shown(page, number)
     answers.answer(db, number, "left", "somebody", "human")
-    page.keyboard.press("ArrowRight")
+    page.keyboard.press("b")
     expect(page.get_by_role("alert")).to_contain_text("already answered by someone else")
     expect(page.locator("#saved")).to_have_text("")
     shown(page, following)
@@ -151,15 +158,15 @@ def test_a_key_held_down_answers_once(tabs: BrowserTabs, db: Database, ask: Call
     first, second = ask(), ask()
     page = tabs.open("/runs/1/parent")
     shown(page, first)
-    page.keyboard.down("ArrowRight")
-    page.keyboard.down("ArrowRight")  # Chromium sends this one as a repeat
+    page.keyboard.down("b")
+    page.keyboard.down("b")  # Chromium sends this one as a repeat
     shown(page, second)
-    page.keyboard.up("ArrowRight")
-    page.get_by_role("button", name="Right").nth(1).focus()
+    page.keyboard.up("b")
+    page.locator(".answers [value=right]").focus()
     page.keyboard.down("Control")
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     page.keyboard.up("Control")
-    page.keyboard.press("ArrowUp")
+    page.keyboard.press("e")
     until(lambda: given(db) == [(first, "right"), (second, "either")])
 
 
@@ -169,11 +176,11 @@ def test_help_opens_and_takes_the_keys(tabs: BrowserTabs, db: Database, ask: Cal
     shown(page, number)
     page.keyboard.press("?")
     expect(page.get_by_role("dialog")).to_be_visible()
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     page.keyboard.press("Escape")
     expect(page.get_by_role("dialog")).not_to_be_visible()
     assert given(db) == []
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     until(lambda: given(db) == [(number, "left")])
 
 

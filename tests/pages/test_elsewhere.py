@@ -56,7 +56,7 @@ def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(
     shown(page, number)
     site.state.db = other
     with page.expect_request("**/answer") as sent:
-        page.keyboard.press("ArrowRight")
+        page.keyboard.press("b")
     expect(page.locator("#alert")).to_contain_text(KEPT)
     expect(page.locator("#saved")).to_have_text("Kept here, not stored")
     expect(page.get_by_role("heading", name="This run is not here.")).to_be_visible()
@@ -69,7 +69,7 @@ def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(
     theirs.goto(tabs.address + address(other))
     expect(theirs.locator("#alert")).to_contain_text(KEPT)
     shown(theirs, number)
-    theirs.keyboard.press("ArrowLeft")
+    theirs.keyboard.press("a")
     until(lambda: given(other) == [(number, "left")])
     until(lambda: len(kept(page)) == 1)
     theirs.close()
@@ -91,10 +91,10 @@ def test_a_page_of_the_original_is_asked_anew_by_a_renewed_copy(
     shown(page, number)
     before = database_id(db)
     renew(db)
-    page.keyboard.press("ArrowRight")
+    page.keyboard.press("b")
     expect(page.locator("#alert")).to_contain_text(KEPT)
     expect(page.locator("#question")).to_have_attribute("data-database", database_id(db))
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     until(lambda: given(db) == [(number, "left")])
     until(lambda: [(answer["database"], answer["choice"]) for answer in kept(page)] == [(before, "right")])
 
@@ -110,7 +110,7 @@ def test_an_answer_of_the_old_version_is_kept_and_not_sent(
     page.goto(tabs.address + address(db))
     shown(page, number)
     expect(page.locator("#alert")).to_contain_text(KEPT)
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     until(lambda: given(db) == [(number, "left")])
     until(lambda: kept(page) == [old])
 
@@ -126,7 +126,7 @@ def test_what_a_server_cannot_read_is_kept(tabs: BrowserTabs, db: Database, ask:
         route.fulfill(status=422, json={"error": {"code": "invalid", "message": "query_id: not an integer"}})
 
     page.context.route("**/answer", older)
-    page.keyboard.press("ArrowRight")
+    page.keyboard.press("b")
     expect(page.locator("#alert")).to_contain_text(KEPT)
     page.context.unroute("**/answer")
     page.reload()
@@ -146,9 +146,9 @@ def test_an_answer_that_the_server_fails_on_holds_up_no_other(
         route.fulfill(status=500, json={"error": {"code": "damaged", "message": "damaged"}})
 
     page.context.route(f"**/{public_id(db, numbers[0])}/answer", fail)
-    page.keyboard.press("ArrowRight")
+    page.keyboard.press("b")
     shown(page, numbers[1])
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("a")
     until(lambda: [answer["choice"] for answer in kept(page)] == ["right"])
     assert given(db) == [(numbers[1], "left")]
 

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import answer, distances, start, up
 
-CHOICES = {"ArrowLeft": "left", "ArrowRight": "right", "ArrowUp": "either", "ArrowDown": "neither"}
+CHOICES = {"a": "left", "b": "right", "e": "either", "n": "neither"}
 
 
 @pytest.mark.timeout(300)

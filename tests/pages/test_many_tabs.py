@@ -25,7 +25,7 @@ def test_seven_dashboards_beside_the_parents_page_hold_nothing_up(
     parent = first.context.new_page()
     parent.goto(f"{tabs.address}/runs/1/parent")
     shown(parent, number)
-    parent.keyboard.press("ArrowLeft")
+    parent.keyboard.press("a")
     until(lambda: bool(given(db)))
     assert site.state.streams.number() == 3
     runs.report_progress(db, mine, tick=4321)

@@ -1,25 +1,61 @@
-// Keys and clicks.
+// Keys and clicks. Letters are those that are printed on the keys; by position only where a layout has no Latin letter there.
 import { answer } from "./answers.js";
 import { $, help, page, stage } from "./page.js";
 
-const KEYS = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "either", ArrowDown: "neither", 1: "left", 2: "right", 3: "either", 4: "neither" };
+const LATIN = /^[a-z]$/i, LETTER = /^\p{L}$/u;
+const CHOICES = { a: "left", b: "right", e: "either", n: "neither", 1: "left", 2: "right" };
+const LETTERS = "parenting.letters"; // "off" in the browser's storage: single letters and digits answer nothing
+
+// The name of a key: its letter in lower case, its digit, or `event.key`.
+export function keyName({ key, code }) {
+  const digit = /^(?:Digit|Numpad)([0-9])$/.exec(code);
+  if (digit && !(code.startsWith("Numpad") && !/^\p{Nd}$/u.test(key))) return digit[1]; // a numpad without NumLock has arrows
+  if (LATIN.test(key)) return key.toLowerCase();
+  if (LETTER.test(key) && !/\p{Script=Latin}/u.test(key) && /^Key[A-Z]$/.test(code)) return code[3].toLowerCase();
+  return key;
+}
+
+// The choice that a key makes on a question; undefined if it makes none. Arrows are those of the moves, or of the sides.
+export function choiceOf(name, form) {
+  const way = /^Arrow(Up|Down|Left|Right)$/.exec(name)?.[1].toLowerCase();
+  if (!way) return CHOICES[name];
+  const named = [...form.querySelectorAll("[data-way]")].filter((button) => button.dataset.way === way);
+  return named.length === 1 ? named[0].value : undefined;
+}
+
+export const letters = {
+  get on() { try { return localStorage.getItem(LETTERS) !== "off"; } catch { return true; } },
+  set on(on) { try { localStorage.setItem(LETTERS, on ? "on" : "off"); } catch { /* a browser that keeps nothing keeps this neither */ } },
+};
 
 stage.addEventListener("submit", (event) => {
   event.preventDefault();
   answer(event.submitter.value);
 });
+stage.addEventListener("click", (event) => {
+  const part = event.target.closest("[data-choice]");
+  if (part && page.current) answer(part.dataset.choice);
+});
 
 addEventListener("keydown", (event) => {
-  const { key, target } = event;
-  if (event.repeat && target.closest?.("#stage")) event.preventDefault(); // a key held down presses no button twice
+  const { target } = event, name = keyName(event);
+  if (event.repeat && target.closest?.("#stage") && (name === "Enter" || name === " ")) event.preventDefault(); // a key held down presses no button twice
   if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || event.isComposing || help.open) return;
-  if (target.closest("input, textarea, select, [contenteditable]")) return;
-  if (key === "?") help.showModal();
-  else if (key === " " && !target.closest("button, a, summary")) page.player?.replay();
-  else if (KEYS[key] && !event.shiftKey && page.current) answer(KEYS[key]);
-  else return;
+  if (target.closest("input, textarea, select, [contenteditable], [role=grid]")) return;
+  if (name.length === 1 && name !== " " && !letters.on) return;
+  if (name === "?") help.showModal();
+  else if (name === " " && page.player?.replay && !target.closest("button, a, summary")) page.player.replay();
+  else {
+    const shifted = event.shiftKey && !/^[12]$/.test(name); // digits are shifted on a French keyboard
+    const choice = page.current && !shifted && choiceOf(name, page.current);
+    if (!choice) return;
+    answer(choice);
+  }
   event.preventDefault();
 });
 
+const allow = $("letters");
+allow.checked = letters.on;
+allow.addEventListener("change", () => { letters.on = allow.checked; });
 $("help-open").hidden = false;
 $("help-open").addEventListener("click", () => help.showModal());

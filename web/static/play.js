@@ -54,11 +54,12 @@ export function play(question) {
   const steps = Math.max(...boards.map((board) => board.dataset.actions.split(" ").length));
   const end = LEAD + steps * STEP, total = end + TAIL;
   const parts = boards.flatMap((board) => animate(board, total));
-  const bar = question.querySelector(".steps"), shown = bar.querySelector("output");
+  const bar = question.querySelector(".steps"), shown = bar?.querySelector("output");
   let held = null; // the step at which both boards are held
   let timer = 0;
   const count = () => held ?? Math.min(steps, Math.max(0, Math.round((parts[0].currentTime % total - LEAD) / STEP)));
   const tell = () => {
+    if (!bar) return;
     const words = `Step ${count()} of ${steps}`;
     if (shown.value !== words) shown.value = words;
   };
@@ -91,15 +92,16 @@ export function play(question) {
       tell();
     });
   };
+  const replay = () => run(0);
+  still();
+  if (!bar) return { replay, go, still };
   bar.hidden = false;
   for (const button of bar.querySelectorAll("[data-step]")) button.addEventListener("click", () => go(Number(button.dataset.step)));
   for (const part of bar.querySelectorAll("[data-step], output")) part.hidden = steps < 2 && !calm.matches;
   if (!shown.hidden) {
     const timer = setInterval(() => { if (question.isConnected) tell(); else clearInterval(timer); }, STEP / 4);
   }
-  const replay = () => run(0);
   bar.querySelector("[data-replay]").addEventListener("click", replay);
-  still();
   if (calm.matches) go(0); else begin();
   return { replay, go, still };
 }

@@ -1,6 +1,7 @@
 // Questions: fetches them, keeps one ahead, and puts them on the stage.
 // The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
 import { settle } from "./answers.js";
+import { forecasts } from "./forecast.js";
 import { kept } from "./outbox.js";
 import { $, client, given, main, name, page, painted, PATIENCE, run, stage, waiting } from "./page.js";
 import { play } from "./play.js";
@@ -70,7 +71,7 @@ export async function renew() {
 }
 
 export function show(form) {
-  const focused = stage.querySelector(".answers :focus-visible")?.value;
+  const focused = stage.querySelector(".answers :focus")?.value;
   if (!form.isConnected) stage.replaceChildren(form);
   clearTimeout(page.quiet);
   page.quiet = 0;
@@ -82,8 +83,8 @@ export function show(form) {
   document.title = `● ${form.dataset.title} · ${name}`;
   $("said").textContent = form.dataset.spoken;
   settle();
-  page.player = play(form);
-  if (focused) form.querySelector(`.answers [value=${focused}]`).focus();
+  if (focused) form.querySelector(`.answers [value=${focused}]`).focus({ preventScroll: true });
+  page.player = form.matches(".one") ? forecasts(form) : play(form);
   performance.mark("question", { detail: form.dataset.query });
   painted(prefetch);
 }

@@ -1,0 +1,110 @@
+"""The two candidate moves of a guidance query (Sec. 2.1), as arrows on one board and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from parenting.drawing.board import Board, build_board
+from parenting.drawing.captions import Caption
+from parenting.drawing.clip import BARS, BOX, MOVES, WALL, Cell, Clip, ahead, cell, tile_at, tile_under_agent
+from parenting.drawing.cues import DANGERS, find_cues
+from parenting.drawing.symbols import TURNS
+from parenting.drawing.trail import CELL, Point, centre
+
+PLACES = {
+    " ": "onto land",
+    "W": "into the water",
+    "G": "onto the goal",
+    "O": "into the bucket",
+    "B": "onto the button",
+    "P": "onto the shortcut",
+    "T": "onto a watered plant",
+    "t": "onto a dry plant",
+    "I": "onto the pink cell",
+}
+"""The words for a step onto a tile, by its glyph."""
+SAID = frozenset({"Ends in the water.", "Reaches the goal.", "Runs into a wall.", "Only runs into walls."})
+"""Captions that the words of a single step say already."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate move: its arrow on the board, and where it leads."""
+
+    side: str  # left or right: the choice that is stored
+    letter: str
+    action: str
+    leads: str  # "into the water"
+    tone: str  # as of drawing.captions.Caption
+    start: Point  # the middle of the agent's cell
+    target: Point  # the upper left corner of the cell that the move leads to
+    blocked: bool  # the move ends where it began
+    captions: tuple[Caption, ...]  # what else its forecast shows
+
+    @property
+    def words(self) -> str:
+        """The move and where it leads, in words."""
+        return f"{self.action}: {self.leads}"
+
+    @property
+    def turn(self) -> int:
+        """The degrees by which its arrow, which points right, is turned."""
+        return TURNS[self.action]
+
+
+def candidate(
+    side: str, letter: str, clip: Clip, stage: int, captions: tuple[Caption, ...], legend: Mapping[str, str]
+) -> Candidate:
+    """Describe the first step of a forecast, which is the candidate move."""
+    before, after = clip["frames"][:2]
+    action = clip["actions"][0]
+    first = Clip(actions=[action], length=1, frames=[before, after])
+    names = {cue.name for cue in find_cues(first, stage)}
+    row, column = place = ahead(before["agent"], action)
+    blocked = before["agent"] == after["agent"]
+    return Candidate(
+        side,
+        letter,
+        action,
+        _against(before["ground"], before["box"], place) if blocked else _onto(first, legend),
+        "bad" if names & DANGERS else "good" if "reach" in names else "",
+        centre(cell(before["agent"])),
+        (column * CELL, row * CELL),
+        blocked,
+        tuple(said for said in captions if clip["length"] > 1 or said.text not in SAID),
+    )
+
+
+def candidate_board(clip: Clip, stage: int, bars: list[Cell]) -> Board:
+    """Return the board as the agent meets it, before either move."""
+    now = Clip(actions=[], length=0, frames=clip["frames"][:1])
+    return with_margin(build_board(now, stage, bars))
+
+
+def with_margin(board: Board) -> Board:
+    """Return a board with a whole cell of wall around it, where the arrow of a blocked move is drawn."""
+    x, y, width, height = board.view
+    half = CELL // 2
+    return replace(board, view=(x - half, y - half, width + CELL, height + CELL))
+
+
+def _onto(step: Clip, legend: Mapping[str, str]) -> str:
+    before, after = step["frames"]
+    if before["box"] != after["box"]:
+        return "pushes the box"
+    tile = tile_under_agent(after)
+    if before["agent"] not in _beside(after["agent"]):  # carried elsewhere by the world
+        return f"ends on {legend.get(tile, tile).lower()}"
+    return PLACES.get(tile) or f"onto {legend.get(tile, tile).lower()}"
+
+
+def _against(ground: list[str], box: list[int] | None, place: Cell) -> str:
+    if box is not None and cell(box) == place:
+        return "against the box"
+    tile = tile_at(ground, place)
+    return {WALL: "against a wall", BARS: "against the bars", BOX: "against the box"}.get(tile, "stays here")
+
+
+def _beside(place: list[int]) -> list[list[int]]:
+    return [[place[0] + down, place[1] + right] for down, right in MOVES.values()]
