@@ -44,7 +44,9 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 def key(page: Page, number: int) -> str:
     """The key that this person presses: never for what is dangerous, else each in turn."""
-    left, right = (card.locator(".bad").count() > 0 for card in page.locator(".card").all())
+    left, right = (
+        card.locator(".bad").count() > 0 for card in page.locator(".card, .moves [data-way]").all()
+    )
     if left and right:
         return "n"
     if left or right:
