@@ -1,4 +1,4 @@
-"""`parenting resume`: let a paused or failed run go on."""
+"""`parenting resume`: let a paused, ended or failed run go on."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from parenting.server.statuses import RunStatus
 def resume(
     run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
 ) -> None:
-    """Let a paused or failed run go on.
+    """Let a paused, ended or failed run go on.
 
-    A failed run goes on from its last good checkpoint. The reason why it failed stays in its log, on its
-    dashboard. A worker has to run: `parenting up` or `parenting worker`.
+    An ended or failed run goes on from its last good checkpoint. Its withdrawn questions are asked again. The
+    reason of a failure stays in its log, on its dashboard. A worker has to run: `parenting up` or
+    `parenting worker`.
 
-    Exit codes: 0 it goes on; 2 there is no such run, or it was stopped or has finished.
+    Exit codes: 0 it goes on; 2 there is no such run, or it has finished.
 
     Example: parenting resume 3
     """

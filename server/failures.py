@@ -1,4 +1,7 @@
-"""Failures of runs and their end, each in a transaction that holds the run. The log keeps the reasons."""
+"""Failures of runs and how ended runs go on, each in a transaction that holds the run.
+
+The log keeps the reasons.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ def fail_if_damaged(session: Session, db: Database, run: Run) -> bool:
 
 
 def resume_in(session: Session, db: Database, run: Run) -> None:
-    """Let a failed run go on: what was withdrawn when it failed is asked again.
+    """Let a stopped or failed run go on: what was withdrawn when it ended is asked again.
 
     The worker takes it up from its last good checkpoint (`server.recall`).
 

@@ -32,7 +32,7 @@ class Failed(BaseModel):
 
 
 class Resumed(BaseModel):
-    """The operator resumed a failed run: it goes on from its last good checkpoint."""
+    """The operator resumed a stopped or failed run: it goes on from its last good checkpoint."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     kind: Literal["resumed"] = "resumed"

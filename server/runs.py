@@ -20,7 +20,7 @@ from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.failures import fail_if_damaged, note_failure, resume_in
 from parenting.server.identity import unused_number
 from parenting.server.queue.queries import withdraw_in
-from parenting.server.statuses import LIVING, OVER, RunStatus
+from parenting.server.statuses import LIVING, OVER, RESUMABLE, RunStatus
 from parenting.server.store.clock import is_over
 from parenting.server.tables import Run
 
@@ -88,17 +88,17 @@ def stored_run(db: Database, run_id: int) -> Run:
 def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None = None) -> Run:
     """Pause, resume (`active`) or stop a run, for the operator.
 
-    A second call changes nothing. Stopping withdraws the open queries. A failed run is resumed from its last
-    good checkpoint; its reason stays in its log.
+    A second call changes nothing. Stopping withdraws the open queries. A stopped or failed run goes on from
+    its last good checkpoint, its withdrawn queries are open again, and its log says so.
 
     Raises:
         NotFound: there is no such run.
         Conflict: it is over for another reason.
-        DamagedRowError: it has failed, and its row cannot be read.
+        DamagedRowError: it was stopped or has failed, and its row cannot be read.
     """
     with db.write() as session:
         run = hold(session, run_id)
-        if (run.status, status) == (RunStatus.FAILED, RunStatus.ACTIVE):
+        if run.status in RESUMABLE and status is RunStatus.ACTIVE:
             resume_in(session, db, run)
         if run.status in OVER and run.status != status:
             raise Conflict(f"This run is {run.status}; it cannot become {status}.")

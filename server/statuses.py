@@ -51,7 +51,7 @@ class RunState(StrEnum):
 RUN_STATUSES = {
     RunStatus.ACTIVE: "The agent acts, or waits for its parent.",
     RunStatus.PAUSED: "The operator paused it; no tick passes until it is resumed.",
-    RunStatus.STOPPED: "The operator stopped it for good; its open questions were withdrawn.",
+    RunStatus.STOPPED: "The operator ended it; its open questions were withdrawn. It can be resumed.",
     RunStatus.FINISHED: "It reached what it was started for.",
     RunStatus.FAILED: "The worker could not go on; the reason says why. It can be resumed.",
 }
@@ -93,4 +93,6 @@ STATE_LABELS = {
 LIVING = (RunStatus.ACTIVE, RunStatus.PAUSED)
 """The statuses of runs that a worker raises."""
 OVER = (RunStatus.STOPPED, RunStatus.FINISHED, RunStatus.FAILED)
-"""The statuses in which a run stays."""
+"""The statuses in which a run stays, unless it is resumed."""
+RESUMABLE = (RunStatus.STOPPED, RunStatus.FAILED)
+"""The statuses from which the operator lets a run go on."""

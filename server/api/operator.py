@@ -29,13 +29,16 @@ def pause_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
 
 @router.post("/runs/{run_id}/resume", summary="Resume a run", responses=REPLIES)
 def resume_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
-    """Resume a paused run, or a failed one from its last good checkpoint. A second call changes nothing."""
+    """Resume a paused run, or a stopped or failed one from its last good checkpoint.
+
+    Questions that were withdrawn when it ended are asked again. A second call changes nothing.
+    """
     return _become(request, db, run_id, RunStatus.ACTIVE)
 
 
 @router.post("/runs/{run_id}/stop", summary="Stop a run", responses=REPLIES)
 def stop_run(request: Request, run_id: RunId, db: Db) -> RunSchema:
-    """End a run for good and withdraw its open questions. A second call changes nothing."""
+    """End a run and withdraw its open questions; it can be resumed. A second call changes nothing."""
     return _become(request, db, run_id, RunStatus.STOPPED, "Stopped by the operator.")
 
 

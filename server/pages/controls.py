@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
-from fastapi import Form, Request, Response
+from fastapi import Form, Query, Request, Response
 from pydantic import TypeAdapter, ValidationError
 
 from parenting.agent.events import Change, EndEpisode, Mature, Probability
@@ -19,13 +19,16 @@ from parenting.server.deps import Db, notify_worker
 from parenting.server.new_run import Goal, Pace
 from parenting.server.pages.dashboard import dashboard_page
 from parenting.server.pages.operator_log import PROBABILITIES, probabilities
-from parenting.server.pages.render import redirect
+from parenting.server.pages.render import moved, page, redirect
 from parenting.server.pages.start import FormFields
+from parenting.server.pages.texts import parent_title
+from parenting.server.queue.queries import open_counts
 from parenting.server.statuses import RunStatus
 
 router = admitted_router(include_in_schema=False)
 
 Back = Annotated[Literal["parent", "dashboard", "operator"], Form()]
+AskedBack = Annotated[Literal["parent", "dashboard"], Query()]
 BACK_PATHS = {"parent": "/parent", "dashboard": "", "operator": "#operator"}
 """The page that a form leads back to, below the run's address."""
 
@@ -49,6 +52,17 @@ def set_status(
     reason = "Stopped by the operator." if status == "stopped" else None
     runs.set_status(db, run_id, RunStatus(status), reason)
     return _back(request, back)
+
+
+@router.get("/runs/{run_id}/end")
+def end_page(request: Request, run_id: RunId, db: Db, back: AskedBack = "dashboard") -> Response:
+    """Ask before a run is ended: the page says what is lost, and that it can be taken back."""
+    run = runs.get_run(db, run_id)
+    if (there := moved(request, run)) is not None:
+        return there
+    waits = open_counts(db, run_id)
+    count = waits.guidance + waits.preference
+    return page("end.html", run=run, title=parent_title(run), open=count, back=back, way=BACK_PATHS[back])
 
 
 @router.post("/runs/{run_id}/event")

@@ -22,7 +22,7 @@ NOTES = {
     "mature": "Ended the stage",
     "end_episode": "Ended the episode",
     "failed": "The run failed: {reason}",
-    "resumed": "Resumed the failed run from its last good checkpoint",
+    "resumed": "Resumed the run from its last good checkpoint",
     "checkpoint_damaged": "A damaged checkpoint was passed over: {reason}",
 }
 

@@ -50,7 +50,7 @@ def withdraw_in(session: Session, run_id: int, kind: str | None = None) -> None:
 
 
 def reopen_in(session: Session, run_id: int) -> None:
-    """Ask again what was withdrawn when a run failed, in a transaction that is already open.
+    """Ask again what was withdrawn when a run ended, in a transaction that is already open.
 
     That is what has no standing answer, but for the guidance of episodes that the operator has ended.
     """

@@ -99,12 +99,14 @@ class HeldRuns:
         return self.sessions[run_id]
 
     def _last(self, run_id: int) -> float:
-        """Save what was ticked of a run that somebody stopped, or that another worker raises, and let go."""
+        """Save what was ticked of a run that somebody stopped, or that another worker raises, and let go.
+
+        A run that is resumed can so be claimed at once.
+        """
         session = self.sessions.get(run_id)
         if session is not None and session.unsaved:
             session.save()
-        if run_id in self.surplus:
-            runs.let_go(self.db, [self.claims[run_id]])
+        runs.let_go(self.db, [self.claims[run_id]])
         self.drop(run_id)
         return AT_NEWS
 

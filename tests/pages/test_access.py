@@ -92,7 +92,6 @@ def test_axe_finds_nothing(tabs: BrowserTabs, lives: None, screen: str) -> None:
     page.keyboard.press("?")
     assert light_and_dark(page) == []
     page.goto(f"{tabs.address}/runs/1")
-    page.get_by_text("Stop for good…").click()
     page.get_by_label("p_rec").fill("often")
     page.get_by_role("button", name="Change").click()
     expect(page.locator("#p_rec-error")).to_be_visible()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 import httpx2
@@ -12,7 +13,9 @@ from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.operator_events import list_operator_events
 from parenting.server.queue import worker_side
-from parenting.server.runs import Claim, get_run, set_status
+from parenting.server.queue.answers import answer
+from parenting.server.queue.queries import open_counts
+from parenting.server.runs import Claim, get_run, report_progress, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 from tests.pages.parent_page import address, form, look
@@ -158,12 +161,33 @@ def test_what_was_done_is_listed_with_its_tick(client: httpx2.Client, db: Databa
     ]
 
 
-def test_stopping_is_asked_for_twice(client: httpx2.Client, mine: Claim) -> None:
-    """The button stands in what has to be opened first, without JavaScript, too."""
-    page = client.get("/runs/1").text
-    folded = page.partition("Stop for good…")[2].partition("</details>")[0]
-    assert 'value="stopped"' in folded
-    assert page.count('value="stopped"') == 1
+def test_a_page_asks_before_a_run_ends_says_what_is_lost_and_how_it_goes_on(
+    client: httpx2.Client, db: Database, mine: Claim, ask: Callable[..., int]
+) -> None:
+    ask()
+    for path in ("/runs/1", "/runs/1/parent"):
+        page = client.get(path).text
+        assert 'value="stopped"' not in page
+        assert f"/runs/{get_run(db, 1).public_id}/end" in page
+    asks = client.get("/runs/1/end?back=parent").text
+    assert "1 open question is withdrawn" in asks
+    assert "Until the run is deleted you can take this back" in asks
+    back = client.post("/runs/1/status", data={"status": "stopped", "back": "parent"}).headers["location"]
+    assert open_counts(db, 1).guidance == 0
+    over = client.get(back).text
+    assert 'value="active">Go on after all' in over
+    assert '<form id="resume" hidden' not in over
+    client.post("/runs/1/status", data={"status": "active", "back": "parent"})
+    assert (get_run(db, 1).status, open_counts(db, 1).guidance) == ("active", 1)
+
+
+def test_a_policy_that_is_optimal_at_the_start_is_not_told_before_an_answer(
+    client: httpx2.Client, db: Database, mine: Claim, ask: Callable[..., int]
+) -> None:
+    report_progress(db, mine, optimal=True)
+    assert '<div id="optimal" class="note" hidden>' in client.get("/runs/1/parent").text
+    answer(db, ask(), "left", "somebody", "human")
+    assert '<div id="optimal" class="note">' in client.get("/runs/1/parent").text
 
 
 @pytest.mark.parametrize(
@@ -173,7 +197,6 @@ def test_stopping_is_asked_for_twice(client: httpx2.Client, mine: Claim) -> None
         ("probabilities", {**PROBABILITIES, "p_guid": "0"}),
         ("goal", {"goal": "5"}),
         ("pace", {"pace": "5"}),
-        ("status", {"status": "active"}),
     ],
 )
 def test_a_run_that_is_over_takes_nothing(
@@ -182,7 +205,7 @@ def test_a_run_that_is_over_takes_nothing(
     client.post("/runs/1/event", data={"kind": "mature"})
     set_status(db, 1, RunStatus.STOPPED, "Stopped by the operator.")
     page = client.get("/runs/1").text
-    assert 'method="post"' not in page
+    assert (page.count('method="post"'), page.count('value="active"')) == (1, 1), "it can be resumed"
     assert "Ended the stage" in page
     reply = client.post(f"/runs/1/{path}", data=data)
     assert reply.status_code == 409

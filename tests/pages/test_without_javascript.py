@@ -106,8 +106,8 @@ def test_from_start_to_stop(tabs: BrowserTabs, db: Database, worker: Worker) -> 
     press(page, "Show")
     expect(page.locator(".entry")).to_have_count(1)
     page.get_by_role("link", name="Dashboard").click()
-    page.get_by_text("Stop for good…").click()
-    press(page, "Stop this run for good")
+    page.get_by_role("link", name="End this run…").click()
+    press(page, "End this run")
     expect(page.get_by_role("status")).to_contain_text("Stopped by the operator.")
     assert get_run(db, 1).status == "stopped"
     page.get_by_role("link", name="Parenting").click()

@@ -143,10 +143,11 @@ def test_pause_resume_stop(client: httpx2.Client, run: Run) -> None:
     assert post("resume").json()["status"] == "active"
     assert post("stop").json()["status"] == "stopped"
     assert post("stop").json()["worker"] == "done"
-    refused = post("resume")
+    refused = post("pause")
     assert refused.status_code == 409
     assert refused.json()["error"]["code"] == "conflict"
     assert post("mature").status_code == 409
+    assert post("resume").json()["status"] == "active"
 
 
 def test_events_reach_the_agent(client: httpx2.Client, db: Database, mine: Claim) -> None:

@@ -1,4 +1,7 @@
-"""A failed run keeps its reason, and goes on from its last good checkpoint, as if nothing had happened."""
+"""An ended run goes on; a failed run keeps its reason.
+
+Each goes on from its last good checkpoint, as if nothing had happened.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,8 @@ from parenting.server.settings import Settings
 from parenting.server.snapshot import DivergedError, pack
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Checkpoint
+from parenting.server.work.held import HeldRuns
+from parenting.server.work.patience import Patience
 from parenting.server.worker import Worker
 from tests.server.raising import ISLAND, inline, same_bits
 
@@ -106,13 +111,14 @@ def test_it_goes_on_with_the_same_bits_and_keeps_its_reason(
     assert [row["event"]["kind"] for row in logged] == ["failed", "resumed"]
 
 
-def test_a_question_that_was_open_is_asked_again(db: Database) -> None:
+@pytest.mark.parametrize("status", [RunStatus.FAILED, RunStatus.STOPPED])
+def test_a_question_that_was_open_is_asked_again(db: Database, status: RunStatus) -> None:
     start(db, ISLAND.new("human"))
     life = taken_up(db)
     while not open_counts(db, RUN).guidance:
         live_to(life, life.last_tick + 1)
     asked = worker_side.asked_at(db, RUN, life.last_tick)
-    fail(life)
+    runs.finish(db, life.claim, status, REASON)
     assert open_counts(db, RUN).guidance == 0
     runs.set_status(db, RUN, RunStatus.ACTIVE)
     again = worker_side.asked_at(db, RUN, life.last_tick)
@@ -121,9 +127,26 @@ def test_a_question_that_was_open_is_asked_again(db: Database) -> None:
     assert (again.id, again.status, open_counts(db, RUN).guidance) == (asked.id, "open", 1)
 
 
-@pytest.mark.parametrize("status", [RunStatus.STOPPED, RunStatus.FINISHED])
-def test_only_a_failed_run_comes_back(db: Database, status: RunStatus) -> None:
-    runs.finish(db, lived(db, to=5).claim, status, "Over.")
+def end_and_let_the_worker_hear(life: RunSession) -> None:
+    runs.set_status(life.db, RUN, RunStatus.STOPPED, "Stopped by the operator.")
+    held = HeldRuns(life.db, Patience(), lambda: None)
+    held.claims[RUN], held.sessions[RUN] = life.claim, life
+    held.turn(RUN, worker_side.watch(life.db, [RUN])[RUN])
+
+
+def test_an_ended_run_goes_on_with_the_same_bits_as_if_nobody_had_ended_it(db: Database) -> None:
+    end_and_let_the_worker_hear(lived(db, 20))
+    runs.set_status(db, RUN, RunStatus.ACTIVE)
+    (mine,) = runs.claim(db, "another")  # at once: its last worker has let go
+    again = RunSession(db, mine, runs.get_run(db, RUN), lambda: None)
+    assert (again.last_tick, runs.get_run(db, RUN).reason) == (40, None)
+    live_to(again, 60)
+    assert same_bits(again.saved, inline(60)) == []
+    assert [note for _, note in notes(db, RUN)] == [Resumed()]
+
+
+def test_a_finished_run_does_not_come_back(db: Database) -> None:
+    runs.finish(db, lived(db, to=5).claim, RunStatus.FINISHED, "Over.")
     with pytest.raises(Conflict):
         runs.set_status(db, RUN, RunStatus.ACTIVE)
 

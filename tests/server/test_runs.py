@@ -39,13 +39,14 @@ def test_doing_it_twice_is_doing_it_once(db: Database, run: Run, status: RunStat
     assert set_status(db, run.id, status).status == status
 
 
-def test_paused_run_goes_on_and_stopped_one_does_not(db: Database, run: Run) -> None:
+def test_paused_and_stopped_runs_go_on(db: Database, run: Run) -> None:
     set_status(db, run.id, RunStatus.PAUSED)
     assert set_status(db, run.id, RunStatus.ACTIVE).status == "active"
     set_status(db, run.id, RunStatus.STOPPED, "Enough.")
     assert get_run(db, run.id).reason == "Enough."
-    with pytest.raises(Conflict, match="is stopped; it cannot become active"):
-        set_status(db, run.id, RunStatus.ACTIVE)
+    with pytest.raises(Conflict, match="is stopped; it cannot become paused"):
+        set_status(db, run.id, RunStatus.PAUSED)
+    assert set_status(db, run.id, RunStatus.ACTIVE).reason is None
 
 
 def test_one_worker_a_run(db: Database, run: Run, clock: Clock) -> None:

@@ -20,6 +20,6 @@ export function recordAnswer() {
 // The time that so many more answers will take, in words; "" while too few were given to tell.
 export function timeLeft(answers) {
   if (times.length < FEW || answers <= 0) return "";
-  const seconds = times.toSorted((a, b) => a - b)[times.length >> 1] * answers / 1000;
+  const seconds = [...times].sort((a, b) => a - b)[times.length >> 1] * answers / 1000;
   return seconds < 5400 ? `about ${Math.max(1, Math.round(seconds / 60))} min` : `about ${Math.round(seconds / 3600)} h`;
 }

@@ -16,7 +16,8 @@ const tell = {
     page.state = now.state;
     page.goal = now.goal;
     if (now.reason) $("reason").textContent = now.reason;
-    $("optimal").hidden = !now.optimal || page.state === "over";
+    $("optimal").hidden = !now.optimal || !now.answers || page.state === "over";
+    $("resume").hidden = !["stopped", "failed"].includes(now.status);
     count(now.answers);
     if (page.current && page.state === "over") page.current = null;
     if (page.current) {
