@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 
 from fastapi import Query, Request, Response
 
-from parenting.server import runs
+from parenting.server import runs, tables
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.damage import sound
@@ -23,6 +23,7 @@ from parenting.server.pages.texts import parent_title
 from parenting.server.reads import answers
 from parenting.server.reads.answers import Answered
 from parenting.server.schemas import Choice
+from parenting.server.statuses import QueryStatus
 from parenting.server.tables import CHOICES, KINDS, Run
 
 router = admitted_router(include_in_schema=False)
@@ -49,7 +50,8 @@ class Entry(NamedTuple):
     number: int
     text: str
     chosen: tuple[str, ...]  # the sides that it favours
-    standing: bool
+    fallen: str  # how it came that it stands no more; "" if it stands
+    change: bool  # whoever looks gave it, and may change it
     who: str
     received: str  # in UTC, to the second
     asked: int  # the tick of the question
@@ -123,7 +125,8 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
         answer.number,
         CHOICE_TEXTS[answer.choice],
         ("left", "right") if answer.choice == "either" else (answer.choice,),
-        answer.standing,
+        _fallen(answer, query),
+        answer.standing and answer.parent == "human" and answer.client_id == mine,
         _who(answer.parent, answer.client_id, mine),
         f"{answer.received:%Y-%m-%d %H:%M:%S}",
         query.tick,
@@ -131,6 +134,12 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
         query.maturity if query.policy_stage is None else query.policy_stage,
         shown,
     )
+
+
+def _fallen(answer: tables.Answer, query: tables.Query) -> str:
+    if answer.standing:
+        return ""
+    return "taken back" if query.status in (QueryStatus.OPEN, QueryStatus.WITHDRAWN) else "corrected later"
 
 
 def _who(parent: str, client_id: str, mine: str) -> str:

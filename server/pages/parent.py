@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import secrets
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
@@ -18,13 +19,13 @@ from fastapi import Form, Query, Request, Response
 
 from parenting.server import runs, tables
 from parenting.server.admission import admitted_router
-from parenting.server.api.bodies import Choice, ClientId
-from parenting.server.api.names import DatabaseId, PublicId, RunId, RunName, read_name
+from parenting.server.api.names import PublicId, RunId, RunName, read_name
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
-from parenting.server.errors import ElsewhereError, NotFound
+from parenting.server.errors import DamagedRowError, ElsewhereError, NotFound
 from parenting.server.identity import database_id
-from parenting.server.pages.question import QuestionView, question_view
+from parenting.server.pages.fields import ChoiceField, ClientField, MaybeDatabase, MaybeQuestion
+from parenting.server.pages.question import Former, QuestionView, question_view
 from parenting.server.pages.render import page, redirect
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, parent_title
 from parenting.server.public_ids import LENGTH
@@ -32,6 +33,7 @@ from parenting.server.queue import answers, leases
 from parenting.server.queue.leases import lease_ahead, may_lease
 from parenting.server.queue.names import Names
 from parenting.server.reads.names import query_number, query_numbers
+from parenting.server.reads.own_answers import last_of, own_answer
 from parenting.server.reads.schemas import run_schema
 from parenting.server.statuses import RunState
 from parenting.server.streams import Streams
@@ -50,10 +52,6 @@ BY_NUMBER = (
     "now. Its answer was not stored. Open the page again."
 )
 
-ClientField = Annotated[ClientId, Form()]
-ChoiceField = Annotated[Choice, Form()]
-DatabaseField = Annotated[DatabaseId | None, Form()]
-QuestionField = Annotated[PublicId | None, Form()]
 Shown = Annotated[tuple[PublicId, ...], Form(max_length=100)]
 Seconds = Annotated[float, Form(ge=0, le=10, allow_inf_nan=False)]
 QueryShown = Annotated[str | None, Query(max_length=LENGTH)]
@@ -72,24 +70,30 @@ class ParentPage:
     sentences: Mapping[str, tuple[str, str]]  # heading and sentence of each state
     more: int  # answers that the goal grows by
     refresh: bool  # without JavaScript the page reloads until a question is there
+    last: QuestionView | None  # the last answer of this client, with its question
 
 
 @router.get("/runs/{run_id}/parent")
-def parent_page(request: Request, run_id: RunId, db: Db, query: QueryShown = None) -> Response:
+def parent_page(
+    request: Request, run_id: RunId, db: Db, query: QueryShown = None, change: bool = False
+) -> Response:
     """The page; with `query` it shows that question, as the forms do. Changes nothing.
+
+    With `change` the question is one that this client has answered, and its form changes the answer.
 
     Its address carries the run's public id. A researcher who writes the number is led there.
     """
     run = runs.get_run(db, run_id)
     asked = None if query is None else _question_of(db, run, query)
     if request.path_params["run_id"] != run.public_id or (asked is not None and query != asked.public_id):
-        return redirect(_address(run, asked), status=307)
+        return redirect(_address(run, asked, change), status=307)
     client = _client(request)
-    shown = question_view(asked, run) if asked is not None and asked.status == "open" else None
+    shown = None if asked is None else _shown(db, run, asked, client, change)
     now = _page_state(run_schema(db, run_id).state, may_lease(db, run_id, client))
     refresh = shown is None and now in ("exploring", "no_worker", "elsewhere")
     here = database_id(db)
-    context = ParentPage(run, parent_title(run), here, client, shown, now, STATE_TEXTS, GOAL_STEP, refresh)
+    title, last = parent_title(run), _last(db, run, client)
+    context = ParentPage(run, title, here, client, shown, now, STATE_TEXTS, GOAL_STEP, refresh, last)
     response = page("parent.html", **vars(context))
     response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")
     return response
@@ -138,8 +142,8 @@ async def answer(
     settings: SettingsOf,
     choice: ChoiceField,
     client_id: ClientField,
-    database: DatabaseField = None,
-    question: QuestionField = None,
+    database: MaybeDatabase = None,
+    question: MaybeQuestion = None,
 ) -> Response:
     """For the form: store the answer, then go to the next question.
 
@@ -170,8 +174,29 @@ def _markup(db: Database, run: Run, query: tables.Query, client_id: str) -> Resp
     return page("_question.html", shown=shown, client=client_id, database=database_id(db))
 
 
-def _address(run: Run, query: tables.Query | None) -> str:
-    return f"/runs/{run.public_id}/parent" + (f"?query={query.public_id}" if query else "")
+def _shown(db: Database, run: Run, asked: tables.Query, client: str, change: bool) -> QuestionView | None:
+    """Return the question that an address names, if it waits, or if its answer is to be changed."""
+    if asked.status == "open":
+        return question_view(asked, run)
+    found = own_answer(db, asked.id, client) if change else None
+    if found is None:
+        return None
+    return question_view(asked, run, Former(found.answer.choice, asked.status == "applied"))
+
+
+def _last(db: Database, run: Run, client: str) -> QuestionView | None:
+    """Return the question that this client answered last, unless it cannot be shown."""
+    found = last_of(db, run.id, client)
+    if found is None:
+        return None
+    with suppress(DamagedRowError):
+        return question_view(found.query, run, Former(found.answer.choice, found.query.status == "applied"))
+    return None
+
+
+def _address(run: Run, query: tables.Query | None, change: bool = False) -> str:
+    named = f"?query={query.public_id}" + ("&change=true" if change else "") if query else ""
+    return f"/runs/{run.public_id}/parent{named}"
 
 
 def _question_of(db: Database, run: Run, name: str) -> tables.Query:

@@ -8,8 +8,16 @@ from parenting.drawing.board import Board
 from parenting.drawing.candidates import with_margin
 from parenting.drawing.query_view import QueryView, query_view
 from parenting.server.damage import reading
-from parenting.server.pages.texts import LEADS
+from parenting.server.pages.texts import AGAIN, LEADS
 from parenting.server.tables import Query, Run
+
+
+@dataclass(frozen=True)
+class Former:
+    """The answer that stands for a question which is shown once more."""
+
+    choice: str
+    heard: bool  # the agent has heard it
 
 
 @dataclass(frozen=True)
@@ -19,6 +27,7 @@ class QuestionView(QueryView):
     id: str = ""  # public, as all that the page sends back
     run: str = ""
     one_board: bool = False  # guidance on one board with both moves, and not on the paper's two
+    former: Former | None = None
 
     @property
     def lead(self) -> str:
@@ -41,8 +50,27 @@ class QuestionView(QueryView):
         """The forecasts of both moves, as large as the board that they are played on."""
         return [with_margin(side.board) for side in self.sides]
 
+    @property
+    def names(self) -> dict[str, str]:
+        """Return the name of each choice, as the button that takes it back tells it."""
+        if self.one_board:
+            sides = {move.side: f"{move.letter}, {move.action}" for move in self.candidates}
+        else:
+            sides = {side.name: side.name.capitalize() for side in self.sides}
+        return {**sides, "either": "Either", "neither": "Neither"}
 
-def question_view(query: Query, run: Run) -> QuestionView:
+    @property
+    def again(self) -> str:
+        """Sentences on the answer that stands, where there is one."""
+        if self.former is None:
+            return ""
+        if not self.former.heard:
+            return AGAIN["unheard"]
+        moved = self.kind == "guidance" and self.former.choice != "neither"
+        return AGAIN["moved" if moved else "heard"]
+
+
+def question_view(query: Query, run: Run, former: Former | None = None) -> QuestionView:
     """Describe a stored query with its run's legend and level.
 
     Raises:
@@ -51,7 +79,8 @@ def question_view(query: Query, run: Run) -> QuestionView:
     with reading(query):
         view = query_view(query.clips, query.kind, query.maturity, run.legend, _rows(run))
     one = query.kind == "guidance" and run.guidance_layout == "one"
-    return QuestionView(**vars(view), id=query.public_id, run=run.public_id, one_board=one)
+    names = {"id": query.public_id, "run": run.public_id}
+    return QuestionView(**vars(view), **names, one_board=one, former=former)
 
 
 def _rows(run: Run) -> list[str]:

@@ -9,6 +9,13 @@ LEADS = {
     "preference": "Both begin at the same place. The agent goes on meanwhile.",
 }
 
+AGAIN = {
+    "unheard": "You have answered this question. Another answer takes the place of yours.",
+    "heard": "The agent has learnt from your answer. Another answer corrects what it learns from now on.",
+    "moved": "The move has happened, and that stays. Another answer corrects what it learns from now on.",
+}
+"""Sentences on a question that its parent has answered, shown where the answer can be changed."""
+
 STATE_TEXTS = {
     "question": ("A question is waiting for you.", "The agent would like to know what you prefer."),
     "exploring": ("The agent is exploring on its own.", "The next question will appear here."),

@@ -57,6 +57,7 @@ def _live(db: Database, mine: Claim) -> None:
     answer(db, queries[0], "left", "a", "human")
     take_answer(db, mine, QUESTIONS)
     answer(db, queries[1], "neither", "a", "human")
+    answer(db, queries[6], "left", "me", "human")  # question 7, which the examples change and take back
     add_operator_event(db, mine.run_id, "change", {"kind": "change", "name": "p_rec", "value": 0.5})
     take_operator_events(db, mine, QUESTIONS + 1)
     add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})

@@ -3,24 +3,29 @@ import { recordAnswer, timeLeft } from "./eta.js";
 import { flush, keep } from "./outbox.js";
 import { $, client, given, page, painted, PATIENCE, run, waiting } from "./page.js";
 import { next, show } from "./questions.js";
+import { change, remember } from "./undo.js";
 import { wait } from "./waiting.js";
 
 const HASTE = 40; // ms after an answer when the next question is asked for, if the answer's reply is not there before
 const ELSEWHERE = "An answer is meant for another database than the one that is served here. It was not stored; this browser keeps it.";
 const saved = []; // replies to answers, until the stage changes
 
-export function count(number) {
-  page.answered = Math.max(page.answered, number);
-  $("count").textContent = page.answered;
+export function count(number, retracted = 0) {
+  page.answers = Math.max(page.answers, number);
+  page.retracted = Math.max(page.retracted, retracted);
+  const standing = page.answers - page.retracted;
+  $("count").textContent = standing;
   $("goal").hidden = !page.goal;
   $("goal").firstElementChild.textContent = page.goal ?? "";
-  $("left").textContent = timeLeft(page.goal - page.answered);
+  $("left").textContent = timeLeft(page.goal - standing);
   for (const button of waiting.querySelectorAll("[data-more]")) button.value = page.goal + Number(button.dataset.more);
 }
 
 export function answer(choice) {
   if (!page.current) return;
-  const { database, query } = page.current.dataset;
+  const { database, query, former } = page.current.dataset;
+  if (former) return change(page.current, choice);
+  remember(page.current, choice);
   given.add(query);
   for (const button of page.current.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
   page.current = null;

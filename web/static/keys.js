@@ -29,6 +29,7 @@ export const letters = {
 };
 
 stage.addEventListener("submit", (event) => {
+  if (event.target.dataset.former) return; // the form itself changes an answer
   event.preventDefault();
   answer(event.submitter.value);
 });

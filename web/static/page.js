@@ -13,7 +13,8 @@ export const page = {
   asking: false, // a request for a question is under way
   again: false, // another one was wanted meanwhile
   state: main.dataset.state,
-  answered: Number($("count").textContent),
+  answers: Number($("count").textContent) + Number(main.dataset.retracted), // as they are numbered
+  retracted: Number(main.dataset.retracted), // of these, those that stand no more
   goal: Number($("goal").firstElementChild.textContent),
   unsaved: 0,
   quiet: 0, // the timer after which the page says that the agent explores

@@ -18,7 +18,7 @@ const tell = {
     if (now.reason) $("reason").textContent = now.reason;
     $("optimal").hidden = !now.optimal || !now.answers || page.state === "over";
     $("resume").hidden = !["stopped", "failed"].includes(now.status);
-    count(now.answers);
+    count(now.answers, now.answers - now.standing);
     if (page.current && page.state === "over") page.current = null;
     if (page.current) {
       if (!page.ahead && !page.lookout && now.open.guidance + now.open.preference > 1) prefetch();

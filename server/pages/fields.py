@@ -1,0 +1,18 @@
+"""Fields of the parent's forms."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Form
+
+from parenting.server.api.bodies import Choice, ClientId
+from parenting.server.api.names import DatabaseId, PublicId
+
+ClientField = Annotated[ClientId, Form()]
+ChoiceField = Annotated[Choice, Form()]
+DatabaseField = Annotated[DatabaseId, Form()]
+QuestionField = Annotated[PublicId, Form()]
+MaybeDatabase = Annotated[DatabaseId | None, Form()]
+MaybeQuestion = Annotated[PublicId | None, Form()]
+"""The same in forms of older versions, which name neither."""

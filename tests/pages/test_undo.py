@@ -1,0 +1,111 @@
+"""Undo: the last answer is taken back or changed, by key, by button, from the history, and by plain forms."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import httpx2
+from playwright.sync_api import expect
+from sqlalchemy import select
+
+from parenting.server.db import Database
+from parenting.server.queue.answers import answer, get_query
+from parenting.server.queue.worker_side import take_answer
+from parenting.server.runs import Claim, get_run
+from parenting.server.tables import Answer
+from tests.pages import island_fixtures as fixtures
+from tests.pages.browser_tabs import BrowserTabs, until
+from tests.pages.parent_page import address, form, public_id, shown
+
+ME, OTHER = "client-of-mine", "client-of-another"
+
+
+def stored(db: Database) -> list[tuple[str, bool]]:
+    """The choices that were stored, each with whether it stands."""
+    with db.read() as session:
+        rows = session.scalars(select(Answer).order_by(Answer.number)).all()
+        return [(row.choice, row.standing) for row in rows]
+
+
+def guidance(db: Database, mine: Claim, tick: int) -> int:
+    return fixtures.ask(db, mine, tick, "guidance", fixtures.guidance("left", "down", start=(1, 2)))
+
+
+def test_plain_forms_take_back_and_change(client: httpx2.Client, db: Database) -> None:
+    _, mine = fixtures.start_run(db)
+    query, here = guidance(db, mine, 1), address(db)
+    client.cookies.set("parenting_client", ME)
+    assert re.search(r'id="undo"[^>]* hidden', client.get(here).text)
+    answer(db, query, "right", ME, "human")
+    page = client.get(here).text
+    assert not re.search(r'id="undo"[^>]* hidden', page)
+    assert '<span id="undone">B, down</span>' in page
+    fields = form(db, query, client_id=ME)
+    back = client.post(f"{here}/withdraw", data=fields)
+    assert back.headers["location"] == address(db, query=query)
+    assert 'action="' + here + '/answer"' in client.get(back.headers["location"]).text
+    assert stored(db) == [("right", False)]
+    answer(db, query, "left", ME, "human")
+    take_answer(db, mine, 2)
+    back = client.post(f"{here}/withdraw", data=fields)
+    assert back.headers["location"].endswith("&change=true")
+    page = client.get(back.headers["location"]).text
+    assert "The move has happened" in page
+    assert 'action="' + here + '/change"' in page
+    assert len(re.findall(r'value="left"[^>]* aria-pressed="true"', page)) == 1
+    assert page.count('aria-pressed="true"') == 1
+    assert client.post(f"{here}/change", data={**fields, "choice": "neither"}).status_code == 303
+    assert stored(db) == [("right", False), ("left", False), ("neither", True)]
+
+
+def test_only_ones_own_answer_is_shown_to_be_changed(client: httpx2.Client, db: Database) -> None:
+    _, mine = fixtures.start_run(db)
+    query = guidance(db, mine, 1)
+    answer(db, query, "left", OTHER, "human")
+    client.cookies.set("parenting_client", ME)
+    there = f"{address(db, query=query)}&change=true"
+    assert 'id="question"' not in client.get(there).text
+    assert "Change this answer" not in client.get("/runs/1/history").text
+    client.cookies.clear()
+    client.cookies.set("parenting_client", OTHER)
+    assert 'id="question"' in client.get(there).text
+    assert f"query={public_id(db, query)}&amp;change=true" in client.get("/runs/1/history").text
+    refused = client.post(f"{address(db)}/change", data=form(db, query, client_id=ME, choice="right"))
+    assert refused.status_code == 409
+    elsewhere = {**form(db, query, client_id=OTHER), "database": "7c9e6679-7425-40de-944b-e07fc1f90ae7"}
+    assert client.post(f"{address(db)}/withdraw", data=elsewhere).status_code == 410
+    assert stored(db) == [("left", True)]
+
+
+def test_z_asks_again_and_the_history_changes(
+    tabs: BrowserTabs, db: Database, mine: Claim, ask: Callable[..., int]
+) -> None:
+    first, second = ask(), ask()
+    page = tabs.open(address(db))
+    shown(page, first)
+    page.keyboard.press("b")
+    shown(page, second)
+    until(lambda: stored(db) == [("right", True)])
+    expect(page.locator("#undo button")).to_contain_text("Undo: B, down")
+    page.keyboard.press("z")
+    shown(page, first)
+    expect(page.locator("#undo")).to_be_hidden()
+    until(lambda: stored(db) == [("right", False)])
+    expect(page.locator("#count")).to_have_text("0")
+    page.keyboard.press("a")
+    until(lambda: stored(db) == [("right", False), ("left", True)])
+    expect(page.locator("#count")).to_have_text("1")
+    assert take_answer(db, mine, 50) is not None
+    page.keyboard.press("z")
+    expect(page.locator(".again")).to_contain_text("Your answer: left.")
+    assert get_query(db, first).status == "applied"
+    expect(page.locator("#said")).not_to_be_empty()  # the script has begun
+    page.keyboard.press("e")
+    until(lambda: stored(db)[-1] == ("either", True))
+    page.goto(tabs.address + f"/runs/{get_run(db, 1).public_id}/history")
+    page.get_by_role("link", name="Change this answer").click()
+    expect(page.locator(".again")).to_contain_text("Your answer: either.")
+    page.locator(".answers [value=neither]").click()
+    until(lambda: stored(db)[-1] == ("neither", True))
+    assert [standing for _, standing in stored(db)] == [False, False, False, True]
