@@ -79,8 +79,8 @@ def question_view(query: Query, run: Run, former: Former | None = None) -> Quest
     with reading(query):
         view = query_view(query.clips, query.kind, query.maturity, run.legend, _rows(run))
     one = query.kind == "guidance" and run.guidance_layout == "one"
-    names = {"id": query.public_id, "run": run.public_id}
-    return QuestionView(**vars(view), **names, one_board=one, former=former)
+    name = query.public_id
+    return QuestionView(**vars(view), id=name, run=run.public_id, one_board=one, former=former)
 
 
 def _rows(run: Run) -> list[str]:

@@ -20,12 +20,12 @@ def own_answer(db: Database, query_id: int, client_id: str) -> Answered | None:
     return _first(db, _own(client_id).where(Answer.query_id == query_id))
 
 
-def _own(client_id: str) -> Select[tuple[Answer, Query]]:
+def _own(client_id: str) -> Select[Answer, Query]:
     rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
     return rows.where(Answer.client_id == client_id, Answer.standing)
 
 
-def _first(db: Database, rows: Select[tuple[Answer, Query]]) -> Answered | None:
+def _first(db: Database, rows: Select[Answer, Query]) -> Answered | None:
     with db.read() as session:
         row = session.execute(rows.limit(1)).first()
     found = None if row is None else Answered(row[0], row[1])

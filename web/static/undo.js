@@ -1,6 +1,7 @@
 // Undo: takes the last answer back while the agent has not heard it, and shows its question again. One that it has heard is
 // shown with its mark, by the server's own markup, and the form there changes it.
 import { report } from "./answers.js";
+import { keyName, letters } from "./keys.js";
 import { flush, kept } from "./outbox.js";
 import { $, client, given, help, page, run } from "./page.js";
 import { show } from "./questions.js";
@@ -64,7 +65,8 @@ form.addEventListener("submit", (event) => {
   event.preventDefault();
   undo();
 });
-addEventListener("keydown", ({ key, target, repeat, ctrlKey, metaKey, altKey, isComposing }) => {
-  if (key.toLowerCase() !== "z" || repeat || ctrlKey || metaKey || altKey || isComposing || help.open) return;
-  if (!target.closest("input, textarea, select, [contenteditable]")) undo();
+addEventListener("keydown", (event) => {
+  if (keyName(event) !== "z" || !letters.on || event.repeat || event.isComposing || help.open) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("input, textarea, select, [contenteditable]")) return;
+  undo();
 });
