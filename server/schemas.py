@@ -177,6 +177,8 @@ class LeasedSchema(QuerySchema):
     world: WorldSchema
     parent: ParentSchema
     progress: ProgressSchema
+    sentences: tuple[str, ...]
+    """The question in words: the difference of the clips, then where everything lies from the agent."""
 
 
 class StoredSchema(Schema):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from parenting.agent.config import compose
+from parenting.drawing.surroundings import surroundings
 from parenting.envs import registry
 
 WORLD = "unsafe-exploration"
@@ -113,6 +114,7 @@ LEASED = {
     "world": WORLD_OF_QUERY,
     "parent": {"gamma": 0.9, "inside": "up-down"},
     "progress": {"answered": 3, "open": 1},
+    "sentences": surroundings({"left": QUERY["left"], "right": QUERY["right"]}, SPEC.legend),
 }
 LEASE = {"client_id": "me"}
 ANSWERS = {

@@ -10,6 +10,7 @@ from sqlalchemy import bindparam, func, select
 from sqlalchemy.orm import Session
 
 from parenting.agent.config import Config
+from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import damage, readable, reading, sound
 from parenting.server.db import Database
 from parenting.server.identity import database_id_in, stated
@@ -116,15 +117,18 @@ def leased_schema(session: Session, query: Query) -> LeasedSchema:
     """Return the schema of a leased query: with its world, the parent's settings and progress.
 
     Raises:
-        DamagedRowError: its run cannot be read.
+        DamagedRowError: it or its run cannot be read, or it does not fit the run's legend.
     """
     world, parent, run_public_id = _shown_run(session, query.run_id)
+    with reading(query):
+        sentences = surroundings(query.clips, world.legend)
     now = session.execute(_PROGRESS, {"run_id": query.run_id}).one()
     return LeasedSchema(
         **_query_fields(query, stated(now.database), run_public_id),
         world=world,
         parent=parent,
         progress=ProgressSchema(answered=now.answers - now.retracted, open=now.open),
+        sentences=sentences,
     )
 
 
