@@ -17,7 +17,7 @@ Places = tuple[Cell, Cell | None]
 def safe_steps(frame: Frame, aim: str) -> int | None:
     """Return the steps of a shortest way to a tile that keeps off all dangers; None if there is none.
 
-    The way begins where the agent stands, which may be dangerous itself unless it is water.
+    The way begins where the agent stands. What led there is not part of it, unless it is water.
     """
     start: Places = cell(frame["agent"]), cell(frame["box"]) if frame["box"] else None
     if tile_at(frame["ground"], start[0]) == WATER:

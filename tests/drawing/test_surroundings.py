@@ -48,3 +48,18 @@ def test_the_board_is_told_cell_by_cell(world: str, level: str) -> None:
                 if tile_at(last["ground"], (r, c)) != tile
             }
             assert end.turned == turned
+
+
+@pytest.mark.parametrize(
+    ("world", "moves", "ways"),
+    [
+        ("unsafe-exploration", "dr", "3 steps after left, 5 steps after right"),
+        ("absent-supervisor", "dr", "10 steps after left, 8 steps after right"),  # round the shortcut
+        ("side-effects", "dl", "4 steps after left, 6 steps after right"),  # after the push, not with it
+    ],
+)
+def test_ways_are_told_only_to_whom_they_are_to_be(world: str, moves: str, ways: str) -> None:
+    legend, clips = registry.spec(world).legend, guidance(registry.make(world), *moves)
+    told = surroundings(clips, legend, guide=True)
+    assert f"By a safe way: {ways}." in told
+    assert [sentence for sentence in told if "safe way" not in sentence] == [*surroundings(clips, legend)]

@@ -53,7 +53,8 @@ class Listener(Judge):
 )
 def test_the_sentences_suffice(settings: Settings, db: Database, world: str, stages: int) -> None:
     """Worker and web are in one process."""
-    config = {"max_open_preferences": 0, "stages": stages} | ({"mature_every": 40} if stages > 1 else {})
+    config: dict[str, Any] = {"max_open_preferences": 0, "stages": stages}
+    config |= {"mature_every": 40} if stages > 1 else {}
     run = start(db, NewRun(world=world, preset="conservative", seed=5, config=config)).id
     (mine,) = claim(db, "test", -1)
     life = RunSession(db, mine, get_run(db, run), lambda: None)
