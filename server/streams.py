@@ -171,7 +171,7 @@ class Streams:
             if now != (subscription.run, subscription.question, subscription.leases):
                 subscription.run, subscription.question, subscription.leases = now
                 _tell(subscription)
-            # the end of a lease is no write: nobody notifies of it
+            # nobody notifies of the end of a lease
             await _either(notified, POLL_SECONDS if ends_in is None else min(POLL_SECONDS, ends_in))
             if notified.is_set() and self.waiting_requests:
                 await asyncio.sleep(YIELD_SECONDS)

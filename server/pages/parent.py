@@ -32,6 +32,7 @@ from parenting.server.public_ids import LENGTH
 from parenting.server.queue import answers, leases
 from parenting.server.queue.leases import lease_ahead, may_lease
 from parenting.server.queue.names import Names
+from parenting.server.queue.presence import holder
 from parenting.server.reads.names import query_number, query_numbers
 from parenting.server.reads.own_answers import last_of, own_answer
 from parenting.server.reads.schemas import run_schema
@@ -69,13 +70,20 @@ class ParentPage:
     state: str  # which of `sentences` holds while there is none
     sentences: Mapping[str, tuple[str, str]]  # heading and sentence of each state
     more: int  # answers that the goal grows by
+    holder: str  # the name by which the stream tells of this client's leases
+    attention: float  # seconds after a sign of life for which questions are held
     refresh: bool  # without JavaScript the page reloads until a question is there
     last: QuestionView | None  # the last answer of this client, with its question
 
 
 @router.get("/runs/{run_id}/parent")
 def parent_page(
-    request: Request, run_id: RunId, db: Db, query: QueryShown = None, change: bool = False
+    request: Request,
+    run_id: RunId,
+    db: Db,
+    settings: SettingsOf,
+    query: QueryShown = None,
+    change: bool = False,
 ) -> Response:
     """The page; with `query` it shows that question, as the forms do. Changes nothing.
 
@@ -93,7 +101,10 @@ def parent_page(
     refresh = shown is None and now in ("exploring", "no_worker", "elsewhere")
     here = database_id(db)
     title, last = parent_title(run), _last(db, run, client)
-    context = ParentPage(run, title, here, client, shown, now, STATE_TEXTS, GOAL_STEP, refresh, last)
+    who, attention = holder(client), settings.attention_seconds
+    context = ParentPage(
+        run, title, here, client, shown, now, STATE_TEXTS, GOAL_STEP, who, attention, refresh, last
+    )
     response = page("parent.html", **vars(context))
     response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")
     return response
@@ -108,17 +119,21 @@ async def question(
     client_id: ClientField,
     shown: Shown = (),
     wait: Seconds = 0.0,
+    take: bool = Form(False),
 ) -> Response:
     """For the script: the next question as markup, leased; 204 if there is none within `wait` seconds.
 
     `shown` are those that the page has already or whose answers are on their way: it asks for another one.
     The request lies here until the agent asks, also while the parent still thinks about the last question:
-    when the next one comes, its reply is on its way at once.
+    when the next one comes, its reply is on its way at once. With `take` a question that somebody else holds
+    comes here where none is free.
     """
     streams: Streams = request.app.state.streams
     run = await streams.admission.read(runs.get_run, db, run_id)
     numbers = await streams.admission.read(query_numbers, db, shown)
     lease = partial(_lease_next, db, run_id, client_id, numbers, settings.lease_seconds)
+    if take:
+        lease = partial(leases.take, db, run_id, client_id, settings.lease_seconds)
     query = await streams.wait_for(lease, wait, request.is_disconnected)
     if query is None:
         return Response(status_code=204)
@@ -132,6 +147,13 @@ def next_question(run_id: RunId, db: Db, settings: SettingsOf, client_id: Client
     """For the form: lease the next question and go to it."""
     run = runs.get_run(db, run_id)
     return redirect(_address(run, leases.lease(db, run.id, client_id, settings.lease_seconds)))
+
+
+@router.post("/runs/{run_id}/parent/take")
+def take_question(run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField) -> Response:
+    """For the form: take the question over, whoever holds it, and go to it."""
+    run = runs.get_run(db, run_id)
+    return redirect(_address(run, leases.take(db, run.id, client_id, settings.lease_seconds)))
 
 
 @router.post("/runs/{run_id}/parent/answer")

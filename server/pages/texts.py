@@ -21,7 +21,11 @@ STATE_TEXTS = {
     "exploring": ("The agent is exploring on its own.", "The next question will appear here."),
     "elsewhere": (
         "Somebody else has the question.",
-        "Unless they answer it, it will appear here within a minute.",
+        "If they close it, it will appear here within a minute. If that is you on another page, answer here.",
+    ),
+    "taken": (
+        "Your question was taken over.",
+        "Another page has it now. If it is closed there, the question will appear here within a minute.",
     ),
     "unsent": (
         "Your answer is kept here.",

@@ -17,6 +17,7 @@ from sqlalchemy import text
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.identity import database_id, renew
+from parenting.server.pages.texts import parent_title
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from tests.database import migrated
@@ -63,7 +64,11 @@ def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(
     names = form(db, number, run=runs.get_run(db, 1).public_id)
     assert sent.value.url.endswith(f"/api/v1/queries/{names['question']}/answer")
     body = {"choice": "right", "client_id": page.locator("#main").get_attribute("data-client"), **names}
-    assert json.loads(sent.value.post_data or "") == body == kept(page)[0]
+    assert json.loads(sent.value.post_data or "") == body
+    assert body.items() <= kept(page)[0].items()
+    said = f"Your answer to “{parent_title(runs.get_run(db, 1))}” of "
+    expect(page.locator("#alert")).to_contain_text(said)
+    expect(page.locator("#alert")).to_contain_text(f"belongs to the database {names['database'][:8]}, which")
 
     theirs = page.context.new_page()
     theirs.goto(tabs.address + address(other))

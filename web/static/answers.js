@@ -1,13 +1,15 @@
 // Answers: takes one for the question on the stage, keeps it, sends it, and says what became of it.
 import { recordAnswer, timeLeft } from "./eta.js";
 import { flush, keep } from "./outbox.js";
-import { $, client, given, page, painted, PATIENCE, run, waiting } from "./page.js";
+import { $, client, given, name, page, painted, PATIENCE, run, waiting } from "./page.js";
 import { next, show } from "./questions.js";
 import { change, remember } from "./undo.js";
 import { wait } from "./waiting.js";
 
 const HASTE = 40; // ms after an answer when the next question is asked for, if the answer's reply is not there before
-const ELSEWHERE = "An answer is meant for another database than the one that is served here. It was not stored; this browser keeps it.";
+const elsewhere = ({ database, title, given: at }) =>
+  `${title ? `Your answer to “${title}” of ${new Date(at).toLocaleString()}` : "An answer"} belongs to the database ${database?.slice(0, 8) ?? "of an older version"}, ` +
+  "which is not the one that is served here. It was not stored; this browser keeps it and sends it once its own database is back.";
 const saved = []; // replies to answers, until the stage changes
 
 export function count(number, retracted = 0) {
@@ -34,7 +36,7 @@ export function answer(choice) {
   $("alert").textContent = "";
   performance.mark("answer", { detail: query });
   recordAnswer();
-  keep({ database, run, question: query, choice, client_id: client });
+  keep({ database, run, question: query, choice, client_id: client, title: name, given: Date.now() });
   if (page.ahead) {
     painted(() => flush(report));
     return show(page.ahead);
@@ -63,7 +65,7 @@ export function report(outcome, reply, answer) {
     if (!page.unsaved) $("saved").textContent = "Saved";
   } else {
     if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? "Kept here, not stored" : "";
-    $("alert").textContent = outcome === "elsewhere" ? ELSEWHERE : reply.message;
+    $("alert").textContent = outcome === "elsewhere" ? elsewhere(answer) : reply.message;
     if (outcome === "elsewhere" && given.delete(answer.question) && !page.current) next(); // a copy of its database asks the same
   }
 }

@@ -16,8 +16,8 @@ async function withStream(use, wanted) {
   }
 }
 
-// Calls tell.run(run) with every change, tell.question(question or null) as soon as another one waits, tell.metrics(rows)
-// for the ticks after tell.after(), and tell.lost() while the server cannot be reached.
+// Calls tell.run(run) with every change, tell.question(question or null) as soon as another one waits, tell.leases(held)
+// when a lease begins or ends, tell.metrics(rows) for the ticks after tell.after(), and tell.lost() while the server cannot be reached.
 // With `background`, a hidden tab goes on asking, slowly; without, it is silent until it is seen again.
 export function follow(id, tell, { background = false } = {}) {
   let stream = null, heard = false, timer = 0, turns = 0, release = () => {};
@@ -26,6 +26,7 @@ export function follow(id, tell, { background = false } = {}) {
     stream = new EventSource(`/api/v1/runs/${id}/events` + (tell.after ? `?after=${tell.after()}` : ""));
     on("run", tell.run);
     if (tell.question) on("question", tell.question);
+    if (tell.leases) on("leases", tell.leases);
     if (tell.metrics) on("metrics", ({ rows }) => tell.metrics(rows));
     stream.addEventListener("error", () => { heard = false; });
     return new Promise((resolve) => { release = resolve; });

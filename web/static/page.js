@@ -12,6 +12,7 @@ export const page = {
   lookout: null, // aborts the request for it, which lies at the server
   asking: false, // a request for a question is under way
   again: false, // another one was wanted meanwhile
+  taken: false, // somebody else took the last question over
   state: main.dataset.state,
   answers: Number($("count").textContent) + Number(main.dataset.retracted), // as they are numbered
   retracted: Number(main.dataset.retracted), // of these, those that stand no more

@@ -3,17 +3,17 @@ import { count, report } from "./answers.js";
 import "./keys.js";
 import { follow } from "./live.js";
 import { flush, flushAll, kept } from "./outbox.js";
-import { $, page, run, stage } from "./page.js";
-import { next, prefetch, renew, show } from "./questions.js";
+import { $, page, run, stage, waiting } from "./page.js";
+import { leases } from "./presence.js";
+import { next, prefetch, show, take } from "./questions.js";
 import { wait } from "./waiting.js";
-
-const RENEW = 25_000; // ms; a question is held for a minute, and for longer while somebody looks at it
 
 // What the run's stream says.
 const tell = {
   run(now) {
     if (page.state === "offline" || page.state === "away") flushAll(report);
     page.state = now.state;
+    if (page.state !== "question") page.taken = false;
     page.goal = now.goal;
     if (now.reason) $("reason").textContent = now.reason;
     $("optimal").hidden = !now.optimal || !now.answers || page.state === "over";
@@ -32,6 +32,7 @@ const tell = {
     if (!page.current) next();
     else if (asked.kind === "guidance" && asked.public_id !== page.current.dataset.query && !page.lookout) prefetch(); // it goes first
   },
+  leases,
   lost(status) {
     page.state = status === 404 ? "away" : "offline";
     wait(page.state);
@@ -40,12 +41,12 @@ const tell = {
 
 // Send what an earlier visit left behind, then follow the run.
 addEventListener("pagehide", () => flush(report));
-document.addEventListener("visibilitychange", () => {
-  if (document.hidden) page.lookout?.abort();
-  else if (!page.ahead) prefetch();
+waiting.addEventListener("submit", (event) => {
+  if (!event.target.action.endsWith("/parent/take")) return;
+  event.preventDefault();
+  take();
 });
 history.replaceState(null, "", `/runs/${run}/parent`);
 const first = stage.querySelector("#question");
 if (first && !kept().includes(first.dataset.query)) show(first);
-setInterval(renew, RENEW);
 flush(report).then(() => follow(run, tell, { background: true }));

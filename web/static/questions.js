@@ -4,14 +4,15 @@ import { settle } from "./answers.js";
 import { forecasts } from "./forecast.js";
 import { kept } from "./outbox.js";
 import { $, client, given, main, name, page, painted, PATIENCE, run, stage, waiting } from "./page.js";
+import { attentive, leave } from "./presence.js";
 import { play } from "./play.js";
 import { wait } from "./waiting.js";
 
 const LOOKOUT = 5; // seconds that the request for the question after this one may lie at the server, while somebody thinks
 
 // The form of the most urgent question, besides those that were answered here; null if there is none within `seconds`.
-async function ask(shown = [], seconds = 0, signal = undefined) {
-  const body = new URLSearchParams({ client_id: client, wait: seconds });
+async function ask(shown = [], seconds = 0, signal = undefined, more = {}) {
+  const body = new URLSearchParams({ client_id: client, wait: seconds, ...more });
   for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
   const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body, signal });
   if (!reply.ok) throw Object.assign(new Error(reply.statusText), { status: reply.status });
@@ -35,18 +36,28 @@ export async function next(seconds = 0) {
       seconds = 0;
     } while (!form && page.again && !page.current);
     if (form && !page.current) show(form);
-    else if (!page.current && page.state === "question") wait(kept().length ? "unsent" : "elsewhere");
+    else if (!page.current && page.state === "question") wait(kept().length ? "unsent" : page.taken ? "taken" : "elsewhere");
     else if (!page.current) wait(page.state);
-  } catch ({ status }) {
-    if (status === 500) wait("damaged");
-    else wait(status === 404 ? "away" : "offline");
+  } catch (error) {
+    failed(error);
   } finally { page.asking = false; }
+}
+
+function failed({ status }) {
+  if (status === 500) wait("damaged");
+  else wait(status === 404 ? "away" : "offline");
+}
+
+// Answer here instead: the question comes here, whoever has it.
+export async function take() {
+  const form = await ask([], 0, undefined, { take: true }).catch(failed);
+  if (form && !page.current) show(form);
 }
 
 // The question after this one: its request lies at the server while somebody thinks, so that its reply leaves as soon as
 // the agent asks.
 export async function prefetch() {
-  if (!page.current || document.hidden) return;
+  if (!page.current || !attentive()) return;
   page.lookout?.abort();
   const mine = page.lookout = new AbortController(), form = page.current, began = performance.now();
   form.dataset.ahead = "";
@@ -63,13 +74,6 @@ export async function prefetch() {
   }
 }
 
-// A question is held for a minute, and for longer while somebody looks at it.
-export async function renew() {
-  if (!page.current || document.hidden) return;
-  await ask().catch(() => null);
-  if (!page.lookout) prefetch();
-}
-
 export function show(form) {
   const focused = stage.querySelector(".answers :focus")?.value;
   if (!form.isConnected) stage.replaceChildren(form);
@@ -77,6 +81,7 @@ export function show(form) {
   page.quiet = 0;
   page.current = form;
   page.ahead = null;
+  page.taken = false;
   waiting.hidden = true;
   stage.hidden = false;
   main.dataset.state = "question";
@@ -87,4 +92,5 @@ export function show(form) {
   page.player = form.matches(".one") ? forecasts(form) : play(form);
   performance.mark("question", { detail: form.dataset.query });
   painted(prefetch);
+  if (document.hidden) leave(); // the title tells of it, and others need not wait
 }
