@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
-from playwright.sync_api import expect
+from playwright.sync_api import Request, expect
 
 from parenting.server.db import Database
 from parenting.server.queue.presence import GRACE_SECONDS, held, holder
@@ -67,17 +68,20 @@ def test_a_page_that_nobody_looks_at_holds_its_question_no_longer(
     page.goto(f"{tabs.address}/runs/1/parent")
     shown(page, number)
     client = page.locator("#main").get_attribute("data-client") or ""
-    sent = []
-    page.on(
-        "request", lambda request: sent.append(request.post_data_json) if "/renew" in request.url else None
-    )
+    sent: list[Any] = []
+
+    def noted(request: Request) -> None:
+        if request.url.endswith("/renew"):
+            sent.append(request.post_data_json)
+
+    page.on("request", noted)
     page.clock.fast_forward(1000 * (settings.attention_seconds + 30))
     while not any(body["idle"] > settings.attention_seconds for body in sent):
-        page.wait_for_timeout(0)
+        page.wait_for_timeout(50)
     count = len(sent)
     shown(page, number)
     page.mouse.move(50, 50)
     while len(sent) == count:
-        page.wait_for_timeout(0)
+        page.wait_for_timeout(50)
     assert sent[-1]["idle"] < 1
     assert [lease["holder"] for lease in held(db, 1).leases] == [holder(client)]

@@ -18,7 +18,7 @@ def leased(db: Database, run: Run, client: str) -> int | None:
 
 
 def renewed(db: Database, run: Run, query: int, client: str = "a", idle: float = 0.0) -> str:
-    """Who has the question after `client` renewed it: yours, elsewhere or closed."""
+    """The holder of the question after `client` renewed it: yours, elsewhere or closed."""
     name = get_query(db, query).public_id
     found = renew(db, run.id, client, [name], LEASE_SECONDS, idle)
     (who,) = [who for who, names in vars(found).items() if names == [name]]
