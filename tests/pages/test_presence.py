@@ -75,7 +75,7 @@ def test_a_page_that_nobody_looks_at_holds_its_question_no_longer(
             sent.append(request.post_data_json)
 
     page.on("request", noted)
-    page.clock.fast_forward(1000 * (settings.attention_seconds + 30))
+    page.clock.fast_forward(int(1000 * (settings.attention_seconds + 30)))
     while not any(body["idle"] > settings.attention_seconds for body in sent):
         page.wait_for_timeout(50)
     count = len(sent)
