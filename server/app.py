@@ -10,6 +10,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.routing import Match
 
 from parenting.server import api, health, pages
@@ -37,6 +38,8 @@ from parenting.server.static import OthersFiles, OurFiles
 from parenting.server.streams import Streams
 
 LARGEST_BODY = 64 * 1024
+SMALL_BODY = 1024
+"""Bytes below which a reply is sent as it is: it fits into one packet, compressed or not."""
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 ABOUT = """Start a run, lease its questions, answer them, watch how the agent learns, export what was said.
 
@@ -88,6 +91,7 @@ def bare_app() -> FastAPI:
         redoc_url=None,
         lifespan=_lifespan,
     )
+    app.add_middleware(GZipMiddleware, minimum_size=SMALL_BODY, compresslevel=6)  # never a stream of events
     app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY)
     app.state.meters = Meters()
     app.add_middleware(

@@ -1,6 +1,7 @@
 """Static files: our own, and those that other packages carry (found without an import, which is slow).
 
-The browser asks each time whether its copy is current, and gets 304 if it is. So after an upgrade no page of
+What pages load of ours has a hash of its content in its name, and a browser keeps it for good. About the rest
+the browser asks each time whether its copy is current, and gets 304 if it is. So after an upgrade no page of
 one version runs a script of another.
 """
 
@@ -15,13 +16,15 @@ from pathlib import Path
 from typing import Any
 
 from fastapi.staticfiles import StaticFiles
+from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, Response
 from starlette.types import Scope
 
+from parenting.server.assets import STATIC, Asset, hashed
 from parenting.server.errors import NotFound
 
-STATIC = Path(__file__).parents[1] / "web" / "static"
+FOR_GOOD = "public, max-age=31536000, immutable"
 VENDOR = {
     "plotly.min.js": ("plotly", "package_data/plotly.min.js"),
     "swagger-ui.js": ("fastapi-swagger", "resources/swagger-ui-bundle.js"),
@@ -43,6 +46,8 @@ class OurFiles(StaticFiles):
         """
         if scope["method"] not in ("GET", "HEAD"):
             raise HTTPException(405)
+        if (asset := hashed(path)) is not None:
+            return _kept(asset, scope)
         full, found = self.lookup_path(path)
         if found is None or not stat.S_ISREG(found.st_mode):
             raise HTTPException(404)
@@ -85,6 +90,15 @@ class OthersFiles(OurFiles):
         if package and file is None:
             raise NotFound(f"{path} is not installed. Run: pip install {package}")
         return ("", None) if file is None else (str(file), file.stat())
+
+
+def _kept(asset: Asset, scope: Scope) -> Response:
+    """Return an asset, as it was compressed once, for a browser to keep."""
+    headers = {"Cache-Control": FOR_GOOD, "Vary": "Accept-Encoding"}
+    content = asset.content
+    if "gzip" in Headers(scope=scope).get("accept-encoding", ""):
+        content, headers["Content-Encoding"] = asset.compressed, "gzip"
+    return Response(content, headers=headers, media_type=asset.media)
 
 
 @lru_cache(maxsize=128)

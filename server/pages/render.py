@@ -10,6 +10,7 @@ from starlette.responses import HTMLResponse, RedirectResponse
 
 from parenting.drawing.render import environment
 from parenting.envs.people_text import isolated
+from parenting.server.assets import asset
 from parenting.server.errors import ServerError
 from parenting.server.public_ids import ALPHABET, LENGTH
 from parenting.server.tables import Run
@@ -18,6 +19,7 @@ WEB = Path(__file__).parent.parent.parent / "web"
 
 _templates = environment(WEB / "templates")
 _templates.filters["isolated"] = isolated
+_templates.globals["asset"] = asset
 
 
 def page(template: str, status: int = 200, **context: object) -> HTMLResponse:
