@@ -16,6 +16,7 @@ from sqlalchemy import text
 
 from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.group_commit import GroupCommit
 from parenting.server.identity import database_id, renew
 from parenting.server.pages.texts import parent_title
 from parenting.server.settings import Settings
@@ -40,6 +41,12 @@ def other(tmp_path: Path) -> Iterator[Database]:
     database.close()
 
 
+def serve(site: FastAPI, database: Database) -> None:
+    """Let another database come to the address, for reads and for the group of writes."""
+    site.state.group_commit.close()
+    site.state.db, site.state.group_commit = database, GroupCommit(database)
+
+
 def kept(page: Page) -> list[dict[str, Any]]:
     """The answers that the browser keeps."""
     found: list[dict[str, Any]] = json.loads(page.evaluate("localStorage.getItem('parenting.answers')"))
@@ -55,7 +62,7 @@ def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(
     page.context.route("**/events*", lambda route: route.abort())  # as if the server had been started again
     page.goto(tabs.address + address(db))
     shown(page, number)
-    site.state.db = other
+    serve(site, other)
     with page.expect_request("**/answer") as sent:
         page.keyboard.press("b")
     expect(page.locator("#alert")).to_contain_text(KEPT)
@@ -80,7 +87,7 @@ def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(
     theirs.close()
     assert given(db) == []
 
-    site.state.db = db
+    serve(site, db)
     until(lambda: given(db) == [(number, "right")])
     expect(page.locator("#saved")).to_have_text("Saved")
     until(lambda: kept(page) == [])
