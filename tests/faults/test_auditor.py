@@ -61,6 +61,8 @@ def test_sound_database_is_sound(house: tuple[Path, Entries]) -> None:
         ("UPDATE answer SET query_id = 99 WHERE number = 2", "belongs to no query of its run"),
         ("UPDATE answer SET number = 7 WHERE number = 2", "A5 run 1 has answers numbered"),
         ("UPDATE run SET answers = 7", "A5 run 1 counts 7 answers"),
+        ("UPDATE run SET retracted = 1", "A5 run 1 counts 1 that stand no more, of 0"),
+        ("UPDATE answer SET supersedes = 1 WHERE number = 2", "A2 the answers to query 2 do not follow"),
         ("UPDATE query SET status = 'open' WHERE id = 1", "query 1 is open, with an answer"),
         ("UPDATE query SET status = 'applied' WHERE id = 5", "query 5 is applied, with an answer"),
         ("UPDATE query SET tick = 1 WHERE id = 2", "C3 run 1 asked 2 times at tick 1"),
