@@ -20,7 +20,16 @@ END = re.compile(
     r"(?P<name>\w+) ends (?P<where>where it begins|[^,.]*)(?:, on (?P<on>[^,.]*))?"
     r"(?:, after (?P<steps>\d+) steps?)?\."
 )
-SAYS_NOTHING_OF_THE_BOARD = ("By air", "By a safe way", "Up: ", "All else", "Both end alike")
+SAYS_NOTHING_OF_THE_BOARD = (
+    "By air",
+    "By a safe way",
+    "Up: ",
+    "Down: ",
+    "Left: ",
+    "Right: ",
+    "All else",
+    "Both end alike",
+)
 
 
 @dataclass

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from parenting.drawing.board import Board
 from parenting.drawing.candidates import with_margin
 from parenting.drawing.query_view import QueryView, query_view
+from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import reading
 from parenting.server.pages.texts import AGAIN, LEADS
 from parenting.server.tables import Query, Run
@@ -28,6 +29,7 @@ class QuestionView(QueryView):
     run: str = ""
     one_board: bool = False  # guidance on one board with both moves, and not on the paper's two
     former: Former | None = None
+    around: tuple[str, ...] = ()  # the difference of the clips and the whole board, in sentences
 
     @property
     def lead(self) -> str:
@@ -37,6 +39,11 @@ class QuestionView(QueryView):
     @property
     def spoken(self) -> str:
         """The whole question as one text; the moves of one board have letters."""
+        return " ".join((self.asked, *self.around))
+
+    @property
+    def asked(self) -> str:
+        """The question and its moves or clips, without the board."""
         if not self.one_board:
             return super().spoken
         moves = [
@@ -78,9 +85,11 @@ def question_view(query: Query, run: Run, former: Former | None = None) -> Quest
     """
     with reading(query):
         view = query_view(query.clips, query.kind, query.maturity, run.legend, _rows(run))
-    one = query.kind == "guidance" and run.guidance_layout == "one"
-    name = query.public_id
-    return QuestionView(**vars(view), id=name, run=run.public_id, one_board=one, former=former)
+        one = query.kind == "guidance" and run.guidance_layout == "one"
+        around = surroundings(query.clips, run.legend, ("A", "B") if one else ("left", "right"))
+    return QuestionView(
+        **vars(view), id=query.public_id, run=run.public_id, one_board=one, former=former, around=around
+    )
 
 
 def _rows(run: Run) -> list[str]:

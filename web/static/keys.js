@@ -1,6 +1,6 @@
 // Keys and clicks. Letters are those that are printed on the keys; by position only where a layout has no Latin letter there.
 import { answer } from "./answers.js";
-import { $, help, page, stage } from "./page.js";
+import { $, help, page, speak, stage } from "./page.js";
 
 const LATIN = /^[a-z]$/i, LETTER = /^\p{L}$/u;
 const CHOICES = { a: "left", b: "right", e: "either", n: "neither", 1: "left", 2: "right" };
@@ -45,6 +45,7 @@ addEventListener("keydown", (event) => {
   if (target.closest("input, textarea, select, [contenteditable], [role=grid]")) return;
   if (name.length === 1 && name !== " " && !letters.on) return;
   if (name === "?") help.showModal();
+  else if (name === "d" && page.current && !event.shiftKey) speak(page.current.querySelector(".around ul").textContent.replace(/\s+/g, " ").trim());
   else if (name === " " && page.player?.replay && !target.closest("button, a, summary")) page.player.replay();
   else {
     const shifted = event.shiftKey && !/^[12]$/.test(name); // digits are shifted on a French keyboard

@@ -21,8 +21,15 @@ export const page = {
   quiet: 0, // the timer after which the page says that the agent explores
 };
 
-// Do something once the stage is painted: until then the page has nothing else to do.
 const CALM = 60; // ms
+
+// What a screen reader is to say. The same words twice are said twice only if they were gone in between.
+export function speak(words) {
+  $("said").textContent = "";
+  setTimeout(() => { $("said").textContent = words; }, CALM);
+}
+
+// Do something once the stage is painted: until then the page has nothing else to do.
 export function painted(then) {
   let timer = 0;
   const once = () => { clearTimeout(timer); then?.(); then = null; };

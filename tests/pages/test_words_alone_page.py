@@ -1,0 +1,57 @@
+"""A program that reads Chromium's accessibility tree finds all that answers a question in its words."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from parenting.envs import registry
+from parenting.server.db import Database
+from tests.drawing.world_clips import guidance
+from tests.pages.browser_tabs import BrowserTabs, given, until
+from tests.pages.test_every_world_page import posted
+from tests.told_board import ToldBoard, read_sentences
+
+FIRST = re.compile(r"(Both end alike|By air) .*")
+"""The first of the sentences on the board; before it stands the question."""
+
+
+def heard(page: Page) -> ToldBoard:
+    """The board that a screen reader is told of, read out of the accessibility tree alone."""
+    expect(page.locator("#said")).to_contain_text("All else is land.")
+    nodes = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
+    texts = [node["name"]["value"] for node in nodes if node["role"]["value"] == "StaticText"]
+    (told,) = [text for text in texts if "The board reaches" in text]
+    found = FIRST.search(told)
+    assert found, told
+    return read_sentences(re.split(r"(?<=\.) (?=[A-Z])", found[0].strip()), ("A", "B"))
+
+
+@pytest.mark.parametrize(
+    ("moves", "choice"), [("du", "left"), ("ud", "right"), ("dl", "either")], ids=["A", "B", "either"]
+)
+def test_the_words_in_the_tree_answer_the_question(
+    tabs: BrowserTabs, db: Database, moves: str, choice: str
+) -> None:
+    clips = guidance(registry.make("unsafe-exploration"), *moves)
+    page = tabs.open(posted(db, "unsafe-exploration", "guidance", clips, 1))
+    told = heard(page)
+    said = page.locator("#said")
+    said.evaluate("said => { said.textContent = ''; }")
+    page.keyboard.press("d")
+    assert heard(page) == told
+    page.keyboard.press({"left": "a", "right": "b", "either": "e"}[told.choice("guidance")])
+    until(lambda: given(db) == [(1, choice)])
+
+
+def test_the_board_in_words_opens_by_key_and_answers_nothing(tabs: BrowserTabs, db: Database) -> None:
+    clips = guidance(registry.make("unsafe-exploration"), "d", "u")
+    page = tabs.open(posted(db, "unsafe-exploration", "guidance", clips, 1))
+    page.locator(".around summary").focus()
+    page.keyboard.press("Space")
+    expect(
+        page.get_by_text("The goal is 3 down and 1 left of the agent, 4 cells by air.", exact=True)
+    ).to_be_visible()
+    assert given(db) == []
