@@ -218,7 +218,7 @@ def keys(browser: Browser, web: httpx2.Client, world: str, ahead: bool, answers:
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.add_init_script(PROBE)
     page.goto(str(web.base_url.join(f"/runs/{run}/parent")))
-    wanted = "#question" + ("[data-ahead]:not([data-ahead=''])" if ahead else "")
+    wanted = "#question[data-listening]" + ("[data-ahead]:not([data-ahead=''])" if ahead else "")
     draws, rows = random.Random(SEED), list[dict[str, Any]]()
     while len(rows) < answers:
         page.wait_for_selector(wanted, timeout=1e3 * PATIENCE)

@@ -58,6 +58,12 @@ class Settings(BaseSettings):
         description="How long after a parent's last sign of life (pointer, key, scroll, focus, touch) their "
         "question is still held.",
     )
+    listen_after_ms: int = Field(
+        200,
+        ge=0,
+        le=10_000,
+        description="How long a question is on the screen before the parent's page takes an answer to it.",
+    )
     claim_seconds: float = Field(
         5.0, gt=0, description="How long a run stays with a worker that gives no sign of life."
     )

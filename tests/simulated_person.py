@@ -93,7 +93,7 @@ def distances(level: str = "island") -> dict[Cell, int]:
 
 def answer(page: Page, to_goal: dict[Cell, int]) -> str:
     """Look at the question, press the key, wait until the page has moved on: the key."""
-    form = page.wait_for_selector("#question")
+    form = page.wait_for_selector("#question[data-listening]")
     assert form
     query = form.get_attribute("data-query")
     left, right = (to_goal.get(_end(path), FAR) for path in _paths(page))

@@ -72,6 +72,7 @@ class ParentPage:
     more: int  # answers that the goal grows by
     holder: str  # the name by which the stream tells of this client's leases
     attention: float  # seconds after a sign of life for which questions are held
+    listen_after: int  # milliseconds that a question is on the screen before it takes an answer
     refresh: bool  # without JavaScript the page reloads until a question is there
     last: QuestionView | None  # the last answer of this client, with its question
 
@@ -101,10 +102,9 @@ def parent_page(
     refresh = shown is None and now in ("exploring", "no_worker", "elsewhere")
     here = database_id(db)
     title, last = parent_title(run), _last(db, run, client)
-    who, attention = holder(client), settings.attention_seconds
-    context = ParentPage(
-        run, title, here, client, shown, now, STATE_TEXTS, GOAL_STEP, who, attention, refresh, last
-    )
+    who, attention, after = holder(client), settings.attention_seconds, settings.listen_after_ms
+    states = (now, STATE_TEXTS, GOAL_STEP)
+    context = ParentPage(run, title, here, client, shown, *states, who, attention, after, refresh, last)
     response = page("parent.html", **vars(context))
     response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")
     return response

@@ -46,7 +46,7 @@ def patient_pages(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
-    return Settings(data=tmp_path, database_url=None)
+    return Settings(data=tmp_path, database_url=None, listen_after_ms=0)
 
 
 @pytest.fixture

@@ -64,6 +64,7 @@ def answer(page: Page, number: int) -> str:
         page.get_by_role("button", name="End this episode").click()
     form = page.locator("#question")
     query, kind = form.get_attribute("data-query"), form.get_attribute("data-kind")
+    page.wait_for_selector("#question[data-listening]")
     page.keyboard.press(key(page, number))
     page.wait_for_selector(f'#question[data-query="{query}"]', state="detached")
     return str(kind)

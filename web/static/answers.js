@@ -1,4 +1,5 @@
 // Answers: takes one for the question on the stage, keeps it, sends it, and says what became of it.
+import { listens } from "./arming.js";
 import { recordAnswer, timeLeft } from "./eta.js";
 import { flush, keep } from "./outbox.js";
 import { $, client, given, name, page, painted, PATIENCE, run, waiting } from "./page.js";
@@ -24,7 +25,7 @@ export function count(number, retracted = 0) {
 }
 
 export function answer(choice) {
-  if (!page.current) return;
+  if (!listens(page.current)) return;
   const { database, query, former } = page.current.dataset;
   if (former) return change(page.current, choice);
   remember(page.current, choice);

@@ -2,6 +2,7 @@
 // The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
 import { settle } from "./answers.js";
 import { forecasts } from "./forecast.js";
+import { arm } from "./arming.js";
 import { kept } from "./outbox.js";
 import { $, client, given, main, name, page, painted, PATIENCE, run, stage, waiting } from "./page.js";
 import { attentive, leave } from "./presence.js";
@@ -80,6 +81,7 @@ export function show(form) {
   clearTimeout(page.quiet);
   page.quiet = 0;
   page.current = form;
+  arm(form);
   page.ahead = null;
   page.taken = false;
   waiting.hidden = true;
