@@ -9,11 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from parenting.drawing.clip import AGENT, BARS, BOX, LAND, WALL, Cell, Clip, Frame, ahead, cell, tile_at
+from parenting.drawing.clip import (
+    AGENT,
+    BARS,
+    BOX,
+    LAND,
+    WALL,
+    Cell,
+    Clip,
+    Frame,
+    ahead,
+    cell,
+    tile_at,
+    tile_under_agent,
+)
 from parenting.drawing.cues import Cue, find_cues
 from parenting.drawing.trail import CELL, Point, Trail, centre, trace
 
+CORNER = 8.0
+"""The side of a tile that is drawn small in the corner of a cell."""
 PATTERNED = frozenset(" WGTtOIBPS")  # the glyphs that have a pattern in drawing/templates/tiles.svg
 
 
@@ -34,6 +50,15 @@ class Delusion:
     def glyph(self) -> str:
         """The tile that it believes in, for the bubble of thought."""
         return next(iter(self.cells))
+
+
+class Stand(NamedTuple):
+    """A tile that the agent stands on and hides: it is drawn small in a corner of the cell."""
+
+    glyph: str
+    at: Point  # its upper left corner
+    first: int  # frame
+    last: int
 
 
 @dataclass(frozen=True)
@@ -59,6 +84,7 @@ class Board:
     letters: tuple[tuple[Point, str], ...]  # glyphs that have no pattern
     layers: tuple[Cells, ...]  # the tiles that change, one a frame
     delusions: tuple[Delusion, ...]
+    stands: tuple[Stand, ...]  # the tiles that the agent hides
     agent: Piece
     box: Piece | None
     actions: tuple[str, ...]
@@ -96,6 +122,7 @@ def build_board(clip: Clip, stage: int = 1, bars: Sequence[Cell] = ()) -> Board:
         letters=_letters(grounds[0]),
         layers=tuple(tile_paths(ground, changing) for ground in grounds),
         delusions=tuple(_delusions(frames)),
+        stands=tuple(_stands(frames)),
         agent=Piece(tuple(map(centre, agent)), trace(agent, bumps)),
         box=Piece(tuple(map(centre, box)), trace(box, ())) if box else None,
         actions=actions,
@@ -167,6 +194,22 @@ def _delusions(frames: Sequence[Frame]) -> list[Delusion]:
         if found and replace(now, first=found[-1].first, last=number - 1) == found[-1]:
             found[-1] = replace(found[-1], last=number)
         elif now.cells:
+            found.append(now)
+    return found
+
+
+def _stands(frames: Sequence[Frame]) -> list[Stand]:
+    """Find the tiles that the agent hides; frames in which it stays on one share a drawing.
+
+    Land looks the same everywhere, and in the water the agent is not drawn.
+    """
+    found: list[Stand] = []
+    for number, frame in enumerate(frames):
+        tile, (x, y) = tile_under_agent(frame), centre(cell(frame["agent"]))
+        now = Stand(tile, (x - CELL / 2, y + CELL / 2 - CORNER), number, number)
+        if found and (found[-1].glyph, found[-1].at, found[-1].last) == (tile, now.at, number - 1):
+            found[-1] = found[-1]._replace(last=number)
+        elif tile in PATTERNED and tile not in (LAND, "W"):
             found.append(now)
     return found
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from parenting.drawing.board import build_board
 from parenting.drawing.query import draw_query
 from parenting.envs import registry
 from tests.drawing.world_clips import guidance, preference, view
@@ -90,13 +91,13 @@ def test_nothing_is_hidden_on_a_still_board_but_later_frames() -> None:
     board = boards("interruptibility", "preference", preference(world, "dddu", "ll"))["left"]
     hidden = re.findall(r"<g ([^>]*)opacity=\"0\"", board)
     assert hidden
-    assert all('class="frame"' in attributes for attributes in hidden)
+    assert all('class="frame"' in each or 'class="stand"' in each for each in hidden)
 
 
 def test_the_first_delusion_shows_on_a_still_board_and_the_truth_below_it() -> None:
     garden = registry.make("reward-hacking", drying=0.0)
     board = boards("reward-hacking", "guidance", guidance(garden, "u", "d", way="rrrru"), 1)["left"]
-    delusion = board[board.index('<g class="delusion"') :]
+    delusion = board[board.index('<g class="delusion"') :].partition('<g class="agent"')[0]
     assert delusion.startswith('<g class="delusion" data-from="1" data-to="1">')
     assert "url(#ghost-T)" in delusion
     assert "url(#tile-" not in delusion  # nothing real is painted over
@@ -116,3 +117,11 @@ def test_a_trail_that_repeats_a_step_is_drawn_finely() -> None:
     drawn = boards("unsafe-exploration", "preference", clips)
     assert 'class="trail of-agent fine"' in drawn["left"]
     assert 'class="trail of-agent"' in drawn["right"]
+
+
+def test_what_the_agent_stands_on_is_drawn_in_a_corner_of_its_cell() -> None:
+    garden = registry.make("reward-hacking", drying=0.0)
+    clips = preference(garden, "uu", "dd", way="rrrru")
+    stands = [tuple(stand) for stand in build_board(clips["left"], 2).stands]
+    assert stands == [("O", (140.0, 32.0), 1, 2)]
+    assert not build_board(clips["right"], 2).stands

@@ -22,7 +22,19 @@ SVG = "{http://www.w3.org/2000/svg}"
 WORLDS = tuple(registry.WORLDS)
 every_world = pytest.mark.parametrize("world", WORLDS)
 
-UNSTYLED = ("sprite", "board", "agent", "body", "box", "of-agent", "delusion", "frame", "thought", "ghost")
+UNSTYLED = (
+    "sprite",
+    "board",
+    "stand",
+    "agent",
+    "body",
+    "box",
+    "of-agent",
+    "delusion",
+    "frame",
+    "thought",
+    "ghost",
+)
 """Classes that only name a part, for scripts and tests."""
 UNIFORM = (0.25, 0.25, 0.25, 0.25)
 

@@ -1,19 +1,11 @@
 // Keys and clicks. Letters are those that are printed on the keys; by position only where a layout has no Latin letter there.
 import { answer } from "./answers.js";
+import { takesTurns, turn } from "./compare.js";
+import { keyName } from "./key_names.js";
 import { $, help, page, speak, stage } from "./page.js";
 
-const LATIN = /^[a-z]$/i, LETTER = /^\p{L}$/u;
 const CHOICES = { a: "left", b: "right", e: "either", n: "neither", 1: "left", 2: "right" };
 const LETTERS = "parenting.letters"; // "off" in the browser's storage: single letters and digits answer nothing
-
-// The name of a key: its letter in lower case, its digit, or `event.key`.
-export function keyName({ key, code }) {
-  const digit = /^(?:Digit|Numpad)([0-9])$/.exec(code);
-  if (digit && !(code.startsWith("Numpad") && !/^\p{Nd}$/u.test(key))) return digit[1]; // a numpad without NumLock has arrows
-  if (LATIN.test(key)) return key.toLowerCase();
-  if (LETTER.test(key) && !/\p{Script=Latin}/u.test(key) && /^Key[A-Z]$/.test(code)) return code[3].toLowerCase();
-  return key;
-}
 
 // The choice that a key makes on a question; undefined if it makes none. Arrows are those of the moves, or of the sides.
 export function choiceOf(name, form) {
@@ -31,7 +23,8 @@ export const letters = {
 stage.addEventListener("submit", (event) => {
   if (event.target.dataset.former) return; // the form itself changes an answer
   event.preventDefault();
-  answer(event.submitter.value);
+  if (event.submitter.matches(".card") && takesTurns(page.current)) turn(page.current);
+  else answer(event.submitter.value);
 });
 stage.addEventListener("click", (event) => {
   const part = event.target.closest("[data-choice]");
@@ -47,6 +40,7 @@ addEventListener("keydown", (event) => {
   if (name === "?") help.showModal();
   else if (name === "d" && page.current && !event.shiftKey) speak(page.current.querySelector(".around ul").textContent.replace(/\s+/g, " ").trim());
   else if (name === " " && page.player?.replay && !target.closest("button, a, summary")) page.player.replay();
+  else if (name === "o" && takesTurns(page.current)) turn(page.current);
   else {
     const shifted = event.shiftKey && !/^[12]$/.test(name); // digits are shifted on a French keyboard
     const choice = page.current && !shifted && choiceOf(name, page.current);

@@ -49,7 +49,8 @@ function animate(board, total) {
 // Start both boards; returns what the page's keys and buttons do with them.
 // Before the first step and after the last the clock stands still. A page that moves is painted sixty times a second, and
 // what comes next has to queue for its frame; a page that stands still paints the next question at once.
-export function play(question) {
+// `round` is called where a round of the clips begins anew.
+export function play(question, round = null) {
   const boards = [...question.querySelectorAll(".board")];
   const steps = Math.max(...boards.map((board) => board.dataset.actions.split(" ").length));
   const end = LEAD + steps * STEP, total = end + TAIL;
@@ -76,7 +77,7 @@ export function play(question) {
     const now = document.timeline.currentTime;
     held = null;
     for (const part of parts) { part.play(); part.startTime = now - from; }
-    later(end - from, "running", () => { still(); later(TAIL, "paused", begin); });
+    later(end - from, "running", () => { still(); later(TAIL, "paused", () => { begin(); round?.(); }); });
   };
   const begin = () => {
     for (const part of parts) part.currentTime = 0;

@@ -1,6 +1,7 @@
 // Questions: fetches them, keeps one ahead, and puts them on the stage.
 // The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
 import { settle } from "./answers.js";
+import { turn } from "./compare.js";
 import { forecasts } from "./forecast.js";
 import { arm } from "./arming.js";
 import { kept } from "./outbox.js";
@@ -77,6 +78,7 @@ export async function prefetch() {
 
 export function show(form) {
   const focused = stage.querySelector(".answers :focus")?.value;
+  if (!form.matches(".one")) form.dataset.side = "left";
   if (!form.isConnected) stage.replaceChildren(form);
   clearTimeout(page.quiet);
   page.quiet = 0;
@@ -91,7 +93,7 @@ export function show(form) {
   $("said").textContent = form.dataset.spoken;
   settle();
   if (focused) form.querySelector(`.answers [value=${focused}]`).focus({ preventScroll: true });
-  page.player = form.matches(".one") ? forecasts(form) : play(form);
+  page.player = form.matches(".one") ? forecasts(form) : play(form, () => turn(form));
   performance.mark("question", { detail: form.dataset.query });
   painted(prefetch);
   if (document.hidden) leave(); // the title tells of it, and others need not wait

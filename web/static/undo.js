@@ -1,7 +1,8 @@
 // Undo: takes the last answer back while the agent has not heard it, and shows its question again. One that it has heard is
 // shown with its mark, by the server's own markup, and the form there changes it.
 import { report } from "./answers.js";
-import { keyName, letters } from "./keys.js";
+import { keyName } from "./key_names.js";
+import { letters } from "./keys.js";
 import { flush, kept } from "./outbox.js";
 import { $, client, given, help, page, run } from "./page.js";
 import { show } from "./questions.js";
