@@ -7,7 +7,7 @@ from typing import Any
 
 from playwright.sync_api import Browser, expect
 
-PAINTED, LOADED, MOST = 15_000, 21_000, 5
+PAINTED, LOADED, MOST = 15_000, 24_000, 5
 """Bytes that the painting of the question needs (page and style), bytes with script and icon, and responses.
 
 What the script then asks for (the state, the next question, the stream) is not counted.
