@@ -91,8 +91,8 @@ def script(name: str, folder: Path = STATIC) -> str:
 
     Raises:
         AssetError: a source has another form of import or export than `import { a, b } from "./c.js"`,
-            `import "./c.js"`, `export function` and `export const`, or a cycle imports something that is
-            no function.
+            `import "./c.js"`, `export function` and `export const`, or a cycle imports something other
+            than a function.
     """
     sources: dict[str, str] = {}
     _collect(name, folder, sources, set())

@@ -210,10 +210,14 @@ def test_the_operator_ends_an_episode(client: httpx2.Client, db: Database, life:
     assert [event.kind for event in rows(db, OperatorEvent)] == ["end_episode"]
 
 
-def test_an_optimal_agent_is_announced(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
+def test_an_optimal_agent_is_announced(
+    client: httpx2.Client, db: Database, life: tuple[Run, Claim], asked: list[int]
+) -> None:
     note = re.compile(r'<div id="optimal" class="note"( hidden)?>')
     assert note.search(look(client).text)[1] == " hidden"  # type: ignore[index]
     runs.report_progress(db, life[1], optimal=True)
+    assert note.search(look(client).text)[1] == " hidden", "nothing was answered yet"  # type: ignore[index]
+    answers.answer(db, asked[0], "left", ME, "human")
     assert note.search(look(client).text)[1] is None  # type: ignore[index]
 
 

@@ -81,8 +81,8 @@ def test_a_level_of_ones_own_stands_in_for_the_list(client: httpx2.Client, db: D
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
-        ("seed", "many", "integer"),
-        ("seed", "-1", "greater than or equal to 0"),
+        ("seed", "many", "whole number"),
+        ("seed", "-1", "from 0 to"),
         ("level", "atlantis", "There is no such level"),
         ("level_text", "#####\n#A?G#\n#####\n", "line 2, column 3"),
         ("world", "moon", "There is no such world"),

@@ -112,7 +112,7 @@ def test_its_commands_do_what_they_say(client: httpx2.Client, db: Database) -> N
         if len(said) == 1:
             post_query(db, claim(db, "worker-1")[0], 1, "guidance", 1, CLIPS)
     assert [status.status_code for name, status in said if name == "lease"] == [200]
-    assert len(said) == 20
+    assert len(said) == 23
 
 
 def test_an_error_looks_as_it_says(client: httpx2.Client) -> None:

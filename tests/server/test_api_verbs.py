@@ -97,7 +97,6 @@ def test_wrong_pace(client: httpx2.Client, run: Run, body: dict[str, Any]) -> No
     ("verb", "body"),
     [
         ("pause", {}),
-        ("resume", {}),
         ("mature", {}),
         ("end-episode", {}),
         ("change", {"name": "p_rec", "value": 0.5}),

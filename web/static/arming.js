@@ -21,7 +21,7 @@ export function arm(form) {
   requestAnimationFrame(() => setTimeout(() => setTimeout(listen, AFTER))); // a page that nobody sees is not painted
 }
 
-// The second click of a double click is no answer to the question that came in between.
+// The second click of a double click does not answer the question that came in between.
 let pressed = null;
 stage.addEventListener("click", (event) => {
   const form = event.target.closest("form");

@@ -49,7 +49,7 @@ function animate(board, total) {
 // Start both boards; returns what the page's keys and buttons do with them.
 // Before the first step and after the last the clock stands still. A page that moves is painted sixty times a second, and
 // what comes next has to queue for its frame; a page that stands still paints the next question at once.
-// `round` is called where a round of the clips begins anew.
+// `round` is called where a round of the clips begins again.
 export function play(question, round = null) {
   const boards = [...question.querySelectorAll(".board")];
   const steps = Math.max(...boards.map((board) => board.dataset.actions.split(" ").length));
