@@ -1,9 +1,11 @@
 """`parenting worker --check`: what a container's health check asks."""
 
 import socket
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -74,7 +76,16 @@ def test_workers_of_other_machines_do_not_count(db: Database) -> None:
     assert check().exit_code == 1
 
 
-def test_tables_are_missing(empty: Database) -> None:
+def test_there_is_no_database(empty: Database, tmp_path: Path) -> None:
+    said = check()
+    assert said.exit_code == 2
+    assert said.stderr.startswith(f"There is no database at {tmp_path / 'parenting.db'}. Set PARENTING_DATA")
+    assert not (tmp_path / "parenting.db").exists()
+
+
+def test_tables_are_missing(empty: Database, tmp_path: Path) -> None:
+    with closing(sqlite3.connect(tmp_path / "parenting.db")) as connection:
+        connection.execute("CREATE TABLE another (number INTEGER)")
     said = check()
     assert said.exit_code == 2
     assert said.stderr.endswith("has no tables yet. Run: `parenting migrate`\n")

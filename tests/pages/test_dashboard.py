@@ -69,7 +69,8 @@ def test_pause_resume_stop(client: httpx2.Client, db: Database) -> None:
     page = client.get("/runs/1").text
     assert "Stopped by the operator." in page
     assert 'action="/runs/1/status"' not in page
-    assert client.post("/runs/1/status", data={"status": "active"}).status_code == 409
+    assert client.post("/runs/1/status", data={"status": "paused"}).status_code == 409
+    assert press("active") == "/runs/1", "an end can be taken back"
 
 
 @pytest.mark.parametrize("status", ["finished", "failed", ""])
