@@ -67,7 +67,7 @@ def require_sound(database: Path) -> None:
     sqlite = sqlite_module()
     try:
         with closing(open_file(database)) as connection:
-            faults = _faults(connection, database)
+            faults = _schema_faults(connection) or _faults(connection, database)
     except sqlite.Error as error:
         if is_busy(error):
             return  # in use, so others can read it
@@ -81,6 +81,18 @@ def require_sound(database: Path) -> None:
         raise _damaged(database, faults[0].splitlines()[-1])
     if _ends_amid_a_page(database, log):
         raise _damaged(database, "it ends in the middle of a page")
+
+
+def _schema_faults(connection: Any) -> list[str]:
+    """Return what is wrong with the text of the schema: the driver could not even name its columns."""
+    for (definition,) in connection.execute(
+        "SELECT CAST(sql AS BLOB) FROM sqlite_schema WHERE sql IS NOT NULL"
+    ):
+        try:
+            bytes(definition).decode()
+        except UnicodeDecodeError:
+            return ["the definition of a table cannot be read"]
+    return []
 
 
 def _ends_amid_a_page(database: Path, log: Path) -> bool:

@@ -4,9 +4,11 @@ import os
 import re
 import signal
 import socket
+import sqlite3
 import subprocess
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -126,6 +128,8 @@ def test_port_in_use_is_told_in_a_sentence(data: Path, command: str) -> None:
 
 @pytest.mark.parametrize("command", ["web", "worker"])
 def test_unmigrated_database_is_refused_in_a_sentence(tmp_path: Path, command: str) -> None:
+    with closing(sqlite3.connect(tmp_path / "parenting.db")) as connection:
+        connection.execute("CREATE TABLE another (number INTEGER)")
     with parenting(command, data=tmp_path) as child:
         out, said = child.communicate(timeout=60)
     assert child.returncode == 2
