@@ -39,8 +39,8 @@ QUEUE = [
     Mutant(
         "two clients get the same question",
         "server/queue/leases.py",
-        "or_(_MINE, _FREE))",
-        "Query.id > 0)",
+        "_OPEN = _ANY.where(or_(_MINE, _FREE))",
+        "_OPEN = _ANY",
         f"{ANSWERS}::test_many_clients_lease_different_questions",
     ),
     Mutant(
@@ -53,8 +53,8 @@ QUEUE = [
     Mutant(
         "an answer that is sent again is refused (idempotence)",
         "server/queue/answers.py",
-        "if before is not None:\n            return _again(before, said, place)",
-        'if before is not None:\n            raise Conflict("It was answered already.")',
+        "if asked.standing is not None:\n        return _again(asked, said, place)",
+        'if asked.standing is not None:\n        raise Conflict("It was answered already.")',
         f"{ANSWERS}::test_same_answer_again_gets_the_same_reply",
     ),
     Mutant(
@@ -74,14 +74,14 @@ QUEUE = [
     Mutant(
         "a second answer that differs is taken for the first",
         "server/queue/answers.py",
-        "if before.choice != said.choice:",
-        "if not before.choice:",
+        "if asked.choice != said.choice:",
+        "if not asked.choice:",
         f"{ANSWERS}::test_another_answer_is_refused",
     ),
     Mutant(
         "a replayed tick hears what comes next, not what was recorded",
         "server/queue/worker_side.py",
-        "if _closed(session, mine.run_id, tick):",
+        "if closed(session, mine.run_id, tick):",
         "if tick < 0:",
         f"{WORKER}::test_replay_gives_back_what_was_recorded",
     ),

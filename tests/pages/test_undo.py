@@ -101,12 +101,13 @@ def test_z_asks_again_and_the_history_changes(
     expect(page.locator(".again")).to_contain_text(re.compile(r"Your answer: [AB], (up|down|left|right)\."))
     assert get_query(db, first).status == "applied"
     expect(page.locator("#said")).not_to_be_empty()  # the script has begun
+    page.wait_for_selector("#question[data-listening]")
     page.keyboard.press("e")
     until(lambda: stored(db)[-1] == ("either", True))
     expect(page.locator(".again")).to_have_count(0)
     page.goto(tabs.address + f"/runs/{get_run(db, 1).public_id}/history")
     page.get_by_role("link", name="Change this answer").click()
-    expect(page.locator(".again")).to_contain_text("Your answer: either.")
+    expect(page.locator(".again")).to_contain_text("Your answer: Either.")
     page.locator(".answers [value=neither]").click()
     until(lambda: stored(db)[-1] == ("neither", True))
     assert [standing for _, standing in stored(db)] == [False, False, False, True]

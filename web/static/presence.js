@@ -23,7 +23,7 @@ function post(verb, body) {
 // Hold what is on the page as long as somebody looks at it, and learn who has it.
 export async function renew() {
   const { current, ahead } = page, shown = [current, ahead].filter(Boolean);
-  if (!current) return;
+  if (!current || current.dataset.former) return; // an answered question that is being changed is nobody's to hold
   const reply = await post("renew", { questions: shown.map(({ dataset }) => dataset.query), idle: idle() }).catch(() => null);
   if (!reply?.ok) return;
   const { yours, elsewhere } = await reply.json();
@@ -47,6 +47,7 @@ export function leases(now) {
   const held = new Map(now.map(({ question, holder }) => [question, holder]));
   const freed = [...holders.keys()].some((question) => !held.has(question));
   holders = held;
+  if (page.current?.dataset.former) return;
   if (page.current) {
     const shown = [page.current, page.ahead].filter(Boolean);
     if (shown.some(({ dataset }) => held.get(dataset.query) !== main.dataset.holder)) renew();

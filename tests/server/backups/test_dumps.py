@@ -36,7 +36,7 @@ def test_a_dump_brings_the_database_back_and_the_former_one_is_kept(
     made = back_up(settings, tmp_path / "monday.dump")
     assert stat.S_IMODE(made.file.stat().st_mode) == 0o600
     start(db, NewRun(world="reward-hacking", parent="scripted"))
-    with pytest.raises(SetupError, match=r"in use: \d+ connections"):
+    with pytest.raises(SetupError, match=r"in use: \d+ connections?"):
         restore(settings, made.file, replace=True)
     db.close()
     with pytest.raises(SetupError, match=r"holds tables\. Give --replace"):
