@@ -61,7 +61,10 @@ def reopen_in(session: Session, run_id: int) -> None:
     rows = update(Query).where(Query.run_id == run_id, Query.status == QueryStatus.WITHDRAWN)
     rows = rows.where(Query.id.not_in(answered))
     rows = rows.where(or_(Query.kind != "guidance", Query.tick >= func.coalesce(ended.scalar_subquery(), -1)))
-    session.execute(rows.values(status=QueryStatus.OPEN, leased_by=None, leased_until=None))
+    nobody: dict[str, None] = dict.fromkeys(
+        ("leased_by", "leased_until", "lease_epoch", "lease_begin", "lease_end")
+    )
+    session.execute(rows.values(status=QueryStatus.OPEN, **nobody))
 
 
 def guidance_first() -> ColumnElement[int]:
