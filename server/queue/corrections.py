@@ -65,15 +65,17 @@ def take_correction(db: Database, mine: Claim, tick: int) -> Corrected | None:
         return None if replaced is None else _corrected(session, found, replaced, tick)
 
 
-def withdraw_guidance(db: Database, mine: Claim) -> None:
-    """Withdraw the open guidance query of a pause that a correction has ended.
+def withdraw_guidance(db: Database, mine: Claim, tick: int) -> None:
+    """Withdraw the open guidance query of a pause that a correction has ended at this tick.
+
+    A replayed tick leaves what was asked since: the agent waits for that.
 
     Raises:
         LostClaimError: another worker trains this run now.
     """
     with db.write() as session:
         held(session, mine)
-        withdraw_in(session, mine.run_id, "guidance")
+        withdraw_in(session, mine.run_id, "guidance", before=tick)
 
 
 def _corrected(session: Session, found: Taken, replaced: Answer, tick: int) -> Corrected:

@@ -41,11 +41,13 @@ def open_by_run(session: Session, run_ids: Sequence[int]) -> dict[int, Open]:
     return {i: Open(counts.get((i, "guidance"), 0), counts.get((i, "preference"), 0)) for i in run_ids}
 
 
-def withdraw_in(session: Session, run_id: int, kind: str | None = None) -> None:
-    """Withdraw the open queries of a run (of one kind), in a transaction that is already open."""
+def withdraw_in(session: Session, run_id: int, kind: str | None = None, before: int | None = None) -> None:
+    """Withdraw a run's open queries, of one kind or asked before a tick, in a transaction that is open."""
     rows = update(Query).where(Query.run_id == run_id, Query.status == QueryStatus.OPEN)
     if kind is not None:
         rows = rows.where(Query.kind == kind)
+    if before is not None:
+        rows = rows.where(Query.tick < before)
     session.execute(rows.values(status=QueryStatus.WITHDRAWN))
 
 

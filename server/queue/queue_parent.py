@@ -64,7 +64,7 @@ class QueueParent:
             return events
         self.corrected = amendment.take(state, events, self._correction(found))
         if self.corrected.heard is not None:
-            corrections.withdraw_guidance(self.db, self.mine)
+            corrections.withdraw_guidance(self.db, self.mine, self.tick)
         return [*events, self.corrected.event]
 
     def _correction(self, found: corrections.Corrected) -> Correction:

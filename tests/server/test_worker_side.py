@@ -6,7 +6,7 @@ from parenting.server.db import Database
 from parenting.server.errors import LostClaimError
 from parenting.server.operator_events import add_operator_event
 from parenting.server.queue.answers import answer, get_query
-from parenting.server.queue.corrections import take_correction
+from parenting.server.queue.corrections import take_correction, withdraw_guidance
 from parenting.server.queue.queries import open_counts
 from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import (
@@ -98,6 +98,15 @@ def test_a_correction_has_a_tick_of_its_own(db: Database, mine: Claim) -> None:
     assert again.answer.id == found.answer.id, "a replayed tick hears it again"
     assert heard(db, mine, 6) is None
     assert take_correction(db, mine, 7) is None
+
+
+def test_a_replayed_correction_leaves_what_was_asked_since(db: Database, mine: Claim) -> None:
+    """Else a worker that was killed would leave an agent that waits for a question that nobody is asked."""
+    post_query(db, mine, 2, "guidance", 1, CLIPS)
+    later = post_query(db, mine, 6, "guidance", 1, CLIPS)
+    withdraw_guidance(db, mine, 4)
+    assert open_counts(db, mine.run_id).guidance == 1
+    assert get_query(db, later).status == "open"
 
 
 def test_correction_before_it_was_heard_is_what_is_heard(db: Database, mine: Claim) -> None:
