@@ -1,20 +1,21 @@
 """One style sheet and one script a page, put together from their sources when they are first asked for.
 
-A script is its page's ES module and all that it imports, in the order in which a browser would run them. Each
-module becomes a block with its own names. Addresses hold a hash of the content, so a browser keeps a copy for
-good; an upgrade, which restarts the server, changes the addresses. The sources stay addressable one by one.
+A script is its page's ES module and all that it imports (`server.scripts`); what it loads later, by
+`import("./later.js")`, has scripts of its own. Addresses hold a hash of the content, so a browser keeps a
+copy for good; an upgrade, which restarts the server, changes the addresses. The sources stay addressable one
+by one.
 """
 
 from __future__ import annotations
 
 import gzip
-import re
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
 from parenting.drawing.render import STYLE
+from parenting.server.scripts import scripts
 
 STATIC = Path(__file__).parents[1] / "web" / "static"
 EVERY_PAGE = ("colours.css", "site.css")
@@ -38,15 +39,6 @@ SHEETS = {
 SCRIPTS = ("parent.js", "history.js", "dashboard.js", "start.js", "docs.js")
 PICTURES = ("icon.svg", "query.svg", "question.svg")
 MEDIA = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
-
-IMPORT = re.compile(r'^import (?:\{ ([\w$, ]+) \} from )?"\./([\w-]+\.js)";\n', re.MULTILINE)
-EXPORT = re.compile(r"^export (?=(?:async function|function|const|class) )", re.MULTILINE)
-OTHER = re.compile(r"^(?:import\b.*|export\b.*)|\bimport\(.*", re.MULTILINE)
-REMARK = re.compile(r"^ *//.*\n", re.MULTILINE)
-
-
-class AssetError(Exception):
-    """A source uses a form of import or export that cannot be put into one script."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +67,11 @@ def hashed(name: str) -> Asset | None:
 def assets() -> dict[str, Asset]:
     """Return all assets by their names without hashes."""
     texts = {name: sheet(parts) for name, parts in SHEETS.items()}
-    texts |= {name: script(name) for name in SCRIPTS}
     texts |= {name: (STATIC / name).read_text("utf-8") for name in PICTURES}
-    return {name: _asset(name, text.encode()) for name, text in texts.items()}
+    found = {name: _asset(name, text.encode()) for name, text in texts.items()}
+    for name in SCRIPTS:
+        found |= page_scripts(name)
+    return found
 
 
 def sheet(parts: tuple[str, ...]) -> str:
@@ -86,76 +80,17 @@ def sheet(parts: tuple[str, ...]) -> str:
     return "\n".join((folders.get(one, STATIC) / one).read_text("utf-8") for one in parts)
 
 
-def script(name: str, folder: Path = STATIC) -> str:
-    """Return one module made of a module and all that it imports.
+def page_scripts(name: str, folder: Path = STATIC) -> dict[str, Asset]:
+    """Return a page's script and those that it loads later, by their names.
 
     Raises:
-        AssetError: a source has another form of import or export than `import { a, b } from "./c.js"`,
-            `import "./c.js"`, `export function` and `export const`, or a cycle imports something other
-            than a function.
+        AssetError: the sources cannot be put together (`server.scripts`).
     """
-    sources: dict[str, str] = {}
-    _collect(name, folder, sources, set())
-    wanted: dict[str, set[str]] = {one: set() for one in sources}
-    for text in sources.values():
-        for names, origin in IMPORT.findall(text):
-            wanted[origin] |= set(_names(names))
-    heads = "".join(f"const {_scope(one)} = {{}};\n" for one in sources)
-    done: dict[str, str] = {}
-    for one in sources:
-        done[one] = _block(one, sources, done, wanted[one])
-    return heads + "".join(done.values())
-
-
-def _collect(name: str, folder: Path, sources: dict[str, str], begun: set[str]) -> None:
-    """Add a module's source after those that it imports."""
-    begun.add(name)
-    text = (folder / name).read_text("utf-8")
-    for _, origin in IMPORT.findall(text):
-        if origin not in begun:
-            _collect(origin, folder, sources, begun)
-    sources[name] = text
-
-
-def _block(name: str, sources: dict[str, str], done: dict[str, str], wanted: set[str]) -> str:
-    """Return a module as a block: what it gives and takes at its beginning, its text, its constants."""
-    text = sources[name]
-    lines = []
-    for names, origin in IMPORT.findall(text):
-        if origin in done:
-            lines += [f"const {{ {names} }} = {_scope(origin)};\n"] if names else []
-            continue
-        for one in _names(
-            names
-        ):  # a cycle: the other module has not run yet, so its functions are looked up late
-            if not _is_function(one, sources[origin]):
-                raise AssetError(
-                    f"{name} imports {one} of {origin}, which imports {name}: only functions can be."
-                )
-            lines.append(f"const {one} = (...given) => {_scope(origin)}.{one}(...given);\n")
-    body = REMARK.sub("", EXPORT.sub("", IMPORT.sub("", text)))
-    if (other := OTHER.search(body)) is not None:
-        raise AssetError(f"{name} cannot be put into one script: {other[0]}")
-    functions = sorted(one for one in wanted if _is_function(one, text))
-    constants = sorted(wanted - set(functions))
-    first, last = _give(name, functions), _give(name, constants)
-    return f"{{ // {name}\n{first}{''.join(lines)}{body}{last}}}\n"
-
-
-def _give(name: str, names: list[str]) -> str:
-    return f"Object.assign({_scope(name)}, {{ {', '.join(names)} }});\n" if names else ""
-
-
-def _is_function(name: str, text: str) -> bool:
-    return re.search(rf"^export (?:async )?function {re.escape(name)}\(", text, re.MULTILINE) is not None
-
-
-def _names(names: str) -> list[str]:
-    return names.split(", ") if names else []
-
-
-def _scope(name: str) -> str:
-    return "of_" + name.removesuffix(".js").replace("-", "_")
+    made = scripts(name, folder)
+    stem = name.removesuffix(".js")
+    parts = {part: _asset(f"{stem}-{part}", text.encode()) for part, text in made.parts.items()}
+    text = made.page({part: f"/static/{one.name}" for part, one in parts.items()})
+    return {name: _asset(name, text.encode()), **{f"{stem}-{part}": one for part, one in parts.items()}}
 
 
 def _asset(name: str, content: bytes) -> Asset:

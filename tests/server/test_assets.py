@@ -7,7 +7,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from parenting.server.assets import SCRIPTS, AssetError, asset, assets, script
+from parenting.server.assets import SCRIPTS, Asset, asset, assets, page_scripts
+from parenting.server.modules import AssetError
 
 pytestmark = pytest.mark.only("sqlite", "files of the pages")
 
@@ -36,22 +37,42 @@ def test_small_replies_go_as_they_are_and_large_ones_compressed(client: httpx2.C
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
-def test_one_script_loads_no_other(name: str) -> None:
-    assert not re.search(r"^\s*(import|export)\b|\bimport\(", script(name), re.MULTILINE)
+def test_page_loads_one_script_at_once(name: str) -> None:
+    loaded = page_scripts(name)
+    assert not re.search(r"^\s*import\b(?!\()", "\n".join(map(_text, loaded.values())), re.MULTILINE)
+    assert set(re.findall(r"/static/([\w.-]+)", _text(loaded[name]))) == {
+        one.name for part, one in loaded.items() if part != name
+    }
+
+
+def _text(one: Asset) -> str:
+    return one.content.decode()
 
 
 @pytest.mark.parametrize(
-    "source",
+    ("source", "line", "why"),
     [
-        'import all from "./b.js";\n',
-        "export default 1;\n",
-        "export let changing = 1;\n",
-        'const later = import("./b.js");\n',
-        'import { x } from "./b.js";\n',
+        ('import * from "./b.js";\n', 2, "cannot be put into one script"),
+        ('import "https://elsewhere.test/b.js";\n', 2, "cannot be put into one script"),
+        ('export * from "./b.js";\n', 2, "cannot be put into one script"),
+        ("import(name);\n", 2, "cannot be put into one script"),
+        ("console.log(import.meta.url);\n", 2, "cannot be put into one script"),
+        ("const now = await fetch('/');\n", 2, "cannot be put into one script"),
+        ('import { x,\n  y } from "./b.js";\n', 2, "imports y of b.js, which has no such export"),
+        ('import { x } from "./b.js";\n', 1, r"imports mine of a.js, which imports b.js: in a cycle"),
+        ('import { z } from "./b.js";\n', 2, "imports z of b.js, which may change it later"),
     ],
 )
-def test_form_that_cannot_be_put_together_is_refused(tmp_path: Path, source: str) -> None:
-    (tmp_path / "a.js").write_text(source + "export const mine = 1;\n")
-    (tmp_path / "b.js").write_text('import { mine } from "./a.js";\nexport const x = 2;\n')
-    with pytest.raises(AssetError, match=r"[ab]\.js"):
-        script("a.js", tmp_path)
+def test_form_that_cannot_be_put_together_is_refused_by_file_and_line(
+    tmp_path: Path, source: str, line: int, why: str
+) -> None:
+    (tmp_path / "a.js").write_text("// what it does\n" + source + "export const mine = 1;\n")
+    (tmp_path / "b.js").write_text('import { mine } from "./a.js";\nexport const x = 2;\nexport let z = 3;\n')
+    with pytest.raises(AssetError, match=rf"^[ab]\.js:{line} .*{why}"):
+        page_scripts("a.js", tmp_path)
+
+
+def test_script_that_is_not_there_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.js").write_text('const later = () => import("./gone.js");\n')
+    with pytest.raises(AssetError, match=r"gone\.js"):
+        page_scripts("a.js", tmp_path)
