@@ -1,6 +1,7 @@
 """Answers a second of many parents at once, as a ratio to a yardstick taken at the same moment.
 
-    python -m benchmarks.parents    64 parents without a pause, then 50 that think for a second
+    python -m benchmarks.parents    64 parents without a pause, then 50 that think for about a second
+    python -m benchmarks.parents --store postgresql    the same, without syncs (`fsync=off`)
 
 A web process serves a run of which 500 questions wait at any time. Each parent leases one, answers it and
 goes on, over a connection of its own; all parents live in two other processes. The yardstick is the durable
@@ -14,6 +15,7 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
+import random
 import re
 import socket
 import tempfile
@@ -32,7 +34,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.settings import Settings
 from parenting.server.store.sqlite import PRAGMAS, sqlite_module
 from parenting.server.tables import Query, Run
-from tests.database import migrated
+from tests.database import STORES, database_url, migrated
 from tests.server.conftest import CLIPS
 from tests.server.processes import command
 from tests.server.serving import free_port, until_up
@@ -95,6 +97,8 @@ def parent(
     """Lease, answer, think, until the end."""
     lease = _request(f"/api/v1/runs/{run}/queries/lease", f'{{"client_id": "{name}"}}')
     body = f'{{"client_id": "{name}", "choice": "left"}}'
+    moment = random.Random(name)
+    time.sleep(thinks * moment.random())
     with socket.create_connection(("127.0.0.1", port), timeout=30) as web:
         while time.monotonic() < end:
             began = time.perf_counter()
@@ -106,7 +110,7 @@ def parent(
                 times.append(1e3 * (time.perf_counter() - began))
             else:
                 errors.append(status)
-            time.sleep(thinks)
+            time.sleep(thinks * moment.uniform(0.5, 1.5))  # else all come at the same moment
 
 
 def _request(path: str, body: str) -> bytes:
@@ -134,11 +138,11 @@ def _some(web: socket.socket) -> bytes:
     return received
 
 
-def measure(parents: int, thinks: float, seconds: float) -> Measured:
+def measure(parents: int, thinks: float, seconds: float, store: str) -> Measured:
     """One crowd before a web process of its own."""
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, database_url(store) as url:
         data, port = Path(name), free_port()
-        settings = Settings(data=data, database_url=None)
+        settings = Settings(data=data, database_url=url)
         db = migrated(settings)
         run = start(db, NewRun(world="unsafe-exploration", config={})).id
         questions = Questions(db, run)
@@ -232,12 +236,13 @@ def main() -> None:
     """Print a row for each crowd."""
     parser = argparse.ArgumentParser(description="Answers a second of many parents at once.")
     parser.add_argument("--seconds", type=float, default=10, help="of each crowd [default: 10]")
+    parser.add_argument("--store", choices=STORES, default="sqlite", help="of the answers [default: sqlite]")
     said = parser.parse_args()
     heads = {"parents": 8, "thinks": 8, "answers/s": 10, "commits/s": 11, "ratio": 8}
     heads |= {"p50 ms": 8, "p99 ms": 8, "errors": 8, "cpu ms": 8}
     print("".join(f"{head:>{width}}" for head, width in heads.items()))
     for parents, thinks in ((CLOSED, 0.0), (THINKING, 1.0)):
-        print(measure(parents, thinks, said.seconds), flush=True)
+        print(measure(parents, thinks, said.seconds, said.store), flush=True)
 
 
 if __name__ == "__main__":

@@ -11,10 +11,12 @@ from __future__ import annotations
 import asyncio
 import json
 from collections import deque
+from functools import partial
 from http import HTTPStatus
 from typing import Any
 
 import httptools
+from starlette.types import Message, Send
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
 from parenting.server.connections.head import UnclearHeadError, check_head
@@ -47,6 +49,7 @@ class BoundedProtocol(HttpToolsProtocol):
         self._body_end = 0.0
         self._cycles: deque[RequestResponseCycle] = deque()  # requests without a whole reply, in their order
         self._unread: asyncio.TimerHandle | None = None
+        self._announced: RequestResponseCycle | None = None  # its reply says that the connection ends
 
     # What the transport calls
 
@@ -130,6 +133,8 @@ class BoundedProtocol(HttpToolsProtocol):
         self._set_deadline(self.limits.pause_seconds)
         super().on_headers_complete()
         self._cycles.append(self.cycle)
+        cycle: Any = self.cycle
+        cycle.send = partial(self._send, cycle, cycle.send)  # its task is to begin
         self._body_end = self.loop.time() + self.limits.body_seconds
 
     def on_body(self, body: bytes) -> None:
@@ -146,12 +151,25 @@ class BoundedProtocol(HttpToolsProtocol):
 
     def on_response_complete(self) -> None:
         """Go on with the next request, unless the reply came before the body: then the rest is not read."""
-        self._cycles.popleft()
+        cycle = self._cycles.popleft()
         self.open_connections.touch(self)
-        if self._in_body and not self.pipeline and not self.transport.is_closing():
+        ends = cycle is self._announced or (self._in_body and not self.pipeline)
+        if ends and not self.transport.is_closing():
             self._linger()
             return
         super().on_response_complete()
+
+    async def _send(self, cycle: RequestResponseCycle, send: Send, message: Message) -> None:
+        """Announce the end of the connection with a reply that comes before the whole body.
+
+        A proxy keeps the connection otherwise, and its next POST, which it may not repeat, fails.
+        """
+        if message["type"] == "http.response.start" and cycle is self.cycle and self._in_body:
+            cycle.keep_alive, self._announced = False, cycle  # uvicorn writes the header
+            await send(message)
+            cycle.keep_alive = True  # it would close at once; `on_response_complete` lingers
+        else:
+            await send(message)
 
     # What `Connections` calls
 

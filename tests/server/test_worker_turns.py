@@ -68,7 +68,7 @@ def test_a_run_that_takes_long_holds_up_no_other(
     held, *others = begin(db, 3)
     slow(monkeypatch, name, held, gate)
     rounds(worker, lambda: all(get_run(db, run).waiting == "guidance" for run in others))
-    assert worker.turns.working() == {held}
+    rounds(worker, lambda: worker.turns.working() == {held})  # the turn that asked may still save
     worker._signed_at = -1e9
     worker._sign()
     assert alive(db) == [worker.name]
