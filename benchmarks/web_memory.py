@@ -6,7 +6,8 @@
 
 Web and worker serve a run in a temporary folder. The load is the same mix all the time: pages, lists, static
 files, metrics, health checks, refused requests, a question leased and answered, and live streams that come
-and go. Some rows are added meanwhile, one answer a second, as a busy parent gives them.
+and go. A crowd comes first, since a thread that starts later for a busy moment would look like growth.
+Some rows are added meanwhile, one answer a second, as a busy parent gives them.
 
 A line is printed each minute with the resident memory of the web process. The growth that counts is the one
 from minute 5 on: before, caches fill. With `--trace` the last lines name the places whose live memory grew
@@ -38,6 +39,7 @@ WARM_MINUTES = 5
 TLS = ssl.create_default_context()
 """Unused, but each client would read all certificates again, which costs more than its requests."""
 CLIENT, CLIENTS = "benchmark", 8
+CROWD = 64
 FRAMES = 6
 SECONDS_TO_START = 300.0
 TOP = 25
@@ -136,6 +138,13 @@ def answer(web: httpx2.Client, name: str) -> None:
         web.post(f"/api/v1/queries/{leased.json()['id']}/answer", json=body)
 
 
+def crowd(url: str) -> None:
+    """Ask for much at once, so that all threads and their connections are there before it counts."""
+    with ThreadPoolExecutor(CROWD) as threads, httpx2.Client(base_url=url, timeout=30, verify=TLS) as web:
+        for _ in range(4):
+            list(threads.map(web.get, CROWD // 2 * ("/runs/1/history", "/")))
+
+
 def look_at_stream(web: httpx2.Client) -> None:
     """Open a live stream and leave it after the first event."""
     with web.stream("GET", "/api/v1/runs/1/events") as reply:
@@ -165,6 +174,7 @@ def measure(minutes: float, rate: float, trace: bool) -> None:
             until_up(url, SECONDS_TO_START)
             body = {"world": "unsafe-exploration"}
             httpx2.post(f"{url}/api/v1/runs", json=body, timeout=30).raise_for_status()
+            crowd(url)
             seen: list[float] = []
 
             def look(minute: int) -> None:
