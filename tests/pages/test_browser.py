@@ -179,6 +179,7 @@ def test_help_opens_and_takes_the_keys(tabs: BrowserTabs, db: Database, ask: Cal
     page.keyboard.press("a")
     page.keyboard.press("Escape")
     expect(page.get_by_role("dialog")).not_to_be_visible()
+    expect(page.locator("dialog :focus")).to_have_count(0)  # Chromium moves it with the next picture
     assert given(db) == []
     page.keyboard.press("a")
     until(lambda: given(db) == [(number, "left")])
