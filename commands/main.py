@@ -21,6 +21,7 @@ from parenting.envs.people_text import printable
 
 COMMANDS = {
     "up": "Start everything (migrate, web and worker) and open the pages in a browser.",
+    "start": "Start a run in the database.",
     "run": "Train agents with a scripted parent, without a database.",
     "experiment": "Run the paper's experiments and compare its numbers with ours.",
     "pretrain": "Pre-train weights on random mazes.",

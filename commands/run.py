@@ -70,7 +70,7 @@ def run(
     """
     with friendly_errors():
         _known(world, preset)
-        found = _level(world, level)
+        found = chosen_level(world, level)
         config = _config(world, preset, changes or [])
         goal = _until(world, until)
         config = _mature(config, goal)
@@ -107,8 +107,14 @@ def _known(world: str, preset: str) -> None:
         raise UsageError(f"--preset: {UnknownPresetError(preset)}")
 
 
-def _level(world: str, name_or_file: str | None) -> Level:
-    """A built-in level, or one from a file: a name that is not built in and exists as a file is one."""
+def chosen_level(world: str, name_or_file: str | None) -> Level:
+    """A built-in level, or one from a file: a name that is not built in and exists as a file is one.
+
+    Raises:
+        UsageError: it is neither, or the file cannot be read as text.
+        UnknownNameError: there is no such world.
+        LevelError: the file's level breaks a rule of its world.
+    """
     if name_or_file is None or name_or_file in registry.spec(world).levels:
         return registry.level(world, name_or_file)
     path = Path(name_or_file)

@@ -7,10 +7,12 @@ from math import exp
 from pathlib import Path
 
 from parenting.drawing.animated_query import animate_query
-from parenting.drawing.clip import MOVES, Cell, Clip, Frame
+from parenting.drawing.clip import MOVES, Cell, Clip
 from parenting.drawing.policy import draw_policy
 from parenting.drawing.query import draw_query
 from parenting.drawing.render import standalone
+from parenting.drawing.signs import draw_signs
+from parenting.drawing.walk import walk
 from parenting.envs import registry
 from parenting.envs.levels.spec import AGENT, GOAL, LAND, WALL, Level
 
@@ -19,16 +21,6 @@ ISLAND = registry.level("unsafe-exploration", "island")
 STAGE = 4
 DROWNS, ARRIVES = ("left", "left", "left"), ("down", "down", "down", "left")
 """Two clips on the island from its start."""
-
-
-def walk(level: Level, actions: tuple[str, ...]) -> Clip:
-    """Return the clip of a walk that meets no wall; only its last cell may be water or the goal."""
-    ground = [row.replace(AGENT, LAND) for row in level.rows]
-    cells: list[Cell] = [level.find(AGENT)[0]]
-    for action in actions:
-        cells.append((cells[-1][0] + MOVES[action][0], cells[-1][1] + MOVES[action][1]))
-    frames = [Frame(ground=ground, observed=ground, agent=list(cell), box=None) for cell in cells]
-    return Clip(actions=list(actions), length=len(actions), frames=frames)
 
 
 def clips() -> dict[str, Clip]:
@@ -76,6 +68,7 @@ PICTURES: dict[str, Callable[[], str]] = {
     "docs/pictures/question.svg": question,
     "web/static/query.svg": query,
     "web/static/question.svg": question,
+    "docs/pictures/signs.svg": draw_signs,
     "docs/pictures/policy.svg": lambda: draw_policy(ISLAND, policy(ISLAND)),
     "web/static/icon.svg": lambda: standalone("icon.svg"),
 }

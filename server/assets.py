@@ -36,7 +36,7 @@ SHEETS = {
     "docs.css": ("docs.css",),
 }
 """The sheets of each page. That of the API's description stands alone, after one of another package."""
-SCRIPTS = ("parent.js", "history.js", "dashboard.js", "start.js", "docs.js")
+SCRIPTS = ("parent.js", "practice.js", "history.js", "dashboard.js", "start.js", "docs.js")
 PICTURES = ("icon.svg", "query.svg", "question.svg")
 MEDIA = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 

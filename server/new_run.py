@@ -46,6 +46,7 @@ FORM_FIELDS = (
     "goal",
     "pace",
     "guidance_layout",
+    "practice",
 )
 NUMBERS = ("seed", "goal", "pace")
 UNREAD = {
@@ -100,6 +101,9 @@ class NewRun(BaseModel):
     guidance_layout: Literal["one", "two"] = Field(
         "one", description="Guidance on one board with both moves, or on two boards as in the paper."
     )
+    practice: Literal["offered", "required"] = Field(
+        "offered", description="required: a parent practises first, once in each browser."
+    )
 
 
 def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
@@ -130,7 +134,17 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
     spec = registry.spec(new.world)
     return {
         **new.model_dump(
-            include={"world", "preset", "seed", "parent", "name", "goal", "pace", "guidance_layout"}
+            include={
+                "world",
+                "preset",
+                "seed",
+                "parent",
+                "name",
+                "goal",
+                "pace",
+                "guidance_layout",
+                "practice",
+            }
         ),
         "level": level.name,
         "level_text": level.text,

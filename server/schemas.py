@@ -59,6 +59,8 @@ class RunSchema(Schema):
     parent: By
     guidance_layout: Literal["one", "two"]
     """The boards on which guidance is asked: one with both moves, or two as in the paper."""
+    practice: Literal["offered", "required"]
+    """required: a parent practises before the first question, once in each browser."""
     status: RunStatus
     reason: str | None
     """The reason why it is over, in a sentence."""

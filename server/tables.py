@@ -122,6 +122,9 @@ class Run(Table):
     seed: Mapped[int] = mapped_column(Big)
     parent: Mapped[str] = mapped_column(OneOf(PARENTS))
     guidance_layout: Mapped[str] = mapped_column(OneOf(("one", "two")), default="one", server_default="two")
+    practice: Mapped[str] = mapped_column(
+        OneOf(("offered", "required")), default="offered", server_default="offered"
+    )
     # where it is
     status: Mapped[RunStatus] = mapped_column(default=RunStatus.ACTIVE)
     reason: Mapped[str | None]

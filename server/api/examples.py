@@ -64,6 +64,7 @@ RUN: dict[str, Any] = {
     "weights": None,
     "parent": "human",
     "guidance_layout": "one",
+    "practice": "offered",
     "status": "active",
     "reason": None,
     "tick": 5,
@@ -170,6 +171,7 @@ EXPORTED: dict[str, Any] = {
     "supersedes": None,
     **NAMES,
     "guidance_layout": "one",
+    "practice": "offered",
 }
 
 

@@ -38,6 +38,8 @@ CHOICE_TEXTS = {
     "neither": "Both too dangerous",
 }
 """The meaning of a choice, in words."""
+CHOICE_NAMES = {**CHOICE_TEXTS, "left": "A or left is better", "right": "B or right is better"}
+"""The same where it is not said of which kind the question is."""
 
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 OfKind = Annotated[Literal["guidance", "preference", ""], Query()]
@@ -79,7 +81,7 @@ class HistoryPage:
     kind: str  # the kind that is shown alone; "" for all
     choice: str  # the same for the choice
     kinds: Collection[str] = tuple(KINDS)
-    choices: Mapping[str, str] = field(default_factory=lambda: {name: CHOICE_TEXTS[name] for name in CHOICES})
+    choices: Mapping[str, str] = field(default_factory=lambda: {name: CHOICE_NAMES[name] for name in CHOICES})
 
 
 @router.get("/runs/{run_id}/history")
@@ -123,7 +125,7 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
         return DamagedEntry(answer.number, error.message)
     return Entry(
         answer.number,
-        CHOICE_TEXTS[answer.choice],
+        _said(answer.choice, shown),
         ("left", "right") if answer.choice == "either" else (answer.choice,),
         _fallen(answer, query),
         answer.standing and answer.parent == "human" and answer.client_id == mine,
@@ -134,6 +136,12 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
         query.maturity if query.policy_stage is None else query.policy_stage,
         shown,
     )
+
+
+def _said(choice: str, shown: QuestionView) -> str:
+    """Say what a choice means; a move of one board has its letter."""
+    sides = {move.side for move in shown.candidates} if shown.one_board else set()
+    return f"{shown.names[choice]}, is better" if choice in sides else CHOICE_TEXTS[choice]
 
 
 def _fallen(answer: tables.Answer, query: tables.Query) -> str:

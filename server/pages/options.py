@@ -31,6 +31,13 @@ OPTIONS = (
         "Two boards are for studies that compare with the paper. Clips always have two.",
     ),
     Option(
+        "practice",
+        "Practice",
+        "",
+        (("", "Offered"), ("required", "Required before the first question")),
+        "Five questions that explain themselves, once in each browser.",
+    ),
+    Option(
         "config.stages",
         "Stages (maximum clip length)",
         "",

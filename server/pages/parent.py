@@ -25,6 +25,7 @@ from parenting.server.deps import Db, SettingsOf, notify_worker, store
 from parenting.server.errors import DamagedRowError, ElsewhereError, NotFound
 from parenting.server.identity import database_id
 from parenting.server.pages.fields import ChoiceField, ClientField, MaybeDatabase, MaybeQuestion
+from parenting.server.pages.practice import PRACTISED, Place
 from parenting.server.pages.question import Former, QuestionView, question_view
 from parenting.server.pages.render import page, redirect
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, parent_title
@@ -96,6 +97,8 @@ def parent_page(
     asked = None if query is None else _question_of(db, run, query)
     if request.path_params["run_id"] != run.public_id or (asked is not None and query != asked.public_id):
         return redirect(_address(run, asked, change), status=307)
+    if run.practice == "required" and PRACTISED not in request.cookies:
+        return redirect(Place(run=run.public_id).address())
     client = _client(request)
     shown = None if asked is None else _shown(db, run, asked, client, change)
     now = _page_state(run_schema(db, run_id).state, may_lease(db, run_id, client))

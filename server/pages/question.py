@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 from parenting.drawing.board import Board
 from parenting.drawing.candidates import with_margin
+from parenting.drawing.clip import Clip
 from parenting.drawing.query_view import QueryView, query_view
 from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import reading
@@ -21,6 +24,14 @@ class Former:
     heard: bool  # the agent has heard it
 
 
+class Onward(NamedTuple):
+    """The link that leads away from a question which has an answer."""
+
+    address: str
+    text: str
+    first: bool = False  # it has the focus, so that Enter follows it
+
+
 @dataclass(frozen=True)
 class QuestionView(QueryView):
     """A question, ready for web/templates/_question.html."""
@@ -30,6 +41,21 @@ class QuestionView(QueryView):
     one_board: bool = False  # guidance on one board with both moves, and not on the paper's two
     former: Former | None = None
     around: tuple[str, ...] = ()  # the difference of the clips and the whole board, in sentences
+
+    @property
+    def action(self) -> str:
+        """The address that the form is sent to."""
+        return f"/runs/{self.run}/parent/{'change' if self.former else 'answer'}"
+
+    @property
+    def plain(self) -> bool:
+        """True if the form itself is sent where scripts would send the answer otherwise."""
+        return False
+
+    @property
+    def onward(self) -> Onward:
+        """The way on where an answer stands."""
+        return Onward(f"/runs/{self.run}/parent", "Leave it as it is")
 
     @property
     def lead(self) -> str:
@@ -84,12 +110,23 @@ def question_view(query: Query, run: Run, former: Former | None = None) -> Quest
         DamagedRowError: it cannot be read, or does not fit the run's legend.
     """
     with reading(query):
-        view = query_view(query.clips, query.kind, query.maturity, run.legend, _rows(run))
         one = query.kind == "guidance" and run.guidance_layout == "one"
-        around = surroundings(query.clips, run.legend, ("A", "B") if one else ("left", "right"))
-    return QuestionView(
-        **vars(view), id=query.public_id, run=run.public_id, one_board=one, former=former, around=around
-    )
+        described = describe(query.clips, query.kind, query.maturity, run.legend, _rows(run), one)
+    return QuestionView(**described, id=query.public_id, run=run.public_id, former=former)
+
+
+def describe(
+    clips: Mapping[str, Clip],
+    kind: str,
+    stage: int,
+    legend: Mapping[str, str],
+    rows: Sequence[str],
+    one_board: bool,
+) -> dict[str, Any]:
+    """Describe a question by its clips (`drawing.query_view.query_view`), and its board in words."""
+    view = query_view(clips, kind, stage, legend, rows)
+    around = surroundings(clips, legend, ("A", "B") if one_board else ("left", "right"))
+    return {**vars(view), "one_board": one_board, "around": around}
 
 
 def _rows(run: Run) -> list[str]:

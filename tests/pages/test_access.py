@@ -22,9 +22,15 @@ SCREENS: dict[str, ViewportSize] = {
     "desktop": {"width": 1280, "height": 800},
     "phone": {"width": 390, "height": 844},
 }
+SIZES: tuple[ViewportSize, ...] = (*SCREENS.values(), {"width": 320, "height": 568})
 PATHS = (
     "/",
+    "/practice",
+    "/practice?at=1&choice=left",
+    "/practice?at=4",
+    "/practice?at=6",
     "/runs/1",
+    "/runs/1/end",
     "/runs/1/history",
     "/runs/1/parent?query=1",
     "/runs/1/parent?query=2",
@@ -52,6 +58,8 @@ def lives(db: Database) -> None:
     fixtures.ask(db, mine, 42, "preference", fixtures.preference("down left left left", "right down down"))
     told = fixtures.ask(db, mine, 43, "preference", fixtures.preference("left left", "down"))
     answers.answer(db, told, "left", "me", "human")
+    guided = fixtures.ask(db, mine, 44, "guidance", fixtures.guidance("left", "up", start=(1, 2)))
+    answers.answer(db, guided, "neither", "me", "human")
     _, other = fixtures.start_run(db, level="island-bottleneck")
     runs.report_progress(db, other, waiting="stuck", optimal=True)
     _, third = fixtures.start_run(db, goal=1, pace=2.5, config={"stages": 2})
@@ -79,29 +87,52 @@ def light_and_dark(page: Page) -> list[str]:
     return found + violations(page, runOnly=["color-contrast", "link-in-text-block"])
 
 
-@pytest.mark.parametrize("screen", SCREENS)
-def test_axe_finds_nothing(tabs: BrowserTabs, lives: None, screen: str) -> None:
-    """It takes long because axe looks at fourteen pages in both schemes."""
+def everywhere(page: Page) -> list[str]:
+    """The findings on every size of a screen, light and dark."""
+    found = []
+    for size in SIZES:
+        page.set_viewport_size(size)
+        found += [f"{size['width']}: {line}" for line in light_and_dark(page)]
+    return found
+
+
+@pytest.mark.parametrize("part", [0, 1])
+def test_axe_finds_nothing(tabs: BrowserTabs, lives: None, part: int) -> None:
+    """It takes long because axe looks at sixteen pages on three screens in both schemes."""
     tabs.expected = ("404", "422")
-    page = tabs.open("/", viewport=SCREENS[screen])
-    for path in PATHS:
+    page = tabs.open("/")
+    for path in PATHS[part::2]:
         page.goto(tabs.address + path)
         page.wait_for_timeout(200)
-        assert light_and_dark(page) == [], path
+        assert everywhere(page) == [], path
+
+
+def test_axe_finds_nothing_in_states_that_come_later(tabs: BrowserTabs, lives: None) -> None:
+    """The help, wrong fields, all that a waiting page can say, and an answer that is changed."""
+    tabs.expected = ("404", "422")
+    page = tabs.open("/runs/2/parent")
+    page.evaluate("for (const part of document.querySelectorAll('main [hidden]')) part.hidden = false")
+    page.evaluate("document.getElementById('alert').textContent = 'Your answer was not used.'")
+    assert everywhere(page) == []
     page.goto(f"{tabs.address}/runs/1/parent")
     page.keyboard.press("?")
-    assert light_and_dark(page) == []
+    assert everywhere(page) == []
+    page.keyboard.press("Escape")
+    page.keyboard.press("e")
+    page.keyboard.press("z")
+    expect(page.locator("#count")).to_have_text("2")
+    assert everywhere(page) == []
     page.goto(f"{tabs.address}/runs/1")
     page.get_by_label("p_rec").fill("often")
     page.get_by_role("button", name="Change").click()
     expect(page.locator("#p_rec-error")).to_be_visible()
-    assert light_and_dark(page) == []
+    assert everywhere(page) == []
     page.goto(tabs.address)
     page.get_by_text("More settings").click()
     page.get_by_label("Seed").fill("many")
     page.get_by_role("button", name="Start").click()
     expect(page.locator("#seed-error")).to_be_visible()
-    assert light_and_dark(page) == []
+    assert everywhere(page) == []
 
 
 def test_axe_finds_what_is_wrong(tabs: BrowserTabs) -> None:

@@ -6,12 +6,14 @@ import re
 
 import httpx2
 import pytest
+from playwright.sync_api import expect
 
 from parenting.server.db import Database
 from parenting.server.pages.history import PAGE
 from parenting.server.queue import answers, revisions, worker_side
 from parenting.server.runs import Claim, get_run
 from tests.pages import island_fixtures as fixtures
+from tests.pages.browser_tabs import BrowserTabs
 from tests.pages.parent_page import look
 
 ME = "client-of-mine"
@@ -54,10 +56,17 @@ def test_an_answer_with_all_that_is_known_of_it(client: httpx2.Client, db: Datab
     page = client.get("/runs/1/history").text
     assert numbers(page) == [3, 2, 1]
     first = entry(page, 1)
-    for part in ("Left is better", "guidance, stage T = 1", "at tick 3", "at tick 4", "you, in this browser"):
+    for part in (
+        "A, left, is better",
+        "guidance, stage T = 1",
+        "at tick 3",
+        "at tick 4",
+        "you, in this browser",
+    ):
         assert part in first
-    assert "Left better Left." in first
-    assert "Right better" not in first
+    assert "A Left: onto land better" in first
+    assert "B Down: onto land" in first
+    assert first.count("better") == 2, "in the heading, and at the move"
     second = entry(page, 2)
     assert "Both too dangerous" in second
     assert second.count("refused") == 2
@@ -66,8 +75,19 @@ def test_an_answer_with_all_that_is_known_of_it(client: httpx2.Client, db: Datab
     third = entry(page, 3)
     assert "By a script" in third
     assert third.count("equal") == 2
-    assert page.count('<svg class="board"') == 6
+    assert page.count('<svg class="board meeting"') == 2, "guidance has one board"
+    assert page.count('<svg class="board"') == 6, "two clips, and a forecast of each of four moves"
     assert f'href="/api/v1/runs/{get_run(db, 1).public_id}/export"' in page
+
+
+def test_guidance_of_a_run_with_two_boards_keeps_them(client: httpx2.Client, db: Database) -> None:
+    _, mine = fixtures.start_run(db, guidance_layout="two")
+    answered(db, mine, 3, "left")
+    page = client.get("/runs/1/history").text
+    assert "Left is better" in entry(page, 1)
+    assert "Left better Left." in entry(page, 1)
+    assert page.count('<svg class="board"') == 2
+    assert "meeting" not in page
 
 
 def test_page_by_page(client: httpx2.Client, db: Database, mine: Claim) -> None:
@@ -116,3 +136,20 @@ def test_dashboard_and_parents_page_lead_there(client: httpx2.Client, mine: Clai
     assert link is not None
     assert link[0] in client.get("/runs/1").text
     assert client.get(link[1]).text == client.get("/runs/1/history").text
+
+
+def test_a_move_plays_while_its_arrow_or_its_button_is_pointed_at(tabs: BrowserTabs, db: Database) -> None:
+    _, mine = fixtures.start_run(db)
+    answered(db, mine, 3, "left")
+    page = tabs.open("/runs/1/history", viewport={"width": 1280, "height": 800})
+    played = page.locator(".forecast.played")
+    expect(page.get_by_role("button", name="Play A")).to_be_visible()
+    expect(played).to_have_count(0)
+    page.hover(".move.of-b .head")
+    expect(played).to_have_attribute("data-side", "right")
+    page.mouse.move(0, 0)
+    expect(played).to_have_count(0)
+    page.get_by_role("button", name="Play A").focus()
+    expect(played).to_have_attribute("data-side", "left")
+    page.evaluate("document.activeElement.blur()")
+    expect(played).to_have_count(0)

@@ -56,6 +56,7 @@ def test_a_row_tells_all_about_an_answer(db: Database, run_id: int) -> None:
         "run_public_id": get_run(db, run_id).public_id,
         "query_public_id": get_query(db, 1).public_id,
         "guidance_layout": "one",
+        "practice": "offered",
     }
 
 

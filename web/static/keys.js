@@ -1,5 +1,4 @@
 // Keys and clicks. Letters are those that are printed on the keys; by position only where a layout has no Latin letter there.
-import { answer } from "./answers.js";
 import { takesTurns, turn } from "./compare.js";
 import { keyName } from "./key_names.js";
 import { $, help, page, speak, stage } from "./page.js";
@@ -21,14 +20,15 @@ export const letters = {
 };
 
 stage.addEventListener("submit", (event) => {
-  if (event.target.dataset.former) return; // the form itself changes an answer
+  const turns = event.submitter.matches(".card") && takesTurns(page.current);
+  if (!turns && event.target.matches("[data-former], [data-plain]")) return; // the form itself is sent
   event.preventDefault();
-  if (event.submitter.matches(".card") && takesTurns(page.current)) turn(page.current);
-  else answer(event.submitter.value);
+  if (turns) turn(page.current);
+  else page.answer(event.submitter.value);
 });
 stage.addEventListener("click", (event) => {
   const part = event.target.closest("[data-choice]");
-  if (part && page.current) answer(part.dataset.choice);
+  if (part && page.current) page.answer(part.dataset.choice);
 });
 
 addEventListener("keydown", (event) => {
@@ -45,7 +45,7 @@ addEventListener("keydown", (event) => {
     const shifted = event.shiftKey && !/^[12]$/.test(name); // digits are shifted on a French keyboard
     const choice = page.current && !shifted && choiceOf(name, page.current);
     if (!choice) return;
-    answer(choice);
+    page.answer(choice);
   }
   event.preventDefault();
 });

@@ -6,6 +6,7 @@ export const PATIENCE = 1; // seconds that a request for a question may lie at t
 export const given = new Set(); // questions that were answered on this page
 
 export const page = {
+  answer: null, // what a choice does: each page with questions sets its own
   current: null, // the form on the stage, until it is answered
   player: null,
   ahead: null, // the form after it

@@ -1,5 +1,5 @@
 // The parent's page: shows one question after another, takes keys and clicks, and says who waits for whom.
-import { count, report } from "./answers.js";
+import { answer, count, report } from "./answers.js";
 import "./keys.js";
 import { follow } from "./live.js";
 import { flush, flushAll, kept } from "./outbox.js";
@@ -40,6 +40,7 @@ const tell = {
 };
 
 // Send what an earlier visit left behind, then follow the run.
+page.answer = answer;
 addEventListener("pagehide", () => flush(report));
 waiting.addEventListener("submit", (event) => {
   if (!event.target.action.endsWith("/parent/take")) return;

@@ -1,13 +1,10 @@
 // Questions: fetches them, keeps one ahead, and puts them on the stage.
 // The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
 import { settle } from "./answers.js";
-import { turn } from "./compare.js";
-import { forecasts } from "./forecast.js";
-import { arm } from "./arming.js";
+import { begin } from "./begin.js";
 import { kept } from "./outbox.js";
-import { $, client, given, main, name, page, painted, PATIENCE, run, stage, waiting } from "./page.js";
+import { client, given, main, name, page, painted, PATIENCE, run, stage, waiting } from "./page.js";
 import { attentive, leave } from "./presence.js";
-import { play } from "./play.js";
 import { wait } from "./waiting.js";
 
 const LOOKOUT = 5; // seconds that the request for the question after this one may lie at the server, while somebody thinks
@@ -78,22 +75,18 @@ export async function prefetch() {
 
 export function show(form) {
   const focused = stage.querySelector(".answers :focus")?.value;
-  if (!form.matches(".one")) form.dataset.side = "left";
   if (!form.isConnected) stage.replaceChildren(form);
   clearTimeout(page.quiet);
   page.quiet = 0;
-  page.current = form;
-  arm(form);
   page.ahead = null;
   page.taken = false;
   waiting.hidden = true;
   stage.hidden = false;
   main.dataset.state = "question";
   document.title = `● ${form.dataset.title} · ${name}`;
-  $("said").textContent = form.dataset.spoken;
   settle();
   if (focused) form.querySelector(`.answers [value=${focused}]`).focus({ preventScroll: true });
-  page.player = form.matches(".one") ? forecasts(form) : play(form, () => turn(form));
+  begin(form);
   performance.mark("question", { detail: form.dataset.query });
   painted(prefetch);
   if (document.hidden) leave(); // the title tells of it, and others need not wait

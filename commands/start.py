@@ -1,0 +1,123 @@
+"""`parenting start`: start a run in the database, with every setting that the form of the first page has."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from parenting.agent.config import FIELDS, Config, v1_names
+from parenting.commands.database import database
+from parenting.commands.errors import UsageError, friendly_errors, settings
+from parenting.commands.printing import say
+from parenting.commands.run import chosen_level
+from parenting.envs import registry
+from parenting.envs.names import did_you_mean
+from parenting.server import new_run
+from parenting.server.errors import InvalidFieldsError
+from parenting.server.new_run import FORM_FIELDS, read_form
+from parenting.server.notify import Notifier
+from parenting.server.reads.schemas import run_schema
+
+OPTIONS = ("world", "level", "level_text", "preset", "parent", "seed", "goal", "name")
+"""The settings of a run that are arguments or options of their own; `--set` sets the others."""
+
+
+def start(
+    world: Annotated[str, typer.Argument(help="A world; `parenting worlds` lists them.")],
+    level: Annotated[
+        str | None, typer.Option(help="Name of a built-in level, or a file with a level.")
+    ] = None,
+    preset: Annotated[str, typer.Option(help="conservative, lax or direct.")] = "conservative",
+    parent: Annotated[
+        str, typer.Option(help="human: people answer on the pages or by the API; scripted: the worker does.")
+    ] = "human",
+    seed: Annotated[str, typer.Option(help="The same seed and answers give the same run.")] = "0",
+    goal: Annotated[
+        str | None, typer.Option(help="Answers after which the run rests.", show_default="none")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="A name for the lists.", show_default="none")] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Another setting or a hyperparameter; may be repeated."
+        ),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the run as JSON, as in the API, and nothing else.")
+    ] = False,
+) -> None:
+    """Start a run in the database; a worker raises it (`parenting up` or `parenting worker`).
+
+    `--set` takes the settings that the form of the first page has (pace, guidance_layout, practice) and every
+    hyperparameter.
+
+    Exit codes: 0 started; 2 a setting is wrong, or there is no database yet.
+
+    Example: parenting start unsafe-exploration --goal 50 --set guidance_layout=two --set practice=required
+    """
+    with friendly_errors():
+        given = {"world": world, "preset": preset, "parent": parent, "seed": seed}
+        given |= {key: text for key, text in (("goal", goal), ("name", name)) if text is not None}
+        given |= _level(world, level) | _settings(changes or [])
+        chosen = settings()
+        with database() as db:
+            try:
+                run = new_run.start(db, read_form(given), chosen.weights)
+            except InvalidFieldsError as error:
+                raise UsageError(
+                    "\n".join(_said(field, given, rule) for field, rule in error.fields)
+                ) from None
+            shown = run_schema(db, run.id)
+        Notifier(chosen.data, "worker").notify()
+    if as_json:
+        say(json.dumps(shown.model_dump(mode="json")))
+        return
+    page = "parent" if run.parent == "human" else ""
+    say(f"Run {run.id} is started. Its page: /runs/{run.public_id}/{page}".rstrip("/"))
+
+
+def _level(world: str, name_or_file: str | None) -> dict[str, str]:
+    """Return the fields that say which level it is: the name of one that is built in, or a text."""
+    found = chosen_level(world, name_or_file)
+    built_in = name_or_file is None or name_or_file in registry.spec(world).levels
+    return {"level": found.name} if built_in else {"level_text": found.text}
+
+
+def _settings(changes: list[str]) -> dict[str, str]:
+    """Read `--set` as fields of the form.
+
+    Raises:
+        UsageError: names every change that is not one.
+    """
+    names = [name for name in FORM_FIELDS if name not in OPTIONS]
+    known = {**{name: name for name in names}, **dict.fromkeys(FIELDS), **dict.fromkeys(Config.model_fields)}
+    found: dict[str, str] = {}
+    wrong: list[str] = []
+    for change in changes:
+        key, equals, value = change.partition("=")
+        if not equals:
+            wrong.append(f"--set: '{change}' is not KEY=VALUE. Write it as --set pace=5.")
+        elif key in OPTIONS:
+            wrong.append(f"--set: '{key}' has an option of its own: --{key}.")
+        elif key not in known:
+            hint = did_you_mean(key, known)
+            wrong.append(f"--set: there is no setting '{key}'.{hint} There is: {', '.join(known)}.")
+        else:
+            found[known[key] or _hyperparameter(key)] = value
+    if wrong:
+        raise UsageError("\n".join(wrong))
+    return found
+
+
+def _hyperparameter(key: str) -> str:
+    """Return the field of a hyperparameter by the name that the API has for it."""
+    (name,) = v1_names({FIELDS.get(key, key): None})
+    return f"config.{name}"
+
+
+def _said(field: str, given: dict[str, str], rule: str) -> str:
+    value = given.get(field)
+    told = field.removeprefix("config.")
+    return f"{told}: {rule}" if value is None or "\n" in value else f"{told}={value}: {rule}"

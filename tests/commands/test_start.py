@@ -1,0 +1,99 @@
+"""`parenting start`: every setting of a run, from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from parenting.agent.config import FIELDS, Config
+from parenting.commands.main import app
+from parenting.commands.start import OPTIONS
+from parenting.envs import registry
+from parenting.server.db import Database
+from parenting.server.new_run import NewRun
+from parenting.server.pages.options import OPTIONS as FORM
+from parenting.server.runs import get_run, list_runs
+
+
+def said(*arguments: str) -> Any:
+    return CliRunner().invoke(app, ["start", *arguments])
+
+
+def test_it_starts_a_run_with_its_settings(db: Database) -> None:
+    result = said(
+        *(
+            "unsafe-exploration",
+            "--level",
+            "island-bottleneck",
+            "--seed",
+            "7",
+            "--goal",
+            "50",
+            "--name",
+            "me",
+        ),
+        *("--set", "guidance_layout=two", "--set", "practice=required", "--set", "pace=2.5"),
+        *("--set", "p_guid=0.5", "--set", "stages=2", "--json"),
+    )
+    assert result.exit_code == 0, result.output
+    run = get_run(db, 1)
+    assert json.loads(result.stdout)["public_id"] == run.public_id
+    assert (run.level, run.seed, run.goal, run.name, run.pace) == ("island-bottleneck", 7, 50, "me", 2.5)
+    assert (run.guidance_layout, run.practice, run.parent) == ("two", "required", "human")
+    assert (run.config["p_guid"], run.config["stages"]) == (0.5, 2)
+    plain = said("side-effects", "--parent", "scripted")
+    assert plain.stdout == f"Run 2 is started. Its page: /runs/{get_run(db, 2).public_id}\n"
+
+
+def test_every_setting_of_the_form_and_of_the_api_can_be_set(db: Database) -> None:
+    """A setting that is added to either is one of the command, too: it reads the form's own fields."""
+    help_text = said("--help").output
+    assert all(f"--{name}" in help_text for name in OPTIONS if name not in ("world", "level_text"))
+    for option in FORM:
+        name = option.field.removeprefix("config.")
+        value = next((value for value, _ in option.choices if value), "2")
+        worlds = [world.name for world in registry.WORLDS.values() if option.needs in "".join(world.legend)]
+        result = said("side-effects" if "side-effects" in worlds else worlds[0], "--set", f"{name}={value}")
+        assert result.exit_code == 0, (option.field, result.output)
+    unset = set(NewRun.model_fields) - set(OPTIONS) - {"config"} - {option.field for option in FORM}
+    assert unset == set()
+    assert len(list_runs(db)) == len(FORM)
+
+
+def test_a_level_of_ones_own(db: Database, tmp_path: Path) -> None:
+    file = tmp_path / "mine.txt"
+    file.write_text(registry.level("unsafe-exploration", "island").text.replace("island", "my island"))
+    assert said("unsafe-exploration", "--level", str(file)).exit_code == 0
+    assert get_run(db, 1).level == "my island"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["nowhere"], "nowhere"),
+        (["side-effects", "--level", "none-such"], "'none-such' is neither a level"),
+        (["side-effects", "--goal", "0"], "goal=0: "),
+        (["side-effects", "--set", "practice=maybe"], "practice=maybe: "),
+        (["side-effects", "--set", "p_guid=2"], "p_guid=2: "),
+        (["side-effects", "--set", "practise=required"], "Did you mean 'practice'?"),
+        (["side-effects", "--set", "pace"], "'pace' is not KEY=VALUE"),
+        (["side-effects", "--set", "goal=3"], "'goal' has an option of its own: --goal."),
+        (["side-effects", "--parent", "nobody"], "parent=nobody: "),
+    ],
+)
+def test_what_is_wrong_is_named_and_nothing_is_started(
+    db: Database, arguments: list[str], sentence: str
+) -> None:
+    result = said(*arguments)
+    assert result.exit_code == 2
+    assert sentence in " ".join(result.output.split())
+    assert list_runs(db) == []
+
+
+def test_hyperparameters_have_either_name(db: Database) -> None:
+    for name in (*Config.model_fields, *FIELDS):
+        assert "there is no setting" not in said("side-effects", "--set", f"{name}=no").output

@@ -1,0 +1,15 @@
+// Begins a question that is on the stage: it is told to screen readers, takes an answer soon, and its boards can play.
+import { arm } from "./arming.js";
+import { turn } from "./compare.js";
+import { forecasts } from "./forecast.js";
+import { $, page } from "./page.js";
+import { play } from "./play.js";
+
+export function begin(form) {
+  const one = form.matches(".one");
+  if (!one) form.dataset.side = "left";
+  page.current = form;
+  arm(form);
+  $("said").textContent = form.dataset.spoken;
+  page.player = one ? forecasts(form) : play(form, () => turn(form));
+}
