@@ -70,6 +70,13 @@ def hashes(answer: Mapping[str, Any], query: Mapping[str, Any], before: str) -> 
     return {"salt": salt, "digest": digest, "link": link_after(before, digest), "chained": AT_ANSWER}
 
 
+def proves(answer: Answer, query: Mapping[str, Any]) -> bool:
+    """Return whether an answer's digest is that of its row and of this content of its question."""
+    salt, digest = sound(answer, "salt"), sound(answer, "digest")
+    text = content(_columns(answer, OF_ANSWER), query)
+    return salt is not None and digest_of(salt, text) == digest
+
+
 def check(db: Database, run_id: int) -> Checked:
     """Check the chain of a run's answers, row by row.
 

@@ -75,7 +75,7 @@ class RunSession:
             -1
         )  # the tick that was reported as stuck: who ends episodes must see the next one too
         sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
-        self._follow_until = take_up(db, claim, run, self._recalled, self.record_ends)
+        self.parent.follow_until = take_up(db, claim, run, self._recalled, self.record_ends)
 
     def _parent(self, config: Config, rule: ScriptedRule, asked: Callable[[], None]) -> QueueParent:
         if self.run.parent == "scripted":
@@ -177,9 +177,9 @@ class RunSession:
         kind = kind_name(query)
         if recorded == (None if kind is None else (kind, encode(self.world, query))):
             return
-        if self.last_tick > self._follow_until:
+        if self.last_tick > self.parent.follow_until:
             diverged(self.db, self.claim, self.run, self._recalled, self.last_tick, self.record_ends)
-            self._follow_until = self.record_ends
+            self.parent.follow_until = self.record_ends
         asked = None if stored is None else self.parent.read(stored)
         self.saved = self.saved._replace(state=follow(self.saved.state, asked, query))
 

@@ -21,10 +21,11 @@ from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import ScriptedRule
 from parenting.server import tables
 from parenting.server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_name
-from parenting.server.damage import readable, reading
+from parenting.server.damage import readable, reading, sound
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
 from parenting.server.queue import answers, corrections, worker_side
+from parenting.server.queue.repairs import repair
 from parenting.server.runs import Claim
 
 SCRIPT = "scripted"
@@ -45,6 +46,7 @@ class QueueParent:
         self.answers = self.events_wait = True
         self.corrected: amendment.Applied | None = None  # heard in this tick
         self.record_ends = -1  # the last tick of the record: up to it, recorded questions stand
+        self.follow_until = -1  # the last tick whose record another machine has written
 
     def looking(self, answers: bool, events: bool) -> Self:
         """Return the same mailbox for one tick; it reads no rows where there are known to be none."""
@@ -94,7 +96,7 @@ class QueueParent:
         if self.tick <= self.record_ends:
             stored = worker_side.asked_at(self.db, self.mine.run_id, self.tick)
             if stored is not None:
-                self.posted(stored.id, self.read(stored))
+                self.posted(stored.id, self.read(self._repaired(stored, query)))
             if stored is not None or self.tick < self.record_ends:
                 return
         kind = kind_name(query)
@@ -103,6 +105,17 @@ class QueueParent:
             number = worker_side.post_query(self.db, self.mine, self.tick, kind, maturity, clips, self.policy)
             self.posted(number, query)
             self.asked()
+
+    def _repaired(self, stored: tables.Query, query: Query) -> tables.Query:
+        """Return the question of a replayed tick; damaged clips are written again where that is proved."""
+        kind = kind_name(query)
+        if kind is None:
+            return stored
+        asked = {"kind": kind, "maturity": int(query.maturity[0]), "clips": encode(self.world, query)}
+        if asked == {name: sound(stored, name) for name in asked}:
+            return stored
+        same_machine = self.tick > self.follow_until
+        return repair(self.db, self.mine, stored, asked, same_machine) or stored
 
     def read(self, row: tables.Query) -> Query:
         """Return a stored query in tensors.
@@ -132,15 +145,6 @@ class ScriptedQueueParent(QueueParent):
         """A mailbox that is answered by `rule`."""
         super().__init__(db, mine, world, config, asked)
         self.rule = rule
-
-    def read(self, row: tables.Query) -> Query:
-        """Return a stored query in tensors.
-
-        Raises:
-            DamagedRowError: its row cannot be read.
-        """
-        with reading(row):
-            return decode(self.world, self.stages, row.kind, row.maturity, row.clips)
 
     def posted(self, number: int, query: Query) -> None:
         """Store the script's answer. A replayed tick stores the same again, which changes nothing."""
