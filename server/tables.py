@@ -194,6 +194,7 @@ class Query(Table):
     lease_epoch: Mapped[str | None]  # by the clock that decides (`server.store.clock`)
     lease_begin: Mapped[float | None]
     lease_end: Mapped[float | None]
+    withdrawn_tick: Mapped[int | None]  # before which the agent stopped waiting for it; null: with its run
 
 
 class Answer(Table):

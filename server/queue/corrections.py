@@ -12,7 +12,7 @@ from sqlalchemy import BindParameter, bindparam, select
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
-from parenting.server.queue.queries import withdraw_in
+from parenting.server.queue.queries import withdraw_guidance_in
 from parenting.server.queue.taken import Taken, heard_before, recorded_at, standing_at
 from parenting.server.queue.worker_side import closed
 from parenting.server.runs import Claim, held, held_status
@@ -75,7 +75,7 @@ def withdraw_guidance(db: Database, mine: Claim, tick: int) -> None:
     """
     with db.write() as session:
         held(session, mine)
-        withdraw_in(session, mine.run_id, "guidance", before=tick)
+        withdraw_guidance_in(session, mine.run_id, tick)
 
 
 def _corrected(session: Session, found: Taken, replaced: Answer, tick: int) -> Corrected:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import ColumnElement, case, func, or_, select, update
+from sqlalchemy import ColumnElement, case, func, select, update
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.statuses import QueryStatus
-from parenting.server.tables import Answer, OperatorEvent, Query
+from parenting.server.tables import Query
 
 
 @dataclass(frozen=True)
@@ -41,28 +41,31 @@ def open_by_run(session: Session, run_ids: Sequence[int]) -> dict[int, Open]:
     return {i: Open(counts.get((i, "guidance"), 0), counts.get((i, "preference"), 0)) for i in run_ids}
 
 
-def withdraw_in(session: Session, run_id: int, kind: str | None = None, before: int | None = None) -> None:
-    """Withdraw a run's open queries, of one kind or asked before a tick, in a transaction that is open."""
+def withdraw_in(session: Session, run_id: int) -> None:
+    """Withdraw a run's open queries as it ends, in a transaction that is already open."""
     rows = update(Query).where(Query.run_id == run_id, Query.status == QueryStatus.OPEN)
-    if kind is not None:
-        rows = rows.where(Query.kind == kind)
-    if before is not None:
-        rows = rows.where(Query.tick < before)
     session.execute(rows.values(status=QueryStatus.WITHDRAWN))
+
+
+def withdraw_guidance_in(session: Session, run_id: int, tick: int) -> None:
+    """Withdraw the guidance asked before a tick, since the agent waits for it no more; `reopen_in` leaves it.
+
+    Where the run has just ended, what its end withdrew is marked as well.
+    """
+    rows = update(Query).where(Query.run_id == run_id, Query.kind == "guidance", Query.tick < tick)
+    rows = rows.where(Query.status.in_((QueryStatus.OPEN, QueryStatus.WITHDRAWN)))
+    rows = rows.where(Query.withdrawn_tick.is_(None))
+    session.execute(rows.values(status=QueryStatus.WITHDRAWN, withdrawn_tick=tick))
 
 
 def reopen_in(session: Session, run_id: int) -> None:
     """Ask again what was withdrawn when a run ended, in a transaction that is already open.
 
-    That is what has no standing answer, but for the guidance of episodes that the operator has ended.
+    Guidance that the agent waits for no more stays withdrawn: its episode was ended, or its pause was ended
+    by a correction.
     """
-    ended = select(func.max(OperatorEvent.applied_tick)).where(
-        OperatorEvent.run_id == run_id, OperatorEvent.kind == "end_episode"
-    )
-    answered = select(Answer.query_id).where(Answer.run_id == run_id, Answer.standing)
     rows = update(Query).where(Query.run_id == run_id, Query.status == QueryStatus.WITHDRAWN)
-    rows = rows.where(Query.id.not_in(answered))
-    rows = rows.where(or_(Query.kind != "guidance", Query.tick >= func.coalesce(ended.scalar_subquery(), -1)))
+    rows = rows.where(Query.withdrawn_tick.is_(None))
     nobody: dict[str, None] = dict.fromkeys(
         ("leased_by", "leased_until", "lease_epoch", "lease_begin", "lease_end")
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from sqlalchemy import bindparam, update
+from sqlalchemy import bindparam, select, update
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
@@ -90,7 +90,7 @@ def withdraw(
     """Take back an answer of one's own that the agent has not heard; its question is open again.
 
     It is leased to the same client. An answer that was heard stays, and the outcome says so. A withdrawal
-    whose reply was lost may be sent again.
+    whose reply was lost may be sent again. From a client that never answered it, it changes nothing.
 
     Raises:
         ElsewhereError: it is meant for another database, run or question.
@@ -117,7 +117,8 @@ def withdraw_in(
         announce(session, "web")
     elif asked.status == QueryStatus.WITHDRAWN:
         raise Conflict("This question was withdrawn: the run or its episode was ended.")
-    hold_in(session, db, place.query, client_id, seconds)
+    if session.execute(_GIVEN, {"query_id": place.query, "client_id": client_id}).first() is not None:
+        hold_in(session, db, place.query, client_id, seconds)
     return Withdrawn("withdrawn", choice=asked.choice, **vars(place))
 
 
@@ -143,4 +144,9 @@ def _retract(session: Session, asked: Any) -> None:
 _RUN, _QUERY, _ANSWER = (Table.metadata.tables[name] for name in ("run", "query", "answer"))
 _FALLEN = update(_ANSWER).where(_ANSWER.c.id == bindparam("answer_id")).values(standing=False)
 _COUNTED = update(_RUN).where(_RUN.c.id == bindparam("run_id")).values(retracted=_RUN.c.retracted + 1)
+_GIVEN = (
+    select(_ANSWER.c.id)
+    .where(_ANSWER.c.query_id == bindparam("query_id"), _ANSWER.c.client_id == bindparam("client_id"))
+    .limit(1)
+)
 _REOPENED = update(_QUERY).where(_QUERY.c.id == bindparam("query_id")).values(status=QueryStatus.OPEN)

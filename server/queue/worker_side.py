@@ -24,7 +24,7 @@ from parenting.server.columns import Damaged
 from parenting.server.db import Database
 from parenting.server.identity import unused_number
 from parenting.server.notes import AGENT_KINDS
-from parenting.server.queue.queries import guidance_first, withdraw_in
+from parenting.server.queue.queries import guidance_first, withdraw_guidance_in
 from parenting.server.queue.taken import Taken, heard_before, recorded_at
 from parenting.server.runs import Claim, held, held_status
 from parenting.server.statuses import LIVING, QueryStatus, RunStatus
@@ -223,7 +223,7 @@ def take_operator_events(db: Database, mine: Claim, tick: int) -> Sequence[Opera
         for event in events:
             event.applied_tick = tick
         if any(event.kind == "end_episode" for event in events):
-            withdraw_in(session, mine.run_id, "guidance")
+            withdraw_guidance_in(session, mine.run_id, tick)
             run.waiting = None
         return events
 

@@ -22,6 +22,18 @@ class Asked:
     told: Stored | None = None
     by: str = ""
     heard_at: int | None = None
+    heard: int | None = None  # the number of the answer that the agent heard last
+    gave: set[str] = field(default_factory=set)  # who has ever answered it
+    settled: bool = False  # the agent waits for it no more
+
+    @property
+    def corrected(self) -> bool:
+        """Return whether a correction of it is on its way to the agent."""
+        return self.status == "applied" and self.told is not None and self.told.number != self.heard
+
+    def free(self, client: str, now: float) -> bool:
+        """Return whether no other client holds it."""
+        return self.holder in (None, client) or self.until <= now
 
 
 @dataclass

@@ -18,10 +18,15 @@ from parenting.server import runs
 from parenting.server.checkpoints import load_checkpoints
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
+from parenting.server.migrate import downgrade, upgrade
 from parenting.server.new_run import start
 from parenting.server.notes import CheckpointDamaged, Failed, Resumed, notes
+from parenting.server.operator_events import add_operator_event
 from parenting.server.queue import worker_side
+from parenting.server.queue.answers import get_query
+from parenting.server.queue.corrections import withdraw_guidance
 from parenting.server.queue.queries import open_counts
+from parenting.server.runs import Claim
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.snapshot import DivergedError, pack
@@ -30,6 +35,7 @@ from parenting.server.tables import Checkpoint
 from parenting.server.work.held import HeldRuns
 from parenting.server.work.patience import Patience
 from parenting.server.worker import Worker
+from tests.server.conftest import CLIPS
 from tests.server.raising import ISLAND, inline, same_bits
 
 RUN = 1
@@ -125,6 +131,35 @@ def test_a_question_that_was_open_is_asked_again(db: Database, status: RunStatus
     assert asked is not None
     assert again is not None
     assert (again.id, again.status, open_counts(db, RUN).guidance) == (asked.id, "open", 1)
+
+
+@pytest.mark.parametrize("ended", ["by its run", "by a correction", "by an episode's end"])
+def test_guidance_that_the_agent_waits_for_no_more_is_not_asked_again(
+    db: Database, mine: Claim, ended: str
+) -> None:
+    """The run ends as the worker marks the event: what its end withdrew is known all the same."""
+    asked = worker_side.post_query(db, mine, 5, "guidance", 1, CLIPS)
+    if ended == "by an episode's end":
+        add_operator_event(db, RUN, "end_episode", {})
+    runs.set_status(db, RUN, RunStatus.STOPPED)
+    if ended == "by a correction":
+        withdraw_guidance(db, mine, 6)
+    elif ended == "by an episode's end":
+        worker_side.take_operator_events(db, mine, 6)
+    runs.set_status(db, RUN, RunStatus.ACTIVE)
+    assert get_query(db, asked).status == ("open" if ended == "by its run" else "withdrawn")
+
+
+def test_a_migration_knows_the_guidance_of_episodes_that_were_ended(db: Database, mine: Claim) -> None:
+    before = worker_side.post_query(db, mine, 5, "guidance", 1, CLIPS)
+    add_operator_event(db, RUN, "end_episode", {})
+    worker_side.take_operator_events(db, mine, 6)
+    since = worker_side.post_query(db, mine, 7, "guidance", 1, CLIPS)
+    runs.set_status(db, RUN, RunStatus.STOPPED)
+    downgrade(db, "0011")
+    upgrade(db)
+    runs.set_status(db, RUN, RunStatus.ACTIVE)
+    assert [get_query(db, asked).status for asked in (before, since)] == ["withdrawn", "open"]
 
 
 def end_and_let_the_worker_hear(life: RunSession) -> None:

@@ -114,6 +114,15 @@ def test_nobody_changes_or_takes_back_what_another_said(db: Database, guidance: 
     assert stored(db) == [(1, "left", True, None)]
 
 
+def test_who_never_answered_takes_nothing_back_and_no_lease(db: Database, mine: Claim, guidance: int) -> None:
+    found = withdraw(db, guidance, "b")
+    assert (found.outcome, found.choice) == ("withdrawn", None)
+    assert lease(db, mine.run_id, "a") is not None, "it is nobody's"
+    withdraw(db, guidance, "b")
+    answer(db, guidance, "left", "a", "human")
+    assert stored(db) == [(1, "left", True, None)]
+
+
 def test_in_a_run_that_is_over_nothing_is_asked_again(db: Database, mine: Claim, guidance: int) -> None:
     answer(db, guidance, "left", "a", "human")
     set_status(db, mine.run_id, RunStatus.STOPPED)

@@ -1,0 +1,31 @@
+"""A guidance question that the agent waits for no more says so, and is not asked again by a run that goes on.
+
+Those of episodes that were ended are known by their events; those that a correction withdrew are not.
+
+Revision: 0012, after 0011
+"""
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0012"
+down_revision = "0011"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    number = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
+    op.add_column("query", sa.Column("withdrawn_tick", number))
+    ended = (
+        "(SELECT max(event.applied_tick) FROM event "
+        "WHERE event.run_id = query.run_id AND event.kind = 'end_episode')"
+    )
+    op.execute(
+        f"UPDATE query SET withdrawn_tick = {ended} "
+        f"WHERE status = 'withdrawn' AND kind = 'guidance' AND tick < {ended}"
+    )
+
+
+def downgrade() -> None:
+    op.drop_column("query", "withdrawn_tick")
