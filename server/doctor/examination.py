@@ -10,7 +10,7 @@ from sqlalchemy import URL, NullPool, create_engine, make_url
 
 from parenting.server.columns import loads
 from parenting.server.db import Database, connect
-from parenting.server.doctor import files, machine, store
+from parenting.server.doctor import files, machine, rows, store
 from parenting.server.doctor.findings import Finding, error, guarded, ok
 from parenting.server.settings import Settings
 
@@ -69,6 +69,8 @@ def _tables(db: Database) -> Iterator[Finding]:
             yield from guarded("clock", partial(store.clock, db))
             yield from guarded("worker", partial(store.workers, db))
             yield from guarded("stored weights", partial(store.stored_weights, db))
+            yield from guarded("rows", partial(rows.rows, db))
+            yield from guarded("checkpoints", partial(rows.checkpoints, db))
     finally:
         db.close()
 

@@ -13,16 +13,20 @@ from sqlalchemy import text, update
 from typer.testing import CliRunner
 
 from parenting.commands.main import app
+from parenting.server.checkpoints import save_checkpoint
 from parenting.server.db import Database, connect
 from parenting.server.doctor import machine
 from parenting.server.migrate import downgrade
 from parenting.server.new_run import NewRun, start
+from parenting.server.queue.worker_side import post_query
+from parenting.server.runs import claim
 from parenting.server.settings import Settings
 from parenting.server.store.sqlite import sqlite_module
 from parenting.server.tables import Run
 from parenting.server.workers import sign
 from parenting.weights.store import SHIPPED, SUFFIX, digest
 from tests.database import migrated
+from tests.server.conftest import CLIPS
 
 
 @pytest.fixture
@@ -69,6 +73,7 @@ def test_all_is_well_where_it_is_and_nothing_is_changed(settings: Settings, db: 
     assert snapshot(settings.data) == before
     expected = ["settings", "versions", "limits", "weights", "sqlite", "permissions", "file system", "space"]
     expected += ["backups", "database", "journal", "mark", "migrations", "clock", "worker", "stored weights"]
+    expected += ["rows", "checkpoints"]
     assert list(found) == expected
     db.close()
     before = snapshot(settings.data)
@@ -165,6 +170,33 @@ def test_weights_that_are_not_what_they_were_are_told(
     said = examined()[1]["weights"]["said"]
     assert f"{name}{SUFFIX} is changed or damaged" in said
     assert said.count("is missing") == len(machine.WEIGHTS) - 1
+
+
+def test_damaged_rows_are_named_with_their_runs_and_the_remedy(settings: Settings, db: Database) -> None:
+    (mine,) = claim(db, "worker")
+    for tick in range(12):
+        post_query(db, mine, tick, "preference", 1, CLIPS)
+    with db.write() as session:
+        session.execute(text("UPDATE run SET config = '{\"stages\": []}'"))
+        session.execute(text("UPDATE query SET clips = '{}' WHERE tick > 0"))
+    code, found = examined()
+    assert (code, states(found)) == (2, {"rows": "error"})
+    said = found["rows"]["said"]
+    assert said.startswith("run 1: its config, legend, brief or level has not the shape")
+    assert "question 2 of run 1 at tick 1: query.clips has not the shape" in said
+    assert "tick 0" not in said
+    assert said.endswith("and 2 more")
+    assert "parenting restore FILE --replace" in found["rows"]["remedy"]
+
+
+def test_a_damaged_checkpoint_is_named_and_costs_nothing(settings: Settings, db: Database) -> None:
+    (mine,) = claim(db, "worker")
+    for tick in (3, 4):
+        save_checkpoint(db, mine, tick, bytes(100))
+    with db.write() as session:
+        session.execute(text("UPDATE checkpoint SET blob = zeroblob(99) WHERE tick = 4"))
+    code, found = examined()
+    assert (code, found["checkpoints"]["said"]) == (1, "damaged: run 1 at tick 4")
 
 
 def test_every_shipped_file_has_its_checksum() -> None:
