@@ -23,6 +23,7 @@ import ssl
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator
@@ -30,6 +31,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
+from typing import IO
 
 import httpx2
 
@@ -78,6 +80,28 @@ def serve(port: int, folder: Path) -> None:
     server = make_server(chosen)
     tracemalloc.start(FRAMES)  # only now: it makes the imports several times as slow
     server.run(sockets=[bind(chosen.host, port)])
+
+
+@contextmanager
+def served(*arguments: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Run `parenting ...` as a process whose output is read all the time: a full pipe would stop it."""
+    with parenting(*arguments, data=folder) as child:
+        pipes = [pipe for pipe in (child.stdout, child.stderr) if pipe is not None]
+        readers = [threading.Thread(target=drain, args=(pipe,)) for pipe in pipes]
+        for reader in readers:
+            reader.start()
+        try:
+            yield child
+        finally:
+            child.kill()
+            for reader in readers:
+                reader.join()
+
+
+def drain(pipe: IO[str]) -> None:
+    """Pass what a process says on to standard error, to its end."""
+    for line in pipe:
+        sys.stderr.write(line)
 
 
 @contextmanager
@@ -168,8 +192,8 @@ def measure(minutes: float, rate: float, trace: bool) -> None:
         folder, port = Path(name), free_port()
         with parenting("migrate", data=folder) as made:
             made.wait()
-        started = traced(port, folder) if trace else parenting("web", "--port", str(port), data=folder)
-        with started as web, parenting("worker", data=folder):
+        started = traced(port, folder) if trace else served("web", "--port", str(port), folder=folder)
+        with started as web, served("worker", folder=folder):
             url = f"http://localhost:{port}"
             until_up(url, SECONDS_TO_START)
             body = {"world": "unsafe-exploration"}
