@@ -71,7 +71,10 @@ class House:
         """Start a process, which kills itself at the point, if there is one."""
         environment = {"PARENTING_LEASE_SECONDS": str(LEASE_SECONDS)}
         if self.settings.database_url is not None:
-            environment["PARENTING_DATABASE_URL"] = self.settings.database_url
+            url = make_url(self.settings.database_url)
+            if url.get_backend_name() == "postgresql":  # its server tells connections apart by this
+                url = url.update_query_dict({"application_name": name})
+            environment["PARENTING_DATABASE_URL"] = url.render_as_string(hide_password=False)
         self.commands[name] = Command(
             *self.orders[name],
             data=self.settings.data,

@@ -1,4 +1,4 @@
-"""The store is locked or full for a while, or may write no more, and all goes on by itself afterwards.
+"""The store is locked, full, read-only or away for a while, and all goes on by itself afterwards.
 
 Parents answer all the time. Every run goes on, what was told is stored (A1), nothing is counted or asked
 twice (A2, C3), each agent's state is what its record gives (C1, C2), no process ends, no reply is a 500 (D2,
@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from pathlib import Path
 
 import httpx2
@@ -24,14 +25,23 @@ from tests.faults import parent
 from tests.faults.figures import Figures
 from tests.faults.house import House
 from tests.faults.rebuilt import rebuild
-from tests.faults.troubles import Restarting, files_bounded, filled, lock_of_another, small_disk
+from tests.faults.troubles import (
+    Restarting,
+    files_bounded,
+    filled,
+    folder_with_quota,
+    immutable,
+    lock_of_another,
+    small_disk,
+)
 from tests.lengths import length
 from tests.server.raising import ISLAND
 
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(600, 3000))]
 LOCKED_SECONDS = 20.0
 FULL_SECONDS = length(10.0, 120.0)
-RESTARTS = length(3, 30)
+RESTARTS, ENDED = length(1, 15), length(4, 60)
+PROCESSES = ("web", "worker 1")
 AWAY_SECONDS = length(5.0, 60.0)
 FIRST_LINES = 4
 """Lines that a process may write besides: one for each kind of refusal, and one that the store is back."""
@@ -140,6 +150,18 @@ def test_a_limit_on_the_size_of_files_is_waited_for(
         figures.count("troubles of the store", f"a limit on files for {AWAY_SECONDS:g} s")
 
 
+@pytest.mark.only("sqlite", "PostgreSQL's files are its server's own")
+def test_a_folder_that_is_read_only_is_waited_for(
+    store: str, tmp_path: Path, rng: random.Random, figures: Figures
+) -> None:
+    """Immutable for root, too (`chattr +i`): every write of an open file fails with EPERM."""
+    folder = tmp_path / "database"
+    folder.mkdir()
+    with elsewhere(folder, tmp_path) as (settings, db), inhabited(settings, db, rng) as house:
+        endure(house, still_read(house, immutable(folder)), AWAY_SECONDS)
+        figures.count("troubles of the store", f"a read-only folder for {AWAY_SECONDS:g} s")
+
+
 @contextmanager
 def still_read(house: House, trouble: AbstractContextManager[None]) -> Iterator[None]:
     """A trouble of writers alone."""
@@ -148,21 +170,46 @@ def still_read(house: House, trouble: AbstractContextManager[None]) -> Iterator[
         assert reader_is_served(house)
 
 
-@pytest.mark.only("postgresql", "SQLite has no server")
-@pytest.mark.parametrize("mode", ["fast", "immediate"])
-def test_postgresql_may_be_restarted(
-    store: str, tmp_path: Path, rng: random.Random, figures: Figures, mode: str
+@pytest.mark.only("sqlite", "PostgreSQL's files are its server's own")
+def test_a_quota_that_is_used_up_is_waited_for(
+    store: str, tmp_path: Path, rng: random.Random, figures: Figures
 ) -> None:
-    """While parents answer: in order, and by a crash that loses what was committed without waiting."""
+    """A real one: a limit of btrfs."""
+    with (
+        folder_with_quota() as folder,
+        elsewhere(folder, tmp_path) as (settings, db),
+        inhabited(settings, db, rng) as house,
+    ):
+        endure(house, still_read(house, filled(folder)), AWAY_SECONDS)
+        figures.count("troubles of the store", f"a quota used up for {AWAY_SECONDS:g} s")
+
+
+@pytest.mark.only("postgresql", "SQLite has no server")
+def test_postgresql_may_be_restarted_and_its_processes_killed(
+    store: str, tmp_path: Path, rng: random.Random, figures: Figures
+) -> None:
+    """In order, by a crash that loses what was committed without waiting, and one connection at a time."""
     cluster = Restarting()
     cluster.create("restarted")
     settings = Settings(data=tmp_path, database_url=cluster.url("restarted"))
     db = connect(settings)
     upgrade(db)
     with inhabited(settings, db, rng) as house:
-        for _ in range(RESTARTS):
+        for name, trouble, seconds in rng.sample(troubles := server_troubles(cluster, rng), len(troubles)):
             house.until_told(rng.randint(1, 3))
-            endure(house, cluster.stopped(mode), rng.uniform(0, 2))
-            figures.count("restarts of PostgreSQL", mode)
+            endure(house, trouble(), rng.uniform(0, seconds))
+            figures.count("troubles of PostgreSQL", name)
     db.close()
     cluster.stop()
+
+
+def server_troubles(
+    cluster: Restarting, rng: random.Random
+) -> list[tuple[str, Callable[[], AbstractContextManager[None]], float]]:
+    """Each with its name and the seconds that it lasts at most, as often as a test of this length has it."""
+    restarts = [(f"restart, {mode}", partial(cluster.stopped, mode), 2.0) for mode in ("fast", "immediate")]
+    killed = [(f"kill -9 behind {name}", partial(cluster.crashed, name, rng), 0.0) for name in PROCESSES]
+    ended = [
+        (f"a connection of {name} ended", partial(cluster.without, name, rng), 0.0) for name in PROCESSES
+    ]
+    return [*restarts * RESTARTS, *killed * RESTARTS, *ended * ENDED]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import random
 import resource
 import shutil
+import signal
 import subprocess
 import tempfile
 import threading
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
@@ -19,6 +22,9 @@ from pysqlite3 import dbapi2 as sqlite
 from tests.postgres import Cluster, programs
 
 DISK_BYTES = 32 * 2**20
+QUOTA_BYTES = 24 * 2**20
+IMAGE_BYTES = 400 * 2**20
+"""The image of the file system with a quota; it takes as much as is written into it."""
 WRITABLE_BYTES = 32 * 2**10
 """Less than the log of a database has at any time."""
 REFILL_SECONDS = 0.05
@@ -36,7 +42,7 @@ def _run(*command: str) -> str | None:
 def _need(*command: str) -> None:
     """Run a command that only root may run, on machines that can do it; else skip the test."""
     if os.geteuid() != 0:
-        pytest.skip("only root may mount file systems")
+        pytest.skip("only root may mount file systems and make files immutable")
     if (why := _run(*command)) is not None:
         pytest.skip(f"this machine cannot do it: {' '.join(command[:3])}: {why}")
 
@@ -50,6 +56,44 @@ def small_disk() -> Iterator[Path]:
             yield Path(folder)
         finally:
             subprocess.run(["umount", "--lazy", folder], check=True)
+
+
+@contextmanager
+def folder_with_quota() -> Iterator[Path]:
+    """A folder that may hold 24 MB: a subvolume of btrfs with a limit, on an image. It says EDQUOT.
+
+    Its files are not copied on write (`chattr +C`), as docs/operations.md advises.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        image, mounted = Path(name) / "image", Path(name) / "mounted"
+        mounted.mkdir()
+        with image.open("wb") as file:
+            file.truncate(IMAGE_BYTES)
+        _need("mkfs.btrfs", "--quiet", str(image))
+        _need("mount", "-o", "loop,commit=1", str(image), str(mounted))
+        try:
+            folder = mounted / "folder"
+            _need("btrfs", "quota", "enable", str(mounted))
+            _need("btrfs", "subvolume", "create", str(folder))
+            _need("btrfs", "qgroup", "limit", str(QUOTA_BYTES), str(folder))
+            _need("chattr", "+C", str(folder))
+            yield folder
+        finally:
+            subprocess.run(["umount", "--lazy", str(mounted)], check=True)
+
+
+@contextmanager
+def immutable(folder: Path) -> Iterator[None]:
+    """Make a folder and its files read-only, for root and for open files too.
+
+    The index of the log (-shm) is left out: processes that share it in memory would end by SIGBUS.
+    """
+    files = [str(file) for file in folder.iterdir() if not file.name.endswith("-shm")]
+    _need("chattr", "+i", *files, str(folder))
+    try:
+        yield
+    finally:
+        subprocess.run(["chattr", "-i", str(folder), *files], check=True)
 
 
 @contextmanager
@@ -73,6 +117,7 @@ def filled(folder: Path) -> Iterator[None]:
         told.set()
         thread.join()
         filler.unlink()
+        os.sync()  # btrfs counts what was freed at its next commit
 
 
 @contextmanager
@@ -115,6 +160,29 @@ class Restarting(Cluster):
         self._ended.append(self.process)
         self.process = self._start()
         self.admin = self._connected()
+
+    @contextmanager
+    def without(self, name: str, rng: random.Random) -> Iterator[None]:
+        """End a connection of the process of this name, as an administrator may."""
+        self.admin.execute("SELECT pg_terminate_backend(%s)", [self._backend_of(name, rng)])
+        yield
+
+    @contextmanager
+    def crashed(self, name: str, rng: random.Random) -> Iterator[None]:
+        """Kill the process behind a connection: the server ends all others, recovers and begins again."""
+        os.kill(self._backend_of(name, rng), signal.SIGKILL)
+        self.admin.close()
+        yield
+        self.admin = self._connected()
+
+    def _backend_of(self, name: str, rng: random.Random) -> int:
+        """One of a process's connections; a process has one at least, for what it listens to."""
+        rows = "SELECT pid FROM pg_stat_activity WHERE application_name = %s ORDER BY pid"
+        end = time.monotonic() + 60
+        while not (found := self.admin.execute(rows, [name]).fetchall()):
+            assert time.monotonic() < end, f"{name} does not connect"
+            time.sleep(0.01)
+        return int(rng.choice(found)[0])
 
     def __init__(self) -> None:
         self._ended: list[subprocess.Popen[bytes]] = []
