@@ -80,7 +80,8 @@ class Queue(Worked):
     def _anybody(self, status: str, data: st.DataObject) -> tuple[str, int]:
         """A client and a query: half the time one of this status that it has answered."""
         told = sorted(number for number, one in self.asked.items() if one.told and one.status == status)
-        if told and data.draw(st.booleans()):
+        own: bool = data.draw(st.booleans())
+        if told and own:
             number = data.draw(st.sampled_from(told))
             return self.asked[number].by, number
         return data.draw(clients), data.draw(st.sampled_from(sorted(self.asked)))
