@@ -156,7 +156,7 @@ def test_a_migration_knows_the_guidance_of_episodes_that_were_ended(db: Database
     worker_side.take_operator_events(db, mine, 6)
     since = worker_side.post_query(db, mine, 7, "guidance", 1, CLIPS)
     runs.set_status(db, RUN, RunStatus.STOPPED)
-    downgrade(db, "0011")
+    downgrade(db, "0012")
     upgrade(db)
     runs.set_status(db, RUN, RunStatus.ACTIVE)
     assert [get_query(db, asked).status for asked in (before, since)] == ["withdrawn", "open"]
