@@ -17,7 +17,13 @@ from pydantic_settings import DotEnvSettingsSource
 from parenting.server.errors import SetupError
 
 PREFIX = "PARENTING_"
-NO_SETTINGS = ("PARENTING_LIFELINE", "PARENTING_CHROMIUM", "PARENTING_TORTURE", "PARENTING_KILL_ROUNDS")
+NO_SETTINGS = (
+    "PARENTING_LIFELINE",
+    "PARENTING_CHROMIUM",
+    "PARENTING_FIREFOX",
+    "PARENTING_TORTURE",
+    "PARENTING_KILL_ROUNDS",
+)
 """Variables that are read elsewhere: by the processes that `parenting up` starts, and by the tests."""
 NEAR = 0.85
 """The least likeness of a name without the prefix to that of a setting, so that it counts as misspelt."""

@@ -1,5 +1,6 @@
 // The parent's page: shows one question after another, takes keys and clicks, and says who waits for whom.
 import { answer, count, report } from "./answers.js";
+import "./bell.js";
 import "./keys.js";
 import { follow } from "./live.js";
 import { flush, flushAll, kept } from "./outbox.js";
