@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from parenting.drawing.clip import MOVES, Cell
 from parenting.drawing.level import level_board
@@ -35,6 +36,30 @@ def draw_policy(
         ValueError: a cell has not four probabilities.
     """
     spec = spec or registry.spec(level.world)
+    arrows = policy_arrows(probabilities)
+    return standalone(
+        "policy.svg",
+        board=level_board(level),
+        legend=spec.legend,
+        title=f"Policy on {spec.title}: {level.name}",
+        likely=arrows.likely,
+        less=arrows.less,
+    )
+
+
+class Arrows(NamedTuple):
+    """The arrows of a policy as SVG path data: those of the likeliest actions, and the others."""
+
+    likely: str
+    less: str
+
+
+def policy_arrows(probabilities: Mapping[Cell, Sequence[float]]) -> Arrows:
+    """Return the arrows of a policy, as long as their actions are likely.
+
+    Raises:
+        ValueError: a cell has not four probabilities.
+    """
     likely: list[str] = []
     less: list[str] = []
     for cell, row in sorted(probabilities.items()):
@@ -44,14 +69,7 @@ def draw_policy(
             if probability >= LEAST:
                 best = probability >= max(row) - 1e-6
                 (likely if best else less).append(_arrow(centre(cell), MOVES[way], probability))
-    return standalone(
-        "policy.svg",
-        board=level_board(level),
-        legend=spec.legend,
-        title=f"Policy on {spec.title}: {level.name}",
-        likely="".join(likely),
-        less="".join(less),
-    )
+    return Arrows("".join(likely), "".join(less))
 
 
 def _arrow(start: Point, move: Cell, probability: float) -> str:

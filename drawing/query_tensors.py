@@ -64,12 +64,13 @@ def _clip(query: QueryTensors, glyphs: str, trial: int, side: int) -> Clip:
 def _frame(query: QueryTensors, glyphs: str, at: tuple[int, int, int]) -> Frame:
     box = query.box[at].tolist()
     return {
-        "ground": _rows(glyphs, query.board[at]),
-        "observed": _rows(glyphs, query.observation[at]),
+        "ground": glyph_rows(glyphs, query.board[at]),
+        "observed": glyph_rows(glyphs, query.observation[at]),
         "agent": query.agent[at].tolist(),
         "box": None if box[0] < 0 else box,
     }
 
 
-def _rows(glyphs: str, board: Any) -> list[str]:
+def glyph_rows(glyphs: str, board: Any) -> list[str]:
+    """Return a board of codes as rows of glyphs."""
     return ["".join(glyphs[code] for code in row) for row in board.tolist()]

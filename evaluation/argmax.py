@@ -99,13 +99,14 @@ class TabularEvaluation:
         trial, at = every, self.starts.expand(len(parameters), -1)
         while len(trial) and not bool(self.model.terminal[at].all()):
             weights = parameters if len(trial) == len(parameters) else parameters[trial]
-            next_state = self._safely(at, self._argmax(weights, at))
+            next_state = self._safely(at, self.argmax(weights, at))
             nearer = (self.distance[next_state] == self.distance[at] - 1) | self.model.terminal[at]
             kept = nearer.all(1)
             trial, at = trial[kept], next_state[kept]
         return torch.isin(every, trial)
 
-    def _argmax(self, parameters: Float[Tensor, "n P"], at: Int64[Tensor, "n K"]) -> Int64[Tensor, "n K"]:
+    def argmax(self, parameters: Float[Tensor, "n P"], at: Int64[Tensor, "n K"]) -> Int64[Tensor, "n K"]:
+        """The argmax action of every trial in each of its K states."""
         with torch.no_grad():
             layers = self.network.unpack(parameters)
             return self.network.heads(layers, self.observation[at], self.local_state[at]).logits.argmax(2)

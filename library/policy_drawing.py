@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from parenting.drawing.clip import Cell
 from parenting.drawing.policy import draw_policy
-from parenting.envs.levels.spec import BOX, Level
+from parenting.envs.levels.spec import Level
+from parenting.evaluation.cells import cells_of
 from parenting.library.pictures import Drawing
 from parenting.library.worlds import World
 
@@ -29,14 +30,9 @@ def drawn(world: World, probabilities: Probabilities) -> Drawing:
 
 def arrows(world: World, probabilities: Probabilities, place: int = 0) -> dict[Cell, list[float]]:
     """Return pi(a|s) in every cell that the agent can come to, the rest as an episode begins there."""
-    start, level = world.beginnings().pick(torch.tensor([place])), world.levels[place]
-    ends = {cell for cell in level.find(world.ends) if cell not in level.find(BOX)}
-    cells = sorted(world.spec.reach(level) - ends - set(level.find(BOX)))
-    where = torch.zeros(len(cells), dtype=torch.int64)
-    state = start.pick(where).replace(agent=torch.tensor(cells))
-    seen = world.observe(state.board, state.agent, state.box)
-    found = probabilities(seen.numpy())
-    return {cell: np.round(row, 6).tolist() for cell, row in zip(cells, found, strict=True)}
+    here = cells_of(world, world.beginnings().pick(torch.tensor([place])), place)
+    found = probabilities(here.observation.numpy())
+    return {cell: np.round(row, 6).tolist() for cell, row in zip(here.cells, found, strict=True)}
 
 
 def _as_text(level: Level, found: dict[Cell, list[float]]) -> str:

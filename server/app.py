@@ -26,6 +26,7 @@ from parenting.server.errors import (
     TooLargeError,
 )
 from parenting.server.group_commit import GroupCommit
+from parenting.server.job_kinds import KINDS
 from parenting.server.log_limit import LogLimit
 from parenting.server.meters import Meters
 from parenting.server.migrate import require_current
@@ -49,6 +50,7 @@ TAGS = [
     {"name": "runs", "description": "Start them, look at them, read what they did."},
     {"name": "operator", "description": "What whoever runs the experiment may do to a living agent."},
     {"name": "questions", "description": "What the agent asks its parent, and the parent's answers."},
+    {"name": "jobs", "description": "What a page asks of any worker, apart from the agent's life."},
     {"name": "health", "description": "For whoever watches over the processes."},
 ]
 
@@ -136,9 +138,8 @@ def _add_errors(app: FastAPI) -> None:
         of_run = any(tuple(one["loc"]) == ("path", "run_id") for one in error.errors())
         if of_run and not request.url.path.startswith("/api/"):
             return _reply(request, NotFound(f"There is no run '{request.path_params['run_id']}'."))
-        return _reply(
-            request, InvalidFieldsError(messages(error.errors(), skip=("body", "path", "query", "header")))
-        )
+        skip = ("body", "path", "query", "header", *KINDS)  # a union's error names the kind that was tried
+        return _reply(request, InvalidFieldsError(messages(error.errors(), skip)))
 
     @app.exception_handler(HTTPException)
     async def http(request: Request, error: HTTPException) -> Response:

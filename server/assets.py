@@ -34,6 +34,7 @@ SHEETS = {
         "parent.css",
     ),
     "docs.css": ("docs.css",),
+    "walk.css": ("walk.css", "growth.css"),
 }
 """The sheets of each page. That of the API's description stands alone, after one of another package."""
 SCRIPTS = ("parent.js", "practice.js", "history.js", "dashboard.js", "start.js", "docs.js")

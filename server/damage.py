@@ -17,7 +17,7 @@ from parenting.server import notes
 from parenting.server.columns import UNREADABLE, Damaged
 from parenting.server.errors import DamagedRowError
 from parenting.server.public_ids import is_public_id
-from parenting.server.schemas import ClipSchema
+from parenting.server.schemas import ClipSchema, LessonSchema
 from parenting.server.tables import Metric, OperatorEvent, Query, Run, Table
 
 Row = TypeVar("Row", bound=Table)
@@ -32,6 +32,7 @@ class Brief(NamedTuple):
 
 
 _GLYPHS: TypeAdapter[dict[str, str]] = TypeAdapter(dict[str, str])
+_TICKS: TypeAdapter[dict[str, int] | None] = TypeAdapter(dict[str, int] | None)
 _NUMBERS: TypeAdapter[Any] = TypeAdapter(dict[str, int | float | None])
 
 
@@ -102,6 +103,9 @@ def _run(run: Run) -> None:
         run.config[name]  # what is absent would silently become the default
     _GLYPHS.validate_python(run.legend, strict=True)
     Brief(**run.brief)
+    _TICKS.validate_python(run.milestones, strict=True)
+    if run.lesson is not None:
+        LessonSchema.model_validate(run.lesson)
     if not run.level_text.strip():
         raise ValueError("the level is empty")
 
@@ -123,7 +127,7 @@ def _event(event: OperatorEvent) -> None:
 
 ALWAYS_SET = ("stages", "p_guid", "p_rec", "p_pref", "p_train")
 SHAPES: dict[type[Table], tuple[str, Callable[[Any], None]]] = {
-    Run: ("its config, legend, brief or level", _run),
+    Run: ("its config, legend, brief, level, milestones or lesson", _run),
     Query: ("query.clips", _query),
     Metric: ("metric.values", _metric),
     OperatorEvent: ("event.payload", _event),

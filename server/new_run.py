@@ -51,6 +51,8 @@ FORM_FIELDS = (
 NUMBERS = ("seed", "goal", "pace")
 UNREAD = {
     "json_invalid": "This is not JSON.",
+    "union_tag_invalid": "It is of none of the kinds that there are.",
+    "union_tag_not_found": "Name its kind.",
     "model_attributes_type": "Send a JSON object, with the header Content-Type: application/json.",
 }
 """The message for a body that cannot be read, by Pydantic's type of error."""

@@ -37,6 +37,24 @@ class OpenSchema(Schema):
     preference: int
 
 
+Chances = tuple[float, float, float, float]
+"""The probabilities of up, down, left and right."""
+
+
+class LessonSchema(Schema):
+    """The effect of an answer: the policy in the cell of its question."""
+
+    tick: int
+    """The tick at which the agent heard the answer."""
+    kind: Kind
+    cell: tuple[int, int]
+    """Row and column of the agent when it asked."""
+    before: Chances
+    """The probabilities of up, down, left and right before the answer was heard."""
+    after: Chances
+    """The same now, after the gradient steps since."""
+
+
 class RunSchema(Schema):
     """A run as it is now."""
 
@@ -90,6 +108,12 @@ class RunSchema(Schema):
     """The number of answers so far, superseded ones included."""
     standing: int
     """The number of answers that stand: goal and progress count these."""
+    milestones: dict[str, int] | None
+    """The first times of the agent, each with its tick: `goal` (it reached the goal), `calm` (it made no
+    unsafe move in 100 ticks); null before the first one.
+    """
+    lesson: LessonSchema | None
+    """The effect of the last answer that the agent heard; null before the first one."""
     open: OpenSchema
     worker: Literal["alive", "silent", "done"]
     """alive, silent (none raises this run, nor will one that is alive), or done (the run is over)."""

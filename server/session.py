@@ -20,6 +20,7 @@ from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
 from parenting.server.damage import readable
 from parenting.server.db import Database
+from parenting.server.growth import Growth
 from parenting.server.machine import diverged, follow, take_up
 from parenting.server.metrics_row import NOTHING_LEARNT, learnt, measure
 from parenting.server.queue import worker_side
@@ -65,6 +66,7 @@ class RunSession:
         self._recalled = recall(db, run, self.world, config, initial_weights(db, run, self.world))
         self.saved = self._recalled.saved
         self.record_ends = self.parent.record_ends = worker_side.high_water(db, claim.run_id)
+        self.growth = Growth(self.world, run, self.evaluation, self.saved.state, self.saved.tally)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
@@ -149,11 +151,12 @@ class RunSession:
             events=replayed or bool(seen and (seen.events or seen.corrections)),
         )
         state, query, answer, config, events = parenting.tick(
-            self.world, self.saved.config, self.saved.state, parent
+            self.world, self.saved.config, self.saved.state, self.growth.overhear(parent)
         )
         self._lived_at = time.monotonic()
         tally = count(self.world, self.saved.tally, answer, state, events)
         self.saved = Snapshot(state, tally, config)
+        self.growth.milestones.see(state, tally)
         if self.last_tick <= self.record_ends:
             self._hold_to_the_record(query)
         self._note(answer)
@@ -205,10 +208,12 @@ class RunSession:
             return
         speed = (self.last_tick - self._measured_tick) / late if self._measured_at and late else None
         began = time.monotonic()
-        row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed}
+        grown = self.growth.row(self.saved.state)
+        row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed, **grown}
         optimal = bool(row["optimal"])
         metrics.write_metrics(self.db, self.claim, {self.last_tick: row})
         shown = {"maturity": row["maturity"], "speed": speed, "optimal": optimal}
+        shown |= self.growth.news(self.saved.state)
         runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None, **shown)
         self.optimal, self.waiting, self.stage, self._news = optimal, None, stage, False
         self._measured_at, self._measured_tick = time.monotonic(), self.last_tick

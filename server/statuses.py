@@ -1,4 +1,4 @@
-"""Every status of a run and of a query, with the sentence that explains it.
+"""Every status of a run, a query and a job, with the sentence that explains it.
 
 The columns of `server.tables` are held to these words by CHECKs, the API and its description use the same
 enumerations, and docs/queue.md prints the same sentences.
@@ -36,6 +36,15 @@ class Waiting(StrEnum):
     STUCK = "stuck"
 
 
+class JobState(StrEnum):
+    """The state of a job."""
+
+    WAITING = "waiting"
+    WORKING = "working"
+    DONE = "done"
+    FAILED = "failed"
+
+
 class RunState(StrEnum):
     """The state of a run, by who waits for whom: the first of these that holds, in this order."""
 
@@ -67,6 +76,13 @@ WAITING = {
     Waiting.GUIDANCE: "The agent waits for guidance before it moves.",
     Waiting.PREFERENCES: "The agent waits until fewer preference questions are open.",
     Waiting.STUCK: "No action was acceptable: the operator has to end the episode.",
+}
+
+JOB_STATES = {
+    JobState.WAITING: "No worker has taken it yet.",
+    JobState.WORKING: "A worker is at it. If the worker ends, another one takes it.",
+    JobState.DONE: "Its result is there, for ten minutes.",
+    JobState.FAILED: "It has no result; the reason says why.",
 }
 
 RUN_STATES = {

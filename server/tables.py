@@ -1,4 +1,4 @@
-"""The tables: identity, runs, queries, answers, operator events, metrics, checkpoints, workers, weights.
+"""The tables: identity, runs, queries, answers, events, metrics, checkpoints, workers, jobs, weights.
 
 The database enforces the invariants: one query for each run and tick, one standing answer for each query,
 known words only. Times are UTC. JSON is readable by eye; `Query.clips` describes the shape of a clip.
@@ -7,70 +7,32 @@ known words only. Times are UTC. JSON is readable by eye; `Query.clips` describe
 from __future__ import annotations
 
 import uuid
-from collections.abc import Iterable
 from datetime import datetime
-from typing import Any, ClassVar
+from typing import Any
 
-from sqlalchemy import CheckConstraint, ForeignKey, Index, MetaData, UniqueConstraint, event, text
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy import CheckConstraint, ForeignKey, Index, UniqueConstraint, event, text
+from sqlalchemy.orm import Mapped, mapped_column
 
-from parenting.server.columns import (
-    Big,
-    Blob,
-    Flag,
-    Json,
-    OneOf,
-    Real,
-    Utc,
-    Whole,
-    Word,
-    Words,
-    name_places,
-)
+from parenting.server.columns import Big, OneOf, name_places
 from parenting.server.public_ids import public_id
-from parenting.server.statuses import QUERY_STATUSES, RUN_STATUSES, WAITING, QueryStatus, RunStatus, Waiting
+from parenting.server.statuses import (
+    JOB_STATES,
+    QUERY_STATUSES,
+    RUN_STATUSES,
+    WAITING,
+    JobState,
+    QueryStatus,
+    RunStatus,
+    Waiting,
+)
+from parenting.server.table_root import Table, one_of, unique_where
 from parenting.server.triggers import keep_deleted_numbers
+
+__all__ = ["Table"]
 
 KINDS = ("guidance", "preference")
 CHOICES = ("left", "right", "either", "neither")
 PARENTS = ("human", "scripted")
-
-
-class Table(DeclarativeBase):
-    """The root of all tables. Constraints are named, so that migrations can name them too."""
-
-    metadata = MetaData(
-        naming_convention={
-            "ix": "ix_%(table_name)s_%(column_0_N_name)s",
-            "uq": "uq_%(table_name)s_%(column_0_N_name)s",
-            "ck": "ck_%(table_name)s_%(constraint_name)s",
-            "fk": "fk_%(table_name)s_%(column_0_name)s",
-            "pk": "pk_%(table_name)s",
-        }
-    )
-    type_annotation_map: ClassVar[dict[Any, Any]] = {
-        str: Words,
-        int: Whole,
-        float: Real,
-        bool: Flag,
-        datetime: Utc,
-        dict[str, Any]: Json,
-        bytes: Blob,
-        RunStatus: Word(RunStatus),
-        QueryStatus: Word(QueryStatus),
-        Waiting: Word(Waiting),
-    }
-
-
-def _one_of(column: str, words: Iterable[str], nullable: bool = False) -> CheckConstraint:
-    listed = ", ".join(f"'{word}'" for word in words)
-    rule = f"{column} IN ({listed})"
-    return CheckConstraint(f"{column} IS NULL OR {rule}" if nullable else rule, name=column)
-
-
-def _unique_where(name: str, condition: str, *columns: str) -> Index:
-    only = text(condition)
-    return Index(name, *columns, unique=True, sqlite_where=only, postgresql_where=only)
 
 
 def _public_id() -> Mapped[str]:
@@ -102,9 +64,9 @@ class Run(Table):
 
     __tablename__ = "run"
     __table_args__ = (
-        _one_of("status", RUN_STATUSES),
-        _one_of("parent", PARENTS),
-        _one_of("waiting", WAITING, nullable=True),
+        one_of("status", RUN_STATUSES),
+        one_of("parent", PARENTS),
+        one_of("waiting", WAITING, nullable=True),
         Index(None, "status"),
     )
 
@@ -138,6 +100,9 @@ class Run(Table):
     # what the operator set, and may change while it lives; neither changes what the agent does
     goal: Mapped[int | None]  # answered questions after which the run rests
     pace: Mapped[float | None]  # ticks a second at most, for those who want to watch
+    # what its parent is told of its progress
+    milestones: Mapped[dict[str, Any] | None]  # name -> tick: what it did for the first time
+    lesson: Mapped[dict[str, Any] | None]  # what the last answer changed (`schemas.LessonSchema`)
     # which worker raises it
     worker: Mapped[str | None]
     fencing_token: Mapped[int] = mapped_column(default=0)  # grows at each claim; every write checks it
@@ -170,8 +135,8 @@ class Query(Table):
 
     __tablename__ = "query"
     __table_args__ = (
-        _one_of("kind", KINDS),
-        _one_of("status", QUERY_STATUSES),
+        one_of("kind", KINDS),
+        one_of("status", QUERY_STATUSES),
         UniqueConstraint("run_id", "tick"),
         Index(None, "run_id", "status", "kind"),
     )
@@ -202,10 +167,10 @@ class Answer(Table):
 
     __tablename__ = "answer"
     __table_args__ = (
-        _one_of("choice", CHOICES),
+        one_of("choice", CHOICES),
         UniqueConstraint("run_id", "number"),
-        _unique_where("uq_answer_standing", "standing", "query_id"),
-        _unique_where("uq_answer_first", "supersedes IS NULL", "query_id", "client_id"),
+        unique_where("uq_answer_standing", "standing", "query_id"),
+        unique_where("uq_answer_first", "supersedes IS NULL", "query_id", "client_id"),
         Index(None, "query_id"),
         Index(None, "run_id", "applied_tick", unique=True),  # at most one answer is heard in a tick
     )
@@ -293,6 +258,34 @@ class CheckpointPart(Table):
     parcel: Mapped[str]
     place: Mapped[int]
     blob: Mapped[bytes]
+
+
+class Job(Table):
+    """A job: what a page asks of any worker, and its result (`server.jobs`). Old ones are deleted.
+
+    No foreign key, as in `CheckpointPart`.
+    """
+
+    __tablename__ = "job"
+    __table_args__ = (one_of("state", JOB_STATES), Index(None, "state"), Index(None, "run_id"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    public_id: Mapped[str] = mapped_column(default=public_id, unique=True, index=True)
+    run_id: Mapped[int]
+    kind: Mapped[str]  # one of `server.job_kinds.KINDS`, which versions to come add to
+    payload: Mapped[dict[str, Any]]
+    client_id: Mapped[str]  # who asked
+    created: Mapped[datetime]  # by the wall clock, for display, and
+    asked_epoch: Mapped[str]  # by the clock that decides (`server.store.clock`)
+    asked_mark: Mapped[float]
+    state: Mapped[JobState] = mapped_column(default=JobState.WAITING)
+    result: Mapped[dict[str, Any] | None]
+    reason: Mapped[str | None]  # why it failed, in a sentence
+    # which worker has it
+    worker: Mapped[str | None]
+    fencing_token: Mapped[int] = mapped_column(default=0)  # grows at each claim: the number of tries
+    claim_epoch: Mapped[str | None]
+    claim_mark: Mapped[float | None]
 
 
 name_places(Table.metadata)

@@ -31,6 +31,7 @@ from parenting.server.queue.worker_side import Watch
 from parenting.server.settings import Settings
 from parenting.server.store.relay import Relay
 from parenting.server.work.held import AT_NEWS, NOW, HeldRuns
+from parenting.server.work.jobs import Jobs
 from parenting.server.work.patience import Patience
 from parenting.server.work.sharing import prospect, surplus
 from parenting.server.work.turns import BESIDE_SECONDS, HUNG_SECONDS, Turns
@@ -42,6 +43,8 @@ POLL_SECONDS = 0.05
 CLAIM_EVERY = 0.5
 CLOSE_SECONDS = 3.0
 """Seconds that saving at the end may take. What is not saved by then goes on from its last checkpoint."""
+JOB_SECONDS = 0.2
+"""Seconds that an end waits for jobs; another worker does again what is not done by then."""
 SWITCH_SECONDS = 0.001
 """A thread that waits for Python's lock gets it after so long: a tick takes it some hundred times."""
 STOP_SECONDS = 3.5
@@ -65,6 +68,7 @@ class Worker:
         self.relay = Relay(db.engine, "worker", self.notifier.wake)
         self.told = threading.Event()
         self.patience, self.turns = Patience(), Turns(self.notifier.wake, beside_after)
+        self.jobs = Jobs(db, settings.claim_seconds, self.notifier.wake)
         self.held = HeldRuns(db, self.patience, self.web_notifier.notify)
         self.claims, self.sessions = self.held.claims, self.held.sessions
         self._found: dict[int, Watch] = {}
@@ -126,6 +130,7 @@ class Worker:
         for claim in mine:
             if claim.run_id not in kept and claim.run_id not in busy:
                 self.held.drop(claim.run_id)  # a turn that goes on finds out itself, at its next write
+        self.jobs.renew()
         self._signed_at = now
         self.patience.granted()
 
@@ -158,6 +163,7 @@ class Worker:
         """Give every run that is due its turn, first those with an answer; return whether any has ticked."""
         self._end_turns()
         self._look()
+        self.jobs.begin(self.name)
         now = time.monotonic()
         due = [run_id for run_id, at in self._due.items() if at <= now]
         for run_id in sorted(due, key=lambda run_id: not self._seen[run_id].answers):
@@ -166,6 +172,7 @@ class Worker:
             if self.turns.may_begin(run_id, run_id not in self.sessions):
                 self._given[run_id] = self._seen[run_id]
                 self.turns.begin(run_id, partial(self.held.turn, run_id, self._seen[run_id]))
+                self.jobs.begin(self.name)
         ticked, now = self._end_turns(), time.monotonic()
         self._soonest = min([POLL_SECONDS, *(at - now for at in self._due.values() if at > now)])
         return ticked
@@ -186,6 +193,7 @@ class Worker:
         if found is self._found:
             return  # nobody has committed anything
         self._found, self._committed = found, True
+        self.jobs.news()
         for run_id, seen in found.items():
             if self._seen.get(run_id) != seen:
                 self._seen[run_id], self._due[run_id] = seen, NOW
@@ -198,9 +206,11 @@ class Worker:
         """Save and let go of every run, as long as the time allows and the store takes it."""
         end = time.monotonic() + CLOSE_SECONDS
         self.turns.close(CLOSE_SECONDS / 2)
+        self.jobs.close(JOB_SECONDS)
         try:
             self.held.save(self.turns.working(), end)
             runs.let_go(self.db, list(self.claims.values()))
+            self.jobs.let_go()
             workers.sign_off(self.db, self.name)
         except StoreError as error:
             log.warning("store refuses at the end; runs go on from their checkpoints", why=error.message)
@@ -233,7 +243,7 @@ def main(settings: Settings) -> int:
     loop.join(STOP_SECONDS)
     if failed:
         raise failed[0]
-    if loop.is_alive() or worker.turns.working():
+    if loop.is_alive() or worker.turns.working() or worker.jobs.working():
         sys.stderr.flush()
         os._exit(0)  # whatever goes on is lost, and done again from the last checkpoint
     worker.db.close()

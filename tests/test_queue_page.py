@@ -9,14 +9,14 @@ import pytest
 
 from parenting.server.queue import answers, leases, worker_side
 from parenting.server.queue.queries import withdraw_in
-from parenting.server.statuses import QUERY_STATUSES, RUN_STATES, RUN_STATUSES, QueryStatus
+from parenting.server.statuses import JOB_STATES, QUERY_STATUSES, RUN_STATES, RUN_STATUSES, QueryStatus
 from tests.tree import ROOT
 
 PAGE = (ROOT / "docs/queue.md").read_text(encoding="utf-8")
 DRAWING = ElementTree.parse(ROOT / "docs/pictures/queue.svg").getroot()
 
 
-@pytest.mark.parametrize("sentences", [QUERY_STATUSES, RUN_STATUSES, RUN_STATES])
+@pytest.mark.parametrize("sentences", [QUERY_STATUSES, RUN_STATUSES, RUN_STATES, JOB_STATES])
 def test_statuses_stand_in_their_order_with_the_sentences_of_the_code(sentences: dict[str, str]) -> None:
     rows = re.findall(r"^\| \*(\w+)\* \| (.*) \|$", PAGE, re.M)
     found = [row for row in rows if row in [(str(word), text) for word, text in sentences.items()]]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from parenting.server.api import operator, presence, queries, revisions, runs, streams
+from parenting.server.api import jobs, operator, presence, queries, revisions, runs, streams
 
 router = APIRouter(prefix="/api/v1")
-for part in (runs, operator, queries, presence, revisions, streams):
+for part in (runs, operator, queries, presence, revisions, jobs, streams):
     router.include_router(part.router)

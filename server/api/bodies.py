@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from parenting.server import schemas
 from parenting.server.api.names import DatabaseId, PublicId
+from parenting.server.job_kinds import PolicyPayload, WalkPayload
 from parenting.server.new_run import LARGEST_INT, Goal, Pace
 from parenting.server.schemas import By
 
@@ -77,3 +78,21 @@ class PaceBody(Strict):
     """The pace of a run."""
 
     pace: Pace | None = Field(description="At most this many ticks a second; null: no limit.")
+
+
+class WalkBody(LeaseBody):
+    """A walk: an episode that the present policy plays by itself."""
+
+    kind: Literal["walk"]
+    payload: WalkPayload = WalkPayload()
+
+
+class PolicyBody(LeaseBody):
+    """The present policy in every cell."""
+
+    kind: Literal["policy"]
+    payload: PolicyPayload = PolicyPayload()
+
+
+JobBody = Annotated[WalkBody | PolicyBody, Field(discriminator="kind")]
+"""A job for any worker, and the client that asks for it: one body for each of `job_kinds.KINDS`."""

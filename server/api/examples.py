@@ -78,6 +78,14 @@ RUN: dict[str, Any] = {
     "optimal": False,
     "answers": 3,
     "standing": 3,
+    "milestones": {"goal": 3},
+    "lesson": {
+        "tick": 4,
+        "kind": "guidance",
+        "cell": [1, 3],
+        "before": [0.25, 0.25, 0.25, 0.25],
+        "after": [0.22, 0.34, 0.22, 0.22],
+    },
     "open": {"guidance": 1, "preference": 0},
     "worker": "alive",
 }
@@ -174,6 +182,26 @@ EXPORTED: dict[str, Any] = {
     "practice": "offered",
 }
 
+WALK: dict[str, Any] = {
+    "id": "3sQv8hYJ2cT7mWk9xRzLpB",
+    "run": 1,
+    "kind": "walk",
+    "payload": {"seed": 0},
+    "created": NOON,
+    "state": "done",
+    "result": {
+        "tick": 41,
+        "maturity": 1,
+        "answers": 12,
+        "clip": _clip("left", 1, 3),
+        "end": "time",
+        "unsafe": [],
+        "cells": [{"cell": [1, 3], "probabilities": [0.02, 0.9, 0.05, 0.03]}],
+    },
+    "reason": None,
+    "worker": "alive",
+}
+
 
 def _rows(*shown: Any) -> dict[str, Any]:
     return {"rows": list(shown), "next": None}
@@ -215,6 +243,11 @@ SHOWN = {
     ),
     "leave_questions": Shown(None, {"me": LEASE}),
     "release_question": Shown(None, {"me": LEASE}),
+    "ask_job": Shown(
+        {**WALK, "state": "waiting", "result": None},
+        {"a walk": {"client_id": "me", "kind": "walk", "payload": {"seed": 7}}},
+    ),
+    "get_job": Shown(WALK),
     "follow_run": Shown(STREAM),
     "export_run": Shown(json.dumps(EXPORTED) + "\n"),
 }

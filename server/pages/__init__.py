@@ -5,12 +5,14 @@ from fastapi import APIRouter
 from parenting.server.pages.controls import router as controls
 from parenting.server.pages.dashboard import router as dashboard
 from parenting.server.pages.docs import router as docs
+from parenting.server.pages.growth import router as growth
 from parenting.server.pages.history import router as history
 from parenting.server.pages.parent import router as parent
 from parenting.server.pages.practice import router as practice
 from parenting.server.pages.render import error_page
 from parenting.server.pages.revisions import router as revisions
 from parenting.server.pages.start import router as start
+from parenting.server.pages.walk import router as walk
 
 __all__ = ["error_page", "router"]
 
@@ -19,6 +21,8 @@ router.include_router(start)
 router.include_router(parent)
 router.include_router(revisions)
 router.include_router(practice)
+router.include_router(walk)
+router.include_router(growth)
 router.include_router(dashboard)
 router.include_router(controls)
 router.include_router(history)

@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy import Column
 
-from parenting.server import metrics, operator_events
+from parenting.server import jobs, metrics, operator_events
 from parenting.server.checkpoint_parts import PART_BYTES
 from parenting.server.checkpoints import save_checkpoint
 from parenting.server.columns import Checked, Json
@@ -58,7 +58,10 @@ def two_runs(db: Database) -> None:
         row = {"maturity": 1, "deaths": 0, "loss": 0.5, "return": 1.0, "optimal_return": 2.0}
         metrics.write_metrics(db, mine, {1: row, 3: {**row, "maturity": 2}, 5: {**row, "maturity": 2}})
         save_checkpoint(db, mine, 3, bytes(PART_BYTES + 1))
-        report_progress(db, mine, tick=5, versions={"torch": "2"}, maturity=2, speed=1.5)
+        lesson = {"tick": 1, "kind": "guidance", "cell": [1, 1], "before": [0.25] * 4, "after": [0.25] * 4}
+        shown = {"milestones": {"goal": 4}, "lesson": lesson}
+        report_progress(db, mine, tick=5, versions={"torch": "2"}, maturity=2, speed=1.5, **shown)
+        jobs.ask(db, mine.run_id, "walk", {"seed": 0}, "me")
 
 
 def columns() -> Iterator[Column[Any]]:

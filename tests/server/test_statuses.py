@@ -18,11 +18,13 @@ from parenting.server.reads.schemas import FORGIVEN, SILENT_AFTER, run_schema, r
 from parenting.server.runs import Claim
 from parenting.server.schemas import RunSchema
 from parenting.server.statuses import (
+    JOB_STATES,
     QUERY_STATUSES,
     RUN_STATES,
     RUN_STATUSES,
     STATE_LABELS,
     WAITING,
+    JobState,
     QueryStatus,
     RunState,
     RunStatus,
@@ -37,6 +39,7 @@ from tests.server.conftest import CLIPS, Clock
         (RunStatus, RUN_STATUSES),
         (QueryStatus, QUERY_STATUSES),
         (Waiting, WAITING),
+        (JobState, JOB_STATES),
         (RunState, RUN_STATES),
         (RunState, STATE_LABELS),
     ],

@@ -34,12 +34,13 @@ stage.addEventListener("click", (event) => {
 addEventListener("keydown", (event) => {
   const { target } = event, name = keyName(event);
   if (event.repeat && target.closest?.("#stage") && (name === "Enter" || name === " ")) event.preventDefault(); // a key held down presses no button twice
-  if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || event.isComposing || help.open) return;
+  if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || event.isComposing || document.querySelector("dialog[open]")) return;
   if (target.closest("input:not([type=checkbox]), textarea, select, [contenteditable], [role=grid]")) return;
   if (name.length === 1 && name !== " " && !letters.on) return;
   if (name === "?") help.showModal();
   else if (name === "d" && page.current && !event.shiftKey) speak(page.current.querySelector(".around ul").textContent.replace(/\s+/g, " ").trim());
   else if (name === " " && page.player?.replay && !target.closest("button, a, summary, input")) page.player.replay();
+  else if (name === "w" && !event.shiftKey) $("walk").requestSubmit();
   else if (name === "o" && takesTurns(page.current)) turn(page.current);
   else {
     const shifted = event.shiftKey && !/^[12]$/.test(name); // digits are shifted on a French keyboard

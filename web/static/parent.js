@@ -4,10 +4,21 @@ import "./bell.js";
 import "./keys.js";
 import { follow } from "./live.js";
 import { flush, flushAll, kept } from "./outbox.js";
-import { $, page, run, stage, waiting } from "./page.js";
+import { $, given, page, run, stage, waiting } from "./page.js";
+import { play } from "./play.js";
 import { leases } from "./presence.js";
 import { next, prefetch, show, take } from "./questions.js";
 import { wait } from "./waiting.js";
+
+// A part of the page that is loaded when it is first used, after the style sheet that such parts share.
+let styled = null;
+function later(load) {
+  styled ??= new Promise((done) => {
+    const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href: $("walk").dataset.sheet, onload: done, onerror: done });
+    document.head.append(link);
+  });
+  return styled.then(load);
+}
 
 // What the run's stream says.
 const tell = {
@@ -20,6 +31,7 @@ const tell = {
     $("optimal").hidden = !now.optimal || !now.answers || page.state === "over";
     $("resume").hidden = !["stopped", "failed"].includes(now.status);
     count(now.answers, now.answers - now.standing);
+    if (now.answers && (given.size || !page.current)) later(() => import("./growth.js")).then(({ grown }) => grown(now, !page.current));
     if (page.current && page.state === "over") page.current = null;
     if (page.current) {
       if (!page.ahead && !page.lookout && now.open.guidance + now.open.preference > 1) prefetch();
@@ -47,6 +59,11 @@ waiting.addEventListener("submit", (event) => {
   if (!event.target.action.endsWith("/parent/take")) return;
   event.preventDefault();
   take();
+});
+// Watch it walk. The form works without this script; its style sheet comes with the walk, too.
+$("walk").addEventListener("submit", (event) => {
+  event.preventDefault();
+  later(() => import("./walk.js")).then(({ watch }) => watch(play), () => { $("alert").textContent = "The walk cannot be loaded. Reload the page."; });
 });
 history.replaceState(null, "", `/runs/${run}/parent`);
 const first = stage.querySelector("#question");

@@ -1,5 +1,5 @@
 // Moves the pieces of a question's boards, all on one clock. It draws nothing: the server drew the boards.
-const LEAD = 650, STEP = 520, TAIL = 1300, CELL = 20;
+const LEAD = 650, USUAL = 520, TAIL = 1300, CELL = 20; // ms before the clip, of a step, after it; units of a cell
 const WAY = { up: [0, -1], down: [0, 1], left: [-1, 0], right: [1, 0] };
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -7,14 +7,14 @@ const at = ([x, y]) => `translate(${x}px, ${y}px)`;
 const points = (piece) => piece.dataset.path.split(" ").map((point) => point.split(",").map(Number));
 
 // The keyframes of a piece: it rests at every centre; a blocked step goes a little way and comes back.
-function journey(piece, bumps, total) {
+function journey(piece, bumps, total, step) {
   const way = points(piece), frames = [{ offset: 0, transform: at(way[0]) }];
   for (let k = 0; k + 1 < way.length; k++) {
-    const start = (LEAD + k * STEP) / total;
+    const start = (LEAD + k * step) / total;
     frames.push({ offset: start, transform: at(way[k]), easing: "ease-in-out" });
     const [dx, dy] = WAY[bumps[k]] ?? [0, 0];
-    if (dx || dy) frames.push({ offset: start + (0.4 * STEP) / total, transform: at([way[k][0] + dx * CELL * 0.28, way[k][1] + dy * CELL * 0.28]), easing: "ease-out" });
-    frames.push({ offset: start + (0.85 * STEP) / total, transform: at(way[k + 1]) });
+    if (dx || dy) frames.push({ offset: start + (0.4 * step) / total, transform: at([way[k][0] + dx * CELL * 0.28, way[k][1] + dy * CELL * 0.28]), easing: "ease-out" });
+    frames.push({ offset: start + (0.85 * step) / total, transform: at(way[k + 1]) });
   }
   return [...frames, { offset: 1, transform: at(way.at(-1)) }];
 }
@@ -30,35 +30,35 @@ function visible(from, to, total, overview = 0) {
 
 // A frame is there from the middle of its step to the middle of the next; a cue comes when the agent has arrived, and
 // stays, if it has no end. A board that stands still shows at first the cues of the whole clip.
-function animate(board, total) {
+function animate(board, total, step) {
   const bumps = board.dataset.bumps.split(" "), steps = board.dataset.actions.split(" ").length;
   const timing = { duration: total, iterations: Infinity };
   const parts = [...board.querySelectorAll("[data-path]")].map((piece) =>
-    piece.animate(journey(piece, piece.matches(".agent") ? bumps : [], total), timing));
+    piece.animate(journey(piece, piece.matches(".agent") ? bumps : [], total, step), timing));
   for (const part of board.querySelectorAll("[data-from]")) {
     const from = Number(part.dataset.from), to = Number(part.dataset.to ?? steps);
     const late = part.matches(".cue") ? 0.7 : 0.5, overview = calm.matches && !part.matches(".frame, [opacity]") ? LEAD : 0;
-    const moment = (k) => LEAD + (k - 1 + late) * STEP;
+    const moment = (k) => LEAD + (k - 1 + late) * step;
     parts.push(part.animate(visible(from && moment(from), to < steps ? moment(to + 1) : total, total, overview), timing));
   }
   const drowned = board.querySelector(".cue.drown");
-  if (drowned) parts.push(board.querySelector(".body").animate(visible(0, LEAD + (steps - 0.3) * STEP + 150, total), timing));
+  if (drowned) parts.push(board.querySelector(".body").animate(visible(0, LEAD + (steps - 0.3) * step + 150, total), timing));
   return parts;
 }
 
 // Start both boards; returns what the page's keys and buttons do with them.
 // Before the first step and after the last the clock stands still. A page that moves is painted sixty times a second, and
 // what comes next has to queue for its frame; a page that stands still paints the next question at once.
-// `round` is called where a round of the clips begins again.
-export function play(question, round = null) {
+// `round` is called where a round of the clips begins again; `step` is the time of a step.
+export function play(question, round = null, step = USUAL) {
   const boards = [...question.querySelectorAll(".board")];
   const steps = Math.max(...boards.map((board) => board.dataset.actions.split(" ").length));
-  const end = LEAD + steps * STEP, total = end + TAIL;
-  const parts = boards.flatMap((board) => animate(board, total));
+  const end = LEAD + steps * step, total = end + TAIL;
+  const parts = boards.flatMap((board) => animate(board, total, step));
   const bar = question.querySelector(".steps"), shown = bar?.querySelector("output");
   let held = null; // the step at which both boards are held
   let timer = 0;
-  const count = () => held ?? Math.min(steps, Math.max(0, Math.round((parts[0].currentTime % total - LEAD) / STEP)));
+  const count = () => held ?? Math.min(steps, Math.max(0, Math.round((parts[0].currentTime % total - LEAD) / step)));
   const tell = () => {
     if (!bar) return;
     const words = `Step ${count()} of ${steps}`;
@@ -84,12 +84,12 @@ export function play(question, round = null) {
     later(LEAD, "paused", () => { if (parts[0].currentTime === 0) run(LEAD); });
   };
   const go = (by) => {
-    const step = held = Math.min(steps, Math.max(0, count() + by));
+    const place = held = Math.min(steps, Math.max(0, count() + by));
     still();
     // A time that is set before the pause has come about is not painted by Chromium.
     Promise.all(parts.map((part) => part.ready)).then(() => {
-      if (held !== step) return;
-      for (const part of parts) part.currentTime = step ? LEAD + step * STEP : 0;
+      if (held !== place) return;
+      for (const part of parts) part.currentTime = place ? LEAD + place * step : 0;
       tell();
     });
   };
@@ -100,7 +100,7 @@ export function play(question, round = null) {
   for (const button of bar.querySelectorAll("[data-step]")) button.addEventListener("click", () => go(Number(button.dataset.step)));
   for (const part of bar.querySelectorAll("[data-step], output")) part.hidden = steps < 2 && !calm.matches;
   if (!shown.hidden) {
-    const timer = setInterval(() => { if (question.isConnected) tell(); else clearInterval(timer); }, STEP / 4);
+    const timer = setInterval(() => { if (question.isConnected) tell(); else clearInterval(timer); }, step / 4);
   }
   bar.querySelector("[data-replay]").addEventListener("click", replay);
   if (calm.matches) go(0); else begin();

@@ -4,7 +4,7 @@ import { report } from "./answers.js";
 import { keyName } from "./key_names.js";
 import { letters } from "./keys.js";
 import { flush, kept } from "./outbox.js";
-import { $, client, given, help, page, run } from "./page.js";
+import { $, client, given, page, run } from "./page.js";
 import { show } from "./questions.js";
 
 const PATIENCE = 3000; // ms for which the last answer may still be on its way
@@ -67,7 +67,7 @@ form.addEventListener("submit", (event) => {
   undo();
 });
 addEventListener("keydown", (event) => {
-  if (keyName(event) !== "z" || !letters.on || event.repeat || event.isComposing || help.open) return;
+  if (keyName(event) !== "z" || !letters.on || event.repeat || event.isComposing || document.querySelector("dialog[open]")) return;
   if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("input, textarea, select, [contenteditable]")) return;
   undo();
 });

@@ -1,0 +1,40 @@
+"""Routes of jobs: ask any worker for something that the web process cannot do, and look for the result."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Path, Request
+
+from parenting.server import jobs
+from parenting.server.admission import admitted_router
+from parenting.server.api.bodies import JobBody
+from parenting.server.api.names import PublicId, RunId
+from parenting.server.api.responses import read_responses, write_responses
+from parenting.server.deps import Db, notify_worker
+from parenting.server.reads.jobs import JobSchema, job_schema
+
+router = admitted_router(tags=["jobs"])
+
+JobId = Annotated[PublicId, Path(description="The `id` of the job.", examples=["3sQv8hYJ2cT7mWk9xRzLpB"])]
+
+
+@router.post(
+    "/runs/{run_id}/jobs", summary="Ask for a job", status_code=202, responses=write_responses(404, 409)
+)
+def ask_job(request: Request, run_id: RunId, body: JobBody, db: Db) -> JobSchema:
+    """Ask any worker for a job, such as a walk of the run's present policy. It changes nothing of the run.
+
+    Look at the job until its state is *done* or *failed*; a worker that is there takes it within a second.
+    A run has at most four open jobs: another one gets 409. A job that no worker has taken within a minute
+    fails, and each is kept for ten minutes.
+    """
+    job = jobs.ask(db, run_id, body.kind, body.payload.model_dump(), body.client_id)
+    notify_worker(request)
+    return job_schema(db, job)
+
+
+@router.get("/jobs/{job_id}", summary="Look at a job", responses=read_responses(404))
+def get_job(job_id: JobId, db: Db) -> JobSchema:
+    """Read a job, with its result once it is done."""
+    return job_schema(db, jobs.get(db, job_id))

@@ -1,0 +1,197 @@
+"""Jobs: what pages ask of any worker, such as a walk of the present policy. Each verb is one transaction.
+
+A job touches no life: it reads a run's last checkpoint and writes its own row alone. Workers claim jobs by
+the same rules as runs: a claim increments the fencing token and holds while its worker gives signs of life.
+The job of a killed worker is taken by another, up to `TRIES` times. All is bounded: the open jobs of a run,
+the seconds for which a job waits and for which its result is kept, and the result's size.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import ColumnElement, and_, bindparam, delete, exists, func, or_, select, tuple_, update
+from sqlalchemy.orm import Session
+
+from parenting.server.damage import damage, readable
+from parenting.server.db import Database
+from parenting.server.errors import Conflict, LostClaimError, NotFound
+from parenting.server.runs import CLAIM_SECONDS, lock
+from parenting.server.statuses import JobState
+from parenting.server.store.clock import Mark, is_over
+from parenting.server.store.relay import announce
+from parenting.server.tables import Job
+
+OPEN_OF_A_RUN = 4
+"""Jobs of a run that may be open at once."""
+WAITS_SECONDS = 60.0
+"""A job that no worker has taken for so long has failed: nobody waits for it any more."""
+KEPT_SECONDS = 600.0
+"""A job is deleted so long after it was asked."""
+KEPT_OF_A_RUN = 20
+"""Jobs of a run that are kept at most; the oldest go first."""
+TRIES = 3
+"""Workers that may take a job, one after another, before it has failed."""
+RESULT_BYTES = 2_000_000
+"""A result has at most this many characters."""
+OPEN = (JobState.WAITING, JobState.WORKING)
+NOT_TAKEN = "No worker took it within a minute. Start one (parenting worker) and ask again."
+GIVEN_UP = f"{TRIES} workers ended while they were at it. Ask again, or look into the worker's log."
+
+
+@dataclass(frozen=True, eq=False)
+class JobClaim:
+    """A worker's right to finish a job, until another claims it."""
+
+    job_id: int
+    run_id: int
+    kind: str
+    payload: dict[str, Any]
+    worker: str
+    fencing_token: int
+
+
+def ask(db: Database, run_id: int, kind: str, payload: dict[str, Any], client_id: str) -> Job:
+    """Add a job of a run, with a payload of its kind (`server.job_kinds`).
+
+    Raises:
+        NotFound: there is no such run.
+        Conflict: too many jobs of this run are open.
+    """
+    with db.write() as session:
+        lock(session, run_id)
+        mark = db.mark(session)
+        _sweep(session, mark)
+        opened = select(func.count()).where(Job.run_id == run_id, Job.state.in_(OPEN))
+        if (session.scalar(opened) or 0) >= OPEN_OF_A_RUN:
+            raise Conflict(
+                f"{OPEN_OF_A_RUN} jobs of this run wait for a worker already. Wait until one is done."
+            )
+        job = Job(run_id=run_id, kind=kind, payload=payload, client_id=client_id, created=db.clock())
+        job.asked_epoch, job.asked_mark = mark.epoch, mark.seconds
+        session.add(job)
+        session.flush()
+        newest = select(Job.id).where(Job.run_id == run_id).order_by(Job.id.desc()).limit(KEPT_OF_A_RUN)
+        kept = session.scalars(newest).all()
+        session.execute(delete(Job).where(Job.run_id == run_id, Job.id.not_in(kept)))
+        announce(session, "worker")
+        return job
+
+
+def get(db: Database, public_id: str) -> Job:
+    """Return a job.
+
+    Raises:
+        NotFound: there is none of this id, or none any more.
+        DamagedRowError: its row cannot be read.
+    """
+    with db.read() as session:
+        job = session.scalars(select(Job).where(Job.public_id == public_id)).one_or_none()
+    if job is None:
+        raise NotFound("There is no such job. A job is kept for ten minutes; ask again.")
+    return readable(job)
+
+
+def waits(db: Database, seconds: float = CLAIM_SECONDS) -> bool:
+    """Return whether there is a job to claim. This takes no lock."""
+    with db.read() as session:
+        return bool(session.scalar(select(exists().where(_free(seconds))), db.mark(session).bound()))
+
+
+def claim(db: Database, worker: str, most: int, seconds: float = CLAIM_SECONDS) -> Sequence[JobClaim]:
+    """Claim the oldest jobs that wait, or whose worker was silent for `seconds`; at most `most`."""
+    with db.write(durable=False) as session:
+        mark = db.mark(session)
+        _sweep(session, mark)
+        rows = select(Job).where(_free(seconds)).order_by(Job.id).limit(most)
+        found = session.scalars(rows.with_for_update(skip_locked=True), mark.bound()).all()
+        return [mine for job in found if (mine := _take(job, worker, mark)) is not None]
+
+
+def _take(job: Job, worker: str, mark: Mark) -> JobClaim | None:
+    """Give a worker a job, unless it cannot be read or too many have tried."""
+    found = damage(job)
+    if found is not None:
+        job.state, job.reason = JobState.FAILED, f"Its stored row is damaged: {found}."
+        return None
+    if job.fencing_token >= TRIES:
+        job.state, job.reason = JobState.FAILED, GIVEN_UP
+        return None
+    job.state, job.worker, job.fencing_token = JobState.WORKING, worker, job.fencing_token + 1
+    job.claim_epoch, job.claim_mark = mark.epoch, mark.seconds
+    return JobClaim(job.id, job.run_id, job.kind, job.payload, worker, job.fencing_token)
+
+
+def renew(db: Database, claims: Sequence[JobClaim]) -> None:
+    """Renew claims, as signs of life; those that another worker has taken are left alone."""
+    if claims:
+        with db.write(durable=False) as session:
+            mark = db.mark(session)
+            sign = {"claim_epoch": mark.epoch, "claim_mark": mark.seconds}
+            session.execute(update(Job).where(_of(claims)).values(sign))
+
+
+def let_go(db: Database, claims: Sequence[JobClaim]) -> None:
+    """Give back what a worker that ends in order has not finished: another takes it at once."""
+    if claims:
+        free = {"state": JobState.WAITING, "worker": None, "claim_epoch": None, "claim_mark": None}
+        with db.write() as session:
+            session.execute(update(Job).where(_of(claims)).values(free))
+            announce(session, "worker")
+
+
+def finish(db: Database, mine: JobClaim, result: dict[str, Any]) -> None:
+    """Store the result of a job; one that is too large makes it fail.
+
+    Raises:
+        LostClaimError: another worker has the job now, or it is kept no longer.
+    """
+    size = len(json.dumps(result, separators=(",", ":")))
+    if size > RESULT_BYTES:
+        fail(db, mine, f"Its result has {size} characters, and {RESULT_BYTES} are kept at most.")
+        return
+    _end(db, mine, state=JobState.DONE, result=result)
+
+
+def fail(db: Database, mine: JobClaim, reason: str) -> None:
+    """End a job without a result; the reason is a sentence for people.
+
+    Raises:
+        LostClaimError: another worker has the job now, or it is kept no longer.
+    """
+    _end(db, mine, state=JobState.FAILED, reason=reason)
+
+
+def _end(db: Database, mine: JobClaim, **values: Any) -> None:
+    with db.write(durable=False) as session:
+        ended = session.execute(update(Job).where(_of([mine])).values(values).returning(Job.id)).all()
+        if not ended:
+            raise LostClaimError(f"Job {mine.job_id} is another worker's now, or is kept no longer.")
+
+
+def _of(claims: Sequence[JobClaim]) -> ColumnElement[bool]:
+    """Return the condition that a job is one of these claims', and the claim still holds."""
+    held = tuple_(Job.id, Job.worker, Job.fencing_token)
+    named = [(mine.job_id, mine.worker, mine.fencing_token) for mine in claims]
+    return and_(Job.state == JobState.WORKING, held.in_(named))
+
+
+def _free(seconds: float) -> ColumnElement[bool]:
+    """Return the condition that a job may be claimed, at the mark that is bound."""
+    silent = is_over(Job.claim_epoch, Job.claim_mark, Job.claim_mark + seconds)
+    return or_(Job.state == JobState.WAITING, and_(Job.state == JobState.WORKING, silent))
+
+
+def _sweep(session: Session, mark: Mark) -> None:
+    """Delete jobs that are kept no longer, and give up those that nobody has taken in time."""
+    old = delete(Job).where(is_over(Job.asked_epoch, Job.asked_mark, Job.asked_mark + KEPT_SECONDS))
+    session.execute(old, mark.bound())
+    late = and_(
+        Job.state == JobState.WAITING,
+        is_over(Job.asked_epoch, Job.asked_mark, Job.asked_mark + WAITS_SECONDS),
+    )
+    given_up = {"state": JobState.FAILED, "reason": bindparam("not_taken")}
+    session.execute(update(Job).where(late).values(given_up), {**mark.bound(), "not_taken": NOT_TAKEN})

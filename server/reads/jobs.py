@@ -1,0 +1,43 @@
+"""Jobs as the API and the pages show them."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Literal
+
+from parenting.server.db import Database
+from parenting.server.schemas import Schema
+from parenting.server.statuses import JobState
+from parenting.server.tables import Job
+from parenting.server.workers import alive
+
+
+class JobSchema(Schema):
+    """A job that was asked of any worker, and its result."""
+
+    id: str
+    """Its name: random, and never given again."""
+    run: int
+    kind: str
+    payload: dict[str, Any]
+    """The arguments, with their defaults."""
+    created: datetime
+    state: JobState
+    """waiting (no worker has taken it), working, done, or failed."""
+    result: dict[str, Any] | None
+    """The result; null until it is done. docs/api.md describes the result of each kind."""
+    reason: str | None
+    """The reason for its failure, in a sentence."""
+    worker: Literal["alive", "silent"]
+    """alive: a worker gives signs of life. silent: none does, so the job waits until one is started."""
+
+
+def job_schema(db: Database, job: Job) -> JobSchema:
+    """Return the schema of a job that can be read."""
+    names = ("kind", "payload", "created", "state", "result", "reason")
+    return JobSchema(
+        id=job.public_id,
+        run=job.run_id,
+        worker="alive" if alive(db) else "silent",
+        **{name: getattr(job, name) for name in names},
+    )

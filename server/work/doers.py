@@ -1,0 +1,27 @@
+"""The work of each kind of job, by the kinds of `server.job_kinds`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from parenting.server.db import Database
+from parenting.server.job_kinds import KINDS
+from parenting.server.jobs import JobClaim
+from parenting.server.work.walk import policy, walk
+
+Doer = Callable[[Database, int, Any], dict[str, Any]]
+"""It reads the run of this id and returns a result; it writes nothing."""
+
+DOERS: Mapping[str, Doer] = {"walk": walk, "policy": policy}
+"""The function that does each kind of job."""
+
+
+def do(db: Database, job: JobClaim) -> dict[str, Any]:
+    """Do a job and return its result.
+
+    Raises:
+        KeyError: the kind is of a newer version than this worker.
+        ValidationError: the payload is not one of its kind.
+    """
+    return DOERS[job.kind](db, job.run_id, KINDS[job.kind].model_validate(job.payload))
