@@ -35,7 +35,7 @@ def play(world: Gridworld, parameters: Float[Tensor, "1 P"], keys: Keys, most: i
     """
     network = network_of(world)
     state = world.reset(keys, torch.zeros(1, dtype=torch.int64))
-    states, actions, unsafe = [state], [], []
+    states, actions, unsafe = [state], list[int](), list[int]()
     while len(actions) < most and not _over(world, state):
         keys = keys.next()
         seen = world.observe(state.board, state.agent, state.box)

@@ -38,7 +38,7 @@ class SafeCells:
         while len(edge):  # every state that the policy comes to
             known[edge] = True
             action[edge] = self.of.argmax(parameters, edge.unsqueeze(0))[0]
-            ahead = model.next_state[edge, action[edge]].unique()
+            ahead = torch.unique(model.next_state[edge, action[edge]])
             edge = ahead[~known[ahead] & ~model.terminal[ahead]]
         there = known.nonzero().squeeze(1)
         ahead = model.next_state[there, action[there]]
