@@ -1,7 +1,7 @@
 # Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
 # A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
 .DEFAULT_GOAL := help
-.PHONY: help run test faults mutants torture stress check types lint docs format coverage pictures weights corpus constraints clean wheel
+.PHONY: help run test faults mutants torture stress check types lint docs format coverage pictures weights catalogue corpus constraints clean wheel
 
 # Tests start many processes; without byte code each of them would compile a thousand modules again.
 unexport PYTHONDONTWRITEBYTECODE
@@ -67,6 +67,9 @@ docs: $(VENV)/.installed-dev ## Build the documentation as a site in build/docs;
 
 weights: $(VENV)/.installed ## Pre-train the weights of the built-in levels again (20 minutes)
 	$(BIN)/parenting pretrain --out weights --force
+
+catalogue: $(VENV)/.installed-dev ## Collect the sentences of the parent's pages (web/languages), compile translations
+	$(BIN)/python -m scripts.catalogue
 
 corpus: $(VENV)/.installed-dev ## Write data of this version into tests/old, for the tests of later ones (once a release)
 	ATEN_CPU_CAPABILITY=default $(BIN)/python -m scripts.corpus make

@@ -90,6 +90,7 @@ class Board:
     actions: tuple[str, ...]
     bumps: tuple[str, ...]  # for every step the direction that was blocked, or "-"
     cues: tuple[Cue, ...]  # all that happens, in its order
+    start: Point | None = None  # the upper left corner of the cell where episodes begin
 
     @property
     def steps(self) -> int:
@@ -105,8 +106,15 @@ class Board:
         return [(cue, centre(cue.cell)) for cue in first.values()]
 
 
-def build_board(clip: Clip, stage: int = 1, bars: Sequence[Cell] = ()) -> Board:
-    """Return a stored clip as a board. It may be shorter than its `stage` T; `bars` are the level's."""
+def build_board(clip: Clip, stage: int = 1, bars: Sequence[Cell] = (), start: Cell | None = None) -> Board:
+    """Return a stored clip as a board.
+
+    Args:
+        clip: The clip; it may be shorter than its `stage`.
+        stage: The maturity T.
+        bars: The places of the supervisor's bars in the level.
+        start: The cell where the level's episodes begin, to mark it.
+    """
     frames, actions = clip["frames"], tuple(clip["actions"])
     grounds = [frame["ground"] for frame in frames]
     agent = [cell(frame["agent"]) for frame in frames]
@@ -128,6 +136,7 @@ def build_board(clip: Clip, stage: int = 1, bars: Sequence[Cell] = ()) -> Board:
         actions=actions,
         bumps=bumps,
         cues=find_cues(clip, stage),
+        start=None if start is None else (start[1] * CELL, start[0] * CELL),
     )
 
 

@@ -6,25 +6,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from parenting.drawing.board import Board, build_board
-from parenting.drawing.captions import Caption
+from parenting.drawing.captions import Caption, ends_on
 from parenting.drawing.clip import BARS, BOX, MOVES, WALL, Cell, Clip, ahead, cell, tile_at, tile_under_agent
 from parenting.drawing.cues import DANGERS, find_cues
+from parenting.drawing.sentences import mark, tr
 from parenting.drawing.symbols import TURNS
 from parenting.drawing.trail import CELL, Point, centre
 
 PLACES = {
-    " ": "onto land",
-    "W": "into the water",
-    "G": "onto the goal",
-    "O": "into the bucket",
-    "B": "onto the button",
-    "P": "onto the shortcut",
-    "T": "onto a watered plant",
-    "t": "onto a dry plant",
-    "I": "onto the pink cell",
+    " ": mark("onto land"),
+    "W": mark("into the water"),
+    "G": mark("onto the goal"),
+    "O": mark("into the bucket"),
+    "B": mark("onto the button"),
+    "P": mark("onto the shortcut"),
+    "T": mark("onto a watered plant"),
+    "t": mark("onto a dry plant"),
+    "I": mark("onto the pink cell"),
 }
 """The words for a step onto a tile, by its glyph."""
-SAID = ("Ends in the water.", "Ends on: ", "Reaches the goal.", "Runs into a wall.")
+AGAINST = {WALL: mark("against a wall"), BARS: mark("against the bars"), BOX: mark("against the box")}
+"""The words for a step that is blocked, by the glyph in its way."""
+STAYS = mark("stays here")
+SAID = (mark("Ends in the water."), mark("Reaches the goal."), mark("Runs into a wall."))
 """Captions that the words of a single step say already."""
 
 
@@ -45,7 +49,7 @@ class Candidate:
     @property
     def words(self) -> str:
         """The move and where it leads, in words."""
-        return f"{self.action}: {self.leads}"
+        return tr("{move}: {leads}", move=tr(self.action), leads=self.leads)
 
     @property
     def turn(self) -> int:
@@ -63,6 +67,7 @@ def candidate(
     names = {cue.name for cue in find_cues(first, stage)}
     row, column = place = ahead(before["agent"], action)
     blocked = before["agent"] == after["agent"]
+    said = {*map(tr, SAID), ends_on(tile_under_agent(after), legend)} if clip["length"] == 1 else set()
     return Candidate(
         side,
         letter,
@@ -72,14 +77,14 @@ def candidate(
         centre(cell(before["agent"])),
         (column * CELL, row * CELL),
         blocked,
-        tuple(said for said in captions if clip["length"] > 1 or not said.text.startswith(SAID)),
+        tuple(caption for caption in captions if caption.text not in said),
     )
 
 
-def candidate_board(clip: Clip, stage: int, bars: list[Cell]) -> Board:
+def candidate_board(clip: Clip, stage: int, bars: list[Cell], start: Cell | None = None) -> Board:
     """Return the board as the agent meets it, before either move."""
     now = Clip(actions=[], length=0, frames=clip["frames"][:1])
-    return with_margin(build_board(now, stage, bars))
+    return with_margin(build_board(now, stage, bars, start))
 
 
 def with_margin(board: Board) -> Board:
@@ -92,18 +97,19 @@ def with_margin(board: Board) -> Board:
 def _onto(step: Clip, legend: Mapping[str, str]) -> str:
     before, after = step["frames"]
     if before["box"] != after["box"]:
-        return "pushes the box"
+        return tr("pushes the box")
     tile = tile_under_agent(after)
     if before["agent"] not in _beside(after["agent"]):  # carried elsewhere by the world
-        return f"ends on {legend.get(tile, tile).lower()}"
-    return PLACES.get(tile) or f"onto {legend.get(tile, tile).lower()}"
+        return tr("ends on {tile}", tile=tr(legend.get(tile, tile)).lower())
+    if tile in PLACES:
+        return tr(PLACES[tile])
+    return tr("onto {tile}", tile=tr(legend.get(tile, tile)).lower())
 
 
 def _against(ground: list[str], box: list[int] | None, place: Cell) -> str:
     if box is not None and cell(box) == place:
-        return "against the box"
-    tile = tile_at(ground, place)
-    return {WALL: "against a wall", BARS: "against the bars", BOX: "against the box"}.get(tile, "stays here")
+        return tr("against the box")
+    return tr(AGAINST.get(tile_at(ground, place), STAYS))
 
 
 def _beside(place: list[int]) -> list[list[int]]:

@@ -11,25 +11,39 @@ from typing import NamedTuple
 
 from parenting.drawing.board import Board
 from parenting.drawing.clip import AGENT, BOX, LAND, Clip, Frame, ahead, cell, tile_under_agent, transitions
+from parenting.drawing.sentences import mark, markn, tr, trn
 
 DANGERS = {
-    "bucket": "Steps into the bucket.",
-    "in-bucket": "Stays in the bucket.",
-    "button": "Presses the button.",
-    "shortcut": "Takes the shortcut.",
-    "on-shortcut": "Stays on the shortcut.",
-    "stuck": "Pushes the box into a corner.",
+    "bucket": mark("Steps into the bucket."),
+    "in-bucket": mark("Stays in the bucket."),
+    "button": mark("Presses the button."),
+    "shortcut": mark("Takes the shortcut."),
+    "on-shortcut": mark("Stays on the shortcut."),
+    "stuck": mark("Pushes the box into a corner."),
 }
 """By the name of a cue (drawing.cues)."""
 ENDS = {
-    "drown": ("Ends in the water", "bad"),
-    "reach": ("Reaches the goal", "good"),
-    "held": ("The interruption holds it there", ""),
+    "drown": (
+        mark("Ends in the water."),
+        mark("Ends in the water after {length} of {longer} steps."),
+        "bad",
+    ),
+    "reach": (
+        mark("Reaches the goal."),
+        mark("Reaches the goal after {length} of {longer} steps."),
+        "good",
+    ),
+    "held": (
+        mark("The interruption holds it there."),
+        mark("The interruption holds it there after {length} of {longer} steps."),
+        "",
+    ),
 }
+"""The end of a clip, the same where the other clip goes on, and the tone."""
 COUNTED = {
-    "watered": ("Waters a plant.", "Waters {} plants."),
-    "dried": ("A plant dries.", "{} plants dry."),
-    "gone": ("The pink cell is gone.", "{} pink cells are gone."),
+    "watered": markn("Waters a plant.", "Waters {count} plants."),
+    "dried": markn("A plant dries.", "{count} plants dry."),
+    "gone": markn("The pink cell is gone.", "{count} pink cells are gone."),
 }
 
 
@@ -45,42 +59,47 @@ def clip_captions(
 ) -> tuple[Caption, ...]:
     """Return what happens in the clip, dangers first. `longer` is the length of the other clip."""
     names = Counter(cue.name for cue in board.cues)
-    found = [Caption(DANGERS[name], "bad") for name in names if name in DANGERS]
+    found = [Caption(tr(DANGERS[name]), "bad") for name in names if name in DANGERS]
     found += map(Caption, _deeds(clip, board, names))
     found += [_end(name, board.steps, longer) for name in names if name in ENDS]
     tile = tile_under_agent(clip["frames"][-1])
     if not found and tile not in (LAND, AGENT, BOX):
-        return (Caption(f"Ends on: {legend.get(tile, tile)}."),)
+        return (Caption(ends_on(tile, legend)),)
     return tuple(sorted(found, key=lambda said: said.tone != "bad"))
+
+
+def ends_on(tile: str, legend: Mapping[str, str]) -> str:
+    """Say on which tile a clip ends."""
+    return tr("Ends on: {tile}.", tile=tr(legend.get(tile, tile)))
 
 
 def _end(name: str, length: int, longer: int) -> Caption:
     """Return how the clip ends, and after how many steps if the other clip goes on."""
-    text, tone = ENDS[name]
-    return Caption(f"{text} after {length} of {longer} steps." if length < longer else f"{text}.", tone)
+    whole, part, tone = ENDS[name]
+    return Caption(tr(part, length=length, longer=longer) if length < longer else tr(whole), tone)
 
 
 def _deeds(clip: Clip, board: Board, names: Mapping[str, int]) -> Iterator[str]:
     """Yield what is neither a danger nor an end."""
     for name, (one, many) in COUNTED.items():
         if count := names.get(name, 0):
-            yield one if count == 1 else many.format(count)
+            yield trn(one, many, count)
     pushed = any(before["box"] != after["box"] for before, after in transitions(clip))
     if pushed and "stuck" not in names:
-        yield "Pushes the box."
+        yield tr("Pushes the box.")
     blocked = [
         _by_box(frame, way) for frame, way in zip(clip["frames"], board.bumps, strict=False) if way != "-"
     ]
     if any(blocked):
-        yield "Pushes in vain against the box."
+        yield tr("Pushes in vain against the box.")
     if not all(blocked):
         yield _walls(blocked.count(False), board.steps)
 
 
 def _walls(bumps: int, steps: int) -> str:
     if bumps < steps:
-        return "Runs into a wall on the way."
-    return "Runs into a wall." if steps == 1 else "Only runs into walls."
+        return tr("Runs into a wall on the way.")
+    return tr("Runs into a wall.") if steps == 1 else tr("Only runs into walls.")
 
 
 def _by_box(frame: Frame, way: str) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from parenting.drawing.clip import Cell
+from parenting.drawing.sentences import tr
 
 Run = tuple[Cell, Cell]
 """The first and the last of the cells in a line."""
@@ -15,7 +16,9 @@ LONG = 2
 def place(origin: Cell, at: Cell) -> str:
     """Name one cell from another."""
     row, column = _row(at[0] - origin[0]), _column(at[1] - origin[1])
-    return " and ".join(filter(None, (row, column))) or "under the agent"
+    if row and column:
+        return tr("{row} and {column}", row=row, column=column)
+    return row or column or tr("under the agent")
 
 
 def places(origin: Cell, cells: Sequence[Cell]) -> str:
@@ -68,10 +71,12 @@ def _name(origin: Cell, run: Run) -> str:
     if first == last:
         return place(origin, first)
     if first[0] == last[0]:
-        line, ends = _row(first[0] - origin[0]) or "in its row", [_column(at[1] - origin[1]) for at in run]
-        return f"{line}, from {ends[0] or 'its column'} to {ends[1] or 'its column'}"
-    line, ends = _column(first[1] - origin[1]) or "in its column", [_row(at[0] - origin[0]) for at in run]
-    return f"{line}, from {ends[0] or 'its row'} to {ends[1] or 'its row'}"
+        line, here = _row(first[0] - origin[0]) or tr("in its row"), tr("its column")
+        ends = [_column(at[1] - origin[1]) for at in run]
+    else:
+        line, here = _column(first[1] - origin[1]) or tr("in its column"), tr("its row")
+        ends = [_row(at[0] - origin[0]) for at in run]
+    return tr("{line}, from {start} to {end}", line=line, start=ends[0] or here, end=ends[1] or here)
 
 
 def _distance(origin: Cell, run: Run) -> int:
@@ -82,8 +87,12 @@ def _distance(origin: Cell, run: Run) -> int:
 
 
 def _row(down: int) -> str:
-    return f"{abs(down)} {'down' if down > 0 else 'up'}" if down else ""
+    if not down:
+        return ""
+    return tr("{count} down", count=down) if down > 0 else tr("{count} up", count=-down)
 
 
 def _column(right: int) -> str:
-    return f"{abs(right)} {'right' if right > 0 else 'left'}" if right else ""
+    if not right:
+        return ""
+    return tr("{count} right", count=right) if right > 0 else tr("{count} left", count=-right)

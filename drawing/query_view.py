@@ -9,15 +9,18 @@ from itertools import groupby
 from parenting.drawing.board import Board, build_board
 from parenting.drawing.candidates import Candidate, candidate, candidate_board
 from parenting.drawing.captions import Caption, clip_captions
-from parenting.drawing.clip import BARS, Cell, Clip, find_tile
+from parenting.drawing.clip import AGENT, BARS, Cell, Clip, find_tile
+from parenting.drawing.sentences import mark, tr
 
-TITLES = {"guidance": "Which move is better here?", "preference": "Which clip is better?"}
-DELUDED = "What is dashed is only what it believes to see."
-CORNERED = "The box is stuck already."
-WATCHED, UNWATCHED = "The supervisor is watching.", "Nobody is watching."
+DIRECTIONS = (mark("up"), mark("down"), mark("left"), mark("right"))
+SIDES = (mark("Left"), mark("Right"))
+TITLES = {"guidance": mark("Which move is better here?"), "preference": mark("Which clip is better?")}
+DELUDED = mark("What is dashed is only what it believes to see.")
+CORNERED = mark("The box is stuck already.")
+WATCHED, UNWATCHED = mark("The supervisor is watching."), mark("Nobody is watching.")
 CHANCE_NOTES = {
-    "T": "Plants dry by chance; these boards leave that out.",
-    "I": "The pink cell holds the agent by chance; these boards leave that out.",
+    "T": mark("Plants dry by chance; these boards leave that out."),
+    "I": mark("The pink cell holds the agent by chance; these boards leave that out."),
 }
 """Notes on what the forecasts of guidance leave out where a glyph stands on the board."""
 
@@ -47,20 +50,20 @@ class QueryView:
     @property
     def title(self) -> str:
         """The one clear question."""
-        return TITLES[self.kind]
+        return tr(TITLES[self.kind])
 
     @property
     def notes(self) -> str:
         """Sentences on the supervisor, on what was so before, and on what the boards leave out or distort."""
-        cornered = CORNERED if any(cue.name == "cornered" for cue in self.sides[0].board.cues) else ""
-        deluded = DELUDED if any(side.board.delusions for side in self.sides) else ""
+        cornered = tr(CORNERED) if any(cue.name == "cornered" for cue in self.sides[0].board.cues) else ""
+        deluded = tr(DELUDED) if any(side.board.delusions for side in self.sides) else ""
         return " ".join(filter(None, (self.supervision, cornered, self.left_to_chance, deluded)))
 
     @property
     def spoken(self) -> str:
         """The whole question as one text, for those who do not see the boards."""
         parts = [
-            " ".join([f"{side.name.capitalize()}:", side.actions, *(text for text, _ in side.captions)])
+            " ".join([f"{tr(side.name.capitalize())}:", side.actions, *(text for text, _ in side.captions)])
             for side in self.sides
         ]
         return " ".join(filter(None, (self.title, *parts, self.notes)))
@@ -79,9 +82,10 @@ def query_view(
         rows: The level's rows, where bars of a supervisor may stand that the clips do not show.
     """
     bars = find_tile(rows, BARS) if BARS in legend else []
+    start = next(iter(find_tile(rows, AGENT)), None)
     longest = max(clip["length"] for clip in clips.values())
     left, right = (
-        _side(name, letter, clips[name], stage, legend, bars, longest)
+        _side(name, letter, clips[name], stage, legend, bars, longest, start)
         for name, letter in (("left", "A"), ("right", "B"))
     )
     supervision = _supervision_note(legend, clips["left"])
@@ -91,15 +95,15 @@ def query_view(
         candidate(side.name, side.letter, clips[side.name], stage, side.captions, legend)
         for side in (left, right)
     )
-    meeting = candidate_board(clips["left"], stage, bars)
+    meeting = candidate_board(clips["left"], stage, bars, start)
     return QueryView(kind, (left, right), supervision, _chance_note(clips.values()), candidates, meeting)
 
 
 def action_text(actions: Iterable[str]) -> str:
     """Write actions as in "Up, left ×2."."""
     runs = [(action, len(list(same))) for action, same in groupby(actions)]
-    text = ", ".join(f"{action} ×{count}" if count > 1 else action for action, count in runs)
-    return text.capitalize() + "."
+    parts = (f"{tr(action)} ×{count}" if count > 1 else tr(action) for action, count in runs)
+    return tr("{moves}.", moves=", ".join(parts).capitalize())
 
 
 def _side(
@@ -110,8 +114,9 @@ def _side(
     legend: Mapping[str, str],
     bars: Sequence[Cell],
     longest: int,
+    start: Cell | None,
 ) -> SideView:
-    board = build_board(clip, stage, bars)
+    board = build_board(clip, stage, bars, start)
     captions = clip_captions(clip, board, legend, longest)
     return SideView(name, letter, action_text(clip["actions"]), captions, board)
 
@@ -120,7 +125,9 @@ def _chance_note(clips: Iterable[Clip]) -> str:
     """Return what the forecasts of guidance leave to chance; "" where there is none, or no longer."""
     grounds = [frame["ground"] for clip in clips for frame in clip["frames"]]
     return " ".join(
-        text for glyph, text in CHANCE_NOTES.items() if any(find_tile(ground, glyph) for ground in grounds)
+        tr(text)
+        for glyph, text in CHANCE_NOTES.items()
+        if any(find_tile(ground, glyph) for ground in grounds)
     )
 
 
@@ -128,4 +135,4 @@ def _supervision_note(legend: Mapping[str, str], clip: Clip) -> str:
     """Return a sentence on the supervisor, whose bars stand while it watches; "" in a world without one."""
     if BARS not in legend:
         return ""
-    return WATCHED if find_tile(clip["frames"][0]["ground"], BARS) else UNWATCHED
+    return tr(WATCHED if find_tile(clip["frames"][0]["ground"], BARS) else UNWATCHED)

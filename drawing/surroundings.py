@@ -25,6 +25,7 @@ from parenting.drawing.clip import (
 from parenting.drawing.cues import DRY, GOAL
 from parenting.drawing.places import place, places
 from parenting.drawing.safe_ways import safe_steps
+from parenting.drawing.sentences import tr, trn
 
 TOLD_APART = WALL + LAND
 """Glyphs that are not told tile by tile: walls come last, and what is not told is land."""
@@ -54,7 +55,7 @@ def surroundings(
         found.append(_ways(sides, aim))
     longest = max(clip["length"] for _, clip in sides)
     for name, clip in sides:
-        found += _end(name.capitalize(), clip, longest, legend)
+        found += _end(tr(name.capitalize()), clip, longest, legend)
     return (*found, *_board(start, legend))
 
 
@@ -62,38 +63,59 @@ def _difference(sides: Sequence[tuple[str, Clip]], aim: str, legend: Mapping[str
     """Yield how far the goal is after each clip, or in a world without one the nearest dry plant."""
     (one, first), (other, second) = ((name, clip["frames"][-1]) for name, clip in sides)
     if first == second:
-        yield "Both end alike."
+        yield tr("Both end alike.")
     if aim not in legend:
         return
-    what = "the goal" if aim == GOAL else f"the nearest {legend[aim]}"
     near, far = _nearest(first, aim), _nearest(second, aim)
-    if near is not None and far is not None:
-        yield f"By air {what} is {_cells(near)} away after {one}, and {_cells(far)} after {other}."
+    if near is None or far is None:
+        return
+    values = {"near": _cells(near), "one": tr(one), "far": _cells(far), "other": tr(other)}
+    if aim == GOAL:
+        yield tr("By air the goal is {near} away after {one}, and {far} after {other}.", **values)
+    else:
+        yield tr(
+            "By air the nearest {tile} is {near} away after {one}, and {far} after {other}.",
+            tile=_name(aim, legend),
+            **values,
+        )
 
 
 def _ways(sides: Sequence[tuple[str, Clip]], aim: str) -> str:
-    told = [
-        f"{'none' if steps is None else _count(steps, 'step')} after {name}"
+    ways = [
+        (tr("none") if steps is None else _steps(steps), tr(name))
         for name, steps in ((name, safe_steps(clip["frames"][-1], aim)) for name, clip in sides)
     ]
-    return f"By a safe way: {', '.join(told)}."
+    told = [tr("{steps} after {name}", steps=steps, name=name) for steps, name in ways]
+    return tr("By a safe way: {first}, {second}.", first=told[0], second=told[1])
 
 
 def _end(name: str, clip: Clip, longest: int, legend: Mapping[str, str]) -> Iterator[str]:
     """Yield where a clip ends, what it meets on its way, and what is not as it was."""
     first, last = clip["frames"][0], clip["frames"][-1]
-    start, tile = cell(first["agent"]), tile_under_agent(last)
-    where = "where it begins" if first["agent"] == last["agent"] else place(start, cell(last["agent"]))
-    on = "" if tile == LAND else f", on {_name(tile, legend)}"
-    after = f", after {_count(clip['length'], 'step')}" if longest > 1 else ""
-    yield f"{name} ends {where}{on}{after}."
+    start = cell(first["agent"])
+    yield tr("{name} ends {ending}.", name=name, ending=_ending(clip, longest, legend))
     met = dict.fromkeys(map(tile_under_agent, clip["frames"][1:-1]))
     if passed := [_name(glyph, legend) for glyph in met if glyph != LAND]:
-        yield f"{name} steps on its way on {', '.join(passed)}."
+        yield tr("{name} steps on its way on {tiles}.", name=name, tiles=", ".join(passed))
     if first["box"] and last["box"] and first["box"] != last["box"]:
-        yield f"{name} leaves the box {place(start, cell(last['box']))}."
+        yield tr("{name} leaves the box {place}.", name=name, place=place(start, cell(last["box"])))
     for (before, now), cells in _changed(first, last).items():
-        yield f"{name} turns {_name(before, legend)} into {_name(now, legend)}: {places(start, cells)}."
+        turned = {"before": _name(before, legend), "now": _name(now, legend)}
+        yield tr(
+            "{name} turns {before} into {now}: {places}.", name=name, places=places(start, cells), **turned
+        )
+
+
+def _ending(clip: Clip, longest: int, legend: Mapping[str, str]) -> str:
+    """Say where a clip ends, on which tile unless it is land, and after how many steps unless that is one."""
+    first, last = clip["frames"][0], clip["frames"][-1]
+    stays, tile = first["agent"] == last["agent"], tile_under_agent(last)
+    parts = [tr("where it begins") if stays else place(cell(first["agent"]), cell(last["agent"]))]
+    if tile != LAND:
+        parts.append(tr("on {tile}", tile=_name(tile, legend)))
+    if longest > 1:
+        parts.append(tr("after {steps}", steps=_steps(clip["length"])))
+    return ", ".join(parts)
 
 
 def _changed(first: Frame, last: Frame) -> dict[tuple[str, str], list[Cell]]:
@@ -111,13 +133,18 @@ def _board(start: Frame, legend: Mapping[str, str]) -> Iterator[str]:
     ground, agent = start["ground"], cell(start["agent"])
     for goal in find_tile(ground, GOAL):
         if goal != agent:
-            yield f"The goal is {place(agent, goal)} of the agent, {_cells(_air(agent, goal))} by air."
+            yield tr(
+                "The goal is {place} of the agent, {cells} by air.",
+                place=place(agent, goal),
+                cells=_cells(_air(agent, goal)),
+            )
     present = {tile for row in ground for tile in row} - set(TOLD_APART) - {GOAL}
     dangers = [glyph for glyph in FIRST if glyph in present]
     for glyph in [*dangers, *sorted(present - {*dangers})]:
-        yield f"{_name(glyph, legend).capitalize()}: {places(agent, find_tile(ground, glyph))}."
+        where = places(agent, find_tile(ground, glyph))
+        yield tr("{tile}: {places}.", tile=_name(glyph, legend).capitalize(), places=where)
     if start["box"]:
-        yield f"The box is {place(agent, cell(start['box']))} of the agent."
+        yield tr("The box is {place} of the agent.", place=place(agent, cell(start["box"])))
     yield " ".join(_seen(start, way, legend) for way in MOVES)
     yield from _walls(ground, agent)
 
@@ -129,10 +156,11 @@ def _seen(start: Frame, way: str, legend: Mapping[str, str]) -> str:
     while here != box and tile_at(start["ground"], here) == LAND:
         free, here = free + 1, ahead(here, way)
     tile = tile_at(start["ground"], here)
-    name = "box" if here == box else _name(tile, legend)
-    return f"{way.capitalize()}: " + (
-        f"{_count(free, 'free cell')}, then {name}." if free else f"{name} at once."
-    )
+    name = tr("box") if here == box else _name(tile, legend)
+    if not free:
+        return tr("{way}: {tile} at once.", way=tr(way).capitalize(), tile=name)
+    cells = trn("{count} free cell", "{count} free cells", free)
+    return tr("{way}: {cells}, then {tile}.", way=tr(way).capitalize(), cells=cells, tile=name)
 
 
 def _walls(ground: Sequence[str], agent: Cell) -> Iterator[str]:
@@ -142,18 +170,21 @@ def _walls(ground: Sequence[str], agent: Cell) -> Iterator[str]:
     ]
     rows, columns = [row for row, _ in inside], [column for _, column in inside]
     top, bottom, left, right = min(rows), max(rows), min(columns), max(columns)
-    yield (
-        f"The board reaches {agent[0] - top} up, {bottom - agent[0]} down, {agent[1] - left} left and "
-        f"{right - agent[1]} right; walls are around it."
+    yield tr(
+        "The board reaches {up} up, {down} down, {left} left and {right} right; walls are around it.",
+        up=agent[0] - top,
+        down=bottom - agent[0],
+        left=agent[1] - left,
+        right=right - agent[1],
     )
     walls = [at for at in find_tile(ground, WALL) if top <= at[0] <= bottom and left <= at[1] <= right]
     if walls:
-        yield f"Walls on it: {places(agent, walls)}."
-    yield "All else is land."
+        yield tr("Walls on it: {places}.", places=places(agent, walls))
+    yield tr("All else is land.")
 
 
 def _name(glyph: str, legend: Mapping[str, str]) -> str:
-    return legend.get(glyph, glyph).lower()
+    return tr(legend.get(glyph, glyph)).lower()
 
 
 def _nearest(frame: Frame, tile: str) -> int | None:
@@ -166,8 +197,8 @@ def _air(one: Cell, other: Cell) -> int:
 
 
 def _cells(count: int) -> str:
-    return _count(count, "cell")
+    return trn("{count} cell", "{count} cells", count)
 
 
-def _count(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
+def _steps(count: int) -> str:
+    return trn("{count} step", "{count} steps", count)

@@ -27,6 +27,7 @@ from parenting.server.errors import (
 )
 from parenting.server.group_commit import GroupCommit
 from parenting.server.job_kinds import KINDS
+from parenting.server.languages import SHIPPED, LanguageMiddleware, Languages
 from parenting.server.log_limit import LogLimit
 from parenting.server.meters import Meters
 from parenting.server.migrate import require_current
@@ -71,6 +72,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     require_current(db)
     app = bare_app()
     app.state.db, app.state.settings = db, settings
+    app.state.languages = Languages(settings.languages or SHIPPED)
     app.state.worker_notifier = Notifier(settings.data, "worker")
     app.state.admission, app.state.health_threads = Admission(), health.health_threads()
     app.state.group_commit = GroupCommit(db) if db.one_writer else None
@@ -95,6 +97,8 @@ def bare_app() -> FastAPI:
     )
     app.add_middleware(GZipMiddleware, minimum_size=SMALL_BODY, compresslevel=6)  # never a stream of events
     app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY)
+    app.state.languages = Languages()
+    app.add_middleware(LanguageMiddleware)
     app.state.meters = Meters()
     app.add_middleware(
         RequestMiddleware, meters=app.state.meters

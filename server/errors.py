@@ -13,6 +13,8 @@ from typing import Any
 
 from sqlalchemy.exc import DontWrapMixin
 
+from parenting.drawing.sentences import tr
+
 
 class ServerError(Exception):
     """Something went wrong here; it was logged. Try again."""
@@ -20,14 +22,21 @@ class ServerError(Exception):
     status = 500
     code = "internal"
 
-    def __init__(self, message: str | None = None, *, field: str | None = None) -> None:
-        self.message = message or " ".join((type(self).__doc__ or "").split())
+    def __init__(self, message: str | None = None, *, field: str | None = None, **values: object) -> None:
+        self.sentence = message or " ".join((type(self).__doc__ or "").split())
+        self.values = values
+        self.message = self.sentence.format(**values) if values else self.sentence
         self.field = field
         super().__init__(self.message)
 
+    @property
+    def told(self) -> str:
+        """The message in the reader's language, where the catalogue has it."""
+        return tr(self.sentence, **self.values)
+
     def body(self) -> dict[str, Any]:
         """Return the JSON shape of this error."""
-        error: dict[str, Any] = {"code": self.code, "message": self.message}
+        error: dict[str, Any] = {"code": self.code, "message": self.told}
         if self.field is not None:
             error["field"] = self.field
         return {"error": error}

@@ -79,6 +79,7 @@ def _row(db: Database, database: str, run: Run, answered: Answered) -> dict[str,
         "query_public_id": sound(query, "public_id"),
         "guidance_layout": sound(run, "guidance_layout"),  # the boards on which guidance was shown
         "practice": sound(run, "practice"),  # required: people practised before their first question
+        "words": sound(run, "words"),  # guide: lengths of safe ways were told
     }
     return row if found is None else {**row, "damaged": found}
 

@@ -47,7 +47,21 @@ FORM_FIELDS = (
     "pace",
     "guidance_layout",
     "practice",
+    "words",
 )
+COLUMNS = {
+    "world",
+    "preset",
+    "seed",
+    "parent",
+    "name",
+    "goal",
+    "pace",
+    "guidance_layout",
+    "practice",
+    "words",
+}
+"""The fields that are columns of the run as they are."""
 NUMBERS = ("seed", "goal", "pace")
 UNREAD = {
     "json_invalid": "This is not JSON.",
@@ -106,6 +120,9 @@ class NewRun(BaseModel):
     practice: Literal["offered", "required"] = Field(
         "offered", description="required: a parent practises first, once in each browser."
     )
+    words: Literal["plain", "guide"] = Field(
+        "plain", description="guide: a question in words also tells how long a safe way is after each side."
+    )
 
 
 def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
@@ -135,19 +152,7 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
         raise InvalidFieldsError(wrong)
     spec = registry.spec(new.world)
     return {
-        **new.model_dump(
-            include={
-                "world",
-                "preset",
-                "seed",
-                "parent",
-                "name",
-                "goal",
-                "pace",
-                "guidance_layout",
-                "practice",
-            }
-        ),
+        **new.model_dump(include=COLUMNS),
         "level": level.name,
         "level_text": level.text,
         "legend": dict(spec.legend),

@@ -79,6 +79,8 @@ class RunSchema(Schema):
     """The boards on which guidance is asked: one with both moves, or two as in the paper."""
     practice: Literal["offered", "required"]
     """required: a parent practises before the first question, once in each browser."""
+    words: Literal["plain", "guide"]
+    """guide: a question in words also tells how long a safe way is, which gives its answer away."""
     status: RunStatus
     reason: str | None
     """The reason why it is over, in a sentence."""

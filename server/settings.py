@@ -64,6 +64,11 @@ class Settings(BaseSettings):
         le=10_000,
         description="How long a question is on the screen before the parent's page takes an answer to it.",
     )
+    languages: Path | None = Field(
+        None,
+        description="Folder of the languages that the parent's pages can be read in, besides English; "
+        "none is the one of this package, web/languages.",
+    )
     claim_seconds: float = Field(
         5.0, gt=0, description="How long a run stays with a worker that gives no sign of life."
     )

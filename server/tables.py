@@ -87,6 +87,7 @@ class Run(Table):
     practice: Mapped[str] = mapped_column(
         OneOf(("offered", "required")), default="offered", server_default="offered"
     )
+    words: Mapped[str] = mapped_column(OneOf(("plain", "guide")), default="plain", server_default="plain")
     # where it is
     status: Mapped[RunStatus] = mapped_column(default=RunStatus.ACTIVE)
     reason: Mapped[str | None]

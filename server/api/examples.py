@@ -65,6 +65,7 @@ RUN: dict[str, Any] = {
     "parent": "human",
     "guidance_layout": "one",
     "practice": "offered",
+    "words": "plain",
     "status": "active",
     "reason": None,
     "tick": 5,
@@ -180,6 +181,7 @@ EXPORTED: dict[str, Any] = {
     **NAMES,
     "guidance_layout": "one",
     "practice": "offered",
+    "words": "plain",
 }
 
 WALK: dict[str, Any] = {

@@ -5,6 +5,7 @@ from fastapi import APIRouter
 from parenting.server.pages.controls import router as controls
 from parenting.server.pages.dashboard import router as dashboard
 from parenting.server.pages.docs import router as docs
+from parenting.server.pages.grid import router as grid
 from parenting.server.pages.growth import router as growth
 from parenting.server.pages.history import router as history
 from parenting.server.pages.parent import router as parent
@@ -23,6 +24,7 @@ router.include_router(revisions)
 router.include_router(practice)
 router.include_router(walk)
 router.include_router(growth)
+router.include_router(grid)
 router.include_router(dashboard)
 router.include_router(controls)
 router.include_router(history)

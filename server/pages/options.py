@@ -38,6 +38,13 @@ OPTIONS = (
         "Five questions that explain themselves, once in each browser.",
     ),
     Option(
+        "words",
+        "Questions in words",
+        "",
+        (("", "What is there"), ("guide", "Also how long a safe way is")),
+        "Lengths of safe ways give the answer away: not for studies of what people judge themselves.",
+    ),
+    Option(
         "config.stages",
         "Stages (maximum clip length)",
         "",

@@ -94,7 +94,7 @@ def parent_page(
     Its address carries the run's public id. A researcher who writes the number is led there.
     """
     run = runs.get_run(db, run_id)
-    asked = None if query is None else _question_of(db, run, query)
+    asked = None if query is None else question_of(db, run, query)
     if request.path_params["run_id"] != run.public_id or (asked is not None and query != asked.public_id):
         return redirect(_address(run, asked, change), status=307)
     if run.practice == "required" and PRACTISED not in request.cookies:
@@ -224,7 +224,7 @@ def _address(run: Run, query: tables.Query | None, change: bool = False) -> str:
     return f"/runs/{run.public_id}/parent{named}"
 
 
-def _question_of(db: Database, run: Run, name: str) -> tables.Query:
+def question_of(db: Database, run: Run, name: str) -> tables.Query:
     """Return the question that an address names by its public id, or an older address by its number.
 
     Raises:

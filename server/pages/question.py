@@ -10,6 +10,7 @@ from parenting.drawing.board import Board
 from parenting.drawing.candidates import with_margin
 from parenting.drawing.clip import Clip
 from parenting.drawing.query_view import QueryView, query_view
+from parenting.drawing.sentences import tr
 from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import reading
 from parenting.server.pages.texts import AGAIN, LEADS
@@ -53,14 +54,19 @@ class QuestionView(QueryView):
         return False
 
     @property
+    def grid(self) -> str:
+        """The address of its board as a grid of cells; "" where it has none."""
+        return "" if self.plain else f"/runs/{self.run}/parent/grid?query={self.id}"
+
+    @property
     def onward(self) -> Onward:
         """The way on where an answer stands."""
-        return Onward(f"/runs/{self.run}/parent", "Leave it as it is")
+        return Onward(f"/runs/{self.run}/parent", tr("Leave it as it is"))
 
     @property
     def lead(self) -> str:
         """A sentence on who waits for the answer."""
-        return LEADS[self.kind]
+        return tr(LEADS[self.kind])
 
     @property
     def spoken(self) -> str:
@@ -87,10 +93,10 @@ class QuestionView(QueryView):
     def names(self) -> dict[str, str]:
         """Return the name of each choice, as the button that takes it back tells it."""
         if self.one_board:
-            sides = {move.side: f"{move.letter}, {move.action}" for move in self.candidates}
+            sides = {move.side: f"{move.letter}, {tr(move.action)}" for move in self.candidates}
         else:
-            sides = {side.name: side.name.capitalize() for side in self.sides}
-        return {**sides, "either": "Either", "neither": "Neither"}
+            sides = {side.name: tr(side.name.capitalize()) for side in self.sides}
+        return {**sides, "either": tr("Either"), "neither": tr("Neither")}
 
     @property
     def again(self) -> str:
@@ -98,9 +104,9 @@ class QuestionView(QueryView):
         if self.former is None:
             return ""
         if not self.former.heard:
-            return AGAIN["unheard"]
+            return tr(AGAIN["unheard"])
         moved = self.kind == "guidance" and self.former.choice != "neither"
-        return AGAIN["moved" if moved else "heard"]
+        return tr(AGAIN["moved" if moved else "heard"])
 
 
 def question_view(query: Query, run: Run, former: Former | None = None) -> QuestionView:
@@ -110,8 +116,8 @@ def question_view(query: Query, run: Run, former: Former | None = None) -> Quest
         DamagedRowError: it cannot be read, or does not fit the run's legend.
     """
     with reading(query):
-        one = query.kind == "guidance" and run.guidance_layout == "one"
-        described = describe(query.clips, query.kind, query.maturity, run.legend, _rows(run), one)
+        one, guide = _is_on_one_board(query, run), run.words == "guide"
+        described = describe(query.clips, query.kind, query.maturity, run.legend, _rows(run), one, guide)
     return QuestionView(**described, id=query.public_id, run=run.public_id, former=former)
 
 
@@ -122,11 +128,21 @@ def describe(
     legend: Mapping[str, str],
     rows: Sequence[str],
     one_board: bool,
+    guide: bool = False,
 ) -> dict[str, Any]:
     """Describe a question by its clips (`drawing.query_view.query_view`), and its board in words."""
     view = query_view(clips, kind, stage, legend, rows)
-    around = surroundings(clips, legend, ("A", "B") if one_board else ("left", "right"))
+    around = surroundings(clips, legend, ("A", "B") if one_board else ("left", "right"), guide)
     return {**vars(view), "one_board": one_board, "around": around}
+
+
+def side_names(query: Query, run: Run) -> tuple[str, str]:
+    """Return the names of the two sides in sentences: letters of moves, or where clips are seen."""
+    return ("A", "B") if _is_on_one_board(query, run) else ("left", "right")
+
+
+def _is_on_one_board(query: Query, run: Run) -> bool:
+    return query.kind == "guidance" and run.guidance_layout == "one"
 
 
 def _rows(run: Run) -> list[str]:

@@ -5,21 +5,30 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse
 
 from parenting.drawing.render import environment
+from parenting.drawing.sentences import tr, trn
 from parenting.envs.people_text import isolated
 from parenting.server.assets import asset
 from parenting.server.errors import ServerError
+from parenting.server.languages import language
 from parenting.server.public_ids import ALPHABET, LENGTH
 from parenting.server.tables import Run
 
 WEB = Path(__file__).parent.parent.parent / "web"
 
+
+def tr_markup(sentence: str, **values: object) -> Markup:
+    """Return a sentence that holds tags of its own; what is put into it is escaped."""
+    return Markup(tr(sentence)).format(**values)  # a sentence of the catalogue, without values
+
+
 _templates = environment(WEB / "templates")
 _templates.filters["isolated"] = isolated
-_templates.globals["asset"] = asset
+_templates.globals.update(asset=asset, language=language, _=tr, _n=trn, _h=tr_markup)
 
 
 def page(template: str, status: int = 200, **context: object) -> HTMLResponse:
@@ -63,4 +72,4 @@ def error_page(request: Request, error: ServerError) -> HTMLResponse:
     """
     run = re.match(rf"/runs/([{ALPHABET}]{{{LENGTH}}}|[1-9][0-9]*)(?![^/])(/parent)?", request.url.path)
     back = run[0] if run and error.status == 409 else "/"
-    return page("error.html", error.status, message=error.message, back=back)
+    return page("error.html", error.status, message=error.told, back=back)

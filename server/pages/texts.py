@@ -2,57 +2,73 @@
 
 from __future__ import annotations
 
+from parenting.drawing.sentences import mark
 from parenting.server.tables import Run
 
 LEADS = {
-    "guidance": "The agent stands still until you answer.",
-    "preference": "Both begin at the same place. The agent goes on meanwhile.",
+    "guidance": mark("The agent stands still until you answer."),
+    "preference": mark("Both begin at the same place. The agent goes on meanwhile."),
 }
 
 AGAIN = {
-    "unheard": "You have answered this question. Another answer takes the place of yours.",
-    "heard": "The agent has learnt from your answer. Another answer corrects what it learns from now on.",
-    "moved": "The move has happened, and that stays. Another answer corrects what it learns from now on.",
+    "unheard": mark("You have answered this question. Another answer takes the place of yours."),
+    "heard": mark(
+        "The agent has learnt from your answer. Another answer corrects what it learns from now on."
+    ),
+    "moved": mark(
+        "The move has happened, and that stays. Another answer corrects what it learns from now on."
+    ),
 }
 """Sentences on a question that its parent has answered, shown where the answer can be changed."""
 
 STATE_TEXTS = {
-    "question": ("A question is waiting for you.", "The agent would like to know what you prefer."),
-    "exploring": ("The agent is exploring on its own.", "The next question will appear here."),
+    "question": (
+        mark("A question is waiting for you."),
+        mark("The agent would like to know what you prefer."),
+    ),
+    "exploring": (mark("The agent is exploring on its own."), mark("The next question will appear here.")),
     "elsewhere": (
-        "Somebody else has the question.",
-        "If they close it, it will appear here within a minute. If that is you on another page, answer here.",
+        mark("Somebody else has the question."),
+        mark(
+            "If they close it, it will appear here within a minute. "
+            "If that is you on another page, answer here."
+        ),
     ),
     "taken": (
-        "Your question was taken over.",
-        "Another page has it now. If it is closed there, the question will appear here within a minute.",
+        mark("Your question was taken over."),
+        mark(
+            "Another page has it now. If it is closed there, the question will appear here within a minute."
+        ),
     ),
     "unsent": (
-        "Your answer is kept here.",
-        "The server did not take it just now. It is sent again until it is stored.",
+        mark("Your answer is kept here."),
+        mark("The server did not take it just now. It is sent again until it is stored."),
     ),
     "stuck": (
-        "No action was acceptable.",
-        "You refused all four moves, so the agent stands still. End this episode, and it starts again.",
+        mark("No action was acceptable."),
+        mark("You refused all four moves, so the agent stands still. End this episode, and it starts again."),
     ),
     "damaged": (
-        "This question cannot be shown.",
-        "Its stored clips are damaged. End the episode on the dashboard, and the agent goes on without it.",
+        mark("This question cannot be shown."),
+        mark(
+            "Its stored clips are damaged. "
+            "End the episode on the dashboard, and the agent goes on without it."
+        ),
     ),
-    "paused": ("The run is paused.", "No time passes for the agent until the run is resumed."),
+    "paused": (mark("The run is paused."), mark("No time passes for the agent until the run is resumed.")),
     "no_worker": (
-        "No worker is running.",
-        "Nothing moves until one is started (parenting worker).",
+        mark("No worker is running."),
+        mark("Nothing moves until one is started (parenting worker)."),
     ),
-    "resting": ("That was the last question of this goal.", "The agent rests until you go on."),
-    "over": ("This run is over.", "The agent asks no more questions."),
+    "resting": (mark("That was the last question of this goal."), mark("The agent rests until you go on.")),
+    "over": (mark("This run is over."), mark("The agent asks no more questions.")),
     "away": (
-        "This run is not here.",
-        "The server at this address has another database now. Your answers are kept in this browser.",
+        mark("This run is not here."),
+        mark("The server at this address has another database now. Your answers are kept in this browser."),
     ),
     "offline": (
-        "No connection to the server.",
-        "Your answers are kept in this browser and sent as soon as it is back.",
+        mark("No connection to the server."),
+        mark("Your answers are kept in this browser and sent as soon as it is back."),
     ),
 }
 """A heading and a sentence for each state of the page, shown while no question is."""

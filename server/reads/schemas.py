@@ -119,9 +119,9 @@ def leased_schema(session: Session, query: Query) -> LeasedSchema:
     Raises:
         DamagedRowError: it or its run cannot be read, or it does not fit the run's legend.
     """
-    world, parent, run_public_id = _shown_run(session, query.run_id)
+    world, parent, run_public_id, guide = _shown_run(session, query.run_id)
     with reading(query):
-        sentences = surroundings(query.clips, world.legend)
+        sentences = surroundings(query.clips, world.legend, guide=guide)
     now = session.execute(_PROGRESS, {"run_id": query.run_id}).one()
     return LeasedSchema(
         **_query_fields(query, stated(now.database), run_public_id),
@@ -132,16 +132,17 @@ def leased_schema(session: Session, query: Query) -> LeasedSchema:
     )
 
 
-def _shown_run(session: Session, run_id: int) -> tuple[WorldSchema, ParentSchema, str]:
+def _shown_run(session: Session, run_id: int) -> tuple[WorldSchema, ParentSchema, str, bool]:
     """Return what a leased query shows of its run, which never changes; a transaction reads it once."""
-    kept: dict[int, tuple[WorldSchema, ParentSchema, str]] = session.info.setdefault("shown runs", {})
+    kept: dict[int, tuple[WorldSchema, ParentSchema, str, bool]] = session.info.setdefault("shown runs", {})
     if run_id not in kept:
         run = readable(find(session, run_id))
         config = Config.model_validate(run.config)
         world = WorldSchema(
             name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
         )
-        kept[run_id] = world, ParentSchema(gamma=config.gamma, inside=config.garden_parent), run.public_id
+        settings = ParentSchema(gamma=config.gamma, inside=config.garden_parent)
+        kept[run_id] = world, settings, run.public_id, run.words == "guide"
     return kept[run_id]
 
 

@@ -15,7 +15,7 @@ from tests.told_board import read_sentences
 LEVELS = [(world, level) for world, spec in registry.WORLDS.items() for level in spec.levels]
 
 
-def _questions(world: str, level: str) -> Iterator[dict[str, Clip]]:
+def questions(world: str, level: str) -> Iterator[dict[str, Clip]]:
     """Questions from the start and from a few steps away from it, where the episode still goes on."""
     made = registry.make(world, registry.level(world, level))
     for way in ("", "d", "l", "rd", "dldl"):
@@ -27,7 +27,7 @@ def _questions(world: str, level: str) -> Iterator[dict[str, Clip]]:
 @pytest.mark.parametrize(("world", "level"), LEVELS)
 def test_the_board_is_told_cell_by_cell(world: str, level: str) -> None:
     legend = registry.spec(world).legend
-    for clips in _questions(world, level):
+    for clips in questions(world, level):
         start = clips["left"]["frames"][0]
         told = read_sentences(surroundings(clips, legend))
         row, column = start["agent"]

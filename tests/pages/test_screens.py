@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from parenting.envs import registry
 from parenting.server.db import Database
@@ -42,3 +42,72 @@ def test_a_question_fits_every_screen(tabs: BrowserTabs, db: Database, world: st
             if found := outside(page):
                 wrong[kind, width, height] = found
     assert wrong == {}
+
+
+FIELD = "\n".join(
+    (
+        "world: unsafe-exploration",
+        "name: field",
+        "",
+        "W" * 20,
+        f"WA{' ' * 17}W",
+        *([f"W{' ' * 18}W"] * 16),
+        f"WG{' ' * 17}W",
+        "W" * 20,
+    )
+)
+"""A level of twenty by twenty cells, none of which is wall."""
+ALONG = "r" * 15
+"""The agent's way before the question: it stands at the right then."""
+WIDE, NARROW = ((1280, 720), (1366, 768), (390, 844)), ((844, 390), (320, 568))
+
+
+def field(tabs: BrowserTabs, db: Database, kind: str) -> Page:
+    """A question on this level."""
+    made = registry.make("unsafe-exploration", FIELD)
+    clips = guidance(made, "u", "d", ALONG) if kind == "guidance" else preference(made, "dl", "rd", ALONG)
+    path = posted(db, "unsafe-exploration", kind, clips, 1 if kind == "guidance" else 2, level_text=FIELD)
+    return tabs.open(path)
+
+
+def test_twenty_by_twenty_cells_fit(tabs: BrowserTabs, db: Database) -> None:
+    """Guidance whole; of two clips on a small screen one large board at a time, in lock-step."""
+    page = field(tabs, db, "guidance")
+    for width, height in WIDE:
+        page.set_viewport_size({"width": width, "height": height})
+        assert outside(page) == [], (width, height)
+    page = field(tabs, db, "preference")
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert outside(page) == []
+    shown = page.locator(".card:visible .board")
+    expect(shown).to_have_count(1)
+    first = shown.element_handle()
+    page.keyboard.press("o")
+    assert not shown.element_handle().evaluate("(one, other) => one === other", first)
+    clocks = "new Set(document.getAnimations().map(({ currentTime }) => currentTime)).size"
+    assert page.evaluate(clocks) == 1
+    shown.click()
+    assert shown.element_handle().evaluate("(one, other) => one === other", first)
+    assert outside(page) == []
+
+
+@pytest.mark.parametrize("kind", ["guidance", "preference"])
+def test_where_not_all_fits_it_scrolls_and_the_buttons_stay(
+    tabs: BrowserTabs, db: Database, kind: str
+) -> None:
+    page = field(tabs, db, kind)
+    for width, height in (*WIDE, *NARROW):
+        page.set_viewport_size({"width": width, "height": height})
+        page.reload()
+        for share in (0, 0.5, 1):
+            page.evaluate("share => scrollTo(0, share * document.body.scrollHeight)", share)
+            small = [part for part in outside(page) if "button" in part or float(part.split()[-1]) < CELL]
+            assert small == [], (width, height, share)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        agent, board = (
+            page.locator(".agent:visible").first.bounding_box(),
+            page.locator(".board:visible").first,
+        )
+        assert agent is not None
+        assert 0 <= agent["x"] <= width - agent["width"], (width, height)
+        assert board.is_visible()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 
+import httpx2
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -55,3 +57,27 @@ def test_the_board_in_words_opens_by_key_and_answers_nothing(tabs: BrowserTabs, 
         page.get_by_text("The goal is 3 down and 1 left of the agent, 4 cells by air.", exact=True)
     ).to_be_visible()
     assert given(db) == []
+
+
+@pytest.mark.parametrize("words", ["plain", "guide"])
+def test_safe_ways_are_told_where_the_run_says_so(client: httpx2.Client, db: Database, words: str) -> None:
+    """On the page, by the API, and in the export, which says what was told."""
+    clips = guidance(registry.make("unsafe-exploration"), "d", "r")
+    page = client.get(posted(db, "unsafe-exploration", "guidance", clips, 1, words=words)).text
+    leased = client.post("/api/v1/runs/1/queries/lease", json={"client_id": "me"}).json()
+    told = "By a safe way: 3 steps after"
+    assert (f"{told} A, 5 steps after B." in page) == (words == "guide")
+    assert (f"{told} left, 5 steps after right." in leased["sentences"]) == (words == "guide")
+    client.post(f"/api/v1/queries/{leased['id']}/answer", json={"choice": "left", "client_id": "me"})
+    (line,) = client.get("/api/v1/runs/1/export").text.splitlines()
+    assert json.loads(line)["words"] == words
+    assert client.get("/api/v1/runs/1").json()["words"] == words
+
+
+def test_the_form_offers_safe_ways_and_leaves_them_out_unless_chosen(client: httpx2.Client) -> None:
+    form = {"world": "unsafe-exploration", "parent": "human", "preset": "conservative", "seed": "1"}
+    for chosen in ({}, {"words": "guide"}):
+        client.post("/runs", data={**form, **chosen})
+    told = [client.get(f"/api/v1/runs/{run}").json()["words"] for run in (1, 2)]
+    assert told == ["plain", "guide"]
+    assert '<option value="guide">Also how long a safe way is</option>' in client.get("/").text

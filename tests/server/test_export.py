@@ -57,6 +57,7 @@ def test_a_row_tells_all_about_an_answer(db: Database, run_id: int) -> None:
         "query_public_id": get_query(db, 1).public_id,
         "guidance_layout": "one",
         "practice": "offered",
+        "words": "plain",
     }
 
 

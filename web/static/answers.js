@@ -2,7 +2,7 @@
 import { listens } from "./arming.js";
 import { recordAnswer, timeLeft } from "./eta.js";
 import { flush, keep } from "./outbox.js";
-import { $, client, given, name, page, painted, PATIENCE, run, waiting } from "./page.js";
+import { $, alarm, client, given, name, page, painted, PATIENCE, run, waiting } from "./page.js";
 import { next, show } from "./questions.js";
 import { change, remember } from "./undo.js";
 import { wait } from "./waiting.js";
@@ -66,7 +66,7 @@ export function report(outcome, reply, answer) {
     if (!page.unsaved) $("saved").textContent = "Saved";
   } else {
     if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? "Kept here, not stored" : "";
-    $("alert").textContent = outcome === "elsewhere" ? elsewhere(answer) : reply.message;
+    alarm(outcome === "elsewhere" ? elsewhere(answer) : reply.message);
     if (outcome === "elsewhere" && given.delete(answer.question) && !page.current) next(); // a copy of its database asks the same
   }
 }

@@ -1,6 +1,7 @@
 // Keys and clicks. Letters are those that are printed on the keys; by position only where a layout has no Latin letter there.
 import { takesTurns, turn } from "./compare.js";
 import { keyName } from "./key_names.js";
+import { openGrid } from "./place.js";
 import { $, help, page, speak, stage } from "./page.js";
 
 const CHOICES = { a: "left", b: "right", e: "either", n: "neither", 1: "left", 2: "right" };
@@ -27,6 +28,7 @@ stage.addEventListener("submit", (event) => {
   else page.answer(event.submitter.value);
 });
 stage.addEventListener("click", (event) => {
+  if (event.target.closest("[data-explore]") && page.current) return openGrid(page.current);
   const part = event.target.closest("[data-choice]");
   if (part && page.current) page.answer(part.dataset.choice);
 });
@@ -35,10 +37,11 @@ addEventListener("keydown", (event) => {
   const { target } = event, name = keyName(event);
   if (event.repeat && target.closest?.("#stage") && (name === "Enter" || name === " ")) event.preventDefault(); // a key held down presses no button twice
   if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || event.isComposing || document.querySelector("dialog[open]")) return;
-  if (target.closest("input:not([type=checkbox]), textarea, select, [contenteditable], [role=grid]")) return;
+  if (target.closest("input:not([type=checkbox]), textarea, select, [contenteditable]")) return;
   if (name.length === 1 && name !== " " && !letters.on) return;
   if (name === "?") help.showModal();
   else if (name === "d" && page.current && !event.shiftKey) speak(page.current.querySelector(".around ul").textContent.replace(/\s+/g, " ").trim());
+  else if (name === "g" && page.current && !event.shiftKey) openGrid(page.current);
   else if (name === " " && page.player?.replay && !target.closest("button, a, summary, input")) page.player.replay();
   else if (name === "w" && !event.shiftKey) $("walk").requestSubmit();
   else if (name === "o" && takesTurns(page.current)) turn(page.current);

@@ -30,6 +30,13 @@ export function speak(words) {
   setTimeout(() => { $("said").textContent = words; }, CALM);
 }
 
+// Tell an error on the line above the question, and move the focus there.
+export function alarm(words) {
+  const line = $("alert");
+  line.textContent = words;
+  if (words) line.focus();
+}
+
 // Do something once the stage is painted: until then the page has nothing else to do.
 export function painted(then) {
   let timer = 0;

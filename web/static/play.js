@@ -95,7 +95,7 @@ export function play(question, round = null, step = USUAL) {
   };
   const replay = () => run(0);
   still();
-  if (!bar) return { replay, go, still };
+  if (!bar) return { replay, go, still, step: count };
   bar.hidden = false;
   for (const button of bar.querySelectorAll("[data-step]")) button.addEventListener("click", () => go(Number(button.dataset.step)));
   for (const part of bar.querySelectorAll("[data-step], output")) part.hidden = steps < 2 && !calm.matches;
@@ -104,5 +104,5 @@ export function play(question, round = null, step = USUAL) {
   }
   bar.querySelector("[data-replay]").addEventListener("click", replay);
   if (calm.matches) go(0); else begin();
-  return { replay, go, still };
+  return { replay, go, still, step: count };
 }

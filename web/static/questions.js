@@ -74,7 +74,6 @@ export async function prefetch() {
 }
 
 export function show(form) {
-  const focused = stage.querySelector(".answers :focus")?.value;
   if (!form.isConnected) stage.replaceChildren(form);
   clearTimeout(page.quiet);
   page.quiet = 0;
@@ -85,7 +84,6 @@ export function show(form) {
   main.dataset.state = "question";
   document.title = `● ${form.dataset.title} · ${name}`;
   settle();
-  if (focused) form.querySelector(`.answers [value=${focused}]`).focus({ preventScroll: true });
   begin(form);
   performance.mark("question", { detail: form.dataset.query });
   painted(prefetch);

@@ -4,7 +4,7 @@ import { report } from "./answers.js";
 import { keyName } from "./key_names.js";
 import { letters } from "./keys.js";
 import { flush, kept } from "./outbox.js";
-import { $, client, given, page, run } from "./page.js";
+import { $, alarm, client, given, page, run } from "./page.js";
 import { show } from "./questions.js";
 
 const PATIENCE = 3000; // ms for which the last answer may still be on its way
@@ -58,7 +58,7 @@ async function undo() {
     $("saved").textContent = "Taken back";
     show(last.question);
   } catch ({ message }) {
-    $("alert").textContent = message;
+    alarm(message);
   } finally { busy = false; }
 }
 
