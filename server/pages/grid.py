@@ -8,11 +8,13 @@ from fastapi import Query, Response
 
 from parenting.drawing.grid import GridView, grid_view
 from parenting.drawing.sentences import tr
+from parenting.envs import registry
 from parenting.server import runs
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.damage import reading
 from parenting.server.deps import Db
+from parenting.server.pages.lessons import LESSONS, WORLD
 from parenting.server.pages.parent import question_of
 from parenting.server.pages.question import side_names
 from parenting.server.pages.render import page
@@ -24,18 +26,27 @@ LONGEST = 1000
 """Steps of a clip at most."""
 
 
+Step = Annotated[int, Query(ge=0, le=LONGEST)]
+
+
 @router.get("/runs/{run_id}/parent/grid")
-def grid(
-    run_id: RunId,
-    db: Db,
-    query: Annotated[str, Query(max_length=LENGTH)],
-    step: Annotated[int, Query(ge=0, le=LONGEST)] = 0,
-) -> Response:
+def grid(run_id: RunId, db: Db, query: Annotated[str, Query(max_length=LENGTH)], step: Step = 0) -> Response:
     """The cells of a question's board at a step of its clips, as markup."""
     run = runs.get_run(db, run_id)
     asked = question_of(db, run, query)
     with reading(asked):
-        found = grid_view(asked.clips, run.legend, side_names(asked, run), step)
+        return _shown(grid_view(asked.clips, run.legend, side_names(asked, run), step))
+
+
+@router.get("/practice/grid")
+def practice_grid(at: Annotated[int, Query(ge=1, le=len(LESSONS))], step: Step = 0) -> Response:
+    """The same of a question of the practice."""
+    lesson = LESSONS[at - 1]
+    names = ("A", "B") if lesson.kind == "guidance" else ("left", "right")
+    return _shown(grid_view(lesson.clips, registry.spec(WORLD).legend, names, step))
+
+
+def _shown(found: GridView) -> Response:
     return page("_grid.html", grid=found, label=_label(found))
 
 

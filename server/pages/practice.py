@@ -87,6 +87,11 @@ class PracticeView(QuestionView):
         return True
 
     @property
+    def grid(self) -> str:
+        """The address of its board as a grid of cells."""
+        return f"{ADDRESS}/grid?at={self.place.at}"
+
+    @property
     def onward(self) -> Onward:
         """The next question, or the end."""
         last = self.place.at == len(LESSONS)

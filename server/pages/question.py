@@ -55,8 +55,8 @@ class QuestionView(QueryView):
 
     @property
     def grid(self) -> str:
-        """The address of its board as a grid of cells; "" where it has none."""
-        return "" if self.plain else f"/runs/{self.run}/parent/grid?query={self.id}"
+        """The address of its board as a grid of cells."""
+        return f"/runs/{self.run}/parent/grid?query={self.id}"
 
     @property
     def onward(self) -> Onward:

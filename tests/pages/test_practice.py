@@ -165,3 +165,18 @@ def test_a_move_is_pointed_at_and_clicked_and_what_comes_too_early_answers_nothi
     page.locator(".answers [value=either]").dispatch_event("click")
     expect(page.locator("[aria-pressed=true]")).to_have_count(1)
     expect(page.locator(".answers [value=right]")).to_have_attribute("aria-pressed", "true")
+
+
+def test_keys_of_the_parents_page_that_need_no_run_work_and_the_others_do_nothing(tabs: BrowserTabs) -> None:
+    page = tabs.open("/practice")
+    page.wait_for_selector("#question[data-listening]")
+    page.keyboard.press("w")
+    page.keyboard.press("z")
+    expect(page.locator("[aria-pressed=true]")).to_have_count(0)
+    page.keyboard.press("d")
+    expect(page.locator("#said")).to_contain_text("The goal is 2 down and 1 right of the agent")
+    page.keyboard.press("g")
+    expect(page.get_by_role("grid")).to_be_visible()
+    page.keyboard.press("Escape")
+    page.keyboard.press("?")
+    expect(page.get_by_role("dialog")).to_be_visible()

@@ -43,7 +43,7 @@ addEventListener("keydown", (event) => {
   else if (name === "d" && page.current && !event.shiftKey) speak(page.current.querySelector(".around ul").textContent.replace(/\s+/g, " ").trim());
   else if (name === "g" && page.current && !event.shiftKey) openGrid(page.current);
   else if (name === " " && page.player?.replay && !target.closest("button, a, summary, input")) page.player.replay();
-  else if (name === "w" && !event.shiftKey) $("walk").requestSubmit();
+  else if (name === "w" && !event.shiftKey) $("walk")?.requestSubmit(); // practice has no policy that walks
   else if (name === "o" && takesTurns(page.current)) turn(page.current);
   else {
     const shifted = event.shiftKey && !/^[12]$/.test(name); // digits are shifted on a French keyboard
