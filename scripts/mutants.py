@@ -33,6 +33,8 @@ FAILED = 1
 """pytest's exit code where tests ran and failed; others mean that it could not run them."""
 TIMED_OUT = re.compile(r"^E +(Failed: Timeout|TimeoutError)", re.MULTILINE)
 """A test that only waited in vain, by pytest-timeout or by its own bound, has caught nothing."""
+FAILURE = re.compile(r"^FAILED ", re.MULTILINE)
+"""A line of pytest's summary. An error before the test says that the tree is broken, and has caught nothing."""
 TOLD = 2000
 """Characters of pytest's output that are printed where a mutant was not caught."""
 
@@ -76,9 +78,17 @@ def attempt(tree: Path, mutant: Mutant) -> Verdict:
         result = run_tests(tree, [mutant.test])
     finally:
         file.write_text(source, encoding="utf-8")
-    outcomes = {0: "not caught", FAILED: "timed out" if TIMED_OUT.search(result.stdout) else "caught"}
-    outcome = outcomes.get(result.returncode, f"pytest could not run (exit code {result.returncode})")
-    return Verdict(mutant, outcome, time.monotonic() - began, result.stdout + result.stderr)
+    said = result.stdout + result.stderr
+    return Verdict(mutant, outcome_of(result.returncode, result.stdout), time.monotonic() - began, said)
+
+
+def outcome_of(code: int, said: str) -> str:
+    """The outcome by pytest's exit code and report."""
+    if code != FAILED:
+        return "not caught" if code == 0 else f"pytest could not run (exit code {code})"
+    if TIMED_OUT.search(said):
+        return "timed out"
+    return "caught" if FAILURE.search(said) else "its test was not reached"
 
 
 def attempt_all(mutants: Sequence[Mutant], trees: Sequence[Path]) -> list[Verdict]:

@@ -41,6 +41,8 @@ def tree(tmp_path: Path) -> Path:
     (tmp_path / "sums.py").write_text("def double(x: int) -> int:\n    return 2 * x\n")
     tests = "from sums import double\ndef test_it():\n    assert double(2) == 4\n"
     tests += "def test_nothing():\n    assert double(0) == 0\n"
+    tests += "import pytest\n@pytest.fixture\ndef four():\n    assert double(2) == 4\n"
+    tests += "def test_behind(four):\n    pass\n"
     (tmp_path / "test_sums.py").write_text(tests)
     return tmp_path
 
@@ -50,6 +52,7 @@ def tree(tmp_path: Path) -> Path:
     [
         ("2 * x", "3 * x", "test_it", "caught"),
         ("2 * x", "3 * x", "test_nothing", "not caught"),
+        ("2 * x", "3 * x", "test_behind", "its test was not reached"),
         ("2 * x", "2 * (x", "test_it", "pytest could not run"),
         ("4 * x", "3 * x", "test_it", "its text stands 0 times in sums.py"),
         ("2 * x", "3 * x", "test_missing", "pytest could not run"),
