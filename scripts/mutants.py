@@ -34,7 +34,7 @@ FAILED = 1
 TIMED_OUT = re.compile(r"^E +(Failed: Timeout|TimeoutError)", re.MULTILINE)
 """A test that only waited in vain, by pytest-timeout or by its own bound, has caught nothing."""
 FAILURE = re.compile(r"^FAILED ", re.MULTILINE)
-"""A line of pytest's summary. An error before the test says that the tree is broken, and has caught nothing."""
+"""A line of pytest's summary. An error before the test says that the tree is broken: it caught nothing."""
 TOLD = 2000
 """Characters of pytest's output that are printed where a mutant was not caught."""
 

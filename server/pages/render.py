@@ -13,7 +13,7 @@ from parenting.drawing.render import environment
 from parenting.drawing.sentences import tr, trn
 from parenting.envs.people_text import isolated
 from parenting.server.assets import asset
-from parenting.server.errors import ServerError
+from parenting.server.errors import ServerError, StoreError
 from parenting.server.languages import language
 from parenting.server.public_ids import ALPHABET, LENGTH
 from parenting.server.tables import Run
@@ -68,8 +68,13 @@ def redirect(path: str, status: int = 303) -> RedirectResponse:
 def error_page(request: Request, error: ServerError) -> HTMLResponse:
     """An error as a page: what happened, in a sentence, and the way back.
 
-    What a run refused leads back to it; else there may be no such run.
+    What a run refused leads back to it, and what the store refused to the same page, or to the page of the
+    form that was sent; else there may be no such run.
     """
     run = re.match(rf"/runs/([{ALPHABET}]{{{LENGTH}}}|[1-9][0-9]*)(?![^/])(/parent)?", request.url.path)
-    back = run[0] if run and error.status == 409 else "/"
-    return page("error.html", error.status, message=error.told, back=back)
+    refused = isinstance(error, StoreError)
+    back = run[0] if run and (error.status == 409 or refused) else "/"
+    again = refused and request.method == "GET"
+    if again:
+        back = request.url.path + (f"?{request.url.query}" if request.url.query else "")
+    return page("error.html", error.status, message=error.told, back=back, again=again)
