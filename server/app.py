@@ -10,8 +10,8 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
-from starlette.middleware.gzip import GZipMiddleware
 from starlette.routing import Match
+from starlette_compress import CompressMiddleware, remove_compress_type
 
 from parenting.server import api, health, pages
 from parenting.server.admission import Admission
@@ -95,7 +95,10 @@ def bare_app() -> FastAPI:
         redoc_url=None,
         lifespan=_lifespan,
     )
-    app.add_middleware(GZipMiddleware, minimum_size=SMALL_BODY, compresslevel=6)  # never a stream of events
+    remove_compress_type("text/event-stream")  # each event leaves at once, as it is
+    app.add_middleware(
+        CompressMiddleware, minimum_size=SMALL_BODY, zstd=False, brotli_quality=5, gzip_level=6
+    )
     app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY)
     app.state.languages = Languages()
     app.add_middleware(LanguageMiddleware)

@@ -9,10 +9,15 @@ by one.
 from __future__ import annotations
 
 import gzip
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
+
+import brotli
+import rcssmin
+import rjsmin
 
 from parenting.drawing.render import STYLE
 from parenting.server.scripts import scripts
@@ -40,16 +45,35 @@ SHEETS = {
 SCRIPTS = ("parent.js", "practice.js", "history.js", "dashboard.js", "start.js", "docs.js")
 PICTURES = ("icon.svg", "query.svg", "question.svg")
 MEDIA = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+SMALLER: dict[str, Callable[[str], str]] = {"css": rcssmin.cssmin, "js": rjsmin.jsmin}
+"""Remove comments and white space that say nothing to a browser; names stay as they are written."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Asset:
     """A file as it is served: its address' last part, its type, its bytes, plain and compressed."""
 
     name: str
     media: str
     content: bytes
-    compressed: bytes
+
+    @cached_property
+    def gzipped(self) -> bytes:
+        """The content for a client that takes gzip."""
+        return gzip.compress(self.content, 9, mtime=0)
+
+    @cached_property
+    def brotlied(self) -> bytes:
+        """The content for a client that takes brotli: an eighth smaller, in some milliseconds once."""
+        return brotli.compress(self.content, quality=11)
+
+    def encoded(self, accepted: str) -> tuple[bytes, dict[str, str]]:
+        """Return the content and its header for a client that takes these encodings (`Accept-Encoding`)."""
+        parts = (one.strip().replace(" ", "").partition(";q=") for one in accepted.split(","))
+        taken = {name for name, _, quality in parts if quality.strip("0.") or not quality}
+        if "br" in taken:
+            return self.brotlied, {"Content-Encoding": "br"}
+        return (self.gzipped, {"Content-Encoding": "gzip"}) if "gzip" in taken else (self.content, {})
 
 
 def asset(name: str) -> str:
@@ -69,7 +93,7 @@ def assets() -> dict[str, Asset]:
     """Return all assets by their names without hashes."""
     texts = {name: sheet(parts) for name, parts in SHEETS.items()}
     texts |= {name: (STATIC / name).read_text("utf-8") for name in PICTURES}
-    found = {name: _asset(name, text.encode()) for name, text in texts.items()}
+    found = {name: _asset(name, text) for name, text in texts.items()}
     for name in SCRIPTS:
         found |= page_scripts(name)
     return found
@@ -89,13 +113,13 @@ def page_scripts(name: str, folder: Path = STATIC) -> dict[str, Asset]:
     """
     made = scripts(name, folder)
     stem = name.removesuffix(".js")
-    parts = {part: _asset(f"{stem}-{part}", text.encode()) for part, text in made.parts.items()}
+    parts = {part: _asset(f"{stem}-{part}", text) for part, text in made.parts.items()}
     text = made.page({part: f"/static/{one.name}" for part, one in parts.items()})
-    return {name: _asset(name, text.encode()), **{f"{stem}-{part}": one for part, one in parts.items()}}
+    return {name: _asset(name, text), **{f"{stem}-{part}": one for part, one in parts.items()}}
 
 
-def _asset(name: str, content: bytes) -> Asset:
+def _asset(name: str, text: str) -> Asset:
     stem, _, ending = name.rpartition(".")
+    content = SMALLER.get(ending, str)(text).encode()
     digest = sha256(content).hexdigest()[:12]
-    media = f"{MEDIA['.' + ending]}; charset=utf-8"
-    return Asset(f"{stem}.{digest}.{ending}", media, content, gzip.compress(content, 9, mtime=0))
+    return Asset(f"{stem}.{digest}.{ending}", f"{MEDIA['.' + ending]}; charset=utf-8", content)

@@ -56,9 +56,9 @@ def scripts(name: str, folder: Path) -> Scripts:
     for module in modules.values():
         module.text = DYNAMIC.sub(lambda found: _loading(found[1], order), module.text)
     parts = {}
-    for later in sorted({one for module in modules.values() for one in module.dynamic} - set(order)):
-        own = [one for one in _order(later, modules) if one not in order]
-        blocks = _blocks(own, modules, wanted, order, "if (!$m.{key}) {{ $m.{key} = {{}};\n{text}}}\n")
+    for later, known in _known(name, order, modules).items():
+        own = [one for one in _order(later, modules) if one not in known]
+        blocks = _blocks(own, modules, wanted, known, "if (!$m.{key}) {{ $m.{key} = {{}};\n{text}}}\n")
         parts[later] = f"export default ($m, $load) => {{\n{blocks}return $m.{_key(later)};\n}};\n"
     blocks = _blocks(order, modules, wanted, (), "{{\n{text}}}\n")
     heads = ", ".join(f"{_key(one)}: {{}}" for one in order)
@@ -91,6 +91,23 @@ def _order(name: str, modules: Mapping[str, Module]) -> list[str]:
 
     visit(name)
     return order
+
+
+def _known(name: str, order: Sequence[str], modules: Mapping[str, Module]) -> dict[str, set[str]]:
+    """Return, for each part that loads later, the modules that have run by then, whoever loads it."""
+    parts = sorted({one for module in modules.values() for one in module.dynamic} - set(order))
+    held = {name: set(order), **{part: set(_order(part, modules)) for part in parts}}
+    loaders = {
+        part: [one for one in held if any(part in modules[inner].dynamic for inner in held[one])]
+        for part in parts
+    }
+    known = {name: set[str](), **{part: set(modules) for part in parts}}
+    while True:
+        before = {part: set(found) for part, found in known.items()}
+        for part in parts:
+            known[part] = set.intersection(*(known[one] | held[one] for one in loaders[part]))
+        if known == before:
+            return {part: known[part] for part in parts}
 
 
 def _check(modules: Mapping[str, Module]) -> None:

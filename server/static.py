@@ -94,10 +94,8 @@ class OthersFiles(OurFiles):
 
 def _kept(asset: Asset, scope: Scope) -> Response:
     """Return an asset, as it was compressed once, for a browser to keep."""
-    headers = {"Cache-Control": FOR_GOOD, "Vary": "Accept-Encoding"}
-    content = asset.content
-    if "gzip" in Headers(scope=scope).get("accept-encoding", ""):
-        content, headers["Content-Encoding"] = asset.compressed, "gzip"
+    content, encoding = asset.encoded(Headers(scope=scope).get("accept-encoding", ""))
+    headers = {"Cache-Control": FOR_GOOD, "Vary": "Accept-Encoding", **encoding}
     return Response(content, headers=headers, media_type=asset.media)
 
 

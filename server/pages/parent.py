@@ -113,6 +113,12 @@ def parent_page(
     return response
 
 
+@router.get("/help")
+def help_dialog() -> Response:
+    """For the script: the dialog on how to answer, with all keys."""
+    return page("_help.html")
+
+
 @router.post("/runs/{run_id}/parent/question")
 async def question(
     request: Request,

@@ -19,9 +19,10 @@ from playwright.sync_api import Browser, expect, sync_playwright
 from parenting.server import runs
 from parenting.server.app import create_app
 from parenting.server.db import Database
+from parenting.server.listener import bind
 from parenting.server.notify import Notifier
 from parenting.server.runs import Claim
-from parenting.server.serve import Server, bind
+from parenting.server.serve import Server
 from parenting.server.settings import Settings
 from tests.database import migrated
 from tests.pages import island_fixtures as fixtures

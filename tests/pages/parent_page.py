@@ -48,5 +48,5 @@ def named(page: Page, query: int) -> str:
 
 
 def shown(page: Page, query: int) -> None:
-    """Wait until a question is on the page."""
-    expect(page.locator(f'#question[data-query="{named(page, query)}"]')).to_be_visible()
+    """Wait until a question is on the page and takes an answer."""
+    expect(page.locator(f'#question[data-query="{named(page, query)}"][data-listening]')).to_be_visible()

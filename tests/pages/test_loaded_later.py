@@ -60,6 +60,14 @@ export const walk = () => import("./walk.js");
 AT = "http://pages.test"
 
 
+NESTED = {
+    "page.js": 'export const load = () => import("./first.js");\n',
+    "first.js": 'import { rare } from "./rare.js";\nexport default () => [rare, import("./second.js")];\n',
+    "second.js": 'import { rare } from "./rare.js";\nexport const same = rare;\n',
+    "rare.js": "export const rare = [7001];\n",
+}
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     for name, text in SOURCES.items():
@@ -146,3 +154,15 @@ def test_content_of_a_later_part_changes_its_address_and_the_pages(folder: Path)
     after = {name: one.name for name, one in page_scripts("page.js", folder).items()}
     changed = {name for name in before if before[name] != after[name]}
     assert changed == {"page.js", "page-walk.js"}
+
+
+def test_part_that_another_part_loads_carries_nothing_of_that_again(tmp_path: Path) -> None:
+    for name, text in NESTED.items():
+        (tmp_path / name).write_text(text)
+    found = {name: one.content.decode() for name, one in page_scripts("page.js", tmp_path).items()}
+    assert [name for name, text in found.items() if "7001" in text] == ["page-first.js"]
+    (tmp_path / "page.js").write_text(
+        NESTED["page.js"] + 'export const other = () => import("./second.js");\n'
+    )
+    found = {name: one.content.decode() for name, one in page_scripts("page.js", tmp_path).items()}
+    assert [name for name, text in found.items() if "7001" in text] == ["page-first.js", "page-second.js"]

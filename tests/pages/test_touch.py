@@ -33,6 +33,7 @@ def test_with_a_keyboard_the_help_shows_keys(tabs: BrowserTabs, db: Database) ->
     fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "up", start=(1, 2)))
     page = tabs.open("/runs/1/parent?query=1", viewport={"width": 1280, "height": 800})
     page.get_by_role("button", name="Help").click()
+    expect(page.get_by_role("dialog")).to_be_visible()
     keys = [" ".join(text.split()) for text in page.locator(".keys dt:visible").all_inner_texts()]
     assert keys == ["A 1", "B 2", "← → ↑ ↓", "E", "N", "Space", "Z", "D", "?"]
 

@@ -4,6 +4,7 @@ import gzip
 import re
 from pathlib import Path
 
+import brotli
 import httpx2
 import pytest
 
@@ -18,9 +19,14 @@ def test_browser_keeps_what_has_its_content_in_its_name(client: httpx2.Client) -
         plain = client.get(asset(name), headers={"Accept-Encoding": "identity"})
         assert plain.headers["cache-control"] == "public, max-age=31536000, immutable"
         assert (plain.content, plain.headers["content-type"]) == (made.content, made.media)
-        packed = client.get(asset(name), headers={"Accept-Encoding": "gzip"})
-        assert (packed.headers["content-encoding"], packed.content) == ("gzip", made.content)
-        assert gzip.decompress(made.compressed) == made.content
+        for accepted, encoding in (("gzip", "gzip"), ("gzip, br", "br"), ("br;q=0, gzip;q=0.5", "gzip")):
+            packed = client.get(asset(name), headers={"Accept-Encoding": accepted})
+            assert (packed.headers["content-encoding"], packed.headers["vary"]) == (
+                encoding,
+                "Accept-Encoding",
+            )
+            assert packed.content == made.content
+        assert gzip.decompress(made.gzipped) == brotli.decompress(made.brotlied) == made.content
 
 
 def test_name_with_another_hash_is_not_served(client: httpx2.Client) -> None:
@@ -34,6 +40,8 @@ def test_small_replies_go_as_they_are_and_large_ones_compressed(client: httpx2.C
     headers = {"Accept-Encoding": "gzip"}
     assert "content-encoding" not in client.get("/healthz", headers=headers).headers
     assert client.get("/api/v1/openapi.json", headers=headers).headers["content-encoding"] == "gzip"
+    headers = {"Accept-Encoding": "gzip, deflate, br, zstd"}
+    assert client.get("/", headers=headers).headers["content-encoding"] == "br"
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

@@ -1,10 +1,10 @@
 // Tells a parent who waits or looks elsewhere that the agent needs help, by a sound and a notification. Off until a button
 // turns it on. What makes the sound is loaded when it is first wanted.
-import { name, waiting } from "./page.js";
+import { name, page, waiting } from "./page.js";
 
 const KEY = "parenting.bell"; // "on" in the browser's storage
 const LONG = 5000; // ms of waiting after which a question is told of although the page is seen
-const buttons = document.querySelectorAll(".bell");
+const buttons = [];
 let since = performance.now();
 let on = read();
 
@@ -26,9 +26,14 @@ async function toggle() {
   if (on) (await import("./sound.js")).begin();
 }
 
-for (const button of buttons) button.addEventListener("click", toggle);
+// A button that turns it on and off.
+page.bell = (button) => {
+  buttons.push(button);
+  button.addEventListener("click", toggle);
+  show();
+};
+document.querySelectorAll(".bell").forEach(page.bell);
 new MutationObserver(async () => {
   if (!waiting.hidden) since = performance.now();
   else if (on && (document.hidden || performance.now() - since > LONG)) (await import("./sound.js")).ring(`The agent needs you · ${name}`);
 }).observe(waiting, { attributeFilter: ["hidden"] });
-show();

@@ -2,7 +2,7 @@
 import { takesTurns, turn } from "./compare.js";
 import { keyName } from "./key_names.js";
 import { openGrid } from "./place.js";
-import { $, help, page, speak, stage } from "./page.js";
+import { $, inDialog, page, speak, stage } from "./page.js";
 
 const CHOICES = { a: "left", b: "right", e: "either", n: "neither", 1: "left", 2: "right" };
 const LETTERS = "parenting.letters"; // "off" in the browser's storage: single letters and digits answer nothing
@@ -36,10 +36,10 @@ stage.addEventListener("click", (event) => {
 addEventListener("keydown", (event) => {
   const { target } = event, name = keyName(event);
   if (event.repeat && target.closest?.("#stage") && (name === "Enter" || name === " ")) event.preventDefault(); // a key held down presses no button twice
-  if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || event.isComposing || document.querySelector("dialog[open]")) return;
+  if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || event.isComposing || inDialog()) return;
   if (target.closest("input:not([type=checkbox]), textarea, select, [contenteditable]")) return;
   if (name.length === 1 && name !== " " && !letters.on) return;
-  if (name === "?") help.showModal();
+  if (name === "?") openHelp();
   else if (name === "d" && page.current && !event.shiftKey) speak(page.current.querySelector(".around ul").textContent.replace(/\s+/g, " ").trim());
   else if (name === "g" && page.current && !event.shiftKey) openGrid(page.current);
   else if (name === " " && page.player?.replay && !target.closest("button, a, summary, input")) page.player.replay();
@@ -54,8 +54,15 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
 });
 
-const allow = $("letters");
-allow.checked = letters.on;
-allow.addEventListener("change", () => { letters.on = allow.checked; });
+async function openHelp() {
+  if (inDialog()) return;
+  page.opening = true;
+  try {
+    const { help } = await import("./help.js");
+    await help();
+  } catch {
+    speak("The help did not come: there is no connection to the server.");
+  } finally { page.opening = false; }
+}
 $("help-open").hidden = false;
-$("help-open").addEventListener("click", () => help.showModal());
+$("help-open").addEventListener("click", openHelp);

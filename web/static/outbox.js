@@ -1,24 +1,11 @@
 // Answers on their way. Each is kept in the browser until the server has acknowledged it, and sent again until then.
 // An answer names the database, the run and the question that it is meant for. A server that has another database, or a
 // copy with an identity of its own, does not store it; the browser keeps it for the server that does.
-const KEY = "parenting.answers";
-let memory = [], sending = null, delay = 500;
-const elsewhere = new Set(); // answers that the server at this address would not have, until it was away
+import { elsewhere, key, meant, read, write } from "./kept.js";
 
-function read() {
-  try { return JSON.parse(localStorage.getItem(KEY)) ?? memory; } catch { return memory; }
-}
-
-function write(answers) {
-  memory = answers;
-  try { localStorage.setItem(KEY, JSON.stringify(answers)); } catch { /* no storage: memory holds them while the page lives */ }
-}
+let sending = null, delay = 500;
 
 const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListener("online", done, { once: true }); });
-
-// One key for an answer. Version 0.1 named no database, and its questions by number: such an answer is kept, not sent.
-const key = ({ database, question, query }) => `${database} ${question ?? query}`;
-const meant = (answer) => !elsewhere.has(key(answer));
 
 // One attempt: "saved", "refused" (the question has another answer, or was withdrawn), "elsewhere" (it is meant for another
 // database, or the server cannot read it) or "kept" (no connection, or a server in trouble).
@@ -70,6 +57,3 @@ export function flushAll(report) {
   elsewhere.clear();
   return flush(report);
 }
-
-// The questions whose answers are still on their way to this server.
-export const kept = () => read().filter((answer) => answer.question && meant(answer)).map(({ question }) => question);

@@ -1,6 +1,6 @@
 // What the parts of the parent's page share: its elements, the names of run and client, and what stands on it now.
 export const $ = (id) => document.getElementById(id);
-export const main = $("main"), stage = $("stage"), waiting = $("waiting"), help = $("help");
+export const main = $("main"), stage = $("stage"), waiting = $("waiting");
 export const { run, client, name } = main.dataset;
 export const PATIENCE = 1; // seconds that a request for a question may lie at the server
 export const given = new Set(); // questions that were answered on this page
@@ -9,6 +9,7 @@ export const page = {
   answer: null, // what a choice does: each page with questions sets its own
   current: null, // the form on the stage, until it is answered
   player: null,
+  put: null, // the form that was put on the stage last
   ahead: null, // the form after it
   lookout: null, // aborts the request for it, which lies at the server
   asking: false, // a request for a question is under way
@@ -19,8 +20,12 @@ export const page = {
   retracted: Number(main.dataset.retracted), // of these, those that stand no more
   goal: Number($("goal").firstElementChild.textContent),
   unsaved: 0,
+  opening: false, // a dialog is on its way, and no key answers
   quiet: 0, // the timer after which the page says that the agent explores
 };
+
+// A dialog has the keys.
+export const inDialog = () => page.opening || document.querySelector("dialog[open]") !== null;
 
 const CALM = 60; // ms
 
@@ -38,9 +43,9 @@ export function alarm(words) {
 }
 
 // Do something once the stage is painted: until then the page has nothing else to do.
-export function painted(then) {
+export function painted(then, calm = CALM) {
   let timer = 0;
   const once = () => { clearTimeout(timer); then?.(); then = null; };
-  requestAnimationFrame(() => setTimeout(once, CALM));
+  requestAnimationFrame(() => setTimeout(once, calm));
   timer = setTimeout(once, 5 * CALM); // a hidden page is never painted
 }

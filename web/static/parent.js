@@ -1,71 +1,25 @@
-// The parent's page: shows one question after another, takes keys and clicks, and says who waits for whom.
-import { answer, count, report } from "./answers.js";
-import "./bell.js";
-import "./keys.js";
-import { follow } from "./live.js";
-import { flush, flushAll, kept } from "./outbox.js";
-import { $, given, page, run, stage, waiting } from "./page.js";
-import { play } from "./play.js";
-import { leases } from "./presence.js";
-import { next, prefetch, show, take } from "./questions.js";
-import { wait } from "./waiting.js";
+// The parent's page. First it paints its question; all that answers it comes after that.
+import { ask, put } from "./asking.js";
+import { kept } from "./kept.js";
+import { page, painted, run, stage } from "./page.js";
 
-// A part of the page that is loaded when it is first used, after the style sheet that such parts share.
-let styled = null;
-function later(load) {
-  styled ??= new Promise((done) => {
-    const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href: $("walk").dataset.sheet, onload: done, onerror: done });
-    document.head.append(link);
-  });
-  return styled.then(load);
+const AGAIN = 1000; // ms until a script that did not arrive is asked for again; meanwhile the form answers by itself
+
+async function first() {
+  const there = stage.querySelector("#question");
+  if (there) return kept().includes(there.dataset.query) ? null : there;
+  return page.state === "question" ? ask().catch(() => null) : null;
 }
 
-// What the run's stream says.
-const tell = {
-  run(now) {
-    if (page.state === "offline" || page.state === "away") flushAll(report);
-    page.state = now.state;
-    if (page.state !== "question") page.taken = false;
-    page.goal = now.goal;
-    if (now.reason) $("reason").textContent = now.reason;
-    $("optimal").hidden = !now.optimal || !now.answers || page.state === "over";
-    $("resume").hidden = !["stopped", "failed"].includes(now.status);
-    count(now.answers, now.answers - now.standing);
-    if (now.answers && (given.size || !page.current)) later(() => import("./growth.js")).then(({ grown }) => grown(now, !page.current));
-    if (page.current && page.state === "over") page.current = null;
-    if (page.current) {
-      if (!page.ahead && !page.lookout && now.open.guidance + now.open.preference > 1) prefetch();
-      return;
-    }
-    if (page.state === "question") next();
-    else wait(page.state);
-  },
-  question(asked) {
-    if (!asked) return;
-    if (!page.current) next();
-    else if (asked.kind === "guidance" && asked.public_id !== page.current.dataset.query && !page.lookout) prefetch(); // it goes first
-  },
-  leases,
-  lost(status) {
-    page.state = status === 404 ? "away" : "offline";
-    wait(page.state);
-  },
-};
+function attend(form) {
+  import("./answering.js").then(({ begin }) => begin(form), (error) => {
+    reportError(error);
+    setTimeout(attend, AGAIN, form);
+  });
+}
 
-// Send what an earlier visit left behind, then follow the run.
-page.answer = answer;
-addEventListener("pagehide", () => flush(report));
-waiting.addEventListener("submit", (event) => {
-  if (!event.target.action.endsWith("/parent/take")) return;
-  event.preventDefault();
-  take();
-});
-// Watch it walk. The form works without this script; its style sheet comes with the walk, too.
-$("walk").addEventListener("submit", (event) => {
-  event.preventDefault();
-  later(() => import("./walk.js")).then(({ watch }) => watch(play), () => { $("alert").textContent = "The walk cannot be loaded. Reload the page."; });
-});
 history.replaceState(null, "", `/runs/${run}/parent`);
-const first = stage.querySelector("#question");
-if (first && !kept().includes(first.dataset.query)) show(first);
-flush(report).then(() => follow(run, tell, { background: true }));
+first().then((form) => {
+  if (form) put(form);
+  painted(() => attend(form), 0);
+});

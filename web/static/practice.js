@@ -4,7 +4,7 @@ import { listens } from "./arming.js";
 import { begin } from "./begin.js";
 import { keyName } from "./key_names.js";
 import { letters } from "./keys.js";
-import { $, help, page, stage } from "./page.js";
+import { $, inDialog, page, stage } from "./page.js";
 
 const question = $("question"), undo = $("undo");
 let sent = false;
@@ -18,7 +18,7 @@ stage.addEventListener("submit", (event) => {
 });
 addEventListener("pageshow", () => { sent = false; }); // also when one comes back to the page
 addEventListener("keydown", (event) => {
-  if (keyName(event) !== "z" || !letters.on || undo.hidden || event.repeat || event.isComposing || help.open) return;
+  if (keyName(event) !== "z" || !letters.on || undo.hidden || event.repeat || event.isComposing || inDialog()) return;
   if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("input, textarea, select, [contenteditable]")) return;
   undo.requestSubmit();
 });

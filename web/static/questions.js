@@ -1,26 +1,13 @@
-// Questions: fetches them, keeps one ahead, and puts them on the stage.
-// The markup of a question comes from the server (drawing/board.py says why); this file swaps it in.
+// Questions: keeps one ahead, and swaps one for the next.
 import { settle } from "./answers.js";
+import { ask, put } from "./asking.js";
 import { begin } from "./begin.js";
-import { kept } from "./outbox.js";
-import { client, given, main, name, page, painted, PATIENCE, run, stage, waiting } from "./page.js";
+import { kept } from "./kept.js";
+import { page, painted, PATIENCE } from "./page.js";
 import { attentive, leave } from "./presence.js";
 import { wait } from "./waiting.js";
 
 const LOOKOUT = 5; // seconds that the request for the question after this one may lie at the server, while somebody thinks
-
-// The form of the most urgent question, besides those that were answered here; null if there is none within `seconds`.
-async function ask(shown = [], seconds = 0, signal = undefined, more = {}) {
-  const body = new URLSearchParams({ client_id: client, wait: seconds, ...more });
-  for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
-  const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body, signal });
-  if (!reply.ok) throw Object.assign(new Error(reply.statusText), { status: reply.status });
-  if (reply.status === 204) return null;
-  const holder = document.createElement("template");
-  holder.innerHTML = await reply.text();
-  const form = holder.content.firstElementChild;
-  return given.has(form.dataset.query) ? null : form; // two requests may bring the same question, one of them late
-}
 
 // Fill the empty stage. One request at a time; what comes meanwhile is asked for once more.
 export async function next(seconds = 0) {
@@ -74,15 +61,11 @@ export async function prefetch() {
 }
 
 export function show(form) {
-  if (!form.isConnected) stage.replaceChildren(form);
+  put(form);
   clearTimeout(page.quiet);
   page.quiet = 0;
   page.ahead = null;
   page.taken = false;
-  waiting.hidden = true;
-  stage.hidden = false;
-  main.dataset.state = "question";
-  document.title = `● ${form.dataset.title} · ${name}`;
   settle();
   begin(form);
   performance.mark("question", { detail: form.dataset.query });

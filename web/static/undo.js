@@ -3,8 +3,9 @@
 import { report } from "./answers.js";
 import { keyName } from "./key_names.js";
 import { letters } from "./keys.js";
-import { flush, kept } from "./outbox.js";
-import { $, alarm, client, given, page, run } from "./page.js";
+import { kept } from "./kept.js";
+import { flush } from "./outbox.js";
+import { $, alarm, client, given, inDialog, page, run } from "./page.js";
 import { show } from "./questions.js";
 
 const PATIENCE = 3000; // ms for which the last answer may still be on its way
@@ -67,7 +68,7 @@ form.addEventListener("submit", (event) => {
   undo();
 });
 addEventListener("keydown", (event) => {
-  if (keyName(event) !== "z" || !letters.on || event.repeat || event.isComposing || document.querySelector("dialog[open]")) return;
+  if (keyName(event) !== "z" || !letters.on || event.repeat || event.isComposing || inDialog()) return;
   if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("input, textarea, select, [contenteditable]")) return;
   undo();
 });

@@ -1,0 +1,72 @@
+// What the parent's page does once its first question is painted: it takes keys and clicks, shows one question after
+// another, and says who waits for whom.
+import { answer, count, report } from "./answers.js";
+import "./bell.js";
+import "./keys.js";
+import { follow } from "./live.js";
+import { flush, flushAll } from "./outbox.js";
+import { $, given, page, run, waiting } from "./page.js";
+import { play } from "./play.js";
+import { leases } from "./presence.js";
+import { next, prefetch, show, take } from "./questions.js";
+import { wait } from "./waiting.js";
+
+// A part of the page that is loaded when it is first used, after the style sheet that such parts share.
+let styled = null;
+function later(load) {
+  styled ??= new Promise((done) => {
+    const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href: $("walk").dataset.sheet, onload: done, onerror: done });
+    document.head.append(link);
+  });
+  return styled.then(load);
+}
+
+// What the run's stream says.
+const tell = {
+  run(now) {
+    if (page.state === "offline" || page.state === "away") flushAll(report);
+    page.state = now.state;
+    if (page.state !== "question") page.taken = false;
+    page.goal = now.goal;
+    if (now.reason) $("reason").textContent = now.reason;
+    $("optimal").hidden = !now.optimal || !now.answers || page.state === "over";
+    $("resume").hidden = !["stopped", "failed"].includes(now.status);
+    count(now.answers, now.answers - now.standing);
+    if (now.answers && (given.size || !page.current)) later(() => import("./growth.js")).then(({ grown }) => grown(now, !page.current));
+    if (page.current && page.state === "over") page.current = null;
+    if (page.current) {
+      if (!page.ahead && !page.lookout && now.open.guidance + now.open.preference > 1) prefetch();
+      return;
+    }
+    if (page.state === "question") next();
+    else wait(page.state);
+  },
+  question(asked) {
+    if (!asked) return;
+    if (!page.current) next();
+    else if (asked.kind === "guidance" && asked.public_id !== page.current.dataset.query && !page.lookout) prefetch(); // it goes first
+  },
+  leases,
+  lost(status) {
+    page.state = status === 404 ? "away" : "offline";
+    wait(page.state);
+  },
+};
+
+// Answer what is on the stage, send what an earlier visit left behind, then follow the run.
+export function begin(form) {
+  page.answer = answer;
+  addEventListener("pagehide", () => flush(report));
+  waiting.addEventListener("submit", (event) => {
+    if (!event.target.action.endsWith("/parent/take")) return;
+    event.preventDefault();
+    take();
+  });
+  // Watch it walk. The form works without this script; its style sheet comes with the walk, too.
+  $("walk").addEventListener("submit", (event) => {
+    event.preventDefault();
+    later(() => import("./walk.js")).then(({ watch }) => watch(play), () => { $("alert").textContent = "The walk cannot be loaded. Reload the page."; });
+  });
+  if (form) show(form);
+  flush(report).then(() => follow(run, tell, { background: true }));
+}
