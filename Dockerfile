@@ -28,6 +28,13 @@ RUN python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))
 RUN --mount=type=bind,from=wheel,source=/wheel,target=/wheel \
     pip install --no-cache-dir --no-deps /wheel/*.whl
 
+# Byte code for everything that a start imports: pip compiles what it installs, but this image comes without that of the
+# standard library, and the user below cannot write it. Each of the processes would compile it at each start.
+RUN python -m compileall -q -j 0 -x '/(site-packages|test|tests|idlelib|lib2to3)/' \
+        "$(python -c 'import sysconfig; print(sysconfig.get_path("stdlib"))')" \
+    && python -c "import importlib.util as found, os; names = ('asyncio', 'json', 'torch', 'fastapi', 'parenting.server.app'); \
+exit([name for name in names if not os.path.exists(found.cache_from_source(found.find_spec(name).origin))] or None)"
+
 # Nothing here lets the server listen beyond its container: that is for whoever publishes the port (docs/deployment.md).
 ENV PYTHONUNBUFFERED=1 PARENTING_DATA=/data PARENTING_PORT=8765
 VOLUME /data

@@ -14,13 +14,16 @@ milliseconds:
 - *live*: the same where nothing is open: the answer goes to the database and to the worker, the agent acts on
   it and trains on it, asks for guidance again (preset conservative), and the page shows that. Presses after
   which a preference came count as well, and those after which the agent first took some steps alone.
+- *started*: the button *Start* of the first page is pressed, until the first question is on the screen. The
+  run is made, a worker begins it and acts until it asks; nothing of the page is in the browser's cache.
 
 A key counts from the event's own time stamp. *On the screen* is when the browser presented the question's
 heading (Element Timing); *painted* is when the page's own part of that frame was done. Between two keys lies
 a random pause, as a person takes it.
 
 Yardsticks from the same run say what the machine does: an empty request, a durable commit of one row, and a
-key until a letter is on an empty page. On a machine with other work compare ratios to them.
+key until a letter is on an empty page. On a machine with other work compare ratios to them: the last column
+has each median in empty requests.
 """
 
 from __future__ import annotations
@@ -40,6 +43,7 @@ from typing import Any, NamedTuple
 import httpx2
 from playwright.sync_api import Browser, Page
 
+from benchmarks.in_page import AHEAD, DONE, EMPTY, PROBE, SINCE, STARTED
 from parenting.server.store.sqlite import PRAGMAS, sqlite_module
 from tests.simulated_person import chromium, up
 
@@ -55,46 +59,7 @@ IDLE = 0.7
 """A machine with a higher load average is not idle."""
 SEED = 3
 CLIENT = "benchmark"
-HEAD = f"{'':23}{'world':20}{'n':>4}{'median':>9}{'p95':>9}{'min':>9}{'max':>9}"
-
-PROBE = """(() => {
-  const rows = window.rows = [];
-  let key = 0;
-  addEventListener("keydown", (event) => { key = event.timeStamp; }, true);
-  new PerformanceObserver((list) => {
-    for (const entry of list.getEntries()) {
-      const row = rows.find(({ query }) => query === entry.identifier);
-      if (row) row.screen = entry.renderTime - row.key;
-    }
-  }).observe({ type: "element" });
-  window.shown = (query, heading) => {
-    const row = { query, key };
-    rows.push(row);
-    heading.setAttribute("elementtiming", query);
-    requestAnimationFrame(() => {
-      const { port1, port2 } = new MessageChannel();
-      port1.onmessage = () => { row.painted = performance.now() - row.key; };
-      port2.postMessage(0);
-    });
-  };
-  addEventListener("DOMContentLoaded", () => {
-    const stage = document.getElementById("stage");
-    if (stage) new MutationObserver(() => {
-      const form = stage.querySelector("#question"), query = form?.dataset.query;
-      if (form && query !== rows.at(-1)?.query) shown(query, form.querySelector("h1"));
-    }).observe(stage, { childList: true });
-  });
-})();"""
-"""In the page: when a question was painted and was on the screen, after the last key."""
-
-AHEAD = "document.querySelector('#question')?.dataset.ahead"
-DONE = "at => rows[at]?.screen !== undefined && rows[at].painted !== undefined"
-EMPTY = """addEventListener("keydown", () => {
-  const heading = document.createElement("h1");
-  heading.textContent = "A";
-  document.body.replaceChildren(heading);
-  shown(String(performance.now()), heading);
-});"""
+HEAD = f"{'':23}{'world':20}{'n':>4}{'median':>9}{'p95':>9}{'min':>9}{'max':>9}{'requests':>10}"
 
 
 class Line(NamedTuple):
@@ -240,6 +205,28 @@ def press(page: Page, pause: float, key: str) -> dict[str, Any]:
     return {**page.evaluate("at => rows[at]", before["count"]), "ahead": before["ahead"]}
 
 
+def starts(browser: Browser, web: httpx2.Client, world: str, times: int) -> Iterator[Line]:
+    """Press Start on the first page, each time in a browser that knows nothing of it."""
+    painted, screen = [], []
+    for seed in range(times):
+        context = browser.new_context(viewport={"width": 1280, "height": 800})
+        page = context.new_page()
+        page.add_init_script(PROBE)
+        page.add_init_script(STARTED)
+        page.goto(str(web.base_url))
+        page.select_option("#world", world)
+        page.fill("form.fields input[name=seed]", str(seed))
+        page.click("form.fields button.primary")
+        page.wait_for_url("**/parent", timeout=1e3 * PATIENCE)
+        until(lambda: page.evaluate(DONE, 0), every=0.05)  # noqa: B023 (called before the next round)
+        for found, since in zip((painted, screen), page.evaluate(SINCE), strict=True):
+            found.append(since)
+        web.post(f"/api/v1/runs/{page.get_attribute('#main', 'data-run')}/stop").raise_for_status()
+        context.close()
+    yield Line("started, painted", world, painted)
+    yield Line("started, on the screen", world, screen)
+
+
 def screens(kind: str, world: str, rows: Sequence[dict[str, Any]]) -> Iterator[Line]:
     """Both times of some presses."""
     yield Line(f"{kind}, painted", world, [row["painted"] for row in rows])
@@ -260,6 +247,8 @@ def measure(worlds: Sequence[str], answers: int) -> Iterator[Line]:
             for ahead in (True, False):
                 for world in worlds:
                     yield from keys(browser, web, world, ahead, answers)
+            for world in worlds:
+                yield from starts(browser, web, world, answers)
         web.close()
 
 
@@ -279,8 +268,10 @@ def main() -> None:
         return
     idle = "" if load <= IDLE else ": NOT idle, so compare ratios to the yardsticks"
     print(f"{os.cpu_count()} cores, load average {load:.2f} at the start{idle}\n\n{HEAD}")
+    request = None
     for line in lines:
-        print(line, flush=True)
+        request = request or line.numbers()["median"]  # the first line is the empty request
+        print(f"{line}{line.numbers()['median'] / request:10.1f}", flush=True)
 
 
 if __name__ == "__main__":

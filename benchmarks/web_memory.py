@@ -68,7 +68,8 @@ PATHS = (
 
 def serve(port: int, folder: Path) -> None:
     """Serve with tracemalloc; each SIGUSR1 writes a snapshot of what is held."""
-    from parenting.server.serve import bind, make_server
+    from parenting.server.listener import bind
+    from parenting.server.serve import make_server
     from parenting.server.settings import Settings
 
     numbers = count(1)

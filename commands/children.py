@@ -96,6 +96,23 @@ def lifeline() -> Iterator[int]:
         os.close(ours)
 
 
+@contextmanager
+def gate() -> Iterator[tuple[int, Callable[[], None]]]:
+    """Yield a descriptor for processes to wait at (`server.lifeline.wait_at`), and what lets them through."""
+    theirs, ours = os.pipe()
+    left = [ours]
+
+    def open_gate() -> None:
+        if left:
+            os.close(left.pop())
+
+    try:
+        yield theirs, open_gate
+    finally:
+        os.close(theirs)
+        open_gate()
+
+
 def start(arguments: Sequence[str], followed: int, descriptors: Sequence[int] = ()) -> Process:
     """Start `parenting ...` in a session of its own: Ctrl-C reaches this process alone, which stops it."""
     # With -P, Python does not look for packages in the current folder: a project of the user's may have a

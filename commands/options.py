@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Annotated
 
 import typer
+
+AfterFd = Annotated[
+    int | None, typer.Option(hidden=True, help="A pipe that `parenting up` closes once the tables are there.")
+]
 
 
 def whole(least: int, most: int) -> Callable[[str | int], int]:

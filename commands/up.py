@@ -1,6 +1,7 @@
 """`parenting up`: start everything by one command.
 
-Web and worker are separate processes, so that neither blocks the other.
+Web and worker are separate processes, so that neither blocks the other. They load their libraries while this
+one migrates the database, and begin once it has: a pipe that this process closes tells them.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
@@ -23,10 +24,8 @@ from parenting.commands import children
 from parenting.commands.children import Child
 from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.printing import say
-from parenting.server.backups.before_migrating import migrate
-from parenting.server.db import connect
 from parenting.server.lifeline import follow
-from parenting.server.serve import bind
+from parenting.server.listener import bind
 from parenting.server.settings import Settings
 from parenting.server.store.private import make_files_private
 
@@ -48,20 +47,29 @@ def up(
     with friendly_errors():
         chosen = settings(port=port)
         listener = bind(chosen.host, chosen.port, chosen.container)
-        _migrate(chosen)
-    with listener, _signals() as told, _children(listener) as both:
-        url = f"http://localhost:{listener.getsockname()[1]}/"
-        say(f"Parenting is at {url}  (Ctrl-C stops it)")
-        if browser and _has_screen():
-            threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-        try:
-            children.watch(both, told)
-        except children.RefusedError as error:
-            _tell(str(error))
-            raise typer.Exit(children.REFUSED) from None
+        with listener, _signals() as told, _children(listener) as (both, migrated):
+            _migrate(chosen)
+            migrated()
+            _watch(both, told, listener.getsockname()[1], browser)
+
+
+def _watch(both: Sequence[Child], told: threading.Event, port: int, browser: bool) -> None:
+    """Say where the pages are, and keep the processes running until told to stop."""
+    url = f"http://localhost:{port}/"
+    say(f"Parenting is at {url}  (Ctrl-C stops it)")
+    if browser and _has_screen():
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+    try:
+        children.watch(both, told)
+    except children.RefusedError as error:
+        _tell(str(error))
+        raise typer.Exit(children.REFUSED) from None
 
 
 def _migrate(chosen: Settings) -> None:
+    from parenting.server.backups.before_migrating import migrate  # loads SQLAlchemy while the others start
+    from parenting.server.db import connect
+
     db = connect(chosen)
     try:
         migrate(db, chosen.data)
@@ -86,16 +94,22 @@ def _signals() -> Iterator[threading.Event]:
 
 
 @contextmanager
-def _children(listener: socket.socket) -> Iterator[Sequence[Child]]:
-    """Start web and worker. A web process that is started again takes the same listening socket."""
+def _children(listener: socket.socket) -> Iterator[tuple[Sequence[Child], Callable[[], None]]]:
+    """Start web and worker, and yield them with what lets them begin.
+
+    A web process that is started again takes the same listening socket.
+    """
     started: list[Child] = []
-    with children.lifeline() as followed:
+    with children.lifeline() as followed, children.gate() as (gate, opened):
         fd = listener.fileno()
-        web = partial(children.start, ["web", "--fd", str(fd)], followed, [fd])
+        after = ["--after-fd", str(gate)]
+        web = partial(children.start, ["web", "--fd", str(fd), *after], followed, [fd, gate])
         try:
             started.append(Child("web", web, _tell))
-            started.append(Child("worker", partial(children.start, ["worker"], followed), _tell))
-            yield started
+            started.append(
+                Child("worker", partial(children.start, ["worker", *after], followed, [gate]), _tell)
+            )
+            yield started, opened
         finally:
             children.stop(started)
 

@@ -9,9 +9,10 @@ import typer
 
 from parenting.commands.database import require_file
 from parenting.commands.errors import friendly_errors, settings
+from parenting.commands.options import AfterFd
 from parenting.commands.printing import say
-from parenting.server.lifeline import follow
-from parenting.server.serve import bind, make_server
+from parenting.server.lifeline import follow, wait_at
+from parenting.server.listener import bind
 from parenting.server.store.private import make_files_private
 
 Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a free one.", show_default="8765")]
@@ -25,6 +26,7 @@ def web(
     fd: Annotated[
         int | None, typer.Option(hidden=True, help="A listening socket, from `parenting up`.")
     ] = None,
+    after_fd: AfterFd = None,
 ) -> None:
     """Serve the pages and the API on this machine until Ctrl-C.
 
@@ -34,6 +36,9 @@ def web(
     make_files_private()
     with friendly_errors():
         chosen = settings(port=port, host=host)
+        from parenting.server.serve import make_server  # loads the web's libraries
+
+        wait_at(after_fd)
         require_file(chosen)
         server = make_server(chosen)
         listener = (

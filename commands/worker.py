@@ -9,9 +9,10 @@ import typer
 
 from parenting.commands.database import require_file
 from parenting.commands.errors import friendly_errors, settings
+from parenting.commands.options import AfterFd
 from parenting.commands.printing import say
 from parenting.server.db import connect
-from parenting.server.lifeline import follow
+from parenting.server.lifeline import follow, wait_at
 from parenting.server.log import set_up_log
 from parenting.server.migrate import require_current
 from parenting.server.settings import Settings
@@ -26,6 +27,7 @@ def worker(
             "--check", help="Only check whether a worker of this machine is alive: exit code 0 if so, else 1."
         ),
     ] = False,
+    after_fd: AfterFd = None,
 ) -> None:
     """Train the agents of the runs in the database until Ctrl-C.
 
@@ -39,12 +41,14 @@ def worker(
     make_files_private()
     with friendly_errors():
         chosen = settings()
-        require_file(chosen)
+        if after_fd is None:
+            require_file(chosen)
         set_up_log(chosen, "worker")
         from parenting.server.worker import (
             main,  # loads torch, which takes a second, so the settings are checked before
         )
 
+        wait_at(after_fd)
         main(chosen)
 
 

@@ -1,4 +1,4 @@
-"""A pipe from one process to those that it starts: when it ends, however it ends, they stop too."""
+"""Pipes from one process to those that it starts: when it ends they stop too, and begin when it lets them."""
 
 from __future__ import annotations
 
@@ -22,3 +22,9 @@ def follow() -> None:
 def _wait(descriptor: int) -> None:
     os.read(descriptor, 1)  # nobody ever writes: it ends when the other end is closed
     os.kill(os.getpid(), signal.SIGTERM)
+
+
+def wait_at(gate: int | None) -> None:
+    """Wait until the process that holds the other end of a pipe closes it; None waits for nothing."""
+    if gate is not None:
+        os.read(gate, 1)  # nobody ever writes

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import socket
 from types import FrameType
 
 import structlog
@@ -14,12 +13,10 @@ from parenting.server.app import create_app
 from parenting.server.connections.files import room_for
 from parenting.server.connections.limits import Limits
 from parenting.server.connections.protocol import bounded
-from parenting.server.errors import SetupError
 from parenting.server.heap import share_heaps
 from parenting.server.log import set_up_log
 from parenting.server.settings import Settings
 
-LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
 log = structlog.get_logger()
 
 GRACE = 1
@@ -37,34 +34,8 @@ class Server(uvicorn.Server):
         super().handle_exit(sig, frame)
 
 
-def bind(host: str, port: int, container: bool = False) -> socket.socket:
-    """Open a listening socket, on this machine only, or with `container` on its whole network.
-
-    Raises:
-        SetupError: the address would let others in, or the port is taken.
-    """
-    if host != LOOPBACK and not (container and host == EVERYWHERE):
-        raise SetupError(
-            f"host: {host} would let others in, and there is no login yet. Use {LOOPBACK}; or, in a "
-            f"container whose port is published on loopback only, {EVERYWHERE} and PARENTING_CONTAINER=true."
-        )
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind((host, port))
-    except OSError as error:
-        listener.close()
-        said = error.strerror or "it cannot be used"
-        raise SetupError(
-            f"port: {port} cannot be used ({said}). Name another one, or 0 for any free one."
-        ) from None
-    listener.listen(128)
-    listener.set_inheritable(True)
-    return listener
-
-
 def make_server(settings: Settings) -> Server:
-    """Make a server that is ready to `run(sockets=[bind(...)])` until a signal stops it.
+    """Make a server that is ready to `run(sockets=[...])` until a signal stops it.
 
     Raises:
         SetupError: the database cannot be used as it is.

@@ -63,6 +63,7 @@ def miniature(tmp_path: Path) -> Path:
     (house / "agent/learning/__init__.py").write_text("import torch\nimport parenting.envs.registry\n")
     (house / "parents/scripted/__init__.py").write_text("import parenting.agent.learning\n")
     (house / "experiments/table1/__init__.py").write_text("import parenting.parents.scripted\n")
+    (house / "server/app/__init__.py").write_text("import fastapi\n")
     (house / "commands/run/__init__.py").write_text(
         "import parenting.experiments.table1\nimport parenting.server.app\n"
     )
@@ -96,6 +97,8 @@ def test_miniature_is_allowed(miniature: Path) -> None:
         ("server/app/__init__.py", "import parenting.agent.learning", "web-without-torch"),
         ("envs/levels/__init__.py", "import torch", "web-without-torch"),
         ("agent/__init__.py", "from parenting.agent.learning import torch", "inits-without-torch"),
+        ("server/worker/__init__.py", "import alembic.config", "start-without-alembic"),
+        ("commands/up/__init__.py", "import parenting.server.app", "up-without-web"),
     ],
 )
 def test_contract_catches(miniature: Path, file: str, line: str, contract: str) -> None:

@@ -88,9 +88,9 @@ FILES = [
     Mutant(
         "each step of a migration is committed by itself (D6)",
         "server/migrate.py",
-        '        command.upgrade(config, "head")\n',
+        '        _alembic(connection, "upgrade", "head")\n',
         "        while _revision(connection) != newest():\n"
-        '            command.upgrade(config, "+1")\n'
+        '            _alembic(connection, "upgrade", "+1")\n'
         '            connection.exec_driver_sql("COMMIT")\n'
         '            connection.exec_driver_sql("BEGIN IMMEDIATE")\n',
         "tests/faults/test_migration_kills.py::"

@@ -15,7 +15,8 @@ import pytest
 from parenting.server.admission import Admission
 from parenting.server.db import Database
 from parenting.server.errors import BusyError
-from parenting.server.serve import bind, make_server
+from parenting.server.listener import bind
+from parenting.server.serve import make_server
 from parenting.server.settings import Settings
 from tests.server.test_meters import figures
 

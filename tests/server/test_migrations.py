@@ -4,12 +4,14 @@ from collections.abc import Iterator
 
 import pytest
 from alembic.autogenerate import compare_metadata
+from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, text
 
 from parenting.server.db import Database
 from parenting.server.errors import SetupError
-from parenting.server.migrate import downgrade, require_current, upgrade
+from parenting.server.migrate import FOLDER, downgrade, known_revisions, require_current, upgrade
 from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 from parenting.server.tables import Table
@@ -143,3 +145,10 @@ def test_only_an_older_revision_can_be_gone_back_to(db: Database, revision: str)
         downgrade(db, revision)
     listed = said.value.message.partition("Use one of: ")[2].rstrip(".").split(", ")
     assert revision not in listed
+
+
+def test_revisions_are_known_without_alembic_as_it_knows_them() -> None:
+    config = Config()
+    config.set_main_option("script_location", str(FOLDER))
+    scripts = ScriptDirectory.from_config(config).walk_revisions()
+    assert known_revisions() == tuple(script.revision for script in scripts)

@@ -7,7 +7,8 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.errors import SetupError
-from parenting.server.serve import bind, make_server
+from parenting.server.listener import bind
+from parenting.server.serve import make_server
 from parenting.server.settings import Settings
 
 ELSEWHERE = ["0.0.0.0", "192.168.1.2", "::", "localhost", ""]
@@ -27,7 +28,7 @@ class Listener(socket.socket):
 
 @pytest.fixture
 def deaf(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("parenting.server.serve.socket.socket", Listener)
+    monkeypatch.setattr("parenting.server.listener.socket.socket", Listener)
 
 
 def test_this_machine_alone_can_reach_it() -> None:
