@@ -35,7 +35,7 @@ def test_with_a_keyboard_the_help_shows_keys(tabs: BrowserTabs, db: Database) ->
     page.get_by_role("button", name="Help").click()
     expect(page.get_by_role("dialog")).to_be_visible()
     keys = [" ".join(text.split()) for text in page.locator(".keys dt:visible").all_inner_texts()]
-    assert keys == ["A 1", "B 2", "← → ↑ ↓", "E", "N", "Space", "Z", "W", "D", "?"]
+    assert keys == ["A 1", "B 2", "← → ↑ ↓", "E", "N", "Space", "Z", "W", "D", "G", "?"]
 
 
 def test_a_table_wider_than_the_phone_has_a_shadow_where_it_goes_on(tabs: BrowserTabs, db: Database) -> None:
