@@ -207,7 +207,7 @@ def press(page: Page, pause: float, key: str) -> dict[str, Any]:
 
 def starts(browser: Browser, web: httpx2.Client, world: str, times: int) -> Iterator[Line]:
     """Press Start on the first page, each time in a browser that knows nothing of it."""
-    painted, screen = [], []
+    painted, screen = list[float](), list[float]()
     for seed in range(times):
         context = browser.new_context(viewport={"width": 1280, "height": 800})
         page = context.new_page()

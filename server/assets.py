@@ -65,7 +65,8 @@ class Asset:
     @cached_property
     def brotlied(self) -> bytes:
         """The content for a client that takes brotli: an eighth smaller, in some milliseconds once."""
-        return brotli.compress(self.content, quality=11)
+        packed: bytes = brotli.compress(self.content, quality=11)
+        return packed
 
     def encoded(self, accepted: str) -> tuple[bytes, dict[str, str]]:
         """Return the content and its header for a client that takes these encodings (`Accept-Encoding`)."""

@@ -33,7 +33,13 @@ def lint(*arguments: str, script: str | None = None) -> list[dict[str, Any]]:
         if os.environ.get("CI"):
             pytest.fail("scripts/browsers has no node_modules: .ci/run installs them.")
         pytest.skip("only CI needs it; npm ci --prefix scripts/browsers installs it")
-    command = [LINT / "node_modules/.bin/eslint", "--config", LINT / "eslint.config.js", "--format", "json"]
+    command: list[str | Path] = [
+        LINT / "node_modules/.bin/eslint",
+        "--config",
+        LINT / "eslint.config.js",
+        "--format",
+        "json",
+    ]
     done = subprocess.run([*command, *arguments], cwd=ROOT, input=script, capture_output=True, text=True)
     assert done.returncode in (0, 1), done.stderr
     found: list[dict[str, Any]] = json.loads(done.stdout)
