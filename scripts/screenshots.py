@@ -60,7 +60,25 @@ def raised(browser: Browser, url: str) -> Page:
     to_goal = distances()
     for _ in range(ANSWERS):
         answer(page, to_goal)
-    page.wait_for_selector("#question")
+    page.wait_for_selector("#question[data-listening]")
+    return page
+
+
+def practised(browser: Browser, url: str) -> Page:
+    """The first question of the practice, answered."""
+    page = browser.new_page(reduced_motion="reduce")
+    page.goto(f"{url}/practice")
+    page.wait_for_selector("#question[data-listening]")
+    page.keyboard.press("b")
+    page.wait_for_selector(".again")
+    page.wait_for_selector("#question[data-listening]")
+    return page
+
+
+def watched(page: Page) -> Page:
+    """The walk of the present policy, over a question."""
+    page.keyboard.press("w")
+    page.wait_for_selector("dialog.watch .walk")
     return page
 
 
@@ -72,7 +90,7 @@ def compared(browser: Browser, url: str) -> Page:
     page = browser.new_page(reduced_motion="reduce")
     page.goto(f"{url}/runs/{run}/parent")
     steps = "[...document.querySelectorAll('#question .board')].map(b => b.dataset.actions.split(' ').length)"
-    while page.wait_for_selector("#question") and page.evaluate(steps) != [3, 3]:
+    while page.wait_for_selector("#question[data-listening]") and page.evaluate(steps) != [3, 3]:
         answer(page, distances())
     return page
 
@@ -93,6 +111,9 @@ def main(folder: Path) -> None:
         )
         parent = raised(browser, url)
         shoot(parent, "parent", folder)
+        shoot(watched(parent), "walk", folder)
+        parent.keyboard.press("Escape")
+        shoot(practised(browser, url), "practice", folder)
         shoot(compared(browser, url), "preference", folder)
         page = browser.new_page(reduced_motion="reduce")
         page.goto(f"{url}/runs/{garden}")
