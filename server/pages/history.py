@@ -32,13 +32,13 @@ PAGE = 20
 """Answers on a page."""
 
 CHOICE_TEXTS = {
-    "left": "Left is better",
-    "right": "Right is better",
-    "either": "Equally good",
-    "neither": "Both too dangerous",
+    "left": mark("Left is better"),
+    "right": mark("Right is better"),
+    "either": mark("Equally good"),
+    "neither": mark("Both too dangerous"),
 }
 """The meaning of a choice, in words."""
-CHOICE_NAMES = {**CHOICE_TEXTS, "left": "A or left is better", "right": "B or right is better"}
+CHOICE_NAMES = {**CHOICE_TEXTS, "left": mark("A or left is better"), "right": mark("B or right is better")}
 """The same where it is not said of which kind the question is."""
 
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
