@@ -115,7 +115,7 @@ def test_some_of_them(client: httpx2.Client, db: Database, mine: Claim) -> None:
     assert numbers(client.get("/runs/1/history?kind=preference").text) == [clips]
     page = client.get("/runs/1/history?kind=guidance&choice=left").text
     assert numbers(page) == list(range(PAGE + 4, 4, -1))
-    assert "<option selected>guidance" in page
+    assert '<option value="guidance" selected>guidance' in page
     here = f"/runs/{get_run(db, 1).public_id}/history"
     assert f'href="{here}?kind=guidance&amp;choice=left&amp;before=5"' in page
     assert "No answer matches." in client.get("/runs/1/history?choice=either").text
