@@ -9,6 +9,7 @@ from urllib.parse import urlencode
 
 from fastapi import Query, Request, Response
 
+from parenting.drawing.sentences import mark, tr
 from parenting.server import runs, tables
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
@@ -141,16 +142,21 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
 def _said(choice: str, shown: QuestionView) -> str:
     """Say what a choice means; a move of one board has its letter."""
     sides = {move.side for move in shown.candidates} if shown.one_board else set()
-    return f"{shown.names[choice]}, is better" if choice in sides else CHOICE_TEXTS[choice]
+    if choice in sides:
+        return tr("{name}, is better", name=shown.names[choice])
+    return tr(CHOICE_TEXTS[choice])
 
 
 def _fallen(answer: tables.Answer, query: tables.Query) -> str:
     if answer.standing:
         return ""
-    return "taken back" if query.status in (QueryStatus.OPEN, QueryStatus.WITHDRAWN) else "corrected later"
+    back = query.status in (QueryStatus.OPEN, QueryStatus.WITHDRAWN)
+    return tr("taken back") if back else tr("corrected later")
 
 
 def _who(parent: str, client_id: str, mine: str) -> str:
     if parent == "scripted":
-        return "a script"
-    return "you, in this browser" if client_id == mine else f"a person ({client_id[:8]})"
+        return tr("a script")
+    if client_id == mine:
+        return tr("you, in this browser")
+    return tr("a person ({name})", name=client_id[:8])
