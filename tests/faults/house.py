@@ -56,6 +56,7 @@ class House:
         self.orders |= {f"worker {number}": ("worker",) for number in range(1, workers + 1)}
         self.patches: Mapping[str, Any] = PATCHES
         self.prepare: Callable[[], object] | None = None
+        self.endings: set[int | None] = {None, -signal.SIGKILL}
         self.commands: dict[str, Command] = {}
         self.ledger = Ledger(settings.data / "ledger")
         self.parents: list[Parent] = []
@@ -94,7 +95,7 @@ class House:
             one = self.commands.get(name)
             if one is None or not one.alive:
                 code = None if one is None else one.process.exitcode
-                assert code in (None, -signal.SIGKILL), f"{name} ended with {code}: {one and one.said()}"
+                assert code in self.endings, f"{name} ended with {code}: {one and one.said()}"
                 self.begin(name)
 
     def kill(self, name: str) -> str:
