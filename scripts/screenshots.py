@@ -29,9 +29,11 @@ GARDEN = {"stages": 3, "mature_every": 15, "time_limit": 10}
 
 
 def shoot(page: Page, name: str, folder: Path, sizes: dict[str, tuple[int, int]] = SCREENS) -> None:
-    """Take pictures of a page on a desktop and on a phone, light and dark."""
+    """Take pictures of a page on a desktop and on a phone, which has no keys, light and dark."""
+    session = page.context.new_cdp_session(page)
     for device, (width, height) in sizes.items():
         page.set_viewport_size({"width": width, "height": height})
+        session.send("Emulation.setTouchEmulationEnabled", {"enabled": device == "phone"})
         for scheme in ("light", "dark"):
             page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
             page.wait_for_timeout(1500)

@@ -66,3 +66,8 @@ def test_firefox_answers_takes_back_reloads_and_shares_two_tabs(
     shown(tab, db, fourth)
     tab.wait("document.querySelector('#count').textContent === '3'")
     assert [choice for _, choice in given(db)] == ["right", "neither", "left", "either"]
+    assert browser_of_mozilla.wrong == []
+    tab.evaluate("console.error('planted')")  # the control: what goes wrong is heard
+    tab.wait("true")
+    assert browser_of_mozilla.wrong == ["planted"]
+    browser_of_mozilla.wrong.clear()

@@ -16,7 +16,16 @@ from parenting.server.pages.texts import STATE_TEXTS
 from parenting.server.statuses import RunState
 from tests.pages import island_fixtures as fixtures
 
-PATHS = ("/", "/runs/1", "/runs/1/parent", "/runs/1/parent?query=1", "/runs/1/parent?query=2", "/runs/77")
+PATHS = (
+    "/",
+    "/practice?at=1&choice=left",
+    "/practice?at=6",
+    "/runs/1",
+    "/runs/1/parent",
+    "/runs/1/parent?query=1",
+    "/runs/1/parent?query=2",
+    "/runs/77",
+)
 STATIC = sorted((WEB / "static").iterdir())
 
 
