@@ -3,6 +3,7 @@
 Keep this file small: a fixture for one folder belongs in that folder's conftest.py.
 """
 
+import gc
 import os
 import shutil
 from pathlib import Path
@@ -39,11 +40,14 @@ def chromium_path() -> str:
 def pytest_collection_modifyitems() -> None:
     """Have torch use one thread: two are slower here, and give other bits. pytest-xdist keeps the cores busy.
 
-    This is not done when this file is read, for the process that only hands out tests needs no torch.
+    This is not done when this file is read, for the process that only hands out tests needs no torch. What
+    the modules have made by now stays; the garbage collector need not look through it again and again.
     """
     import torch
 
     torch.set_num_threads(1)
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from tests.tree import ROOT
 
@@ -64,25 +63,32 @@ def numbers(some: Sequence[Row], column: str) -> list[float]:
     return [float(row[column]) for row in some]
 
 
+def stats() -> Any:
+    """Return `scipy.stats`, whose import takes a second that each process which collects tests would pay."""
+    from scipy import stats
+
+    return stats
+
+
 def student(values: Sequence[float]) -> Ends:
-    found = stats.ttest_1samp(values, 0).confidence_interval(0.95)
+    found = stats().ttest_1samp(values, 0).confidence_interval(0.95)
     return found.low, found.high
 
 
 def welch(more: Sequence[float], less: Sequence[float]) -> Ends:
-    found = stats.ttest_ind(more, less, equal_var=False).confidence_interval(0.95)
+    found = stats().ttest_ind(more, less, equal_var=False).confidence_interval(0.95)
     return found.low, found.high
 
 
 def widened(ends: Ends, error: float) -> Ends:
     middle, half = sum(ends) / 2, (ends[1] - ends[0]) / 2
-    return middle - hypot(half, stats.norm.ppf(0.975) * error), middle + hypot(
-        half, stats.norm.ppf(0.975) * error
+    return middle - hypot(half, stats().norm.ppf(0.975) * error), middle + hypot(
+        half, stats().norm.ppf(0.975) * error
     )
 
 
 def wilson(hits: int, count: int) -> Ends:
-    low, high = stats.binomtest(hits, count).proportion_ci(0.95, "wilson")
+    low, high = stats().binomtest(hits, count).proportion_ci(0.95, "wilson")
     return 100 * low, 100 * high
 
 
@@ -140,7 +146,7 @@ def figure2(what: str, every: Sequence[Row]) -> Ends:
     if one := re.fullmatch(r"(exact look-ahead|full-coverage agent), T = (\d)", told):
         of = {"exact look-ahead": "look-ahead", "full-coverage agent": "coverage"}[one[1]]
         (row,) = [row for row in here if (row["of"], row["stage"]) == (of, one[2])]
-        low, high = stats.norm.interval(0.95, float(row["waterings"]), float(row["error"]))
+        low, high = stats().norm.interval(0.95, float(row["waterings"]), float(row["error"]))
         return low, high
     if one := re.fullmatch(r"(.*), gain from T = (\d) to T = (\d)", told):
         ends = [last_of(here, FIGURE2[one[1]], stage) for stage in one.groups()[1:]]
@@ -198,7 +204,7 @@ def median(values: Sequence[float], agents: Sequence[str]) -> Ends:
     """The order statistics of a binomial distribution; or agents drawn with replacement, 9999 times."""
     if not any(agents):
         order, n = sorted(values), len(values)
-        rank = int(stats.binom.ppf(0.025, n, 0.5))
+        rank = int(stats().binom.ppf(0.025, n, 0.5))
         return order[rank - 1], order[n - rank]
     groups = defaultdict(list)
     for value, agent in zip(values, agents, strict=True):
