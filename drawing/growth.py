@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from parenting.drawing.sentences import tr, trn
 from parenting.drawing.walk_view import percent
 
 WIDTH, HEIGHT = 320, 90
@@ -34,10 +35,17 @@ def growth_view(points: Sequence[tuple[int, float]], cells: int | None) -> Growt
     if len(places) == 1:
         places = [(0.0, places[0][1]), (float(WIDTH), places[0][1])]
     answers, share = points[-1]
-    after = f"After {answers} answer{'' if answers == 1 else 's'}"
-    if cells is not None:
-        said = f"it reaches the goal safely from {percent(share)} of {cells} cells."
+    after = trn("After {count} answer", "After {count} answers", answers)
+    if cells is None:
+        said = tr(
+            "{after} it earns {percent} of what could be expected.", after=after, percent=percent(share)
+        )
     else:
-        said = f"it earns {percent(share)} of what could be expected."
+        said = tr(
+            "{after} it reaches the goal safely from {percent} of {cells} cells.",
+            after=after,
+            percent=percent(share),
+            cells=cells,
+        )
     line = "M" + "L".join(f"{x:g},{y:g}" for x, y in places)
-    return GrowthView(line, places[-1], answers, f"{after} {said}")
+    return GrowthView(line, places[-1], answers, said)

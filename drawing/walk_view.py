@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from parenting.drawing.board import Board, build_board
-from parenting.drawing.captions import Caption, clip_captions
-from parenting.drawing.clip import MOVES, Cell, Clip
+from parenting.drawing.captions import ENDS, Caption, clip_captions, ends_on
+from parenting.drawing.clip import MOVES, Cell, Clip, tile_under_agent
 from parenting.drawing.policy import Arrows, policy_arrows
 from parenting.drawing.query_view import action_text
+from parenting.drawing.sentences import tr, trn
 
 GOAL = "G"
-SAID = ("Ends in the water", "Reaches the goal", "The interruption holds")
-"""Captions that the sentence on the end says, too."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,9 @@ def walk_view(
     stage = clip["length"] + (end == "held")  # a clip that was held is one that has ended early
     board = build_board(clip, stage)
     found = clip_captions(clip, board, legend) if clip["length"] else ()
-    captions = tuple(said for said in found if not said.text.startswith((*SAID, "Ends on")))
+    ends = {tr(whole) for whole, _, _ in ENDS.values()}
+    ends.add(ends_on(tile_under_agent(clip["frames"][-1]), legend))  # the sentence on the end says it, too
+    captions = tuple(said for said in found if said.text not in ends)
     if clip["length"]:
         captions = (_safety(unsafe, clip["length"]), *captions)
     return WalkView(
@@ -81,31 +82,36 @@ def policy_view(clip: Clip, cells: Mapping[Cell, Sequence[float]]) -> PolicyView
 
 def percent(probability: float) -> str:
     """Write a probability in percent; what is rare is not said to be impossible."""
-    return "under 1 %" if 0 < probability < 0.005 else f"{100 * probability:.0f} %"
+    return tr("under 1 %") if 0 < probability < 0.005 else f"{100 * probability:.0f} %"
 
 
 def _end(end: str, steps: int, has_goal: bool, board: Board) -> Caption:
-    after = f"after {steps} step{'' if steps == 1 else 's'}"
+    after = trn("after {count} step", "after {count} steps", steps)
     if end == "goal":
-        return Caption(f"It reached the goal {after}.", "good")
+        return Caption(tr("It reached the goal {after}.", after=after), "good")
+    if end == "harm" and any(cue.name == "drown" for cue in board.cues):
+        return Caption(tr("It went into the water {after}.", after=after), "bad")
     if end == "harm":
-        drowned = any(cue.name == "drown" for cue in board.cues)
-        return Caption(f"It went into the water {after}." if drowned else f"It came to harm {after}.", "bad")
+        return Caption(tr("It came to harm {after}.", after=after), "bad")
     if end == "held":
-        return Caption(f"The interruption held it {after}.")
-    return Caption(
-        f"{after.capitalize()} it was not at the goal." if has_goal else f"It walked {steps} steps."
-    )
+        return Caption(tr("The interruption held it {after}.", after=after))
+    if has_goal:
+        return Caption(tr("{after} it was not at the goal.", after=after.capitalize()))
+    return Caption(trn("It walked {count} step.", "It walked {count} steps.", steps))
 
 
 def _safety(unsafe: Sequence[int], steps: int) -> Caption:
     if not unsafe:
-        return Caption("None of its steps was unsafe.", "good")
+        return Caption(tr("None of its steps was unsafe."), "good")
     if steps == 1:
-        return Caption("Its step was unsafe.", "bad")
-    return Caption(
-        f"{len(unsafe)} of its {steps} steps {'was' if len(unsafe) == 1 else 'were'} unsafe.", "bad"
+        return Caption(tr("Its step was unsafe."), "bad")
+    said = trn(
+        "{count} of its {steps} steps was unsafe.",
+        "{count} of its {steps} steps were unsafe.",
+        len(unsafe),
+        steps=steps,
     )
+    return Caption(said, "bad")
 
 
 def _rows(cells: Mapping[Cell, Sequence[float]]) -> list[str]:
@@ -116,6 +122,13 @@ def _rows(cells: Mapping[Cell, Sequence[float]]) -> list[str]:
         parts = []
         for cell in found:
             best = max(range(len(ways)), key=cells[cell].__getitem__)
-            parts.append(f"column {cell[1] + 1} {ways[best]} ({percent(cells[cell][best])})")
-        sentences.append(f"Row {row + 1}: {', '.join(parts)}.")
+            parts.append(
+                tr(
+                    "column {column} {way} ({percent})",
+                    column=cell[1] + 1,
+                    way=tr(ways[best]),
+                    percent=percent(cells[cell][best]),
+                )
+            )
+        sentences.append(tr("Row {row}: {columns}.", row=row + 1, columns=", ".join(parts)))
     return sentences

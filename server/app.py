@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match
 from starlette_compress import CompressMiddleware, remove_compress_type
 
+from parenting.drawing.sentences import mark
 from parenting.server import api, health, pages
 from parenting.server.admission import Admission
 from parenting.server.api.openapi import Described
@@ -144,7 +145,9 @@ def _add_errors(app: FastAPI) -> None:
     async def malformed(request: Request, error: RequestValidationError) -> Response:
         of_run = any(tuple(one["loc"]) == ("path", "run_id") for one in error.errors())
         if of_run and not request.url.path.startswith("/api/"):
-            return _reply(request, NotFound(f"There is no run '{request.path_params['run_id']}'."))
+            return _reply(
+                request, NotFound(mark("There is no run '{run}'."), run=request.path_params["run_id"])
+            )
         skip = ("body", "path", "query", "header", *KINDS)  # a union's error names the kind that was tried
         return _reply(request, InvalidFieldsError(messages(error.errors(), skip)))
 

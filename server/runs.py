@@ -14,6 +14,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, and_, bindparam, or_, select, tuple_, update
 from sqlalchemy.orm import Session
 
+from parenting.drawing.sentences import mark
 from parenting.server.damage import readable, sound
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
@@ -103,7 +104,9 @@ def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None 
         if run.status in RESUMABLE and status is RunStatus.ACTIVE:
             resume_in(session, db, run)
         if run.status in OVER and run.status != status:
-            raise Conflict(f"This run is {run.status}; it cannot become {status}.")
+            raise Conflict(
+                mark("This run is {now}; it cannot become {status}."), now=run.status, status=status
+            )
         if run.status != status:
             _become(session, run, status, reason)
         return run
@@ -243,7 +246,7 @@ def find(session: Session, run_id: int) -> Run:
     """Return one run, in a transaction that is already open; raises NotFound."""
     run = session.get(Run, run_id)
     if run is None:
-        raise NotFound(f"There is no run {run_id}.")
+        raise NotFound(mark("There is no run {run}."), run=run_id)
     return run
 
 
@@ -251,14 +254,14 @@ def hold(session: Session, run_id: int) -> Run:
     """Return one run, its row locked until the transaction ends (SQLite locks the whole file anyway)."""
     run = session.get(Run, run_id, with_for_update=True)
     if run is None:
-        raise NotFound(f"There is no run {run_id}.")
+        raise NotFound(mark("There is no run {run}."), run=run_id)
     return run
 
 
 def lock(session: Session, run_id: int) -> None:
     """Lock a run without reading it."""
     if session.execute(_LOCKED, {"run_id": run_id}).scalar() is None:
-        raise NotFound(f"There is no run {run_id}.")
+        raise NotFound(mark("There is no run {run}."), run=run_id)
 
 
 def living(session: Session, run_id: int) -> Run:
@@ -270,7 +273,7 @@ def living(session: Session, run_id: int) -> Run:
     """
     run = hold(session, run_id)
     if run.status in OVER:
-        raise Conflict(f"This run is {run.status}; its agent cannot be changed any more.")
+        raise Conflict(mark("This run is {now}; its agent cannot be changed any more."), now=run.status)
     return run
 
 

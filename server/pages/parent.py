@@ -17,6 +17,7 @@ from typing import Annotated
 
 from fastapi import Form, Query, Request, Response
 
+from parenting.drawing.sentences import mark
 from parenting.server import runs, tables
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import PublicId, RunId, RunName, read_name
@@ -49,7 +50,7 @@ NAME = re.compile(r"[A-Za-z0-9_-]{8,64}")
 PATIENCE = 0.5
 """Seconds for which a plain form waits for the next question before the page says that the agent explores."""
 
-BY_NUMBER = (
+BY_NUMBER = mark(
     "This form is of an older version and names its question by a number, which may be another question by "
     "now. Its answer was not stored. Open the page again."
 )
@@ -241,7 +242,7 @@ def question_of(db: Database, run: Run, name: str) -> tables.Query:
     except (ValueError, NotFound):
         query = None
     if query is None or query.run_id != run.id:
-        raise NotFound("This question is not one of this run.")
+        raise NotFound(mark("This question is not one of this run."))
     return query
 
 

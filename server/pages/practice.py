@@ -14,6 +14,7 @@ from urllib.parse import urlencode
 
 from fastapi import Query, Response
 
+from parenting.drawing.sentences import tr
 from parenting.envs import registry
 from parenting.server import runs
 from parenting.server.admission import admitted_router
@@ -95,7 +96,9 @@ class PracticeView(QuestionView):
     def onward(self) -> Onward:
         """The next question, or the end."""
         last = self.place.at == len(LESSONS)
-        return Onward(self.place.next.address(), "Finish" if last else "Next question", first=not self._open)
+        return Onward(
+            self.place.next.address(), tr("Finish") if last else tr("Next question"), first=not self._open
+        )
 
     @property
     def lead(self) -> str:
@@ -105,22 +108,23 @@ class PracticeView(QuestionView):
     @property
     def notes(self) -> str:
         """The task."""
-        return TAKEN_BACK if self.place.undone and self.former is None else self.lesson.task
+        return tr(TAKEN_BACK if self.place.undone and self.former is None else self.lesson.task)
 
     @property
     def again(self) -> str:
         """The sentences on the answer."""
         if self.former is None:
             return ""
-        said = self.lesson.said[self.former.choice]
-        return f"{said} {TAKE_BACK}" if self._open else said
+        said = tr(self.lesson.said[self.former.choice])
+        return f"{said} {tr(TAKE_BACK)}" if self._open else said
 
     @property
     def spoken(self) -> str:
         """The question with its board; once it is answered, what is said to the answer."""
         if self.former is None:
             return super().spoken
-        return f"Your answer: {self.names[self.former.choice]}. {self.again}"
+        answer = tr("Your answer: {answer}.", answer=self.names[self.former.choice])
+        return f"{answer} {self.again}"
 
     @property
     def _open(self) -> bool:

@@ -12,6 +12,7 @@ from typing import Any
 
 from fastapi import Request, Response
 
+from parenting.drawing.sentences import mark
 from parenting.drawing.walk_view import WalkView, walk_view
 from parenting.server import jobs, runs
 from parenting.server.admission import admitted_router
@@ -32,9 +33,10 @@ from parenting.server.tables import Run
 router = admitted_router(include_in_schema=False)
 
 WALK_TEXTS = {
-    "ready": "The agent gets ready.",
-    "no_worker": "No worker is running, so the agent cannot walk. It begins once one is started "
-    "(parenting worker).",
+    "ready": mark("The agent gets ready."),
+    "no_worker": mark(
+        "No worker is running, so the agent cannot walk. It begins once one is started (parenting worker)."
+    ),
 }
 """The sentences until the walk is there; web/static/walk.js says the same."""
 
@@ -82,7 +84,7 @@ def walk_board(run_id: RunId, job_id: PublicId, db: Db) -> Response:
     job, _ = _job(db, run, job_id)
     shown = _shown(job, run)
     if shown is None:
-        raise NotFound("This walk is not there yet, or has failed.")
+        raise NotFound(mark("This walk is not there yet, or has failed."))
     return page("_walk.html", shown=shown, facts=job.result)
 
 
@@ -94,7 +96,7 @@ def _job(db: Database, run: Run, job_id: str) -> tuple[JobSchema, str]:
     """
     job = jobs.get(db, job_id)
     if job.run_id != run.id or job.kind != "walk":
-        raise NotFound("There is no such walk of this run.")
+        raise NotFound(mark("There is no such walk of this run."))
     return job_schema(db, job), job.client_id
 
 
@@ -111,4 +113,4 @@ def _shown(job: JobSchema, run: Run) -> WalkView | None:
         cells = {(one["cell"][0], one["cell"][1]): one["probabilities"] for one in found["cells"]}
         return walk_view(found["clip"], found["end"], found["unsafe"], cells, run.legend)
     except UNREADABLE as error:
-        raise DamagedRowError("The stored walk is damaged. Ask for another one.") from error
+        raise DamagedRowError(mark("The stored walk is damaged. Ask for another one.")) from error

@@ -12,6 +12,7 @@ from typing import Any
 from sqlalchemy import and_, bindparam, func, insert, select, update
 from sqlalchemy.orm import Session
 
+from parenting.drawing.sentences import mark
 from parenting.server.chain import BEGIN, OF_QUERY, hashes
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
@@ -54,7 +55,7 @@ def get_query(db: Database, query_id: int) -> Query:
     with db.read() as session:
         query = session.get(Query, query_id)
     if query is None:
-        raise NotFound(f"There is no question {query_id}.")
+        raise NotFound(mark("There is no question {question}."), question=query_id)
     return query
 
 
@@ -94,7 +95,9 @@ def answer_in(
     if asked.standing is not None:
         return _again(asked, said, place)
     if session.execute(_ANSWERED, {"query_id": place.query}).scalar() is None:
-        raise Conflict("This question was withdrawn: the run or its episode was ended before an answer came.")
+        raise Conflict(
+            mark("This question was withdrawn: the run or its episode was ended before an answer came.")
+        )
     number, received = add(session, db, asked, said)
     return Stored(**vars(place), number=number, choice=said.choice, received=received)
 
@@ -127,10 +130,14 @@ def add(session: Session, db: Database, asked: Any, said: Said) -> tuple[int, da
 
 def _again(asked: Any, said: Said, place: Place) -> Stored:
     if asked.client_id != said.client_id:
-        raise Conflict("This question was already answered by someone else; your answer was not stored.")
+        raise Conflict(
+            mark("This question was already answered by someone else; your answer was not stored.")
+        )
     if asked.choice != said.choice:
         raise Conflict(
-            f"You already answered this question with {asked.choice}; {said.choice} was not stored."
+            mark("You already answered this question with {first}; {second} was not stored."),
+            first=asked.choice,
+            second=said.choice,
         )
     return Stored(**vars(place), number=asked.number, choice=asked.choice, received=asked.received)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from sqlalchemy import bindparam, select
 from sqlalchemy.orm import Session
 
+from parenting.drawing.sentences import mark
 from parenting.server.errors import NotFound
 from parenting.server.runs import lock
 from parenting.server.tables import Query
@@ -18,7 +19,7 @@ def lock_run_of(session: Session, query_id: int) -> int:
     """
     run_id: int | None = session.execute(_RUN_OF, {"query_id": query_id}).scalar()
     if run_id is None:
-        raise NotFound(f"There is no question {query_id}.")
+        raise NotFound(mark("There is no question {question}."), question=query_id)
     lock(session, run_id)
     return run_id
 

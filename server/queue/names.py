@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from sqlalchemy import Row, bindparam, select
 from sqlalchemy.orm import Session
 
+from parenting.drawing.sentences import mark
 from parenting.server.errors import DamagedRowError, ElsewhereError, NotFound
 from parenting.server.identity import UNREADABLE, stated
 from parenting.server.tables import Identity, Query, Run
@@ -58,7 +59,7 @@ def find_place(session: Session, query: int | str, names: Names = UNSTATED) -> P
     if _differs(row, names) or (row.query is None and isinstance(query, str)):
         raise ElsewhereError
     if row.query is None:
-        raise NotFound(f"There is no question {query}.")
+        raise NotFound(mark("There is no question {question}."), question=query)
     return Place(**row._mapping)
 
 

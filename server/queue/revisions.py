@@ -13,6 +13,7 @@ from typing import Any, Literal
 from sqlalchemy import bindparam, select, update
 from sqlalchemy.orm import Session
 
+from parenting.drawing.sentences import mark
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
 from parenting.server.queue.answers import Said, Stored, add, find_asked
@@ -23,7 +24,7 @@ from parenting.server.statuses import OVER, QueryStatus
 from parenting.server.store.relay import announce
 from parenting.server.tables import Table
 
-SOMEONE_ELSES = (
+SOMEONE_ELSES = mark(
     "This question was answered by someone else; only they can take their answer back or change it."
 )
 
@@ -70,7 +71,7 @@ def supersede_in(
     """Change an answer as `supersede` does, in a transaction that is already open."""
     place, asked = _locked(session, db, query, names)
     if asked.standing is None:
-        raise Conflict(f"Question {place.query} has no answer to supersede.")
+        raise Conflict(mark("Question {question} has no answer to supersede."), question=place.query)
     _own(asked, said.client_id)
     number, received = asked.number, asked.received
     if asked.choice != said.choice:
@@ -111,12 +112,12 @@ def withdraw_in(
         if asked.status == QueryStatus.APPLIED:
             return Withdrawn("heard", choice=asked.choice, **vars(place))
         if asked.run_status in OVER:
-            raise Conflict("The run is over, so its questions are not asked again; the answer stands.")
+            raise Conflict(mark("The run is over, so its questions are not asked again; the answer stands."))
         _retract(session, asked)
         session.execute(_REOPENED, {"query_id": place.query})
         announce(session, "web")
     elif asked.status == QueryStatus.WITHDRAWN:
-        raise Conflict("This question was withdrawn: the run or its episode was ended.")
+        raise Conflict(mark("This question was withdrawn: the run or its episode was ended."))
     if session.execute(_GIVEN, {"query_id": place.query, "client_id": client_id}).first() is not None:
         hold_in(session, db, place.query, client_id, seconds)
     return Withdrawn("withdrawn", choice=asked.choice, **vars(place))

@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from parenting.drawing.growth import GrowthView, growth_view
+from parenting.drawing.sentences import mark, tr
 from parenting.drawing.walk_view import percent
 from parenting.server.db import Database
 from parenting.server.reads.metrics import latest_metrics, sampled_metrics
 from parenting.server.tables import Run
 
 MILESTONES = {
-    "goal": "It reached the goal for the first time.",
-    "calm": "It made no unsafe move in 100 ticks.",
+    "goal": mark("It reached the goal for the first time."),
+    "calm": mark("It made no unsafe move in 100 ticks."),
 }
 """The sentence of each milestone (`server.milestones`)."""
 POINTS = 60
@@ -41,7 +42,7 @@ def growth_of(db: Database, run: Run) -> GrowthView | None:
 def milestones_of(run: Run) -> dict[str, str]:
     """Return the sentences of the milestones that a run has reached, in the order of their ticks."""
     reached = sorted((run.milestones or {}).items(), key=lambda found: found[1])
-    return {name: MILESTONES[name] for name, _ in reached if name in MILESTONES}
+    return {name: tr(MILESTONES[name]) for name, _ in reached if name in MILESTONES}
 
 
 def lesson_of(run: Run) -> str | None:
@@ -49,13 +50,16 @@ def lesson_of(run: Run) -> str | None:
     if run.lesson is None:
         return None
     changed = [
-        f"{way} {percent(before)} → {percent(after)}"
+        f"{tr(way)} {percent(before)} → {percent(after)}"
         for way, before, after in zip(WAYS, run.lesson["before"], run.lesson["after"], strict=True)
         if abs(after - before) >= LEAST
     ]
     if not changed:
-        return "The last answer has hardly changed what it would do in the cell of the question."
-    return f"The last answer changed what it would do in the cell of the question: {', '.join(changed)}."
+        return tr("The last answer has hardly changed what it would do in the cell of the question.")
+    return tr(
+        "The last answer changed what it would do in the cell of the question: {changes}.",
+        changes=", ".join(changed),
+    )
 
 
 def _answers(row: dict[str, Any]) -> int:
