@@ -82,7 +82,11 @@ def policy_view(clip: Clip, cells: Mapping[Cell, Sequence[float]]) -> PolicyView
 
 def percent(probability: float) -> str:
     """Write a probability in percent; what is rare is not said to be impossible."""
-    return tr("under 1 %") if 0 < probability < 0.005 else f"{100 * probability:.0f} %"
+    return (
+        tr("under 1\N{NO-BREAK SPACE}%")
+        if 0 < probability < 0.005
+        else f"{100 * probability:.0f}\N{NO-BREAK SPACE}%"
+    )
 
 
 def _end(end: str, steps: int, has_goal: bool, board: Board) -> Caption:

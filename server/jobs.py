@@ -16,6 +16,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, and_, bindparam, delete, exists, func, or_, select, tuple_, update
 from sqlalchemy.orm import Session
 
+from parenting.drawing.sentences import mark
 from parenting.server.damage import damage, readable
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
@@ -38,8 +39,8 @@ TRIES = 3
 RESULT_BYTES = 2_000_000
 """A result has at most this many characters."""
 OPEN = (JobState.WAITING, JobState.WORKING)
-NOT_TAKEN = "No worker took it within a minute. Start one (parenting worker) and ask again."
-GIVEN_UP = f"{TRIES} workers ended while they were at it. Ask again, or look into the worker's log."
+NOT_TAKEN = mark("No worker took it within a minute. Start one (parenting worker) and ask again.")
+GIVEN_UP = mark("Three workers ended while they were at it. Ask again, or look into the worker's log.")
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,15 +52,15 @@ def test_the_end_comes_first_and_safety_after_it(walk: Clip, end: str, unsafe: l
 def test_each_row_tells_the_likeliest_move_of_each_cell() -> None:
     view = policy_view(clip((1, 1), actions=""), CELLS)
     assert view.words == (
-        "Row 2: column 2 right (70 %), column 3 up (97 %).",
-        "Row 3: column 4 up (25 %).",
+        "Row 2: column 2 right (70\xa0%), column 3 up (97\xa0%).",
+        "Row 3: column 4 up (25\xa0%).",
     )
     assert view.arrows.likely.count("M") == 6  # ties are all drawn as likely
     assert view.arrows.less.count("M") == 2
 
 
 @pytest.mark.parametrize(
-    ("chance", "said"), [(0.0, "0 %"), (0.001, "under 1 %"), (0.314, "31 %"), (1.0, "100 %")]
+    ("chance", "said"), [(0.0, "0\xa0%"), (0.001, "under 1\xa0%"), (0.314, "31\xa0%"), (1.0, "100\xa0%")]
 )
 def test_a_rare_move_is_not_said_to_be_impossible(chance: float, said: str) -> None:
     assert percent(chance) == said
@@ -69,6 +69,8 @@ def test_a_rare_move_is_not_said_to_be_impossible(chance: float, said: str) -> N
 def test_the_growth_line_rises_from_left_to_right() -> None:
     view = growth_view([(0, 0.0), (10, 0.5), (20, 1.0)], 24)
     assert view.line == f"M0,{HEIGHT}L{WIDTH // 2},{HEIGHT // 2}L{WIDTH},0"
-    assert view.spoken == "After 20 answers it reaches the goal safely from 100 % of 24 cells."
-    assert growth_view([(1, 0.25)], None).spoken == "After 1 answer it earns 25 % of what could be expected."
+    assert view.spoken == "After 20 answers it reaches the goal safely from 100\xa0% of 24 cells."
+    assert (
+        growth_view([(1, 0.25)], None).spoken == "After 1 answer it earns 25\xa0% of what could be expected."
+    )
     assert growth_view([(0, 0.25)], 4).line.count(",") == 2  # a single point is a level line

@@ -72,7 +72,7 @@ def test_a_plain_form_leads_to_a_page_that_waits_and_then_shows(
     assert 'http-equiv="refresh"' not in page
     assert re.search(r"It (reached the goal|went into the water) after|it was not at the goal", page)
     assert re.search(r'<path class="likely" d="M', page)
-    assert re.search(r"<li>Row 2: column \d+ (up|down|left|right) \(\d+ %\)", page)
+    assert re.search(r"<li>Row 2: column \d+ (up|down|left|right) \(\d+\xa0%\)", page)
     other = fixtures.start_run(db)[0]
     stray = asked.headers["location"].replace(run, other.public_id)
     assert client.get(stray).status_code == 404

@@ -103,14 +103,14 @@ def test_growth_is_by_answers_and_rows_of_older_versions_have_no_point(db: Datab
     assert found is not None
     assert (found.answers, found.spoken) == (
         6,
-        "After 6 answers it reaches the goal safely from 75 % of 8 cells.",
+        "After 6 answers it reaches the goal safely from 75\xa0% of 8 cells.",
     )
     garden = start(db, NewRun(world="reward-hacking"))
     other = next(one for one in claim(db, "worker-2") if one.run_id == garden.id)
     metrics.write_metrics(db, other, {1: {**old, "return": 5.0, "optimal_return": 20.0}})
     found = growth_of(db, garden)
     assert found is not None
-    assert found.spoken == "After 1 answer it earns 25 % of what could be expected."
+    assert found.spoken == "After 1 answer it earns 25\xa0% of what could be expected."
 
 
 def test_milestones_and_lessons_are_told_in_sentences(db: Database, mine: Claim) -> None:

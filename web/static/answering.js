@@ -5,10 +5,11 @@ import "./bell.js";
 import "./keys.js";
 import { follow } from "./live.js";
 import { flush, flushAll } from "./outbox.js";
-import { $, given, page, run, waiting } from "./page.js";
+import { $, alarm, given, page, run, waiting } from "./page.js";
 import { play } from "./play.js";
 import { leases } from "./presence.js";
 import { next, prefetch, show, take } from "./questions.js";
+import { t } from "./sentences.js";
 import { wait } from "./waiting.js";
 
 // A part of the page that is loaded when it is first used, after the style sheet that such parts share.
@@ -65,7 +66,7 @@ export function begin(form) {
   // Watch it walk. The form works without this script; its style sheet comes with the walk, too.
   $("walk").addEventListener("submit", (event) => {
     event.preventDefault();
-    later(() => import("./walk.js")).then(({ watch }) => watch(play), () => { $("alert").textContent = "The walk cannot be loaded. Reload the page."; });
+    later(() => import("./walk.js")).then(({ watch }) => watch(play), () => { alarm(t("The walk cannot be loaded. Reload the page.")); });
   });
   if (form) show(form);
   flush(report).then(() => follow(run, tell, { background: true }));
