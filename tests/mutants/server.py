@@ -92,6 +92,27 @@ QUEUE = [
         "if known is not None and tick < 0:",
         f"{WORKER}::test_known_tick_is_not_asked_twice",
     ),
+    Mutant(
+        "a run that goes on asks guidance that the agent waits for no more",
+        "server/queue/queries.py",
+        "    rows = rows.where(Query.withdrawn_tick.is_(None))\n    nobody",
+        "    nobody",
+        "tests/server/test_resume.py::test_guidance_that_the_agent_waits_for_no_more_is_not_asked_again",
+    ),
+    Mutant(
+        "who never answered a question takes its lease by taking an answer back",
+        "server/queue/revisions.py",
+        'if session.execute(_GIVEN, {"query_id": place.query, "client_id": client_id}).first() is not None:',
+        "if client_id:",
+        "tests/server/test_revisions.py::test_who_never_answered_takes_nothing_back_and_no_lease",
+    ),
+    Mutant(
+        "a damaged question is written again without a proof",
+        "server/queue/repairs.py",
+        "return any(proves(one, content) for one in answers) if answers else otherwise",
+        "return True",
+        "tests/server/test_repairs.py::test_what_no_answers_digest_proves_stays_as_it_is",
+    ),
 ]
 
 WEB = [
