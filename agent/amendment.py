@@ -2,6 +2,7 @@
 
 Nothing is subtracted from X: its rows hold sums, and a stage may have cleared them (`own_stage_only`).
 A correction trains nothing by itself. Frozen policies, stages reached, moves made and Adam's moments stay.
+A skip is corrected, too, by the answer that its parent finds later.
 """
 
 from __future__ import annotations
@@ -10,14 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import torch
 from jaxtyping import Bool
 from torch import Tensor
 
 from parenting.agent import dataset, guidance
 from parenting.agent.config import Config
 from parenting.agent.events import EndEpisode, Event
-from parenting.agent.query import Answer, Choice, Query, QueryKind
+from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.agent.state import AgentState
 
 
@@ -32,7 +32,7 @@ class Amend:
 
 @dataclass(frozen=True)
 class Reconsider:
-    """Take *neither* back while the agent still pauses there; the new answer is heard in the same tick."""
+    """Take *neither* or *skip* back in the pause that it was said in; the new answer is heard at once."""
 
     replaced: Answer
 
@@ -62,37 +62,36 @@ def take(state: AgentState, events: Sequence[Event], correction: Correction) -> 
     `events` are the operator's, which apply first: *end the episode* ends the pause.
     """
     ended = any(isinstance(event, EndEpisode) for event in events)
-    approved = correction.answer.choice != Choice.NEITHER
-    if not ended and bool((approved & in_pause(state, correction.replaced.query)).any()):
+    decided = (correction.answer.choice != Choice.NEITHER) | (correction.replaced.choice == Choice.SKIP)
+    if not ended and bool((decided & in_pause(state, correction.replaced)).any()):
         return Applied(Reconsider(correction.replaced), correction.answer)
     return Applied(Amend(correction.standing, correction.replaced, correction.answer), None)
 
 
-def in_pause(state: AgentState, query: Query) -> Bool[Tensor, "N"]:
-    """Return where this guidance query was refused in the pause that the agent is still in (Sec. 2.1)."""
-    here = (query.board[:, 0, 0] == state.world.board).flatten(1).all(1)
-    agent = (query.agent[:, 0, 0] == state.world.agent).all(1)
-    box = (query.box[:, 0, 0] == state.world.box).all(1)
-    refused = (state.refused & candidates(query)).sum(1) == 2
-    return (query.kind == QueryKind.GUIDANCE) & state.waiting & here & agent & box & refused
-
-
-def candidates(query: Query) -> Bool[Tensor, "N 4"]:
-    """Return the two moves that a guidance query asks about."""
-    return torch.nn.functional.one_hot(query.action[:, :, 0], 4).sum(1) > 0
+def in_pause(state: AgentState, answer: Answer) -> Bool[Tensor, "N"]:
+    """Return where guidance was refused or skipped in the pause that the agent is still in (Sec. 2.1)."""
+    query = answer.query
+    refused = (state.refused & guidance.candidates(query)).sum(1) == 2
+    skipped = (state.set_aside & guidance.pair_of(query)).any(1) & (answer.choice == Choice.SKIP)
+    guided = (query.kind == QueryKind.GUIDANCE) & state.waiting & guidance.at_place(state, query)
+    return guided & (refused | skipped)
 
 
 def amend(config: Config, state: AgentState, event: Amend) -> AgentState:
-    """Rebuild X of every trial from the answers that stand."""
+    """Rebuild X of every trial from the answers that stand. What was skipped counts once it is answered."""
     state = state.replace(x=dataset.blank(state.x))
     for answer in event.standing:
         state = state.replace(x=guidance.store(config, state, answer))
-    return state
+    guided, reviewed = guidance.counted(event.answer)
+    now = guided | (reviewed & (event.answer.query.maturity == state.maturity))
+    return state.replace(answered=state.answered + (now & (event.replaced.choice == Choice.SKIP)))
 
 
 def reconsider(state: AgentState, event: Reconsider) -> AgentState:
-    """Restore the moves that *neither* refused; the answer that follows counts in its place."""
-    query = event.replaced.query
-    again = in_pause(state, query) & (event.replaced.choice == Choice.NEITHER)
-    refused = state.refused & ~(again[:, None] & candidates(query))
-    return state.replace(refused=refused, answered=state.answered - again.long())
+    """Restore what *neither* refused, or the pair that *skip* set aside; the answer that follows counts."""
+    query, choice = event.replaced.query, event.replaced.choice
+    here = in_pause(state, event.replaced)
+    again, aside = here & (choice == Choice.NEITHER), here & (choice == Choice.SKIP)
+    refused = state.refused & ~(again[:, None] & guidance.candidates(query))
+    set_aside = state.set_aside & ~(aside[:, None] & guidance.pair_of(query))
+    return state.replace(refused=refused, set_aside=set_aside, answered=state.answered - again.long())

@@ -10,12 +10,13 @@ from parenting.agent import dataset, familiarity
 from parenting.agent.config import Config
 from parenting.agent.dataset import Entry
 from parenting.agent.query import Answer, Choice, Query, QueryKind
-from parenting.agent.state import AgentState
+from parenting.agent.state import PAIRS, AgentState
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
 from parenting.envs.rng import Stream, gumbel
 from parenting.envs.struct import Struct
 
 NO_ACTION = -1
+_RANKED = torch.tensor(PAIRS)  # pairs of ranks in their order: the two best first
 
 
 class View(Struct):
@@ -35,7 +36,7 @@ class Heard(Struct):
     """The effect of this tick's answers on the pause."""
 
     approved: Int64[Tensor, "N"]  # the action to perform, or NO_ACTION
-    redraw: Bool[Tensor, "N"]  # *neither*: ask about other actions in this same tick
+    redraw: Bool[Tensor, "N"]  # *neither* or *skip*: ask about another pair in this same tick
 
 
 def hear(config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Heard]:
@@ -43,13 +44,36 @@ def hear(config: Config, state: AgentState, answer: Answer) -> tuple[AgentState,
     query, choice = answer.query, answer.choice
     if not bool((choice != Choice.NONE).any()):
         return state, _nothing_heard(state)
-    guided = (query.kind == QueryKind.GUIDANCE) & (choice != Choice.NONE)
-    reviewed = (query.kind == QueryKind.PREFERENCE) & (choice != Choice.NONE)
+    guided, reviewed = counted(answer)
+    told = (query.kind == QueryKind.GUIDANCE) & (choice != Choice.NONE) & at_place(state, query)
     state = state.replace(
         x=store(config, state, answer),
         answered=state.answered + (guided | (reviewed & (query.maturity == state.maturity))),
     )
-    return _resolve(state, query, choice, guided & state.waiting)
+    return _resolve(state, query, choice, told & state.waiting)
+
+
+def counted(answer: Answer) -> tuple[Bool[Tensor, "N"], Bool[Tensor, "N"]]:
+    """Return where guidance was answered, and where a preference was; a skip answers neither."""
+    kind, judged = answer.query.kind, answer.judges
+    return (kind == QueryKind.GUIDANCE) & judged, (kind == QueryKind.PREFERENCE) & judged
+
+
+def at_place(state: AgentState, query: Query) -> Bool[Tensor, "N"]:
+    """Return where the world is as it was when a query was asked: no move is approved for another place."""
+    board = (query.board[:, 0, 0] == state.world.board).flatten(1).all(1)
+    agent = (query.agent[:, 0, 0] == state.world.agent).all(1)
+    return board & agent & (query.box[:, 0, 0] == state.world.box).all(1)
+
+
+def candidates(query: Query) -> Bool[Tensor, "N 4"]:
+    """Return the two moves that a guidance query asks about."""
+    return torch.nn.functional.one_hot(query.action[:, :, 0], 4).sum(1) > 0
+
+
+def pair_of(query: Query) -> Bool[Tensor, "N 6"]:
+    """Return the pair of moves that a guidance query asks about, as in `PAIRS`."""
+    return candidates(query)[:, _RANKED.to(query.kind.device)].all(2)
 
 
 def _nothing_heard(state: AgentState) -> Heard:
@@ -57,10 +81,13 @@ def _nothing_heard(state: AgentState) -> Heard:
 
 
 def store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset:
-    """X with the answers of this tick: Eq. (1), at the first state of the clips. *Neither* stores nothing."""
+    """X with the answers of this tick: Eq. (1), at the first state of the clips.
+
+    *Neither* and *skip* store nothing.
+    """
     query, choice = answer.query, answer.choice
     first = query.observation[:, 0, 0]
-    learnt = (query.kind != QueryKind.NONE) & (choice != Choice.NONE) & (choice != Choice.NEITHER)
+    learnt = (query.kind != QueryKind.NONE) & answer.judges & (choice != Choice.NEITHER)
     if not bool(learnt.any()):
         return state.x
     trained = query.maturity == state.maturity if config.own_stage_only else learnt
@@ -76,13 +103,15 @@ def _resolve(state: AgentState, query: Query, choice: Tensor, guided: Tensor) ->
     left, right = query.action[:, 0, 0], query.action[:, 1, 0]
     coin = state.keys.uniform(Stream.EITHER) < 0.5
     leftward = (choice == Choice.LEFT) | ((choice == Choice.EITHER) & coin)
-    refusing = guided & (choice == Choice.NEITHER)
-    approving = guided & ~refusing
-    both = torch.nn.functional.one_hot(query.action[:, :, 0], 4).sum(1) > 0
-    refused = (state.refused | (refusing[:, None] & both)) & ~approving[:, None]
+    refusing, skipping = guided & (choice == Choice.NEITHER), guided & (choice == Choice.SKIP)
+    approving = guided & ~refusing & ~skipping
+    refused = (state.refused | (refusing[:, None] & candidates(query))) & ~approving[:, None]
+    set_aside = state.set_aside & ~approving[:, None]
+    if bool(skipping.any()):
+        set_aside = set_aside | (skipping[:, None] & pair_of(query))
     approved = torch.where(approving, torch.where(leftward, left, right), NO_ACTION)
-    state = state.replace(waiting=state.waiting & ~approving, refused=refused)
-    return state, Heard(approved=approved, redraw=refusing & ~refused.all(1))
+    state = state.replace(waiting=state.waiting & ~approving, refused=refused, set_aside=set_aside)
+    return state, Heard(approved=approved, redraw=(refusing | skipping) & state.free_pairs.any(1))
 
 
 def ask(
@@ -90,14 +119,14 @@ def ask(
 ) -> tuple[AgentState, Query]:
     """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi.
 
-    After *neither*, draw two other actions.
+    After *neither*, draw two other actions; after *skip*, another pair.
 
     Args:
         world: The world, which forecasts both moves.
         config: The hyperparameters; `p_guid` is read.
         state: N agents.
         view: What each trial observes, and its policy there.
-        heard: What this tick's answers mean: who has an approved action, who was told *neither*.
+        heard: What this tick's answers mean: who has an approved action, who has to ask again.
         query: The empty query of this tick.
 
     Returns:
@@ -123,7 +152,7 @@ def _candidates(world: Gridworld, state: AgentState, view: View, asking: Tensor,
     """The two moves as clips of length 1: where the agent stands, and the forecast of each move."""
     noise = gumbel(state.keys.uniform(Stream.CANDIDATES, 4))
     perturbed = (view.logits.double() + noise).masked_fill(state.refused, -torch.inf)
-    pair = perturbed.topk(2, dim=1).indices
+    pair = _pair(state, perturbed)
     sides = torch.where(state.keys.uniform(Stream.SIDES)[:, None] < 0.5, pair, pair.flip(1))
     before = [state.world, state.world]
     after = [world.forecast(state.world, sides[:, side]) for side in (0, 1)]
@@ -136,6 +165,19 @@ def _candidates(world: Gridworld, state: AgentState, view: View, asking: Tensor,
         **_frames(world, query, before, after),
     )
     return asked.where(asking, query)
+
+
+def _pair(state: AgentState, perturbed: Float[Tensor, "N 4"]) -> Int64[Tensor, "N 2"]:
+    """Return the two best actions, or of the pairs that were not skipped the best by its better action."""
+    best = perturbed.topk(2, dim=1).indices
+    if not bool(state.set_aside.any()):
+        return best
+    ranked = perturbed.sort(dim=1, descending=True).indices
+    pairs = ranked[:, _RANKED.to(ranked.device)]  # [N, 6, 2], the best first
+    moves = torch.nn.functional.one_hot(pairs, 4).sum(2) > 0  # [N, 6, 4]
+    free = (moves[:, :, _RANKED.to(ranked.device)].all(3) & state.free_pairs[:, None]).any(2)  # [N, 6]
+    first = free.int().argmax(1)
+    return torch.where(state.set_aside.any(1)[:, None], pairs[torch.arange(len(first)), first], best)
 
 
 def _first(action: Tensor, sides: Tensor) -> Tensor:

@@ -51,6 +51,7 @@ def init(
         familiarity=zeros(familiarity.n_local_states(len(world.legend))),
         waiting=zeros(dtype=torch.bool),
         refused=zeros(4, dtype=torch.bool),
+        set_aside=zeros(6, dtype=torch.bool),
         x=dataset.empty(trials, world.height, world.width, device),
         recorder=_recorder(world, config.max_clip_length, trials, device),
         learner=_learner(network_of(world), config, keys, weights),

@@ -103,7 +103,8 @@ def apply(world: Gridworld, config: Config, state: AgentState, event: TickEvent)
         case EndEpisode():
             ended = state.world.replace(step_count=torch.full_like(state.world.step_count, world.time_limit))
             calm = torch.zeros_like(state.waiting)
-            return state.replace(world=ended, waiting=calm, refused=torch.zeros_like(state.refused)), config
+            nothing = {name: torch.zeros_like(getattr(state, name)) for name in ("refused", "set_aside")}
+            return state.replace(world=ended, waiting=calm, **nothing), config
         case Change(name=name, value=value):
             return state, config.model_copy(update={name: value})
         case Amend():

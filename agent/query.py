@@ -1,11 +1,14 @@
-"""Queries and answers: two clips, and *left*, *right*, *either* or *neither* (Sec. 2.1, 2.2, Eq. 1)."""
+"""Queries and answers: two clips, and *left*, *right*, *either* or *neither* (Sec. 2.1, 2.2, Eq. 1).
+
+Ours is *skip*: a parent who cannot tell. Nothing is learnt from it.
+"""
 
 from __future__ import annotations
 
 from enum import IntEnum
 
 import torch
-from jaxtyping import Float64, Int64, UInt8
+from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
 from parenting.envs.struct import Struct
@@ -20,13 +23,17 @@ class QueryKind(IntEnum):
 
 
 class Choice(IntEnum):
-    """The parent's answer: none yet, one side, *either* (equivalent) or *neither* (both unacceptable)."""
+    """The parent's answer: none yet, one side, *either* (equivalent) or *neither* (both unacceptable).
+
+    *Skip* judges neither side: the parent cannot tell.
+    """
 
     NONE = 0
     LEFT = 1
     RIGHT = 2
     EITHER = 3
     NEITHER = 4
+    SKIP = 5
 
 
 class Query(Struct):
@@ -58,6 +65,11 @@ class Answer(Struct):
     choice: Int64[Tensor, "N"]
 
     @property
+    def judges(self) -> Bool[Tensor, "N"]:
+        """Return where the parent has answered and could tell."""
+        return (self.choice != Choice.NONE) & (self.choice != Choice.SKIP)
+
+    @property
     def mu(self) -> Float64[Tensor, "N 2"]:
         """Return mu of Eq. (1): [1, 0] for left, [0, 1] for right, [0.5, 0.5] for either.
 
@@ -66,7 +78,7 @@ class Answer(Struct):
         return _MU.to(self.choice.device)[self.choice]
 
 
-_MU = torch.tensor([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0]], dtype=torch.float64)
+_MU = torch.tensor([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0], [0, 0]], dtype=torch.float64)
 
 
 def empty(trials: int, length: int, height: int, width: int, device: str | torch.device = "cpu") -> Query:

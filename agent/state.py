@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import torch
 from jaxtyping import Bool, Float, Int8, Int64, UInt8
 from torch import Tensor
 
@@ -11,6 +12,10 @@ from parenting.agent.dataset import Dataset
 from parenting.envs.gridworld import WorldState
 from parenting.envs.rng import Keys
 from parenting.envs.struct import Struct
+
+PAIRS = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+"""The pairs of two of the four actions, as guidance asks about them (Sec. 2.1)."""
+_PAIRS = torch.tensor(PAIRS)
 
 
 class Learner(Struct):
@@ -109,6 +114,7 @@ class AgentState(Struct):
     familiarity: Int64[Tensor, "N L"]  # guidance queries made in each local state
     waiting: Bool[Tensor, "N"]  # paused for guidance
     refused: Bool[Tensor, "N 4"]  # actions refused in this pause
+    set_aside: Bool[Tensor, "N 6"]  # pairs of actions skipped in this pause, as in `PAIRS`
     x: Dataset
     recorder: Recorder
     learner: Learner
@@ -123,6 +129,17 @@ class AgentState(Struct):
     def all_refused(self) -> Bool[Tensor, "N"]:
         """Paused, and every action refused: *no acceptable action*."""
         return self.waiting & self.refused.all(1)
+
+    @property
+    def free_pairs(self) -> Bool[Tensor, "N 6"]:
+        """The pairs of actions that may be asked about in this pause, as in `PAIRS`."""
+        neither_refused = ~self.refused[:, _PAIRS.to(self.refused.device)].any(2)
+        return neither_refused & ~self.set_aside
+
+    @property
+    def unsure(self) -> Bool[Tensor, "N"]:
+        """Paused, and every pair of acceptable actions skipped: the parent cannot tell."""
+        return self.waiting & ~self.refused.all(1) & ~self.free_pairs.any(1)
 
 
 RENAMED = {

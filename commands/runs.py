@@ -73,7 +73,7 @@ def _row(run: RunSchema | DamagedSchema) -> dict[str, str]:
         "now": now(run),
         "stage": f"{run.maturity} of {run.config['stages']}",
         "tick": str(run.tick),
-        "answers": str(run.answers) if run.goal is None else f"{run.answers} of {run.goal}",
+        "answers": str(run.standing) if run.goal is None else f"{run.standing} of {run.goal}",
         "optimal": "yes" if run.optimal else "no",
     }
 

@@ -34,20 +34,21 @@ class AnswerLog:
         """Note what is heard in a tick, each with the tick at which it was asked."""
         for row in (answer.choice != Choice.NONE).nonzero().flatten().tolist():
             trial, asked = trials[row], describe(answer.query, row)
-            since = self._since(trial, asked)
-            self.rows.append((trial, since, tick, *asked, Choice(int(answer.choice[row])).name.lower()))
+            choice = Choice(int(answer.choice[row]))
+            since = self._since(trial, asked, asked[0] == "guidance" and choice == Choice.SKIP)
+            self.rows.append((trial, since, tick, *asked, choice.name.lower()))
 
     def applied(self, events: Sequence[Event], tick: int) -> None:
         """Note the operator's events that apply before a tick."""
         self.events += [event_record(tick, event.model_dump()) for event in events]
 
-    def _since(self, trial: int, asked: Asked) -> int:
-        """Return the tick at which the oldest open question of these words was asked."""
+    def _since(self, trial: int, asked: Asked, again: bool) -> int:
+        """Return when the oldest open question of these words was asked; `again` keeps it open."""
         waiting = self._open.get(trial, [])
         place = next((place for place, (_, one) in enumerate(waiting) if one == asked), None)
         if place is None:
             raise ValueError(f"parent: it answers trial {trial} a question that was not asked: {asked}.")
-        return waiting.pop(place)[0]
+        return waiting[place][0] if again else waiting.pop(place)[0]
 
     def records(self) -> list[dict[str, Any]]:
         """Return the answers by trial, then in the order in which they were heard."""

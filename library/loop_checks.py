@@ -73,6 +73,8 @@ def check_answer(answer: object, state: AgentState, nothing: Tensor) -> None:
             f"answer: choice has shape {tuple(answer.choice.shape)} and its query"
             f" {len(answer.query.kind)} rows; there must be one for each of {trials} agents of this world."
         )
-    if answer.choice.is_floating_point() or not bool(((answer.choice >= 0) & (answer.choice <= 4)).all()):
+    if answer.choice.is_floating_point() or not bool(
+        ((answer.choice >= 0) & (answer.choice <= max(Choice))).all()
+    ):
         known = ", ".join(f"{int(choice)} {choice.name.lower()}" for choice in Choice)
         raise ValueError(f"answer: choice {answer.choice.tolist()} must hold whole numbers of {known}.")

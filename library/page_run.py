@@ -29,7 +29,7 @@ from parenting.server.reads import answers
 from parenting.server.settings import Settings
 from parenting.server.snapshot import Snapshot, initial_snapshot, initial_weights, unpack
 from parenting.server.statuses import QueryStatus
-from parenting.server.tables import Answer, Query, Run
+from parenting.server.tables import SKIP, Answer, Query, Run
 
 
 def begin(db: Database, settings: Settings, task: Task, rule: StopRule, seed: int, person: Person) -> int:
@@ -118,6 +118,7 @@ def _offer_again(db: Database, number: int) -> None:
 def all_heard(db: Database, number: int) -> bool:
     """Return whether the agent has heard every answer that is stored."""
     unheard = select(Answer.id).where(Answer.run_id == number, Answer.standing, Answer.applied_tick.is_(None))
+    unheard = unheard.where(Answer.choice != SKIP)  # of clips that were skipped twice the agent hears nothing
     with db.read() as session:
         return session.scalars(unheard.limit(1)).first() is None
 

@@ -113,8 +113,8 @@ def _watch(
         while True:
             now = run_schema(db, run)
             done = _is_done(now, rule) and all_heard(db, run)
-            line.show(f"Run {run}: {now.state.value}, tick {now.tick}, {counted(now.answers, 'answer')}")
-            if callback and callback(Progress(int(done), 1, now.tick, now.answers)) is False:
+            line.show(f"Run {run}: {now.state.value}, tick {now.tick}, {counted(now.standing, 'answer')}")
+            if callback and callback(Progress(int(done), 1, now.tick, now.standing)) is False:
                 return True
             if done or now.status in OVER:
                 return True

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import torch
 
@@ -14,18 +13,12 @@ from parenting.agent.events import Event
 from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.agent.state import AgentState
 from parenting.library.question import Query, Question, choice_of, question
+from parenting.library.set_aside import Open, SetAside
 from parenting.library.worlds import World
 
 
 class EndedError(Exception):
     """Training ends before its time: a callback or a parent says so. The agents are kept as they are."""
-
-
-class Open(NamedTuple):
-    """A question that waits for its answer."""
-
-    trial: int
-    query: Query
 
 
 class Parent(ABC):
@@ -57,8 +50,11 @@ class Parent(ABC):
             question: Two clips, as plain Python and as tensors.
 
         Returns:
-            "left", "right", "either" (both are as good) or "neither" (both are unacceptable: an agent that
-            asked for guidance asks about other moves), or a `Choice`; None to be asked again next tick.
+            "left", "right", "either" (both are as good), "neither" (both are unacceptable: an agent that
+            asked for guidance asks about other moves) or "skip" (it cannot be told), or a `Choice`; None to
+            be asked again next tick. After a skip an agent that asked for guidance asks about another pair of
+            moves, and about the skipped ones again once none is left. A preference is asked
+            once more, later, and then dropped.
         """
 
     def begin(self, world: World, config: Config, trials: int) -> None:
@@ -66,6 +62,7 @@ class Parent(ABC):
         self.world, self.config, self.trials = world, config, trials
         self.in_training: Sequence[int] = range(trials)
         self._open: list[Open] = []
+        self._aside = SetAside()
 
     def events(self, state: AgentState) -> Sequence[Event]:
         """Return the operator's events that apply before this tick: none, unless a subclass has some."""
@@ -73,16 +70,21 @@ class Parent(ABC):
 
     def take(self, state: AgentState) -> Answer:
         """Return at most one answer a trial: that to its oldest question which has one."""
-        left, heard = list[Open](), dict[int, tuple[Query, Choice]]()
+        left, last, heard = list[Open](), list[Open](), dict[int, tuple[Query, Choice]]()
         for one in self._open:
             if one.trial not in self.in_training:
                 continue
             said = None if one.trial in heard else self.answer(question(one.query, 0, one.trial))
-            if said is None:
+            choice = Choice.NONE if said is None else choice_of(said, type(self).__name__)
+            if choice == Choice.NONE:
                 left.append(one)
+            elif choice == Choice.SKIP and not one.guides and not one.skipped:
+                last.append(one._replace(skipped=True))  # put back once
             else:
-                heard[one.trial] = one.query, choice_of(said, type(self).__name__)
-        self._open = left
+                heard[one.trial] = one.query, choice
+                if one.guides:
+                    self._aside.heard(one, choice)
+        self._open = [one for one in left if not self._aside.closed(one)] + last
         return compose_answer(self, heard)
 
     def post(self, query: queries.Query) -> None:
@@ -90,6 +92,7 @@ class Parent(ABC):
         known = Query.of(query, self.world)
         asking = (query.kind != QueryKind.NONE).nonzero().flatten().tolist()
         self._open += [Open(trial, known.row(trial)) for trial in asking]
+        self._open += self._aside.asked_again(query)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}>"

@@ -23,8 +23,8 @@ from parenting.library.worlds import World
 if TYPE_CHECKING:
     from parenting.library.result import TrainResult
 
-KEYS = {"l": "left", "r": "right", "e": "either", "n": "neither"}
-PROMPT = "l left, r right, e either, n neither, q stop: "
+KEYS = {"l": "left", "r": "right", "e": "either", "n": "neither", "s": "skip"}
+PROMPT = "l left, r right, e either, n neither, s skip, q stop: "
 
 
 class Person:
@@ -100,7 +100,9 @@ class TerminalParent(Parent):
     def begin(self, world: World, config: Config, trials: int) -> None:
         """Begin with the answers that were given before."""
         super().begin(world, config, trials)
-        self._given = {(row["trial"], row["asked"]): row["choice"] for row in self.before}
+        heard = [row for row in self.before if row["answered"] is not None]
+        self._given = {(row["trial"], row["answered"]): row for row in heard}
+        self._given_until = max((row["answered"] for row in heard), default=0)
         self._ticks: dict[int, int] = {}
         self.answers = 0
 
@@ -111,16 +113,14 @@ class TerminalParent(Parent):
         self._tick = int(state.keys.tick[0])
         return super().take(state)
 
-    def answer(self, question: Question) -> str:
-        """Show both clips and read a letter.
+    def answer(self, question: Question) -> str | None:
+        """Show both clips and read a letter; what was said before is said again at its tick.
 
         Raises:
             EndedError: the person stops.
         """
-        # an answer comes in the tick after its question, so that this is the tick at which it was asked
-        given = self._given.get((question.trial, self._tick))
-        if given is not None:
-            return str(given)
+        if self._tick < self._given_until:
+            return self._said_before(question)
         print(f"\n{both_clips(question.kind, question.left, question.right)}")
         self.asking = True
         try:
@@ -133,6 +133,13 @@ class TerminalParent(Parent):
             self.asking = False
         self.answers += 1
         return KEYS[said]
+
+    def _said_before(self, question: Question) -> str | None:
+        """Return the answer that this question got in the tick that comes; None if it got none there."""
+        row = self._given.get((question.trial, self._tick + 1))
+        asked = question.kind, *(" ".join(clip.actions) for clip in (question.left, question.right))
+        same = row is not None and asked == (row["kind"], row["left"], row["right"])
+        return str(row["choice"]) if row is not None and same else None
 
     def how_to_go_on(self) -> str:
         """Return what a person who stopped wants to know."""

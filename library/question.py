@@ -20,7 +20,7 @@ from parenting.library.worlds import World
 
 SHOWN = 4
 """Questions of a query that a notebook draws at most."""
-CHOICES = {"left": Choice.LEFT, "right": Choice.RIGHT, "either": Choice.EITHER, "neither": Choice.NEITHER}
+CHOICES = {choice.name.lower(): choice for choice in Choice if choice != Choice.NONE}
 
 
 class Query(queries.Query):
@@ -139,13 +139,13 @@ def choice_of(said: Any, who: str) -> Choice:
     """Return what a parent said as a choice.
 
     Raises:
-        ValueError: it is none of the four.
+        ValueError: it is none of them.
     """
     if isinstance(said, Choice) and said != Choice.NONE:
         return said
     if isinstance(said, str) and said in CHOICES:
         return CHOICES[said]
     raise ValueError(
-        f"{who}.answer returned {said!r}. Return 'left', 'right', 'either' or 'neither', the same as a"
-        " parenting.Choice, or None to answer later."
+        f"{who}.answer returned {said!r}. Return 'left', 'right', 'either' or 'neither', 'skip' if it cannot"
+        " be told, the same as a parenting.Choice, or None to answer later."
     )

@@ -84,10 +84,12 @@ class ReplayParent(Parent):
             row = self._by_answer.get((trial, self._tick))
             if row is None:
                 continue
-            query = self._posted.pop((trial, row["asked"]), None)
+            query = self._posted.get((trial, row["asked"]))
             if query is None:
                 self._refuse(trial, row["asked"], row, "nothing")
             else:
+                if row["choice"] != "skip":  # which may be answered later
+                    del self._posted[trial, row["asked"]]
                 heard[trial] = query, choice_of(row["choice"], "ReplayParent")
         return compose_answer(self, heard)
 

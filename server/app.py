@@ -53,6 +53,7 @@ TAGS = [
     {"name": "operator", "description": "What whoever runs the experiment may do to a living agent."},
     {"name": "questions", "description": "What the agent asks its parent, and the parent's answers."},
     {"name": "jobs", "description": "What a page asks of any worker, apart from the agent's life."},
+    {"name": "pages", "description": "What our own pages tell of themselves."},
     {"name": "health", "description": "For whoever watches over the processes."},
 ]
 
@@ -103,7 +104,7 @@ def bare_app() -> FastAPI:
     app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY)
     app.state.languages = Languages()
     app.add_middleware(LanguageMiddleware)
-    app.state.meters = Meters()
+    app.state.meters, app.state.page_errors = Meters(), LogLimit()
     app.add_middleware(
         RequestMiddleware, meters=app.state.meters
     )  # the outermost: refused requests count, too

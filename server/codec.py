@@ -18,7 +18,7 @@ from parenting.drawing.query_tensors import ACTIONS, SIDES, read_clips
 from parenting.envs.gridworld import Gridworld
 
 KINDS = {"guidance": QueryKind.GUIDANCE, "preference": QueryKind.PREFERENCE}
-CHOICES = {"left": Choice.LEFT, "right": Choice.RIGHT, "either": Choice.EITHER, "neither": Choice.NEITHER}
+CHOICES = {choice.name.lower(): choice for choice in Choice if choice != Choice.NONE}
 CHOICE_NAMES = {int(choice): name for name, choice in CHOICES.items()}
 
 

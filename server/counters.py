@@ -21,7 +21,8 @@ class Counters(Struct):
     deaths: Int64[Tensor, "N"]  # unsafe steps (docs/paper.md, "Unsafe")
     episodes: Int64[Tensor, "N"]  # ended ones
     kinds: Int64[Tensor, "N 3"]  # answered queries by Kind
-    choices: Int64[Tensor, "N 5"]  # answers by Choice
+    choices: Int64[Tensor, "N 5"]  # answers by Choice, without skips
+    skips: Int64[Tensor, "N"]  # guidance queries that were skipped
 
 
 def no_counts() -> Counters:
@@ -30,7 +31,7 @@ def no_counts() -> Counters:
     def zeros(*shape: int) -> Tensor:
         return torch.zeros(1, *shape, dtype=torch.int64)
 
-    return Counters(deaths=zeros(), episodes=zeros(), kinds=zeros(3), choices=zeros(5))
+    return Counters(deaths=zeros(), episodes=zeros(), kinds=zeros(3), choices=zeros(5), skips=zeros())
 
 
 def count(
@@ -57,11 +58,11 @@ def _corrected(tally: Counters, event: TickEvent) -> Counters:
 
 
 def _add(tally: Counters, answer: Answer, times: int) -> Counters:
-    said = answer.choice != Choice.NONE
-    if not bool(said.any()):
+    if not bool((answer.choice != Choice.NONE).any()):
         return tally
-    heard = times * said[:, None]
+    heard = times * answer.judges[:, None]
     return tally.replace(
+        skips=tally.skips + times * (answer.choice == Choice.SKIP),
         kinds=tally.kinds + (torch.nn.functional.one_hot(answer.query.kind, len(QueryKind)) * heard),
-        choices=tally.choices + (torch.nn.functional.one_hot(answer.choice, len(Choice)) * heard),
+        choices=tally.choices + (torch.nn.functional.one_hot(answer.choice, len(Choice))[:, :5] * heard),
     )

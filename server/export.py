@@ -1,7 +1,8 @@
 """The answers of a run as JSON lines: the question, the choice, who answered and when, and the policy.
 
-Each answer is a line, with the same keys in every line, so that other programs read the file as a table (for
-example `datasets.load_dataset("json", data_files="run-1.jsonl")`). A superseded answer keeps its own line.
+Each answer and each skip is a line, with the same keys in every line, so that other programs read the file as
+a table (for example `datasets.load_dataset("json", data_files="run-1.jsonl")`). A superseded answer keeps its
+own line.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ MU = {
     "right": [0.0, 1.0],
     "either": [0.5, 0.5],
     "neither": None,
+    "skip": None,
 }
-"""Eq. (1); *neither* trains nothing."""
+"""Eq. (1); *neither* and *skip* train nothing."""
 
 
 def rows(db: Database, run_id: int) -> Iterator[dict[str, Any]]:
@@ -80,6 +82,7 @@ def _row(db: Database, database: str, run: Run, answered: Answered) -> dict[str,
         "guidance_layout": sound(run, "guidance_layout"),  # the boards on which guidance was shown
         "practice": sound(run, "practice"),  # required: people practised before their first question
         "words": sound(run, "words"),  # guide: lengths of safe ways were told
+        "remarks": sound(run, "remarks"),  # the page told of hasty and contradictory answers
     }
     return row if found is None else {**row, "damaged": found}
 

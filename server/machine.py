@@ -127,5 +127,6 @@ def follow(state: AgentState, recorded: Query | None, asked: Query) -> AgentStat
         )
         return state.replace(world=place, waiting=torch.ones_like(state.waiting))
     if bool(asked.kind[0] == QueryKind.GUIDANCE):
-        return state.replace(waiting=torch.zeros_like(state.waiting), refused=torch.zeros_like(state.refused))
+        calm = {name: torch.zeros_like(getattr(state, name)) for name in ("waiting", "refused", "set_aside")}
+        return state.replace(**calm)
     return state

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from parenting.agent.query import Choice, QueryKind
+from parenting.agent.query import QueryKind
 from parenting.evaluation.argmax import Evaluation
+from parenting.server.codec import CHOICES
 from parenting.server.snapshot import Snapshot
 
 Row = dict[str, float | int | None]
@@ -27,7 +28,8 @@ def measure(saved: Snapshot, evaluation: Evaluation) -> Row:
         "episodes": int(tally.episodes[0]),
         "guidance": int(tally.kinds[0, QueryKind.GUIDANCE]),
         "preference": int(tally.kinds[0, QueryKind.PREFERENCE]),
-        **{choice.name.lower(): int(tally.choices[0, choice]) for choice in Choice if choice != Choice.NONE},
+        **{name: int(tally.choices[0, choice]) for name, choice in CHOICES.items() if name != "skip"},
+        "skips": int(tally.skips[0]),
         "return": float(evaluation.returns(live)[0]),
         "optimal_return": evaluation.best(),
         "optimal": int(evaluation.optimal(live)[0]),

@@ -48,6 +48,7 @@ FORM_FIELDS = (
     "guidance_layout",
     "practice",
     "words",
+    "remarks",
 )
 COLUMNS = {
     "world",
@@ -60,9 +61,11 @@ COLUMNS = {
     "guidance_layout",
     "practice",
     "words",
+    "remarks",
 }
 """The fields that are columns of the run as they are."""
-NUMBERS = ("seed", "goal", "pace")
+AS_JSON = ("seed", "goal", "pace", "remarks")
+"""Fields of the form whose text is a number or a truth value."""
 UNREAD = {
     "json_invalid": "This is not JSON.",
     "union_tag_invalid": "It is of none of the kinds that there are.",
@@ -123,6 +126,10 @@ class NewRun(BaseModel):
     words: Literal["plain", "guide"] = Field(
         "plain", description="guide: a question in words also tells how long a safe way is after each side."
     )
+    remarks: bool = Field(
+        True,
+        description="Tell the parent of hasty, dangerous and contradictory answers, once in ten questions.",
+    )
 
 
 def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
@@ -170,7 +177,7 @@ def read_form(form: Mapping[str, str]) -> NewRun:
     """
     given = {name: text for name, text in form.items() if text.strip()}
     fields: dict[str, Any] = {name: given[name] for name in FORM_FIELDS if name in given}
-    fields |= {name: _number(fields[name]) for name in NUMBERS if name in fields}
+    fields |= {name: _number(fields[name]) for name in AS_JSON if name in fields}
     changes = {name: text for name, text in given.items() if name.startswith("config.")}
     fields["config"] = {name.removeprefix("config."): _number(text) for name, text in changes.items()}
     try:

@@ -13,6 +13,7 @@ from parenting.server.statuses import QueryStatus, RunState, RunStatus, Waiting
 # The words of server.tables, as types: a test holds them equal.
 Kind = Literal["guidance", "preference"]
 Choice = Literal["left", "right", "either", "neither"]
+Said = Literal["left", "right", "either", "neither", "skip"]
 By = Literal["human", "scripted"]
 
 
@@ -81,6 +82,8 @@ class RunSchema(Schema):
     """required: a parent practises before the first question, once in each browser."""
     words: Literal["plain", "guide"]
     """guide: a question in words also tells how long a safe way is, which gives its answer away."""
+    remarks: bool
+    """True if the page tells the parent of hasty and contradictory answers."""
     status: RunStatus
     reason: str | None
     """The reason why it is over, in a sentence."""
@@ -92,11 +95,12 @@ class RunSchema(Schema):
     """Ticks a second, as last measured."""
     waiting: Waiting | None
     """The reason why no tick passes: the agent waits for guidance, for fewer open preference questions, or
-    for the operator (*stuck*: no action was acceptable, so the episode has to be ended); null while it acts.
+    for the operator (*stuck*: no action was acceptable, so the episode has to be ended), or for an answer to
+    what was skipped (*unsure*: every pair of moves was); null while it acts.
     """
     state: RunState
     """One word for who waits for whom, the first of these that holds: over, paused, resting (the goal is
-    reached), question (one waits for a person), no_worker, stuck, exploring.
+    reached), question (one waits for a person), no_worker, stuck, unsure, exploring.
     """
     goal: int | None
     """Answered questions after which the run rests; null: never."""
@@ -116,6 +120,8 @@ class RunSchema(Schema):
     """
     lesson: LessonSchema | None
     """The effect of the last answer that the agent heard; null before the first one."""
+    skipped: int
+    """The number of times that a question was skipped; `answers` counts these rows, `standing` does not."""
     open: OpenSchema
     worker: Literal["alive", "silent", "done"]
     """alive, silent (none raises this run, nor will one that is alive), or done (the run is over)."""
@@ -223,6 +229,21 @@ class StoredSchema(Schema):
     query_public_id: str
 
 
+class SkippedSchema(Schema):
+    """The reply to a skip."""
+
+    outcome: Literal["set_aside", "put_back", "withdrawn"]
+    """set_aside: the agent asks about another pair of moves. put_back: the clips are shown once more, after
+    all other questions. withdrawn: they had been put back, and are not shown any more."""
+    query: int
+    run: int
+    number: int | None
+    """The number of the row among the run's answers; null if this skip was stored before."""
+    database: str
+    run_public_id: str
+    query_public_id: str
+
+
 class ChangedSchema(StoredSchema):
     """The reply to a change: the answer that stands now."""
 
@@ -238,8 +259,8 @@ class WithdrawnSchema(Schema):
     and nothing was changed; the answer can be changed instead."""
     query: int
     run: int
-    choice: Choice | None
-    """The answer that was taken back, or that stands; null if this client gave none."""
+    choice: Said | None
+    """The answer or skip that was taken back, or that stands; null if this client gave none."""
     database: str
     run_public_id: str
     query_public_id: str
@@ -257,10 +278,10 @@ class RenewedSchema(Schema):
 
 
 class AnswerSchema(Schema):
-    """The answer that stands for a question."""
+    """The answer that stands for a question; *skip*: the parent could not tell."""
 
     number: int
-    choice: Choice
+    choice: Said
     parent: By
     received: datetime
     applied_tick: int | None

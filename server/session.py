@@ -114,6 +114,8 @@ class RunSession:
         reason: Waiting | None = None
         if bool(self.saved.state.all_refused):
             reason = Waiting.STUCK
+        elif bool(self.saved.state.unsure):
+            reason = Waiting.UNSURE
         elif seen.open_guidance:
             reason = Waiting.GUIDANCE
         elif seen.open_preferences:

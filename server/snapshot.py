@@ -26,6 +26,8 @@ S = TypeVar("S", bound=Struct)
 
 INFO = "info."
 """Checkpoints leave `info` out: it records what the last tick did, and nothing in the agent reads it."""
+ADDED = {"set_aside", "skips"}
+"""Pieces that checkpoints of before version 0.4 lack: nothing was skipped."""
 
 
 class DivergedError(ServerError):
@@ -134,4 +136,5 @@ def read(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None =
 
 
 def _restore(template: S, parts: dict[str, Tensor]) -> S:
-    return template.map(lambda name, old, _axis: old if name.startswith(INFO) else parts[name])
+    kept = {name for name, _, _ in template.leaves() if name.startswith(INFO)} | (ADDED - parts.keys())
+    return template.map(lambda name, old, _axis: old if name in kept else parts[name])

@@ -34,6 +34,7 @@ class Waiting(StrEnum):
     GUIDANCE = "guidance"
     PREFERENCES = "preferences"
     STUCK = "stuck"
+    UNSURE = "unsure"
 
 
 class JobState(StrEnum):
@@ -54,6 +55,7 @@ class RunState(StrEnum):
     QUESTION = "question"
     NO_WORKER = "no_worker"
     STUCK = "stuck"
+    UNSURE = "unsure"
     EXPLORING = "exploring"
 
 
@@ -69,13 +71,14 @@ QUERY_STATUSES = {
     QueryStatus.OPEN: "It waits for an answer.",
     QueryStatus.ANSWERED: "It was answered; the agent has not heard it yet.",
     QueryStatus.APPLIED: "The agent has heard the answer, at the answer's `applied_tick`.",
-    QueryStatus.WITHDRAWN: "It is no longer asked: the run ended, or the operator ended the episode.",
+    QueryStatus.WITHDRAWN: "It is no longer asked: run or episode ended, or it was skipped twice.",
 }
 
 WAITING = {
     Waiting.GUIDANCE: "The agent waits for guidance before it moves.",
     Waiting.PREFERENCES: "The agent waits until fewer preference questions are open.",
     Waiting.STUCK: "No action was acceptable: the operator has to end the episode.",
+    Waiting.UNSURE: "Every pair of moves was skipped: one of them has to be answered, or the episode ended.",
 }
 
 JOB_STATES = {
@@ -92,6 +95,7 @@ RUN_STATES = {
     RunState.QUESTION: "A question waits for the person who is the parent.",
     RunState.NO_WORKER: "No worker raises the run.",
     RunState.STUCK: "No action was acceptable: the operator has to end the episode.",
+    RunState.UNSURE: "Every pair of moves was skipped: one of them has to be answered, or the episode ended.",
     RunState.EXPLORING: "The agent acts on its own, or a scripted parent answers it.",
 }
 
@@ -102,6 +106,7 @@ STATE_LABELS = {
     RunState.QUESTION: "a question waits",
     RunState.NO_WORKER: "no worker",
     RunState.STUCK: "no action acceptable",
+    RunState.UNSURE: "every pair skipped",
     RunState.EXPLORING: "exploring",
 }
 """The same in a word or two, for lists of runs."""

@@ -32,6 +32,8 @@ __all__ = ["Table"]
 
 KINDS = ("guidance", "preference")
 CHOICES = ("left", "right", "either", "neither")
+SKIP = "skip"  # the parent cannot tell: this counts as no choice
+SAID = (*CHOICES, SKIP)
 PARENTS = ("human", "scripted")
 
 
@@ -88,6 +90,7 @@ class Run(Table):
         OneOf(("offered", "required")), default="offered", server_default="offered"
     )
     words: Mapped[str] = mapped_column(OneOf(("plain", "guide")), default="plain", server_default="plain")
+    remarks: Mapped[bool] = mapped_column(default=True, server_default=text("false"))  # on hasty answers
     # where it is
     status: Mapped[RunStatus] = mapped_column(default=RunStatus.ACTIVE)
     reason: Mapped[str | None]
@@ -97,7 +100,8 @@ class Run(Table):
     maturity: Mapped[int] = mapped_column(default=1, server_default=text("1"))  # the stage T, for display
     speed: Mapped[float | None]  # ticks a second lately, for display
     answers: Mapped[int] = mapped_column(default=0)  # numbers its answers, in their own transactions
-    retracted: Mapped[int] = mapped_column(default=0, server_default=text("0"))  # those that stand no more
+    retracted: Mapped[int] = mapped_column(default=0, server_default=text("0"))  # no more standing, or skips
+    skipped: Mapped[int] = mapped_column(default=0, server_default=text("0"))  # skips not taken back
     # what the operator set, and may change while it lives; neither changes what the agent does
     goal: Mapped[int | None]  # answered questions after which the run rests
     pace: Mapped[float | None]  # ticks a second at most, for those who want to watch
@@ -152,6 +156,7 @@ class Query(Table):
     """{"left": CLIP, "right": CLIP}, CLIP = {"actions": ["up", ...], "length": n, "frames": [n + 1 of
     {"ground": [rows], "observed": [rows], "agent": [row, column], "box": [row, column] or null}]}."""
     status: Mapped[QueryStatus] = mapped_column(default=QueryStatus.OPEN)
+    put_back: Mapped[bool] = mapped_column(default=False, server_default=text("false"))  # skipped once
     posted: Mapped[datetime]
     policy_stage: Mapped[int | None]  # which policy asked: the stage T that it was in, and
     policy_steps: Mapped[int | None]  # its gradient steps in that stage; null: asked before these were kept
@@ -164,11 +169,11 @@ class Query(Table):
 
 
 class Answer(Table):
-    """A parent's answer. Rows are only ever added; an answer that supersedes another names its row."""
+    """A parent's answer or skip. Rows are only ever added; one that supersedes another names its row."""
 
     __tablename__ = "answer"
     __table_args__ = (
-        one_of("choice", CHOICES),
+        one_of("choice", SAID),
         UniqueConstraint("run_id", "number"),
         unique_where("uq_answer_standing", "standing", "query_id"),
         unique_where("uq_answer_first", "supersedes IS NULL", "query_id", "client_id"),
@@ -180,7 +185,7 @@ class Answer(Table):
     query_id: Mapped[int] = mapped_column(ForeignKey("query.id"))
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
     number: Mapped[int]
-    choice: Mapped[str] = mapped_column(OneOf(CHOICES))
+    choice: Mapped[str] = mapped_column(OneOf(SAID))
     parent: Mapped[str] = mapped_column(OneOf(PARENTS))
     client_id: Mapped[str]
     supersedes: Mapped[int | None] = mapped_column(ForeignKey("answer.id"))

@@ -13,7 +13,7 @@ from torch.nn.functional import one_hot
 from parenting.agent import parenting
 from parenting.agent.config import Config
 from parenting.agent.parent import BatchParent
-from parenting.agent.query import Answer, Choice, QueryKind
+from parenting.agent.query import Answer, QueryKind
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
 from parenting.evaluation.argmax import Evaluation, evaluation
@@ -78,7 +78,7 @@ class BatchTrainer:
 
     def _count(self, answer: Answer, stage: Int64[Tensor, "N"]) -> None:
         counts, report, kind = self.counts, self.state.info, answer.query.kind
-        answered = answer.choice != Choice.NONE
+        answered = answer.judges
         died = report.moved & self.world.unsafe(report.before, report.action, self.state.world)
         # a preference belongs to the stage that its clips were recorded at, however late the answer
         of = torch.where(kind == QueryKind.PREFERENCE, answer.query.maturity, stage)

@@ -53,12 +53,24 @@ class AnswerBody(Strict):
     question: PublicId | None = Field(None, description="The `public_id` of the question.")
 
 
-class WithdrawBody(LeaseBody):
-    """The client that takes its answer back, and the names of the question."""
+class NamedBody(LeaseBody):
+    """The client that takes its answer back or skips, and the names of the question."""
 
     database: DatabaseId | None = Field(None, description="The `database` that came with the question.")
     run: PublicId | None = Field(None, description="The `run_public_id` that came with it.")
     question: PublicId | None = Field(None, description="The `public_id` of the question.")
+
+
+class PageErrorBody(Strict):
+    """A fault of a script of our pages, as a browser tells it."""
+
+    message: str = Field(min_length=1, max_length=500)
+    source: str | None = Field(None, max_length=300, description="The address of the script.")
+    line: int | None = Field(None, ge=0, le=LARGEST_INT)
+    column: int | None = Field(None, ge=0, le=LARGEST_INT)
+    stack: str | None = Field(None, max_length=4000)
+    page: str | None = Field(None, max_length=300, description="The path of the page.")
+    run: PublicId | None = Field(None, description="The `public_id` of the run that the page shows.")
 
 
 class ChangeBody(Strict):

@@ -66,6 +66,7 @@ RUN: dict[str, Any] = {
     "guidance_layout": "one",
     "practice": "offered",
     "words": "plain",
+    "remarks": True,
     "status": "active",
     "reason": None,
     "tick": 5,
@@ -87,6 +88,7 @@ RUN: dict[str, Any] = {
         "before": [0.25, 0.25, 0.25, 0.25],
         "after": [0.22, 0.34, 0.22, 0.22],
     },
+    "skipped": 0,
     "open": {"guidance": 1, "preference": 0},
     "worker": "alive",
 }
@@ -142,6 +144,7 @@ NAMES = {"database": DATABASE, "run_public_id": RUN_ID, "query_public_id": QUEST
 STORED = {"query": 7, "run": 1, "number": 4, "choice": "left", "received": NOON, **NAMES}
 CHANGED = {**STORED, "number": 5, "choice": "right", "heard": True}
 WITHDRAWN = {"outcome": "withdrawn", "query": 7, "run": 1, "choice": "left", **NAMES}
+SKIPPED = {"outcome": "set_aside", "query": 7, "run": 1, "number": 4, **NAMES}
 METRIC = {"tick": 4, "values": {"deaths": 0, "loss": 0.6931, "entropy_global": 1.386}}
 EVENTS = [
     {"id": 1, "run": 1, "event": {"kind": "mature"}, "created": NOON, "applied_tick": 4},
@@ -202,6 +205,7 @@ WALK: dict[str, Any] = {
     },
     "reason": None,
     "worker": "alive",
+    "remarks": True,
 }
 
 
@@ -239,6 +243,7 @@ SHOWN = {
     "answer_question": Shown(STORED, ANSWERS),
     "change_answer": Shown(CHANGED, {"to right": {"choice": "right", "client_id": "me"}}),
     "withdraw_answer": Shown(WITHDRAWN, {"mine": LEASE}),
+    "skip_question": Shown(SKIPPED, {"mine": LEASE}),
     "renew_leases": Shown(
         {"yours": [QUESTION_ID], "elsewhere": [], "closed": []},
         {"looking": {"client_id": "me", "questions": [QUESTION_ID], "idle": 3.5}},
@@ -250,6 +255,7 @@ SHOWN = {
         {"a walk": {"client_id": "me", "kind": "walk", "payload": {"seed": 7}}},
     ),
     "get_job": Shown(WALK),
+    "report_page_error": Shown(None, {"a fault": {"message": "x is not a function", "page": "/runs/3"}}),
     "follow_run": Shown(STREAM),
     "export_run": Shown(json.dumps(EXPORTED) + "\n"),
 }

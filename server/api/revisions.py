@@ -1,4 +1,4 @@
-"""Routes of second thoughts: take an answer of one's own back, or change it."""
+"""Routes of second thoughts: take an answer of one's own back, change it, or skip a question."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from functools import partial
 from fastapi import Request
 
 from parenting.server.admission import admitted_router
-from parenting.server.api.bodies import AnswerBody, WithdrawBody
+from parenting.server.api.bodies import AnswerBody, NamedBody
 from parenting.server.api.names import QueryName
 from parenting.server.api.responses import write_responses
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
 from parenting.server.queue.answers import Said
 from parenting.server.queue.names import Names
 from parenting.server.queue.revisions import supersede_in, withdraw_in
-from parenting.server.schemas import ChangedSchema, WithdrawnSchema
+from parenting.server.queue.skips import skip_in
+from parenting.server.schemas import ChangedSchema, SkippedSchema, WithdrawnSchema
+from parenting.server.tables import SKIP
 
 router = admitted_router(tags=["questions"])
 
@@ -25,7 +27,7 @@ router = admitted_router(tags=["questions"])
     responses=write_responses(404, 409, 410),
 )
 async def withdraw_answer(
-    request: Request, query_id: QueryName, body: WithdrawBody, db: Db, settings: SettingsOf
+    request: Request, query_id: QueryName, body: NamedBody, db: Db, settings: SettingsOf
 ) -> WithdrawnSchema:
     """Take back an answer of this client that the agent has not heard.
 
@@ -72,3 +74,26 @@ async def change_answer(request: Request, query_id: QueryName, body: AnswerBody,
     found = await store(request, partial(supersede_in, db=db, query=query_id, said=said, names=names))
     notify_worker(request)
     return ChangedSchema(**vars(found))
+
+
+@router.post(
+    "/queries/{query_id}/skip",
+    summary="Skip a question",
+    responses=write_responses(404, 409, 410),
+)
+async def skip_question(request: Request, query_id: QueryName, body: NamedBody, db: Db) -> SkippedSchema:
+    """Say that this question cannot be told. It counts as no answer, and nothing is learnt from it.
+
+    Guidance is set aside: the agent asks about another pair of moves, as long as there is one, and *neither*
+    is not said of it. Clips are put back behind all other questions once, and withdrawn when they are skipped
+    again. The same request may be sent again; clips that were put back have to be leased again before they
+    can be skipped a second time. `withdraw` takes a skip back, and `change` answers what was skipped, whoever
+    skipped it.
+
+    A question that was answered, skipped by another client or withdrawn gets 409. Names of another database,
+    run or question get 410 (`elsewhere`).
+    """
+    said, names = Said(SKIP, body.client_id, "human"), Names(body.database, body.run, body.question)
+    found = await store(request, partial(skip_in, db=db, query=query_id, said=said, names=names))
+    notify_worker(request)
+    return SkippedSchema(**vars(found))

@@ -12,6 +12,7 @@ from parenting.server.pages.parent import router as parent
 from parenting.server.pages.practice import router as practice
 from parenting.server.pages.render import error_page
 from parenting.server.pages.revisions import router as revisions
+from parenting.server.pages.skips import router as skips
 from parenting.server.pages.start import router as start
 from parenting.server.pages.walk import router as walk
 
@@ -25,6 +26,7 @@ router.include_router(practice)
 router.include_router(walk)
 router.include_router(growth)
 router.include_router(grid)
+router.include_router(skips)
 router.include_router(dashboard)
 router.include_router(controls)
 router.include_router(history)

@@ -33,6 +33,10 @@ STATUS = {
     "question": ("A question waits for the parent.", ""),
     "exploring": ("The agent is exploring on its own.", ""),
     "stuck": ("No action was acceptable.", "The agent stands still until its episode is ended."),
+    "unsure": (
+        "Every pair of moves was skipped.",
+        "The agent stands still until its parent answers one, or the episode is ended.",
+    ),
     "offline": ("No connection to the server.", "These numbers are of a moment ago."),
 }
 """A heading and a sentence for each state of a run, for those who watch it."""

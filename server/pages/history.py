@@ -23,9 +23,9 @@ from parenting.server.pages.render import moved, page
 from parenting.server.pages.texts import parent_title
 from parenting.server.reads import answers
 from parenting.server.reads.answers import Answered
-from parenting.server.schemas import Choice
+from parenting.server.schemas import Said
 from parenting.server.statuses import QueryStatus
-from parenting.server.tables import CHOICES, KINDS, Run
+from parenting.server.tables import KINDS, SAID, SKIP, Run
 
 router = admitted_router(include_in_schema=False)
 
@@ -37,6 +37,7 @@ CHOICE_TEXTS = {
     "right": mark("Right is better"),
     "either": mark("Equally good"),
     "neither": mark("Both too dangerous"),
+    "skip": mark("Skipped: could not tell"),
 }
 """The meaning of a choice, in words."""
 CHOICE_NAMES = {**CHOICE_TEXTS, "left": mark("A or left is better"), "right": mark("B or right is better")}
@@ -44,7 +45,7 @@ CHOICE_NAMES = {**CHOICE_TEXTS, "left": mark("A or left is better"), "right": ma
 
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 OfKind = Annotated[Literal["guidance", "preference", ""], Query()]
-OfChoice = Annotated[Choice | Literal[""], Query()]
+OfChoice = Annotated[Said | Literal[""], Query()]
 
 
 class Entry(NamedTuple):
@@ -82,7 +83,7 @@ class HistoryPage:
     kind: str  # the kind that is shown alone; "" for all
     choice: str  # the same for the choice
     kinds: Collection[str] = tuple(KINDS)
-    choices: Mapping[str, str] = field(default_factory=lambda: {name: CHOICE_NAMES[name] for name in CHOICES})
+    choices: Mapping[str, str] = field(default_factory=lambda: {name: CHOICE_NAMES[name] for name in SAID})
 
 
 @router.get("/runs/{run_id}/history")
@@ -150,6 +151,8 @@ def _said(choice: str, shown: QuestionView) -> str:
 def _fallen(answer: tables.Answer, query: tables.Query) -> str:
     if answer.standing:
         return ""
+    if answer.choice == SKIP and query.put_back:
+        return tr("put back")
     back = query.status in (QueryStatus.OPEN, QueryStatus.WITHDRAWN)
     return tr("taken back") if back else tr("corrected later")
 

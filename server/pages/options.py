@@ -45,6 +45,13 @@ OPTIONS = (
         "Lengths of safe ways give the answer away: not for studies of what people judge themselves.",
     ),
     Option(
+        "remarks",
+        "Remarks on answers",
+        "",
+        (("", "At most one in ten questions"), ("false", "None")),
+        "On answers that are hasty, contradict an earlier one or prefer a danger. Studies may want none.",
+    ),
+    Option(
         "config.stages",
         "Stages (maximum clip length)",
         "",

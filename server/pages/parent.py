@@ -36,7 +36,7 @@ from parenting.server.queue.leases import lease_ahead, may_lease
 from parenting.server.queue.names import Names
 from parenting.server.queue.presence import holder
 from parenting.server.reads.names import query_number, query_numbers
-from parenting.server.reads.own_answers import last_of, own_answer
+from parenting.server.reads.own_answers import changeable, last_of
 from parenting.server.reads.schemas import run_schema
 from parenting.server.statuses import RunState
 from parenting.server.streams import Streams
@@ -97,7 +97,7 @@ def parent_page(
     run = runs.get_run(db, run_id)
     asked = None if query is None else question_of(db, run, query)
     if request.path_params["run_id"] != run.public_id or (asked is not None and query != asked.public_id):
-        return redirect(_address(run, asked, change), status=307)
+        return redirect(address(run, asked, change), status=307)
     if run.practice == "required" and PRACTISED not in request.cookies:
         return redirect(Place(run=run.public_id).address())
     client = _client(request)
@@ -156,14 +156,14 @@ async def question(
 def next_question(run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField) -> Response:
     """For the form: lease the next question and go to it."""
     run = runs.get_run(db, run_id)
-    return redirect(_address(run, leases.lease(db, run.id, client_id, settings.lease_seconds)))
+    return redirect(address(run, leases.lease(db, run.id, client_id, settings.lease_seconds)))
 
 
 @router.post("/runs/{run_id}/parent/take")
 def take_question(run_id: RunId, db: Db, settings: SettingsOf, client_id: ClientField) -> Response:
     """For the form: take the question over, whoever holds it, and go to it."""
     run = runs.get_run(db, run_id)
-    return redirect(_address(run, leases.take(db, run.id, client_id, settings.lease_seconds)))
+    return redirect(address(run, leases.take(db, run.id, client_id, settings.lease_seconds)))
 
 
 @router.post("/runs/{run_id}/parent/answer")
@@ -190,7 +190,7 @@ async def answer(
     notify_worker(request)
     run = await streams.admission.read(runs.get_run, db, stored.run)
     lease = partial(leases.lease, db, run.id, client_id, settings.lease_seconds)
-    return redirect(_address(run, await streams.wait_for(lease, PATIENCE, request.is_disconnected)))
+    return redirect(address(run, await streams.wait_for(lease, PATIENCE, request.is_disconnected)))
 
 
 def _lease_next(
@@ -210,7 +210,7 @@ def _shown(db: Database, run: Run, asked: tables.Query, client: str, change: boo
     """Return the question that an address names, if it waits, or if its answer is to be changed."""
     if asked.status == "open":
         return question_view(asked, run)
-    found = own_answer(db, asked.id, client) if change else None
+    found = changeable(db, asked.id, client) if change else None
     if found is None:
         return None
     return question_view(asked, run, Former(found.answer.choice, asked.status == "applied"))
@@ -226,7 +226,8 @@ def _last(db: Database, run: Run, client: str) -> QuestionView | None:
     return None
 
 
-def _address(run: Run, query: tables.Query | None, change: bool = False) -> str:
+def address(run: Run, query: tables.Query | None, change: bool = False) -> str:
+    """Return the address of a run's parent's page, which shows a question, perhaps to change its answer."""
     named = f"?query={query.public_id}" + ("&change=true" if change else "") if query else ""
     return f"/runs/{run.public_id}/parent{named}"
 

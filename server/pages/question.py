@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -13,8 +15,8 @@ from parenting.drawing.query_view import QueryView, query_view
 from parenting.drawing.sentences import tr
 from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import reading
-from parenting.server.pages.texts import AGAIN, LEADS
-from parenting.server.tables import Query, Run
+from parenting.server.pages.texts import AGAIN, LEADS, PUT_BACK
+from parenting.server.tables import SKIP, Query, Run
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class QuestionView(QueryView):
     one_board: bool = False  # guidance on one board with both moves, and not on the paper's two
     former: Former | None = None
     around: tuple[str, ...] = ()  # the difference of the clips and the whole board, in sentences
+    marks: tuple[str, str] = ("", "")  # the same for the same clip, left and right
+    put_back: bool = False  # clips that somebody has skipped once
 
     @property
     def action(self) -> str:
@@ -65,8 +69,8 @@ class QuestionView(QueryView):
 
     @property
     def lead(self) -> str:
-        """A sentence on who waits for the answer."""
-        return tr(LEADS[self.kind])
+        """A sentence on who waits for the answer, or on an earlier skip."""
+        return tr(PUT_BACK if self.put_back else LEADS[self.kind])
 
     @property
     def spoken(self) -> str:
@@ -96,13 +100,15 @@ class QuestionView(QueryView):
             sides = {move.side: f"{move.letter}, {tr(move.action)}" for move in self.candidates}
         else:
             sides = {side.name: tr(side.name.capitalize()) for side in self.sides}
-        return {**sides, "either": tr("Either"), "neither": tr("Neither")}
+        return {**sides, "either": tr("Either"), "neither": tr("Neither"), SKIP: tr("I can’t tell")}
 
     @property
     def again(self) -> str:
         """Sentences on the answer that stands, where there is one."""
         if self.former is None:
             return ""
+        if self.former.choice == SKIP:
+            return tr(AGAIN["skipped"])
         if not self.former.heard:
             return tr(AGAIN["unheard"])
         moved = self.kind == "guidance" and self.former.choice != "neither"
@@ -118,7 +124,8 @@ def question_view(query: Query, run: Run, former: Former | None = None) -> Quest
     with reading(query):
         one, guide = _is_on_one_board(query, run), run.words == "guide"
         described = describe(query.clips, query.kind, query.maturity, run.legend, _rows(run), one, guide)
-    return QuestionView(**described, id=query.public_id, run=run.public_id, former=former)
+    ours = {"id": query.public_id, "run": run.public_id, "former": former, "put_back": query.put_back}
+    return QuestionView(**described, **ours)
 
 
 def describe(
@@ -133,7 +140,13 @@ def describe(
     """Describe a question by its clips (`drawing.query_view.query_view`), and its board in words."""
     view = query_view(clips, kind, stage, legend, rows)
     around = surroundings(clips, legend, ("A", "B") if one_board else ("left", "right"), guide)
-    return {**vars(view), "one_board": one_board, "around": around}
+    marks = _mark(clips["left"]), _mark(clips["right"])
+    return {**vars(view), "one_board": one_board, "around": around, "marks": marks}
+
+
+def _mark(clip: Clip) -> str:
+    """Return a few letters by which the page knows a clip again."""
+    return hashlib.blake2b(json.dumps(clip).encode(), digest_size=6).hexdigest()
 
 
 def side_names(query: Query, run: Run) -> tuple[str, str]:

@@ -18,6 +18,7 @@ AGAIN = {
     "moved": mark(
         "The move has happened, and that stays. Another answer corrects what it learns from now on."
     ),
+    "skipped": mark("If you can tell now, answer: the agent learns from it, and moves if it still waits."),
 }
 """Sentences on a question that its parent has answered, shown where the answer can be changed."""
 
@@ -55,6 +56,10 @@ STATE_TEXTS = {
             "End the episode on the dashboard, and the agent goes on without it."
         ),
     ),
+    "unsure": (
+        mark("You skipped every pair of moves."),
+        mark("The agent stands still. Look at the pairs again, let either move do, or end this episode."),
+    ),
     "paused": (mark("The run is paused."), mark("No time passes for the agent until the run is resumed.")),
     "no_worker": (
         mark("No worker is running."),
@@ -73,6 +78,9 @@ STATE_TEXTS = {
 }
 """A heading and a sentence for each state of the page, shown while no question is."""
 
+
+PUT_BACK = mark("This was skipped before. Skip it again, and it is not shown any more.")
+"""A sentence on clips that were put back."""
 
 GOAL_STEP = 50
 """Answers that a goal grows by where it is reached, by a button."""

@@ -20,7 +20,7 @@ from parenting.server.queue.names import UNSTATED, Names, Place, find_place
 from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
 from parenting.server.store.relay import announce
-from parenting.server.tables import Query, Table
+from parenting.server.tables import SKIP, Query, Table
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,14 @@ class Stored:
 class Said:
     """An answer as it arrives: the choice, the client that sent it, and who decided."""
 
-    choice: str
+    choice: str  # left, right, either or neither (Sec. 2.3), or skip
     client_id: str
     parent: str
+
+    @property
+    def skips(self) -> bool:
+        """Return whether the parent cannot tell: such a row counts as no answer."""
+        return self.choice == SKIP
 
 
 def get_query(db: Database, query_id: int) -> Query:
@@ -107,7 +112,9 @@ def find_asked(session: Session, query: int) -> Any:
     return session.execute(_ASKED, {"query_id": query}).one()
 
 
-def add(session: Session, db: Database, asked: Any, said: Said) -> tuple[int, datetime]:
+def add(
+    session: Session, db: Database, asked: Any, said: Said, standing: bool = True
+) -> tuple[int, datetime]:
     """Add an answer after the last one to its question, and return its number and time."""
     run_id: int = asked.run_id
     # Numbered in this transaction: no reader can see number n + 1 before n.
@@ -118,17 +125,23 @@ def add(session: Session, db: Database, asked: Any, said: Said) -> tuple[int, da
         "number": number,
         **vars(said),
         "supersedes": asked.last,
-        "standing": True,
+        "standing": standing,
         "received": db.clock(),
     }
     link = asked.last_link if isinstance(asked.last_link, str) else ""
     before = BEGIN if number == 1 else link
     session.execute(_INSERTED, row | hashes(row, asked._mapping, before))
+    if said.skips:
+        session.execute(_SKIPPED, {"run_id": run_id})
     announce(session, "worker")
     return number, row["received"]
 
 
 def _again(asked: Any, said: Said, place: Place) -> Stored:
+    if asked.choice == SKIP and not said.skips:
+        raise Conflict(
+            mark("This question was skipped and is not asked now; change the skip to your answer.")
+        )
     if asked.client_id != said.client_id:
         raise Conflict(
             mark("This question was already answered by someone else; your answer was not stored.")
@@ -150,7 +163,7 @@ _ASKED = (
     select(
         _query.id.label("query_id"),
         _run.status.label("run_status"),
-        *(_query[name] for name in ("run_id", "status", *OF_QUERY)),
+        *(_query[name] for name in ("run_id", "status", "put_back", "leased_by", *OF_QUERY)),
         _answer.id.label("standing"),
         *(_answer[name] for name in ("client_id", "choice", "number", "received")),
         _last.c.link.label("last_link"),
@@ -176,5 +189,10 @@ _NUMBERED = (
     .where(_run.id == bindparam("run_id"))
     .values(answers=_run.answers + 1)
     .returning(_run.answers)
+)
+_SKIPPED = (
+    update(_RUN)
+    .where(_run.id == bindparam("run_id"))
+    .values(skipped=_run.skipped + 1, retracted=_run.retracted + 1)
 )
 _INSERTED = insert(_ANSWER)

@@ -66,7 +66,7 @@ def take_correction(db: Database, mine: Claim, tick: int) -> Corrected | None:
 
 
 def withdraw_guidance(db: Database, mine: Claim, tick: int) -> None:
-    """Withdraw the open guidance query of a pause that a correction has ended at this tick.
+    """Withdraw the open guidance query of a pause that a correction has ended or turned at this tick.
 
     A replayed tick leaves what was asked since: the agent waits for that.
 

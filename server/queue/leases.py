@@ -17,7 +17,7 @@ from sqlalchemy.orm.attributes import set_committed_value
 from parenting.server.damage import damage, readable
 from parenting.server.db import Database
 from parenting.server.queue.locks import lock_query
-from parenting.server.queue.queries import guidance_first
+from parenting.server.queue.queries import urgency
 from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
 from parenting.server.store.clock import Mark, holds, is_over
@@ -30,7 +30,7 @@ def waiting(db: Database, run_id: int) -> Query | None:
     """Return the most urgent open query, leased or not: guidance first, then the oldest."""
     rows = select(Query).where(Query.run_id == run_id, Query.status == QueryStatus.OPEN)
     with db.read() as session:
-        return session.scalars(rows.order_by(guidance_first(), Query.tick).limit(1)).first()
+        return session.scalars(rows.order_by(*urgency()).limit(1)).first()
 
 
 def lease(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECONDS) -> Query | None:
@@ -171,8 +171,8 @@ _ANY = (
 )
 _OPEN = _ANY.where(or_(_MINE, _FREE))
 _WANTED = or_(Run.goal.is_(None), Run.goal > _STANDING)
-_OFFER = _OPEN.where(_WANTED).order_by(case((_MINE, 0), else_=1), guidance_first(), Query.tick)
-_TAKEN = _ANY.where(_WANTED).order_by(case((_MINE, 0), (_FREE, 1), else_=2), guidance_first(), Query.tick)
+_OFFER = _OPEN.where(_WANTED).order_by(case((_MINE, 0), else_=1), *urgency())
+_TAKEN = _ANY.where(_WANTED).order_by(case((_MINE, 0), (_FREE, 1), else_=2), *urgency())
 _other = aliased(Query)
 # Two names for one list: under one name SQLAlchemy writes an empty list for IN and for NOT IN alike, which on
 # PostgreSQL offers nothing.
@@ -186,4 +186,4 @@ _ANSWERS_TO_COME = (
 )
 _AHEAD = _OPEN.where(
     Query.id.not_in(_SHOWN), or_(Run.goal.is_(None), Run.goal > _STANDING + _ANSWERS_TO_COME)
-).order_by(guidance_first(), Query.tick)
+).order_by(*urgency())

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from sqlalchemy import ColumnElement, case, func, select, update
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from parenting.server.db import Database
 from parenting.server.statuses import QueryStatus
-from parenting.server.tables import Query
+from parenting.server.tables import SKIP, Answer, Query
 
 
 @dataclass(frozen=True)
@@ -62,14 +63,20 @@ def reopen_in(session: Session, run_id: int) -> None:
     """Ask again what was withdrawn when a run ended, in a transaction that is already open.
 
     Guidance that the agent waits for no more stays withdrawn: its episode was ended, or its pause was ended
-    by a correction.
+    by a correction. So do clips that were skipped twice.
     """
+    skipped = select(Answer.query_id).where(Answer.run_id == run_id, Answer.standing, Answer.choice == SKIP)
     rows = update(Query).where(Query.run_id == run_id, Query.status == QueryStatus.WITHDRAWN)
-    rows = rows.where(Query.withdrawn_tick.is_(None))
+    rows = rows.where(Query.withdrawn_tick.is_(None), Query.id.not_in(skipped))
     nobody: dict[str, None] = dict.fromkeys(
         ("leased_by", "leased_until", "lease_epoch", "lease_begin", "lease_end")
     )
     session.execute(rows.values(status=QueryStatus.OPEN, **nobody))
+
+
+def urgency() -> tuple[ColumnElement[Any] | InstrumentedAttribute[Any], ...]:
+    """Return the order of questions: guidance first, then the oldest; what was put back comes last."""
+    return guidance_first(), Query.put_back, Query.tick
 
 
 def guidance_first() -> ColumnElement[int]:

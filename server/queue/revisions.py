@@ -22,7 +22,7 @@ from parenting.server.queue.names import UNSTATED, Names, Place, find_place
 from parenting.server.runs import lock
 from parenting.server.statuses import OVER, QueryStatus
 from parenting.server.store.relay import announce
-from parenting.server.tables import Table
+from parenting.server.tables import SKIP, Table
 
 SOMEONE_ELSES = mark(
     "This question was answered by someone else; only they can take their answer back or change it."
@@ -52,14 +52,14 @@ class Withdrawn:
 def supersede(
     db: Database, query: int | str, choice: str, client_id: str, parent: str, names: Names = UNSTATED
 ) -> Changed:
-    """Put another answer in the place of one's own; the old row stays and keeps its tick.
+    """Put another answer in the place of one's own, or of anybody's skip; the old row keeps its tick.
 
     The same choice changes nothing, so a change whose reply was lost may be sent again.
 
     Raises:
         ElsewhereError: it is meant for another database, run or question.
         NotFound: there is no such query.
-        Conflict: there is no answer to supersede, or it is somebody else's.
+        Conflict: there is no answer to supersede, or it is somebody else's and no skip.
     """
     with db.write() as session:
         return supersede_in(session, db, query, Said(choice, client_id, parent), names)
@@ -69,14 +69,17 @@ def supersede_in(
     session: Session, db: Database, query: int | str, said: Said, names: Names = UNSTATED
 ) -> Changed:
     """Change an answer as `supersede` does, in a transaction that is already open."""
-    place, asked = _locked(session, db, query, names)
+    place, asked = find_locked(session, db, query, names)
     if asked.standing is None:
         raise Conflict(mark("Question {question} has no answer to supersede."), question=place.query)
-    _own(asked, said.client_id)
+    if asked.choice != SKIP:
+        _own(asked, said.client_id)
     number, received = asked.number, asked.received
     if asked.choice != said.choice:
         _retract(session, asked)
         number, received = add(session, db, asked, said)
+        if asked.status == QueryStatus.WITHDRAWN:  # it was skipped twice
+            session.execute(_ANSWERED, {"query_id": place.query})
     heard = asked.status == QueryStatus.APPLIED
     return Changed(**vars(place), number=number, choice=said.choice, received=received, heard=heard)
 
@@ -90,8 +93,9 @@ def withdraw(
 ) -> Withdrawn:
     """Take back an answer of one's own that the agent has not heard; its question is open again.
 
-    It is leased to the same client. An answer that was heard stays, and the outcome says so. A withdrawal
-    whose reply was lost may be sent again. From a client that never answered it, it changes nothing.
+    It is leased to the same client. An answer that was heard stays, and the outcome says so. A skip is taken
+    back in the same way. A withdrawal whose reply was lost may be sent again. From a client that never
+    answered it, it changes nothing.
 
     Raises:
         ElsewhereError: it is meant for another database, run or question.
@@ -106,7 +110,7 @@ def withdraw_in(
     session: Session, db: Database, query: int | str, client_id: str, names: Names, seconds: float
 ) -> Withdrawn:
     """Take an answer back as `withdraw` does, in a transaction that is already open."""
-    place, asked = _locked(session, db, query, names)
+    place, asked = find_locked(session, db, query, names)
     if asked.standing is not None:
         _own(asked, client_id)
         if asked.status == QueryStatus.APPLIED:
@@ -118,12 +122,16 @@ def withdraw_in(
         announce(session, "web")
     elif asked.status == QueryStatus.WITHDRAWN:
         raise Conflict(mark("This question was withdrawn: the run or its episode was ended."))
+    elif asked.put_back and session.execute(_LAST_BY, {"answer_id": asked.last}).scalar() == client_id:
+        session.execute(_REOPENED, {"query_id": place.query})
+        session.execute(_UNSKIPPED, {"run_id": place.run})
     if session.execute(_GIVEN, {"query_id": place.query, "client_id": client_id}).first() is not None:
         hold_in(session, db, place.query, client_id, seconds)
     return Withdrawn("withdrawn", choice=asked.choice, **vars(place))
 
 
-def _locked(session: Session, db: Database, query: int | str, names: Names) -> tuple[Place, Any]:
+def find_locked(session: Session, db: Database, query: int | str, names: Names) -> tuple[Place, Any]:
+    """Return where a question is, its run locked, and the question with the answer that stands."""
     place = find_place(session, query, names)
     if not db.one_writer:
         lock(session, place.run)
@@ -138,7 +146,7 @@ def _own(asked: Any, client_id: str) -> None:
 def _retract(session: Session, asked: Any) -> None:
     """Let the answer that stands stand no more."""
     session.execute(_FALLEN, {"answer_id": asked.standing})
-    session.execute(_COUNTED, {"run_id": asked.run_id})
+    session.execute(_UNSKIPPED if asked.choice == SKIP else _COUNTED, {"run_id": asked.run_id})
 
 
 # Statements are built once.
@@ -150,4 +158,8 @@ _GIVEN = (
     .where(_ANSWER.c.query_id == bindparam("query_id"), _ANSWER.c.client_id == bindparam("client_id"))
     .limit(1)
 )
-_REOPENED = update(_QUERY).where(_QUERY.c.id == bindparam("query_id")).values(status=QueryStatus.OPEN)
+_UNSKIPPED = update(_RUN).where(_RUN.c.id == bindparam("run_id")).values(skipped=_RUN.c.skipped - 1)
+_ONE = update(_QUERY).where(_QUERY.c.id == bindparam("query_id"))
+_REOPENED = _ONE.values(status=QueryStatus.OPEN, put_back=False)
+_ANSWERED = _ONE.values(status=QueryStatus.ANSWERED)
+_LAST_BY = select(_ANSWER.c.client_id).where(_ANSWER.c.id == bindparam("answer_id"))

@@ -1,28 +1,28 @@
-"""The answers of one client that stand: the page shows them to whoever gave them."""
+"""The standing answers that one client may change: its own, and any skip."""
 
 from __future__ import annotations
 
-from sqlalchemy import Select, select
+from sqlalchemy import Select, or_, select
 
 from parenting.server.db import Database
 from parenting.server.reads.answers import Answered
-from parenting.server.tables import Answer, Query
+from parenting.server.tables import SKIP, Answer, Query
 
 
 def last_of(db: Database, run_id: int, client_id: str) -> Answered | None:
     """Return the last standing answer that this client gave in a run, if its row can be read."""
-    rows = _own(client_id).where(Answer.run_id == run_id).order_by(Answer.number.desc())
-    return _first(db, rows)
+    rows = _standing().where(Answer.client_id == client_id, Answer.run_id == run_id)
+    return _first(db, rows.order_by(Answer.number.desc()))
 
 
-def own_answer(db: Database, query_id: int, client_id: str) -> Answered | None:
-    """Return the answer that stands for a query, if this client gave it and its row can be read."""
-    return _first(db, _own(client_id).where(Answer.query_id == query_id))
+def changeable(db: Database, query_id: int, client_id: str) -> Answered | None:
+    """Return the answer that stands for a query, if this client gave it or it is a skip, and can be read."""
+    mine = or_(Answer.client_id == client_id, Answer.choice == SKIP)
+    return _first(db, _standing().where(Answer.query_id == query_id, mine))
 
 
-def _own(client_id: str) -> Select[Answer, Query]:
-    rows = select(Answer, Query).join(Query, Answer.query_id == Query.id)
-    return rows.where(Answer.client_id == client_id, Answer.standing)
+def _standing() -> Select[Answer, Query]:
+    return select(Answer, Query).join(Query, Answer.query_id == Query.id).where(Answer.standing)
 
 
 def _first(db: Database, rows: Select[Answer, Query]) -> Answered | None:

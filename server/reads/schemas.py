@@ -44,6 +44,9 @@ SILENT_AFTER = timedelta(seconds=5)
 """A run counts as not raised once its worker has been silent for this long. One that no worker has
 claimed yet, as a run that was just started, is not raised if no worker is alive at all."""
 
+HELD_UP: dict[Waiting | None, RunState] = {Waiting.STUCK: RunState.STUCK, Waiting.UNSURE: RunState.UNSURE}
+"""The states in which no question is open and none comes by itself."""
+
 FORGIVEN = timedelta(minutes=5)
 """For so long at most a missing sign is put down to a store that refuses."""
 PROBE_SECONDS = 0.1
@@ -200,7 +203,7 @@ def _run_state(run: Run, opened: Open, resting: bool, worker: Sign) -> RunState:
         return RunState.QUESTION
     if worker == "silent":
         return RunState.NO_WORKER
-    return RunState.STUCK if run.waiting is Waiting.STUCK else RunState.EXPLORING
+    return HELD_UP.get(run.waiting, RunState.EXPLORING)
 
 
 def _workers(db: Database, runs: Sequence[Run], now: Mark) -> dict[int, Sign]:

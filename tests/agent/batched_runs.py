@@ -84,7 +84,14 @@ def random_parent(query: Query) -> torch.Tensor:
     """A parent whose answers have no sense but use all four choices: a function of moves and places alone."""
     moves = (query.action * torch.tensor([[[3], [5]]])).sum((1, 2))
     places = (query.agent * torch.tensor([7, 11])).sum((1, 2, 3))
-    return torch.where(query.kind == QueryKind.NONE, 0, 1 + (moves + places) % len(list(Choice)[1:]))
+    return torch.where(query.kind == QueryKind.NONE, 0, 1 + (moves + places) % int(Choice.NEITHER))
+
+
+def unsure_parent(query: Query) -> torch.Tensor:
+    """The same, but at a third of all places every pair of moves is skipped."""
+    unclear = query.agent[:, 0, 0].sum(1) % 3 == 0
+    skips = unclear & (query.kind == QueryKind.GUIDANCE)
+    return torch.where(skips, int(Choice.SKIP), random_parent(query))
 
 
 def lenient_parent(query: Query) -> torch.Tensor:

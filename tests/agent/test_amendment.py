@@ -23,6 +23,7 @@ from tests.agent.x_by_hand import entries, summed
 WORLD = make("unsafe-exploration", "island")
 CONFIG = Config(p_guid=0.9, p_pref=0.5, p_rec=0.5, queries_per_stage=6, max_clip_length=3, pretrain=False)
 SAID = [Choice.LEFT, Choice.RIGHT, Choice.EITHER, Choice.NEITHER]
+STORED_NOT = (Choice.NEITHER, Choice.SKIP)
 
 
 class Wavering:
@@ -37,7 +38,8 @@ class Wavering:
 
     def events(self, state: AgentState) -> Sequence[TickEvent]:
         self.applied = None
-        events = [EndEpisode()] if bool(state.all_refused) and self.random.random() < 0.5 else []
+        lost = bool(state.all_refused | state.unsure)
+        events = [EndEpisode()] if lost and self.random.random() < 0.5 else []
         if not self.standing or self.random.random() > 0.3:
             return events
         replaced = self.standing.pop(self.random.randrange(len(self.standing)))
@@ -55,7 +57,7 @@ class Wavering:
             return self.applied.heard or silence(self.nothing)
         if not self.open:
             return silence(self.nothing)
-        answer = said(self.open.pop(0), self.random.choice(SAID))
+        answer = said(self.open.pop(0), self.random.choice([*SAID, Choice.SKIP, Choice.SKIP]))
         self.standing.append(answer)
         return answer
 
@@ -84,7 +86,7 @@ def test_x_is_what_the_standing_answers_make_it(seed: int, own_stage_only: bool)
         if any(isinstance(event, Amend) for event in events) or tick == 79:
             stage = int(state.maturity[0]) if own_stage_only else None
             assert entries(state) == summed(parent.standing, stage)
-            assert int(state.x.size[0]) == sum(one.choice[0] != Choice.NEITHER for one in parent.standing)
+            assert int(state.x.size[0]) == sum(one.choice[0] not in STORED_NOT for one in parent.standing)
     assert parent.corrected > 5
 
 

@@ -16,8 +16,8 @@ DOUBLE = torch.float64
 
 
 def test_eq_1_mu() -> None:
-    answer = Answer(query=empty(5, 1, 2, 2), choice=torch.tensor(list(Choice)))
-    assert answer.mu.tolist() == [[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0]]
+    answer = Answer(query=empty(len(Choice), 1, 2, 2), choice=torch.tensor(list(Choice)))
+    assert answer.mu.tolist() == [[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0], [0, 0]]
 
 
 def rows(a0: list[list[int]], mu: list[list[float]]) -> Rows:

@@ -24,7 +24,9 @@ def summed(answers: Sequence[Answer], stage: int | None) -> dict[tuple[bytes, in
     found = dict[tuple[bytes, int, int], float]()
     for answer in answers:
         query = answer.query
-        if answer.choice[0] == Choice.NEITHER or (stage is not None and int(query.maturity[0]) != stage):
+        if answer.choice[0] in (Choice.NEITHER, Choice.SKIP) or (
+            stage is not None and int(query.maturity[0]) != stage
+        ):
             continue
         s0 = bytes(query.observation[0, 0, 0].flatten().tolist())
         one, other = query.action[0, :, 0].tolist()

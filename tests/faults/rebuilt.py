@@ -29,7 +29,7 @@ from parenting.envs.rng import keys
 from tests.faults.auditor import Store, checkpoint_bytes
 
 _EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
-CHOICES = {name: Choice[name.upper()] for name in ("left", "right", "either", "neither")}
+CHOICES = {name: Choice[name.upper()] for name in ("left", "right", "either", "neither", "skip")}
 
 
 def read_json(value: Any) -> Any:

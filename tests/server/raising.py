@@ -90,7 +90,7 @@ class Inline(ScriptedParent):
         self.heard: list[tuple[int, str]] = []  # the tick at which an answer was heard, and what it was
 
     def events(self, state: AgentState) -> Sequence[Event]:
-        return [EndEpisode()] if bool(state.all_refused) else []
+        return [EndEpisode()] if bool(state.all_refused | state.unsure) else []
 
     def tick(self) -> None:
         state, tally, config = self.saved

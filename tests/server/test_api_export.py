@@ -5,13 +5,12 @@ import json
 import httpx2
 import pytest
 
-from parenting.server.codec import CHOICES
 from parenting.server.db import Database
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.reads import answers
 from parenting.server.runs import Claim
-from parenting.server.tables import Run
+from parenting.server.tables import CHOICES, Run
 from tests.server.conftest import CLIPS
 from tests.server.heard import heard_answers
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import pytest
 import torch
 
-from parenting.agent.query import Query
+from parenting.agent.query import Choice, Query
 from parenting.agent.state import RENAMED
 from parenting.server.db import Database
 from parenting.server.errors import ServerError
@@ -25,7 +25,7 @@ from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.snapshot import INFO, Snapshot, pack
 from parenting.server.tables import Checkpoint
-from tests.agent.batched_runs import random_parent
+from tests.agent.batched_runs import Judge, random_parent, unsure_parent
 from tests.database import migrated
 from tests.server.raising import CONFIG, ISLAND, SEED, Begun, Inline, same_bits
 
@@ -44,9 +44,13 @@ NEAR = """\
 BUTTON = Begun("interruptibility", NEAR, CONFIG)
 """Both begin pre-trained; in the first a box moves, in the second the ground changes and chance is drawn."""
 
+SKIPPED = "a pair set aside"
+"""The moment of a life whose parent cannot always tell."""
+
 Came = Callable[[Inline], bool]
 MOMENTS: dict[str, tuple[Begun, Came]] = {
     "a paused tick": (ISLAND, lambda run: bool(run.saved.state.waiting & run.saved.state.refused.any(1))),
+    SKIPPED: (ISLAND, lambda run: skips_on(run)),
     "no acceptable action": (ISLAND, lambda run: bool(run.saved.state.all_refused)),
     "mid-clip": (ISLAND, lambda run: mid_clip(run)),
     "an episode's end": (ISLAND, lambda run: bool(run.saved.state.world.terminated)),
@@ -60,6 +64,12 @@ MOMENTS: dict[str, tuple[Begun, Came]] = {
 
 def mid_clip(run: Inline) -> bool:
     return bool(run.saved.state.recorder.running & (run.saved.state.maturity == 3))
+
+
+def skips_on(run: Inline) -> bool:
+    """All pairs but one are set aside, and that one is about to be: then none is left."""
+    skipping = run.rule.answer(run.query) == Choice.SKIP
+    return bool((run.saved.state.set_aside.sum(1) == 5) & skipping)
 
 
 def moved(run: Inline) -> bool:
@@ -77,6 +87,7 @@ class Moment(NamedTuple):
     blob: bytes
     query: Query
     after: dict[int, Snapshot]
+    judge: Judge
 
 
 @cache
@@ -84,7 +95,7 @@ def moment(name: str) -> Moment:
     """Its first coming after the first maturation. One life for each: a life consumes its states."""
     begun, came = MOMENTS[name]
     for seed in range(SEED, SEED + 50):  # some lives never come to some moments
-        run = Inline(begun, seed, judge=random_parent)
+        run = Inline(begun, seed, judge=unsure_parent if name == SKIPPED else random_parent)
         for _ in range(150):
             run.tick()
             if int(run.saved.state.maturity) > 1 and came(run):
@@ -93,9 +104,9 @@ def moment(name: str) -> Moment:
 
 
 def _after(begun: Begun, run: Inline) -> Moment:
-    blob, query = pack(run.saved), run.query
+    blob, query, judge = pack(run.saved), run.query, run.rule.answer
     after = {tick: begun.unpack(pack(run.saved)) for tick in lived(run)}
-    return Moment(begun, blob, query, after)
+    return Moment(begun, blob, query, after, judge)
 
 
 def lived(run: Inline) -> Iterator[int]:
@@ -108,7 +119,7 @@ def lived(run: Inline) -> Iterator[int]:
 
 def go_on(moment: Moment, blob: bytes) -> Iterator[list[str]]:
     """The pieces of state that differ from those of the run itself, at each tick of `AFTERWARDS`."""
-    run = Inline(moment.begun, judge=random_parent)
+    run = Inline(moment.begun, judge=moment.judge)
     run.saved, run.query = moment.begun.unpack(blob), moment.query
     for tick in lived(run):
         yield same_bits(run.saved, moment.after[tick])

@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from parenting.agent.query import Answer, empty
+from parenting.server import tables
 from parenting.server.codec import CHOICES
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
@@ -22,7 +23,7 @@ from tests.server.heard import heard_answers
 @pytest.fixture
 def run_id(db: Database, mine: Claim, clock: Clock) -> int:
     """Four answers: one of each choice, heard; the last is corrected."""
-    for tick, choice in enumerate(CHOICES):
+    for tick, choice in enumerate(tables.CHOICES):
         query = post_query(db, mine, 2 * tick, "preference", 2, CLIPS, policy=(2, 30 + tick))
         clock.pass_seconds(0.5)
         answer(db, query, choice, "tab", "human")
@@ -58,6 +59,7 @@ def test_a_row_tells_all_about_an_answer(db: Database, run_id: int) -> None:
         "guidance_layout": "one",
         "practice": "offered",
         "words": "plain",
+        "remarks": True,
     }
 
 

@@ -36,7 +36,7 @@ EXPECTED = json.loads((OLD / "expected.json").read_text())
 RUNS = (1, 2, 3)
 WRITTEN_WITH = ("AVX2", "AVX512")
 """Instructions of torch with the same bits as those that wrote the sample."""
-NAMES = ["database", "run_public_id", "query_public_id", "guidance_layout", "practice", "words"]
+NAMES = ["database", "run_public_id", "query_public_id", "guidance_layout", "practice", "words", "remarks"]
 """The keys that later versions add to a row of the export."""
 PAGES = ("/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/api/v1/runs/{}/queries")
 

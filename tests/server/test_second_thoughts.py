@@ -12,14 +12,17 @@ import pytest
 import torch
 
 from parenting.agent.query import Answer as Said
+from parenting.agent.query import Choice
 from parenting.agent.state import AgentState
 from parenting.server import runs
 from parenting.server.codec import CHOICES, decode
+from parenting.server.counters import Counters
 from parenting.server.db import Database
 from parenting.server.new_run import start
 from parenting.server.operator_events import add_operator_event
-from parenting.server.queue import answers, corrections, revisions, worker_side
+from parenting.server.queue import answers, corrections, revisions, skips, worker_side
 from parenting.server.queue.leases import lease
+from parenting.server.reads.set_aside import set_aside
 from parenting.server.session import RunSession
 from parenting.server.tables import Answer
 from parenting.server.verify import verify
@@ -48,7 +51,7 @@ class Fickle:
         self.db, self.begun, self.random = db, begun, Random(seed)
         self.run = start(db, begun.new("human")).id
         self.life = self.taken_up()
-        self.changed = self.withdrawn = self.heard = self.killed = 0
+        self.changed = self.withdrawn = self.heard = self.killed = self.skipped = self.found = 0
 
     def taken_up(self) -> RunSession:
         (mine,) = runs.claim(self.db, "worker", -1)
@@ -66,7 +69,9 @@ class Fickle:
                     self.life.tick(seen)
                     if self.random.random() < 0.1:
                         self.life.save()
-            elif bool(self.life.saved.state.all_refused):
+            elif bool(self.life.saved.state.unsure) and self.random.random() < 0.5:
+                self.answer_what_was_skipped()
+            elif bool(self.life.saved.state.all_refused | self.life.saved.state.unsure):
                 add_operator_event(self.db, self.run, "end_episode", {"kind": "end_episode"})
             else:
                 self.answer()
@@ -80,10 +85,18 @@ class Fickle:
     def answer(self) -> None:
         query = lease(self.db, self.run, "me")
         assert query is not None
-        answers.answer(self.db, query.id, self.random.choice(NAMES), "me", "human")
+        if self.random.random() < 0.35:
+            self.skipped += skips.skip(self.db, query.id, "me").outcome == "set_aside"
+        else:
+            answers.answer(self.db, query.id, self.random.choice(NAMES), "me", "human")
         if self.random.random() < 0.2:
             assert revisions.withdraw(self.db, query.id, "me").outcome == "withdrawn"
             self.withdrawn += 1
+
+    def answer_what_was_skipped(self) -> None:
+        self.life.report_waiting(worker_side.watch(self.db, [self.run])[self.run])
+        query = self.random.choice(set_aside(self.db, self.run))
+        self.found += revisions.supersede(self.db, query.id, self.random.choice(NAMES), "me", "human").heard
 
     def ponder(self) -> None:
         """Take an answer back, or change one, now and then."""
@@ -123,8 +136,21 @@ class Fickle:
             if not seen.corrections:
                 break
             self.life.tick(seen)
+        self.life.report_waiting(seen)
         self.life.save()
         return last(self.db, self.run, self.begun).state
+
+
+def counted(tally: Counters) -> tuple[list[int], list[int], int]:
+    return tally.kinds[0].tolist(), tally.choices[0].tolist(), int(tally.skips[0])
+
+
+def tallied(standing: list[Said]) -> tuple[list[int], list[int], int]:
+    """The counts of metrics from the answers alone: those that stand, and the skips that do."""
+    told = [answer for answer in standing if answer.choice[0] != Choice.SKIP]
+    kinds = [sum(int(answer.query.kind[0]) == kind for answer in told) for kind in range(3)]
+    choices = [sum(int(answer.choice[0]) == choice for answer in told) for choice in range(5)]
+    return kinds, choices, len(standing) - len(told)
 
 
 @pytest.mark.torture
@@ -141,7 +167,9 @@ def test_x_is_what_the_standing_answers_make_it(
         state = person.save()
         stage = int(state.maturity[0]) if own_stage_only else None
         assert entries(state) == summed(person.standing_answers(), stage)
+        assert counted(last(db, person.run, person.begun).tally) == tallied(person.standing_answers())
     assert (person.changed > 3, person.withdrawn > 0, person.heard > 0, person.killed > 0) == (True,) * 4
+    assert (person.skipped > 3, person.found > 0) == (True, True)
     found = verify(db, person.run)
     assert (found.x, found.chain.problems) == (None, [])
     assert found.replayed is not None

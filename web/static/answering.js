@@ -30,7 +30,7 @@ const tell = {
     if (page.state !== "question") page.taken = false;
     page.goal = now.goal;
     if (now.reason) $("reason").textContent = now.reason;
-    $("optimal").hidden = !now.optimal || !now.answers || page.state === "over";
+    $("optimal").hidden = !now.optimal || !now.standing || page.state === "over";
     $("resume").hidden = !["stopped", "failed"].includes(now.status);
     count(now.answers, now.answers - now.standing);
     if (now.answers && (given.size || !page.current)) later(() => import("./growth.js")).then(({ grown }) => grown(now, !page.current));

@@ -4,6 +4,7 @@ import { recordAnswer, timeLeft } from "./eta.js";
 import { flush, keep } from "./outbox.js";
 import { $, alarm, client, given, name, page, painted, PATIENCE, run, waiting } from "./page.js";
 import { next, show } from "./questions.js";
+import { remark } from "./remarks.js";
 import { change, remember } from "./undo.js";
 import { wait } from "./waiting.js";
 
@@ -11,7 +12,8 @@ const HASTE = 40; // ms after an answer when the next question is asked for, if 
 const elsewhere = ({ database, title, given: at }) =>
   `${title ? `Your answer to “${title}” of ${new Date(at).toLocaleString()}` : "An answer"} belongs to the database ${database?.slice(0, 8) ?? "of an older version"}, ` +
   "which is not the one that is served here. It was not stored; this browser keeps it and sends it once its own database is back.";
-const saved = []; // replies to answers, until the stage changes
+const OTHERS_FIRST = 300; // ms after a skip in which other parents may have the next question
+const saved = []; // replies and their answers, until the stage changes
 
 export function count(number, retracted = 0) {
   page.answers = Math.max(page.answers, number);
@@ -29,6 +31,7 @@ export function answer(choice) {
   const { database, query, former } = page.current.dataset;
   if (former) return change(page.current, choice);
   remember(page.current, choice);
+  remark(page.current, choice, performance.now() - page.shown);
   given.add(query);
   for (const button of page.current.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
   page.current = null;
@@ -36,24 +39,24 @@ export function answer(choice) {
   $("saved").textContent = "Saving";
   $("alert").textContent = "";
   performance.mark("answer", { detail: query });
-  recordAnswer();
+  if (choice !== "skip") recordAnswer();
   keep({ database, run, question: query, choice, client_id: client, title: name, given: Date.now() });
   if (page.ahead) {
     painted(() => flush(report));
     return show(page.ahead);
   }
   page.player.still();
-  Promise.race([flush(report), new Promise((done) => { setTimeout(done, HASTE); })]).then(() => { if (!page.current && !page.lookout) next(PATIENCE); });
+  Promise.race([flush(report), new Promise((done) => { setTimeout(done, HASTE); })]).then(() => choice === "skip" && new Promise((done) => { setTimeout(done, OTHERS_FIRST); })).then(() => { if (!page.current && !page.lookout) next(PATIENCE); });
   wait(page.state === "question" ? "exploring" : page.state);
 }
 
 // A page that changes twice is painted twice: what was saved is told together with the next question, if that comes soon.
 export function settle() {
-  for (const reply of saved.splice(0)) report("saved", reply);
+  for (const told of saved.splice(0)) report("saved", ...told);
 }
 
 export function report(outcome, reply, answer) {
-  if (outcome === "saved" && page.quiet) return saved.push(reply);
+  if (outcome === "saved" && page.quiet) return saved.push([reply, answer]);
   $("saved").classList.toggle("kept", outcome === "kept");
   if (outcome === "kept") {
     $("saved").textContent = "Kept here, not sent yet";
@@ -62,7 +65,8 @@ export function report(outcome, reply, answer) {
   }
   page.unsaved = Math.max(0, page.unsaved - 1);
   if (outcome === "saved") {
-    if (reply.run_public_id === run) count(reply.number);
+    if (reply.outcome === "put_back") given.delete(reply.query_public_id); // it is shown once more
+    if (reply.run_public_id === run) count(reply.number, page.retracted + (answer?.choice === "skip" && reply.number !== null));
     if (!page.unsaved) $("saved").textContent = "Saved";
   } else {
     if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? "Kept here, not stored" : "";

@@ -11,6 +11,7 @@ export function begin(form) {
   const one = form.matches(".one");
   if (!one) form.dataset.side = "left";
   page.current = form;
+  page.shown = performance.now();
   arm(form);
   if (page.put !== form) {
     size(form);

@@ -1,11 +1,12 @@
 // The dashboard: numbers, the table of stages and small charts by Plotly, fed by the run's metrics as they come.
+import "./errors.js";
 import { follow } from "./live.js";
 
 const main = document.getElementById("main"), run = main.dataset.run;
 const lineOf = (id) => document.querySelector(`[data-chart=${id}]`)?.dataset.line;
 const SERIES = {
   deaths: [["deaths", "deaths"]],
-  asked: [["guidance", "guidance"], ["preference", "preference"]],
+  asked: [["guidance", "guidance"], ["preference", "preference"], ["skips", "guidance skipped"]],
   answers: [["left", "left"], ["right", "right"], ["either", "either"], ["neither", "neither"]],
   return: [["return", "argmax policy"], ["optimal_return", lineOf("return")]],
   stages: [["return", "argmax policy"], ["optimal_return", lineOf("stages")]],
@@ -149,7 +150,8 @@ const tell = {
     status(now.state);
     main.dataset.status = now.status;
     put("tick", now.tick);
-    put("answered", now.answers);
+    put("answered", now.standing);
+    put("skipped", now.skipped);
     put("goal", now.goal);
     put("maturity", now.maturity);
     if (now.reason) put("reason", now.reason);

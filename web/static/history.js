@@ -1,4 +1,5 @@
 // The history: the boards of an answer play while they are pointed at or hold the focus, and stand still otherwise.
+import "./errors.js";
 import { forecasts } from "./forecast.js";
 import { play } from "./play.js";
 

@@ -4,7 +4,7 @@ import { keyName } from "./key_names.js";
 import { openGrid } from "./place.js";
 import { $, inDialog, page, speak, stage } from "./page.js";
 
-const CHOICES = { a: "left", b: "right", e: "either", n: "neither", 1: "left", 2: "right" };
+const CHOICES = { a: "left", b: "right", e: "either", n: "neither", s: "skip", 1: "left", 2: "right" };
 const LETTERS = "parenting.letters"; // "off" in the browser's storage: single letters and digits answer nothing
 
 // The choice that a key makes on a question; undefined if it makes none. Arrows are those of the moves, or of the sides.
@@ -48,7 +48,7 @@ addEventListener("keydown", (event) => {
   else {
     const shifted = event.shiftKey && !/^[12]$/.test(name); // digits are shifted on a French keyboard
     const choice = page.current && !shifted && choiceOf(name, page.current);
-    if (!choice) return;
+    if (!choice || (choice === "skip" && !page.current.querySelector(".cannot"))) return;
     page.answer(choice);
   }
   event.preventDefault();

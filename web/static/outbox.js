@@ -3,6 +3,7 @@
 // copy with an identity of its own, does not store it; the browser keeps it for the server that does.
 import { elsewhere, key, meant, read, write } from "./kept.js";
 
+const LATE = 15_000; // ms after which a reply is not waited for any more; the answer is sent again
 let sending = null, delay = 500;
 
 const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListener("online", done, { once: true }); });
@@ -11,10 +12,12 @@ const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListe
 // database, or the server cannot read it) or "kept" (no connection, or a server in trouble).
 async function send({ database, run, question, choice, client_id }) {
   if (!question) return ["elsewhere"];
+  const late = new AbortController(), timer = setTimeout(() => late.abort(), LATE);
   try {
-    const reply = await fetch(`/api/v1/queries/${question}/answer`, {
-      method: "POST", keepalive: true, headers: { "content-type": "application/json" },
-      body: JSON.stringify({ choice, client_id, database, run, question }),
+    const skips = choice === "skip", asked = { client_id, database, run, question };
+    const reply = await fetch(`/api/v1/queries/${question}/${skips ? "skip" : "answer"}`, {
+      method: "POST", keepalive: true, signal: late.signal, headers: { "content-type": "application/json" },
+      body: JSON.stringify(skips ? asked : { choice, ...asked }),
     });
     if (reply.ok) return ["saved", await reply.json()];
     if (reply.status >= 500 || reply.status === 429) return ["kept", reply.status === 500];
@@ -22,7 +25,7 @@ async function send({ database, run, question, choice, client_id }) {
     return [error.code === "conflict" ? "refused" : "elsewhere", error];
   } catch {
     return ["kept"];
-  }
+  } finally { clearTimeout(timer); }
 }
 
 async function drain(report) {

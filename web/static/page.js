@@ -8,6 +8,7 @@ export const given = new Set(); // questions that were answered on this page
 export const page = {
   answer: null, // what a choice does: each page with questions sets its own
   current: null, // the form on the stage, until it is answered
+  shown: 0, // when it came, by the page's clock
   player: null,
   put: null, // the form that was put on the stage last
   ahead: null, // the form after it

@@ -1,4 +1,5 @@
 // The parent's page. First it paints its question; all that answers it comes after that.
+import "./errors.js";
 import { ask, put } from "./asking.js";
 import { kept } from "./kept.js";
 import { page, painted, run, stage } from "./page.js";

@@ -1,5 +1,6 @@
 // Practice: the keys, clicks and boards of the parent's page. No run takes the answer, so the form itself is sent, and the
 // server's next page says what the answer means.
+import "./errors.js";
 import { listens } from "./arming.js";
 import { begin } from "./begin.js";
 import { keyName } from "./key_names.js";

@@ -1,4 +1,6 @@
 // The form shows the levels, glyphs and settings of the chosen world only. Without this script it shows all, by world.
+import "./errors.js";
+
 const world = document.getElementById("world"), level = document.getElementById("level"), own = document.getElementById("level_text");
 
 function narrow() {

@@ -19,7 +19,7 @@ function offer() {
   form.hidden = !last;
   if (!last) return;
   form.elements.question.value = last.question.dataset.query;
-  $("undone").textContent = last.question.querySelector(`.answers [value=${last.choice}]`).dataset.said;
+  $("undone").textContent = last.question.querySelector(`[data-said][value=${last.choice}]`).dataset.said;
 }
 
 export function remember(question, choice) {

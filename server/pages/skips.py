@@ -1,0 +1,72 @@
+"""Forms of a parent who cannot tell: skip a question, look at what was skipped again, let either move do."""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+from typing import Annotated
+
+from fastapi import Query, Request, Response
+
+from parenting.server import runs
+from parenting.server.admission import admitted_router
+from parenting.server.api.names import PublicId, RunId
+from parenting.server.deps import Db, SettingsOf, notify_worker, store
+from parenting.server.pages.fields import ClientField, DatabaseField, QuestionField
+from parenting.server.pages.parent import PATIENCE, address
+from parenting.server.pages.render import redirect
+from parenting.server.queue import leases
+from parenting.server.queue.answers import Said
+from parenting.server.queue.names import Names
+from parenting.server.queue.revisions import supersede
+from parenting.server.queue.skips import skip_in
+from parenting.server.reads.set_aside import set_aside
+from parenting.server.streams import Streams
+from parenting.server.tables import SKIP
+
+router = admitted_router(include_in_schema=False)
+
+OTHERS_FIRST = 0.3
+"""Seconds after a skip in which other parents may have the next question."""
+
+After = Annotated[PublicId | None, Query()]
+
+
+@router.post("/runs/{run_id}/parent/skip")
+async def skip(
+    request: Request,
+    run_id: PublicId,
+    db: Db,
+    settings: SettingsOf,
+    client_id: ClientField,
+    database: DatabaseField,
+    question: QuestionField,
+) -> Response:
+    """Skip a question, then go to the next one."""
+    said, names = Said(SKIP, client_id, "human"), Names(database, run_id, question)
+    found = await store(request, partial(skip_in, db=db, query=question, said=said, names=names))
+    notify_worker(request)
+    await asyncio.sleep(OTHERS_FIRST)
+    streams: Streams = request.app.state.streams
+    run = await streams.admission.read(runs.get_run, db, found.run)
+    lease = partial(leases.lease, db, run.id, client_id, settings.lease_seconds)
+    return redirect(address(run, await streams.wait_for(lease, PATIENCE, request.is_disconnected)))
+
+
+@router.get("/runs/{run_id}/parent/again")
+def again(run_id: RunId, db: Db, after: After = None) -> Response:
+    """Go to a question that was skipped in this pause, to answer it: the first, or that after one."""
+    run, skipped = runs.get_run(db, run_id), set_aside(db, run_id)
+    places = [query.public_id for query in skipped]
+    following = places.index(after) + 1 if after in places else 0
+    return redirect(address(run, skipped[following % len(skipped)] if skipped else None, change=True))
+
+
+@router.post("/runs/{run_id}/parent/either")
+def either(request: Request, run_id: RunId, db: Db, client_id: ClientField) -> Response:
+    """Answer what was skipped last with *either*: the agent makes one of the two moves."""
+    run, skipped = runs.get_run(db, run_id), set_aside(db, run_id)
+    if skipped:
+        supersede(db, skipped[-1].public_id, "either", client_id, "human")
+        notify_worker(request)
+    return redirect(address(run, None))
