@@ -185,6 +185,7 @@ EXPORTED: dict[str, Any] = {
     "guidance_layout": "one",
     "practice": "offered",
     "words": "plain",
+    "remarks": True,
 }
 
 WALK: dict[str, Any] = {
@@ -205,7 +206,6 @@ WALK: dict[str, Any] = {
     },
     "reason": None,
     "worker": "alive",
-    "remarks": True,
 }
 
 

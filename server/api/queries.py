@@ -21,8 +21,9 @@ from parenting.server.queue.names import Names
 from parenting.server.reads import pagination
 from parenting.server.reads.names import run_number_in
 from parenting.server.reads.schemas import asked_schema, asked_schemas, leased_schema
+from parenting.server.receipts import StoredSchema
 from parenting.server.runs import find
-from parenting.server.schemas import AskedSchema, LeasedSchema, StoredSchema
+from parenting.server.schemas import AskedSchema, LeasedSchema
 from parenting.server.tables import Run
 
 router = admitted_router(tags=["questions"])

@@ -15,7 +15,7 @@ from parenting.server.queue.answers import Said
 from parenting.server.queue.names import Names
 from parenting.server.queue.revisions import supersede_in, withdraw_in
 from parenting.server.queue.skips import skip_in
-from parenting.server.schemas import ChangedSchema, SkippedSchema, WithdrawnSchema
+from parenting.server.receipts import ChangedSchema, SkippedSchema, WithdrawnSchema
 from parenting.server.tables import SKIP
 
 router = admitted_router(tags=["questions"])

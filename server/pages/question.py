@@ -124,8 +124,8 @@ def question_view(query: Query, run: Run, former: Former | None = None) -> Quest
     with reading(query):
         one, guide = _is_on_one_board(query, run), run.words == "guide"
         described = describe(query.clips, query.kind, query.maturity, run.legend, _rows(run), one, guide)
-    ours = {"id": query.public_id, "run": run.public_id, "former": former, "put_back": query.put_back}
-    return QuestionView(**described, **ours)
+        described["put_back"] = query.put_back
+    return QuestionView(**described, id=query.public_id, run=run.public_id, former=former)
 
 
 def describe(
