@@ -31,7 +31,7 @@ WRITTEN_DOWN = """() => {
 
 
 def heard(page: Page) -> list[str]:
-    """What the page sounded, asked and showed since this was last called."""
+    """Return all that the page sounded, asked and showed since this was last called."""
     found: list[str] = page.evaluate("heard.splice(0)")
     return sorted(found)
 

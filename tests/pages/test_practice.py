@@ -34,7 +34,7 @@ def begun_at(lesson: Lesson) -> str:
 
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.task[:30])
 def test_clips_are_the_worlds_own_and_the_right_answer_is_the_scripted_parents(lesson: Lesson) -> None:
-    """What is learnt is true: the world itself makes these clips, and Sec. 3.1.3 answers them so."""
+    """Practice teaches the truth: the world itself makes these clips, and Sec. 3.1.3 answers them so."""
     world = registry.make(WORLD, begun_at(lesson))
     clips = lesson.clips
     for side in ("left", "right"):

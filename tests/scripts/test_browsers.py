@@ -23,7 +23,7 @@ PLANTED = {
     "new URLPattern(numbers);": "URLPattern",
     "scheduler.postTask(numbers);": "scheduler",
 }
-"""What some supported browser lacks, and a part of what lint says about it."""
+"""Things that some supported browser lacks, and a part of what lint says about each."""
 SPARED = "numbers.map(String).filter(Boolean).findLast(String).at(-1); navigator.locks.query(); fetch('/');"
 
 
