@@ -149,6 +149,7 @@ def test_the_waiting_page_shows_growth_a_walk_and_a_milestone_once(
     expect(dialog(page).locator(".waits")).to_have_text("A question is waiting.")
     dialog(page).get_by_role("button", name="Close").click()
     shown(page, second)
+    expect(page.locator(".beside .lesson")).to_contain_text("The last answer changed: up 25 % → 10 %, down")
     page.reload()
     shown(page, second)
     page.keyboard.press("b")
