@@ -11,6 +11,7 @@ from schemathesis.schemas import BaseSchema
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 from sqlalchemy import select
 
+from parenting.server import jobs
 from parenting.server.app import bare_app
 from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
@@ -21,11 +22,11 @@ from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query, take_answer, take_operator_events
 from parenting.server.runs import Claim, claim, finish, set_status
 from parenting.server.statuses import RunStatus
-from parenting.server.tables import Query, Run
+from parenting.server.tables import Job, Query, Run
 from parenting.server.workers import sign
 from tests.server.conftest import CLIPS
 
-RUNS, QUESTIONS = 4, 8
+RUNS, QUESTIONS, JOBS = 4, 8, 2
 UNTOLD: dict[str, list[Any]] = {"start_run": [positive_data_acceptance]}
 """Rules that a schema cannot hold: which levels, presets and settings there are, and which go together."""
 
@@ -62,6 +63,9 @@ def _live(db: Database, mine: Claim) -> None:
     take_operator_events(db, mine, QUESTIONS + 1)
     add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
     write_metrics(db, mine, {tick: {"deaths": 0, "loss": None} for tick in range(5)})
+    for kind in ("walk", "policy"):
+        jobs.ask(db, mine.run_id, kind, {}, "me")
+    jobs.finish(db, jobs.claim(db, "worker-1", 1)[0], {"steps": 3})
 
 
 def reply_to(case: Case[Any], app: FastAPI) -> int:
@@ -74,7 +78,7 @@ def reply_to(case: Case[Any], app: FastAPI) -> int:
 
 def _lead(case: Case[Any], db: Database) -> None:
     """Well-formed ids lead to what is there, and one in so many beyond; malformed ones stay as they are."""
-    for name, count, table in (("run_id", RUNS, Run), ("query_id", QUESTIONS, Query)):
+    for name, count, table in (("run_id", RUNS, Run), ("query_id", QUESTIONS, Query), ("job_id", JOBS, Job)):
         drawn = case.path_parameters.get(name)
         if isinstance(drawn, list | dict):  # as text it is escaped; else a "?" in it would end the path
             case.path_parameters[name] = str(drawn)
@@ -84,6 +88,6 @@ def _lead(case: Case[Any], db: Database) -> None:
             case.path_parameters[name] = 1 + drawn % (count + 1)
 
 
-def _public_id(db: Database, table: type[Run] | type[Query], number: int) -> str:
+def _public_id(db: Database, table: type[Run] | type[Query] | type[Job], number: int) -> str:
     with db.read() as session:
         return session.execute(select(table.public_id).where(table.id == number)).scalar_one()
