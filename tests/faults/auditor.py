@@ -121,7 +121,7 @@ def numbers_have_no_gaps(runs: Sequence[Row], answers: Sequence[Row]) -> Iterato
 
 def what_stands_no_more_is_counted(runs: Sequence[Row], answers: Sequence[Row]) -> Iterator[str]:
     """A5: a run knows how many of its answers stand."""
-    fallen = Counter(row["run_id"] for row in answers if not row["standing"])
+    fallen = Counter(row["run_id"] for row in answers if not row["standing"] or row["choice"] == "skip")
     for run in runs:
         if run["retracted"] != fallen[run["id"]]:
             yield f"A5 run {run['id']} counts {run['retracted']} that stand no more, of {fallen[run['id']]}"
@@ -144,7 +144,13 @@ def statuses_fit(queries: Sequence[Row], answers: Sequence[Row]) -> Iterator[str
     heard = {row["query_id"] for row in answers if row["applied_tick"] is not None}
     for row in queries:
         answer, status = row["id"] in standing, row["status"]
-        wanted = {"open": not answer, "withdrawn": not answer, "answered": answer, "applied": answer}
+        skipped = answer and standing[row["id"]]["choice"] == "skip" and row["kind"] == "preference"
+        wanted = {
+            "open": not answer,
+            "withdrawn": not answer or skipped,
+            "answered": answer,
+            "applied": answer,
+        }
         if not wanted[status] or (row["id"] in heard) != (status == "applied"):
             yield f"query {row['id']} is {status}, {'with' if answer else 'without'} an answer"
 

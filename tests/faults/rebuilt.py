@@ -139,7 +139,7 @@ def entries_of_x(store: Store, run: int) -> tuple[int, int]:
         f"AND applied_tick <= {int(saved['keys.tick'][0])} ORDER BY applied_tick"
     )
     standing = {row["query_id"]: row["choice"] for row in heard}
-    return int(saved["x.size"][0]), sum(choice != "neither" for choice in standing.values())
+    return int(saved["x.size"][0]), sum(choice not in ("neither", "skip") for choice in standing.values())
 
 
 def _differing(state: AgentState, saved: dict[str, torch.Tensor]) -> list[str]:

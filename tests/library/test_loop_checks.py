@@ -22,7 +22,7 @@ def asked() -> tuple[pt.World, pt.Config, pt.AgentState, Any]:
     ("choice", "words"),
     [
         ([1], ["shape (1,)", "2 agents"]),
-        ([1, 5], ["[1, 5]", "4 neither"]),
+        ([1, 6], ["[1, 6]", "4 neither", "5 skip"]),
         ([-1, 0], ["[-1, 0]", "0 none"]),
         ([1.0, 2.0], ["[1.0, 2.0]", "whole numbers"]),
     ],
