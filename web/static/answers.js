@@ -56,6 +56,7 @@ export function settle() {
 }
 
 export function report(outcome, reply, answer) {
+  if (reply?.outcome === "put_back" && given.delete(reply.query_public_id) && !page.current) next(); // it is shown once more
   if (outcome === "saved" && page.quiet) return saved.push([reply, answer]);
   $("saved").classList.toggle("kept", outcome === "kept");
   if (outcome === "kept") {
@@ -65,8 +66,7 @@ export function report(outcome, reply, answer) {
   }
   page.unsaved = Math.max(0, page.unsaved - 1);
   if (outcome === "saved") {
-    if (reply.outcome === "put_back") given.delete(reply.query_public_id); // it is shown once more
-    if (reply.run_public_id === run) count(reply.number, page.retracted + (answer?.choice === "skip" && reply.number !== null));
+    if (reply.run_public_id === run && answer.choice !== "skip") count(reply.number);
     if (!page.unsaved) $("saved").textContent = "Saved";
   } else {
     if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? "Kept here, not stored" : "";
