@@ -146,7 +146,7 @@ def test_a_fault_of_the_page_is_said_and_sent(tabs: BrowserTabs, db: Database, m
         page.evaluate("setTimeout(() => { throw new Error('planted') })")
     assert "planted" in (sent.value.post_data or "")
     expect(page.locator("#alert")).to_contain_text("went wrong")
-    with page.expect_response("**/api/v1/page-errors") as told:
+    with page.expect_event("pageerror"), page.expect_response("**/api/v1/page-errors") as told:
         page.evaluate("void Promise.reject(new Error('another'))")
     assert told.value.status == 204
     assert tabs.wrong == ["planted", "another"]
