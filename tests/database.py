@@ -40,7 +40,7 @@ def unmigrated(settings: Settings, clock: Callable[[], datetime] = utc_now) -> D
 def migrated(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Database:
     """A new database with all tables and no rows: the one that `settings` name."""
     if settings.database_url is not None:
-        cluster().create(_name(settings.database_url), _postgresql_template())
+        cluster().copy(_name(settings.database_url), _postgresql_template())
         return _connect(settings, clock)
     database = _connect(settings, clock)
     file = settings.data / "parenting.db"

@@ -1,13 +1,16 @@
 """The wheel carries everything that the program needs: code, pages and migrations."""
 
 import ast
+import atexit
 import re
 import shutil
 import subprocess
 import sys
 import tarfile
+import tempfile
 import zipfile
 from collections.abc import Iterable
+from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -36,6 +39,14 @@ def build_wheel(folder: Path) -> Path:
     return pip_wheel(copy_tree(folder / "source"), folder / "wheel")
 
 
+@cache
+def wheel_of_the_tree() -> Path:
+    """Built once a process."""
+    folder = tempfile.mkdtemp(prefix="parenting-wheel-")
+    atexit.register(shutil.rmtree, folder)
+    return build_wheel(Path(folder))
+
+
 def build_sdist(folder: Path) -> Path:
     """The archive of sources, built from a copy as well."""
     source, target = copy_tree(folder / "source"), folder / "sdist"
@@ -59,8 +70,8 @@ def pip_wheel(source: Path, target: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
-    return zipfile.ZipFile(build_wheel(tmp_path_factory.mktemp("build")))
+def wheel() -> zipfile.ZipFile:
+    return zipfile.ZipFile(wheel_of_the_tree())
 
 
 def test_wheel_carries_exactly_the_files_of_our_folders(wheel: zipfile.ZipFile) -> None:

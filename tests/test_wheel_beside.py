@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_wheel import build_wheel
+from tests.test_wheel import wheel_of_the_tree
 
 FOLDERS = ("agent", "envs", "server", "web", "library", "commands", "experiments", "parents")
 
@@ -19,14 +19,14 @@ FOLDERS = ("agent", "envs", "server", "web", "library", "commands", "experiments
 def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A fresh environment with the wheel in it; the other libraries are those of the present one."""
     place = tmp_path_factory.mktemp("environment")
-    wheel = build_wheel(tmp_path_factory.mktemp("wheel"))
     venv.create(place, with_pip=False)
     purelib = next(place.glob("lib/python*/site-packages"))
     # Our own installation, which is editable, must not be found: its .pth files are not read from here.
     (purelib / "present.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
     command = [sys.executable, "-m", "pip", "--python", str(place / "bin/python"), "install", "--quiet"]
     options = ["--no-deps", "--no-index", "--ignore-installed", "--disable-pip-version-check"]
-    subprocess.run([*command, *options, str(wheel)], check=True)
+    options += ["--no-compile"]  # Python compiles what it imports
+    subprocess.run([*command, *options, str(wheel_of_the_tree())], check=True)
     return place / "bin/python"
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import httpx2
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, ViewportSize, expect
 
 from parenting.server import operator_events, runs
@@ -15,6 +14,7 @@ from parenting.server.db import Database
 from parenting.server.queue import answers
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
+from tests.pages.axe import violated
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import until
 
@@ -75,7 +75,7 @@ def lives(db: Database) -> None:
 
 def violations(page: Page, **options: Any) -> list[str]:
     """The findings of axe, a line each, with the first element; `options` choose its rules."""
-    found = Axe().run(page, options={"resultTypes": ["violations"], **options}).response["violations"]
+    found = violated(page, **options)
     return [f"{rule['id']}: {rule['help']}: {rule['nodes'][0]['html']}" for rule in found]
 
 

@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page
 
 from parenting.experiments.reporting.html import report
 from parenting.experiments.reporting.markdown import RESULTS
+from tests.pages.axe import violated
 from tests.tree import ROOT
 
 PUBLISHED = ROOT / "docs/results"
@@ -63,7 +63,7 @@ def test_on_a_phone_a_verdict_stands_beside_what_it_is_on(browser: Browser, writ
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing_and_figures_are_drawn(browser: Browser, written: str, scheme: str) -> None:
     page = opened(browser, written, 390, scheme)
-    found = Axe().run(page).response["violations"]
+    found = violated(page)
     assert [violation["id"] for violation in found] == []
     drawn = page.evaluate("[...document.images].map(image => image.naturalWidth)")
     assert len(drawn) == sum(len(list((PUBLISHED / name).glob("*.svg"))) for name in NAMES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any, Literal, NamedTuple
 
 import httpx2
@@ -101,11 +102,21 @@ class Inline(ScriptedParent):
 
 
 def inline(ticks: int, begun: Begun = ISLAND) -> Snapshot:
-    """The state of the run after `ticks` ticks."""
+    """The state of the run after `ticks` ticks; that of the island is lived once a process."""
+    return _lived(ticks) if begun is ISLAND else lived(ticks, begun)
+
+
+def lived(ticks: int, begun: Begun) -> Snapshot:
+    """Live a run of its own."""
     run = Inline(begun)
     for _ in range(ticks):
         run.tick()
     return run.saved
+
+
+@cache
+def _lived(ticks: int) -> Snapshot:
+    return lived(ticks, ISLAND)
 
 
 def last(db: Database, run_id: int, begun: Begun = ISLAND) -> Snapshot:

@@ -7,7 +7,7 @@ import socket
 import sqlite3
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from parenting.server.db import connect
 from parenting.server.new_run import NewRun, start
 from parenting.server.settings import Settings
 from tests.database import migrated
+from tests.server.processes import Command
 from tests.server.serving import Stream, free_port, parenting, until_up
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM]
@@ -112,30 +113,30 @@ def test_web_and_worker_do_not_outlive_up(tmp_path: Path) -> None:
         until(lambda: not any(alive(child) for child in children))
 
 
+def said(*arguments: str, data: Path, code: int = 2, environment: Mapping[str, str] | None = None) -> str:
+    """Return the output of a command that ends by itself; it is a fork of a program that has loaded all."""
+    ended = Command(*arguments, data=data, environment=environment)
+    assert ended.wait(60) == code, ended.said()
+    return ended.said()
+
+
 @pytest.mark.parametrize("command", ["up", "web"])
 def test_port_in_use_is_told_in_a_sentence(data: Path, command: str) -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-        with parenting(command, "--port", str(port), data=data) as child:
-            out, said = child.communicate(timeout=60)
-    assert child.returncode == 2
-    assert (
-        said
-        == f"port: {port} cannot be used (Address already in use). Name another one, or 0 for any free one.\n"
+        told = said(command, "--port", str(port), data=data)
+    assert told == (
+        f"port: {port} cannot be used (Address already in use). Name another one, or 0 for any free one.\n"
     )
-    assert out == ""
 
 
 @pytest.mark.parametrize("command", ["web", "worker"])
 def test_unmigrated_database_is_refused_in_a_sentence(tmp_path: Path, command: str) -> None:
     with closing(sqlite3.connect(tmp_path / "parenting.db")) as connection:
         connection.execute("CREATE TABLE another (number INTEGER)")
-    with parenting(command, data=tmp_path) as child:
-        out, said = child.communicate(timeout=60)
-    assert child.returncode == 2
-    assert said.endswith("has no tables yet. Run: `parenting migrate`\n")
-    assert said.count("\n") == 1
-    assert out == ""
+    told = said(command, data=tmp_path)
+    assert told.endswith("has no tables yet. Run: `parenting migrate`\n")
+    assert told.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -147,28 +148,20 @@ def test_unmigrated_database_is_refused_in_a_sentence(tmp_path: Path, command: s
     ],
 )
 def test_wrong_setting_is_told_in_a_sentence(data: Path, name: str, value: str, told: str) -> None:
-    with parenting("web", data=data, **{name: value}) as child:
-        _, said = child.communicate(timeout=60)
-    assert child.returncode == 2
-    assert told in said
-    assert "Traceback" not in said
+    found = said("web", data=data, environment={name: value})
+    assert told in found
+    assert "Traceback" not in found
 
 
 def test_a_wrong_option_is_named_as_it_was_given(data: Path) -> None:
-    with parenting("up", "--port", "99999", data=data) as child:
-        _, said = child.communicate(timeout=60)
-    assert child.returncode == 2
-    assert said.startswith("--port: '99999' is wrong: ")
-    assert "PARENTING_PORT" not in said
+    told = said("up", "--port", "99999", data=data)
+    assert told.startswith("--port: '99999' is wrong: ")
+    assert "PARENTING_PORT" not in told
 
 
 def test_migrate_twice(tmp_path: Path) -> None:
-    said = []
-    for _ in range(2):
-        with parenting("migrate", data=tmp_path) as child:
-            said.append(child.communicate(timeout=60)[0])
-            assert child.returncode == 0
-    assert said == ["The database is up to date now.\n", "The database was up to date.\n"]
+    told = [said("migrate", data=tmp_path, code=0) for _ in range(2)]
+    assert told == ["The database is up to date now.\n", "The database was up to date.\n"]
 
 
 def until(met: Callable[[], bool]) -> None:
