@@ -1,0 +1,43 @@
+"""The number of answers that stand, above the question, whatever comes first: the reply or the stream."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from playwright.sync_api import Route, expect
+
+from parenting.server.db import Database
+from parenting.server.settings import Settings
+from tests.pages.browser_tabs import BrowserTabs
+from tests.pages.parent_page import address
+
+LATE = 1.5
+"""Seconds by which the reply to a skip is late, so that the stream tells of it first."""
+
+
+def test_a_skip_that_the_stream_tells_first_is_taken_off_once(
+    settings: Settings, tabs: BrowserTabs, db: Database, ask: Callable[..., int]
+) -> None:
+    ask("preference")
+    ask("preference")
+    page = tabs.open(address(db), viewport={"width": 390, "height": 844})
+
+    def late(route: Route) -> None:
+        reply = route.fetch()
+        time.sleep(LATE)
+        route.fulfill(response=reply)
+
+    page.wait_for_selector("#question[data-listening]")
+    page.keyboard.press("e")
+    expect(page.locator("#count")).to_have_text("1")
+    page.route("**/skip", late)
+    page.wait_for_selector("#question[data-listening]")
+    skip, title = page.locator(".cannot").bounding_box(), page.locator("#question h1").bounding_box()
+    assert skip is not None
+    assert title is not None
+    assert skip["y"] >= title["y"] + title["height"], "the button covers no word of the title on a phone"
+    page.keyboard.press("s")
+    expect(page.locator("#saved")).to_have_text("Saving")
+    expect(page.locator("#saved")).to_have_text("Saved")
+    expect(page.locator("#count")).to_have_text("1")
