@@ -41,7 +41,7 @@ from tests.server.raising import ISLAND
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(600, 3000))]
 LOCKED_SECONDS = 20.0
 FULL_SECONDS = length(10.0, 120.0)
-RESTARTS, ENDED = length(1, 15), length(4, 60)
+RESTARTS, ENDED = length(1, 15), length(2, 60)
 PROCESSES = ("web", "worker 1")
 AWAY_SECONDS = length(5.0, 60.0)
 FIRST_LINES = 4
