@@ -30,15 +30,18 @@ GARDEN = {"stages": 3, "mature_every": 15, "time_limit": 10}
 
 def shoot(page: Page, name: str, folder: Path, sizes: dict[str, tuple[int, int]] = SCREENS) -> None:
     """Take pictures of a page on a desktop and on a phone, which has no keys, light and dark."""
-    session = page.context.new_cdp_session(page)
     for device, (width, height) in sizes.items():
         page.set_viewport_size({"width": width, "height": height})
-        session.send("Emulation.setTouchEmulationEnabled", {"enabled": device == "phone"})
+        session = page.context.new_cdp_session(page)
+        if device == "phone":
+            session.send("Emulation.setTouchEmulationEnabled", {"enabled": True})
         for scheme in ("light", "dark"):
             page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
             page.wait_for_timeout(1500)
             drawn = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
             few_colours(drawn).save(folder / f"{name}-{device}-{scheme}.png", optimize=True)
+        session.detach()
+    page.reload()  # without it the page still takes itself for one on a touch screen
 
 
 def few_colours(drawn: Image.Image) -> Image.Image:
@@ -79,6 +82,7 @@ def practised(browser: Browser, url: str) -> Page:
 
 def watched(page: Page) -> Page:
     """The walk of the present policy, over a question."""
+    page.wait_for_selector("#question[data-listening]")
     page.keyboard.press("w")
     page.wait_for_selector("dialog.watch .walk")
     return page
