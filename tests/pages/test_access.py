@@ -213,7 +213,7 @@ def test_the_parents_page_is_small(client: httpx2.Client, lives: None) -> None:
 def test_the_charts_are_drawn_and_go_on(tabs: BrowserTabs, db: Database, lives: None) -> None:
     page = tabs.open("/runs/1")
     lines = page.locator(".plot .scatterlayer .trace")
-    expect(lines).to_have_count(14)
+    expect(lines).to_have_count(15)
     (mine,) = (claim for claim in runs.claim(db, "another", seconds=-1) if claim.run_id == 1)
     fixtures.measure(db, mine, 55)
     expect(page.locator("#now-tick")).to_have_text("55")

@@ -22,7 +22,12 @@ def test_on_a_touch_screen_the_help_names_the_buttons_and_no_keys(
     page = tabs.open("/runs/1/parent?query=1", viewport=screen, has_touch=True, is_mobile=True)
     page.get_by_role("button", name="Help").click()
     expect(page.get_by_role("dialog")).to_be_visible()
-    assert page.locator(".keys div:not(.turns) dt:visible").all_inner_texts() == [*names, "Either", "Neither"]
+    assert page.locator(".keys div:not(.turns) dt:visible").all_inner_texts() == [
+        *names,
+        "Either",
+        "Neither",
+        "I can’t tell",
+    ]
     assert not [key for key in page.locator("kbd").all() if key.is_visible()]
     buttons = [text.split("\n")[0] for text in page.locator(".answers button").all_inner_texts()]
     assert buttons[:2] == names
@@ -35,7 +40,7 @@ def test_with_a_keyboard_the_help_shows_keys(tabs: BrowserTabs, db: Database) ->
     page.get_by_role("button", name="Help").click()
     expect(page.get_by_role("dialog")).to_be_visible()
     keys = [" ".join(text.split()) for text in page.locator(".keys dt:visible").all_inner_texts()]
-    assert keys == ["A 1", "B 2", "← → ↑ ↓", "E", "N", "Space", "Z", "W", "D", "G", "?"]
+    assert keys == ["A 1", "B 2", "← → ↑ ↓", "E", "N", "S", "Space", "Z", "W", "D", "G", "?"]
 
 
 def test_a_table_wider_than_the_phone_has_a_shadow_where_it_goes_on(tabs: BrowserTabs, db: Database) -> None:

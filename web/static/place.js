@@ -1,7 +1,7 @@
 // Keeps the place of the person while one question takes the place of another: where the focus is, and what is open.
 import { stage } from "./page.js";
 
-const PARTS = [".answers [value]", ".around summary", "[data-explore]", ".steps [data-step]", "[data-replay]", "[role=grid]"];
+const PARTS = [".answers [value]", ".around summary", "[data-explore]", ".cannot", ".steps [data-step]", "[data-replay]", "[role=grid]"];
 let place = null, open = false;
 
 // A selector of the same part of another question; null for what has none there.
