@@ -26,9 +26,7 @@ from parenting.server.store.clock import is_over
 from parenting.server.tables import Run
 
 CLAIM_SECONDS = 5.0
-PROGRESS_FIELDS = frozenset(
-    {"tick", "waiting", "optimal", "versions", "maturity", "speed", "milestones", "lesson"}
-)
+PROGRESS_FIELDS = {"tick", "waiting", "optimal", "versions", "maturity", "speed", "milestones", "lesson"}
 """The columns that a worker reports."""
 
 

@@ -24,7 +24,7 @@ Ask = Callable[..., int]
 
 
 def stored(db: Database) -> list[tuple[str, bool]]:
-    """What was said, and whether it stands."""
+    """The choices, each with True if it stands."""
     with db.read() as session:
         rows = session.scalars(select(Answer).order_by(Answer.number)).all()
         return [(row.choice, row.standing) for row in rows]
