@@ -19,10 +19,10 @@ def lint_imports(tree: Path, *options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code, *options], cwd=tree, capture_output=True, text=True)
 
 
-@pytest.mark.parametrize("contract", [contract["id"] for contract in CONTRACTS])
-def test_contract_is_kept(contract: str) -> None:
-    result = lint_imports(ROOT, "--contract", contract)
+def test_every_contract_is_kept() -> None:
+    result = lint_imports(ROOT)
     assert result.returncode == 0, result.stdout + result.stderr
+    assert f"{len(CONTRACTS)} kept, 0 broken" in result.stdout
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """A person answers questions by keyboard in every world, in stages up to T = 2, and in one of them at T = 1.
 
-The processes are real, and a dashboard moves meanwhile. Each asks 10 questions; in `make torture` each asks
+The processes are real, and a dashboard moves meanwhile. Each asks 8 questions; in `make torture` each asks
 30, and every world is tried at T = 1.
 """
 
@@ -18,7 +18,7 @@ from tests.lengths import length
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import create, until, up
 
-QUESTIONS = length(10, 30)
+QUESTIONS = length(8, 30)
 STAGES = {
     1: {},
     2: {
