@@ -151,3 +151,23 @@ def test_a_fault_of_the_page_is_said_and_sent(tabs: BrowserTabs, db: Database, m
     assert told.value.status == 204
     assert tabs.wrong == ["planted", "another"]
     tabs.wrong.clear()
+
+
+def test_haste_is_remarked_at_most_once_in_ten_questions(
+    tabs: BrowserTabs, db: Database, mine: Claim, ask: Ask
+) -> None:
+    query = ask()
+    page = tabs.open(address(db))
+    shown(page, query)
+    told = page.evaluate(
+        """async () => {
+            const { remark } = await import("/static/remarks.js"), seen = [];
+            for (let number = 0; number < 14; number++) {
+                remark(document.getElementById("question"), "either", number === 0 ? 5000 : 100);
+                seen.push(!document.getElementById("remark").hidden);
+            }
+            return seen;
+        }"""
+    )
+    assert [number for number, one in enumerate(told) if one] == [2, 12], "after two fast answers in a row"
+    assert page.locator("#remark [data-slip]:not([hidden])").get_attribute("data-slip") == "hasty"
