@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import cache
 
 import structlog
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
-from starlette.routing import Match
+from starlette.routing import BaseRoute, Match
 from starlette_compress import CompressMiddleware, remove_compress_type
 
 from parenting.drawing.sentences import mark
@@ -92,7 +94,7 @@ def bare_app() -> FastAPI:
         description=ABOUT,
         openapi_tags=TAGS,
         openapi_url="/api/v1/openapi.json",
-        generate_unique_id_function=lambda route: route.name,
+        generate_unique_id_function=_route_name,
         docs_url=None,  # FastAPI's own pages load from another origin; ours is server.pages.docs
         redoc_url=None,
         lifespan=_lifespan,
@@ -109,12 +111,26 @@ def bare_app() -> FastAPI:
         RequestMiddleware, meters=app.state.meters
     )  # the outermost: refused requests count, too
     _add_errors(app)
-    app.include_router(health.router)
-    app.include_router(api.router)
-    app.include_router(pages.router)
+    app.router.routes += _routes()
     app.mount("/static/vendor", OthersFiles())
     app.mount("/static", OurFiles(), name="static")
     return app
+
+
+@cache
+def _routes() -> list[BaseRoute]:
+    """Return the routes of health, API and pages.
+
+    All applications of a process share them: the framework works out what a route needs at its first request.
+    """
+    holder = FastAPI(openapi_url=None, generate_unique_id_function=_route_name)
+    for router in (health.router, api.router, pages.router):
+        holder.include_router(router)
+    return list(holder.routes)
+
+
+def _route_name(route: APIRoute) -> str:
+    return route.name
 
 
 @asynccontextmanager
