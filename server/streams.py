@@ -106,7 +106,7 @@ class Streams:
                     async for event in self._metrics(run_id, after):
                         after = int(event.id or -1)
                         yield event
-                await _either(changed, ready - now if subscription.run != seen else None)
+                await either(changed, ready - now if subscription.run != seen else None)
         finally:
             self._leave(run_id, subscription)
 
@@ -141,7 +141,7 @@ class Streams:
                 left = until - time.monotonic()
                 if found is not None or left <= 0 or self.closed:
                     return found
-                await _either(notified, min(left, POLL_SECONDS))
+                await either(notified, min(left, POLL_SECONDS))
             return None
         finally:
             self.waiting_requests -= 1
@@ -172,9 +172,13 @@ class Streams:
                 subscription.run, subscription.question, subscription.leases = now
                 _tell(subscription)
             # nobody notifies of the end of a lease
-            await _either(notified, POLL_SECONDS if ends_in is None else min(POLL_SECONDS, ends_in))
+            await either(notified, POLL_SECONDS if ends_in is None else min(POLL_SECONDS, ends_in))
             if notified.is_set() and self.waiting_requests:
                 await asyncio.sleep(YIELD_SECONDS)
+
+    def news(self) -> asyncio.Event:
+        """Return what the next notification sets; take it before the look that it is to repeat."""
+        return self._notified
 
     def _on_notification(self) -> None:
         self.notifier.drain()
@@ -213,7 +217,8 @@ def _look(db: Database, run_id: int) -> tuple[Seen, float | None]:
     return (run_schema(db, run_id).model_dump(mode="json"), question, leases.leases), leases.ends_in
 
 
-async def _either(event: asyncio.Event, timeout: float | None) -> None:
+async def either(event: asyncio.Event, timeout: float | None) -> None:
+    """Wait for an event, or for so many seconds; None waits for the event alone."""
     try:
         await asyncio.wait_for(event.wait(), None if timeout is None else max(timeout, 0.0))
     except TimeoutError:

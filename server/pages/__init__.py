@@ -2,6 +2,7 @@
 
 from fastapi import APIRouter
 
+from parenting.server.pages.carried import router as carried
 from parenting.server.pages.controls import router as controls
 from parenting.server.pages.dashboard import router as dashboard
 from parenting.server.pages.docs import router as docs
@@ -20,6 +21,7 @@ __all__ = ["error_page", "router"]
 
 router = APIRouter(include_in_schema=False)
 router.include_router(start)
+router.include_router(carried)
 router.include_router(parent)
 router.include_router(revisions)
 router.include_router(practice)

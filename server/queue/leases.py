@@ -24,6 +24,8 @@ from parenting.server.store.clock import Mark, holds, is_over
 from parenting.server.tables import Query, Run, Table
 
 LEASE_SECONDS = 60.0
+ROOM = 2
+"""Queries that a page has at once: one that it shows, and one for afterwards."""
 
 
 def waiting(db: Database, run_id: int) -> Query | None:
@@ -51,6 +53,31 @@ def lease_ahead(
     """
     asks = {"run_id": run_id, "client_id": client_id, "shown": list(shown), "to_come": list(shown)}
     return _hold(db, _AHEAD, asks, seconds)
+
+
+def lease_more(
+    db: Database, run_id: int, client_id: str, has: set[int], seconds: float = LEASE_SECONDS
+) -> Query | None:
+    """Hold one query more for a page that has room for it, besides those that it `has`; None if not.
+
+    A page has room for `ROOM`, and for guidance also where it has so many preferences. Queries that are no
+    longer open, or held by this client, leave `has`. Where it gave one up, such as one that was put back,
+    other parents come first: nothing is held until the next call.
+    """
+    with db.read() as session:
+        seen = {"run_id": run_id, "client_id": client_id, "has": list(has), **db.mark(session).bound()}
+        rows = session.execute(_OPEN_OF, seen).all()
+        first = session.execute(_FIRST, {"run_id": run_id}).first()
+    has.intersection_update(row.id for row in rows if row.mine)
+    if first is None or not all(row.mine for row in rows):
+        return None
+    if len(has) >= ROOM and (first.id in has or first.kind != "guidance"):
+        return None
+    return (
+        lease_ahead(db, run_id, client_id, sorted(has), seconds)
+        if has
+        else lease(db, run_id, client_id, seconds)
+    )
 
 
 def take(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECONDS) -> Query | None:
@@ -187,3 +214,14 @@ _ANSWERS_TO_COME = (
 _AHEAD = _OPEN.where(
     Query.id.not_in(_SHOWN), or_(Run.goal.is_(None), Run.goal > _STANDING + _ANSWERS_TO_COME)
 ).order_by(*urgency())
+_OPEN_OF = select(Query.id, _MINE.label("mine")).where(
+    Query.run_id == bindparam("run_id"),
+    Query.status == QueryStatus.OPEN,
+    Query.id.in_(bindparam("has", expanding=True)),
+)
+_FIRST = (
+    select(Query.id, Query.kind)
+    .where(Query.run_id == bindparam("run_id"), Query.status == QueryStatus.OPEN)
+    .order_by(*urgency())
+    .limit(1)
+)

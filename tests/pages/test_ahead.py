@@ -9,11 +9,11 @@ from concurrent.futures import ThreadPoolExecutor
 import httpx2
 import pytest
 from fastapi import FastAPI
-from playwright.sync_api import APIResponse, Route, expect
+from playwright.sync_api import expect
 
 from parenting.server.db import Database
 from parenting.server.queue import answers
-from tests.pages.browser_tabs import BrowserTabs, given, until
+from tests.pages.browser_tabs import BrowserTabs, until
 from tests.pages.parent_page import named, shown
 
 
@@ -24,23 +24,6 @@ def test_a_question_that_comes_later_is_fetched_ahead_too(tabs: BrowserTabs, ask
     expect(page.locator("#question")).to_have_attribute("data-ahead", "")
     second = ask("preference", "left left", "down")
     expect(page.locator("#question")).to_have_attribute("data-ahead", named(page, second))
-
-
-def test_the_request_for_the_next_question_lies_at_the_server_while_somebody_thinks(
-    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
-) -> None:
-    first = ask()
-    page = tabs.open("/")
-    with page.expect_request(lambda request: "shown=" in (request.post_data or "")) as lookout:
-        page.goto(f"{tabs.address}/runs/1/parent")
-        shown(page, first)
-    page.keyboard.press("a")
-    until(lambda: given(db) == [(first, "left")])
-    second = ask()
-    shown(page, second)
-    reply = lookout.value.response()
-    assert reply is not None
-    assert f'data-query="{named(page, second)}"' in reply.text()
 
 
 def test_guidance_goes_before_what_was_leased_ahead(tabs: BrowserTabs, ask: Callable[..., int]) -> None:
@@ -63,9 +46,9 @@ def test_a_page_that_is_gone_is_promised_nothing(
     first = ask()
     page = tabs.open("/runs/1/parent")
     shown(page, first)
-    until(lambda: site.state.streams.waiting_requests == 1)  # for the question after it
+    until(lambda: site.state.streams.number() == 1)  # it brings the question after it, too
     page.context.close()
-    until(lambda: site.state.streams.waiting_requests == 0)  # Chromium's news of it may take its time
+    until(lambda: site.state.streams.number() == 0)  # Chromium's news of it may take its time
     second = ask()
     assert answers.get_query(db, second).leased_by is None
 
@@ -99,39 +82,3 @@ def test_a_question_that_was_leased_to_one_who_is_gone_is_let_go(
     monkeypatch.setattr("starlette.requests.Request.is_disconnected", lambda request: gone())
     assert client.post("/runs/1/parent/question", data={"client_id": "somebody"}).status_code == 200
     assert answers.get_query(db, number).leased_by is None
-
-
-def test_what_two_requests_bring_is_shown_once(
-    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
-) -> None:
-    first, held = ask(), dict[str, tuple[Route, APIResponse]]()
-
-    def hold(route: Route) -> None:
-        held["ahead" if "shown=" in (route.request.post_data or "") else "next"] = (route, route.fetch())
-
-    def release(which: str) -> None:
-        while which not in held:
-            page.wait_for_timeout(20)
-        route, reply = held.pop(which)
-        route.fulfill(response=reply)
-
-    page = tabs.open("/")
-    page.route("**/parent/question", hold)
-    page.goto(f"{tabs.address}/runs/1/parent")
-    release("next")
-    shown(page, first)
-    page.wait_for_timeout(200)  # the request for the question after it lies at the server
-    page.keyboard.press("a")
-    page.wait_for_timeout(200)
-    second = ask()
-    while (
-        len(held) < 2
-    ):  # it brings the second question, and so does a request that the stream's word set off
-        page.wait_for_timeout(20)
-    release("ahead")
-    shown(page, second)
-    page.keyboard.press("b")
-    page.wait_for_timeout(200)
-    release("next")
-    expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
-    assert given(db) == [(first, "left"), (second, "right")]

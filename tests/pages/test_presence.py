@@ -11,7 +11,7 @@ from parenting.server.db import Database
 from parenting.server.queue.presence import GRACE_SECONDS, held, holder
 from parenting.server.settings import Settings
 from tests.pages.browser_tabs import BrowserTabs, given, until
-from tests.pages.parent_page import shown
+from tests.pages.parent_page import named, shown
 
 ELSEWHERE = "Somebody else has the question."
 
@@ -32,7 +32,7 @@ def test_a_question_is_taken_over_and_the_other_page_says_so(
     expect(phone.get_by_role("heading", name="Your question was taken over.")).to_be_visible()
     plain = tabs.open("/runs/1/parent", java_script_enabled=False)
     plain.get_by_role("button", name="Answer here instead").click()
-    shown(plain, number)
+    expect(plain.locator(f'#question[data-query="{named(plain, number)}"]')).to_be_visible()
     expect(laptop.get_by_role("heading", name="Your question was taken over.")).to_be_visible()
     plain.get_by_role("group", name="Your answer").get_by_role("button", name="Left").click()
     until(lambda: given(db) == [(number, "left")])

@@ -3,12 +3,14 @@
 import { answer, count, report } from "./answers.js";
 import "./bell.js";
 import "./keys.js";
-import { follow } from "./live.js";
+import { carry } from "./carried.js";
+import { poll } from "./live.js";
+import { kept } from "./kept.js";
 import { flush, flushAll } from "./outbox.js";
 import { $, alarm, given, page, run, waiting } from "./page.js";
 import { play } from "./play.js";
-import { leases } from "./presence.js";
-import { next, prefetch, show, take } from "./questions.js";
+import { attentive, leases } from "./presence.js";
+import { arrive, next, prefetch, show, take } from "./questions.js";
 import { t } from "./sentences.js";
 import { wait } from "./waiting.js";
 
@@ -47,12 +49,28 @@ const tell = {
     if (!page.current) next();
     else if (asked.kind === "guidance" && asked.public_id !== page.current.dataset.query && !page.lookout) prefetch(); // it goes first
   },
+  asked: arrive,
   leases,
   lost(status) {
     page.state = status === 404 ? "away" : "offline";
     wait(page.state);
   },
 };
+
+// What the page has of its run's questions, and whether somebody is there who answers more of them.
+function has() {
+  const forms = [page.current, page.ahead, ...page.later].filter(Boolean);
+  return { shown: [...new Set([...forms.map(({ dataset }) => dataset.query), ...kept()])], asks: attentive() };
+}
+
+// Hear of the run by the browser's stream, and ask for it while nothing is heard.
+function listen() {
+  const { heard, wish } = carry((event, data) => tell[event](data), has);
+  Object.assign(page, { carried: heard, wish });
+  const ask = poll(run, tell, heard, true);
+  document.addEventListener("visibilitychange", ask);
+  ask();
+}
 
 // Answer what is on the stage, send what an earlier visit left behind, then follow the run.
 export function begin(form) {
@@ -69,5 +87,5 @@ export function begin(form) {
     later(() => import("./walk.js")).then(({ watch }) => watch(play), () => { alarm(t("The walk cannot be loaded. Reload the page.")); });
   });
   if (form) show(form);
-  flush(report).then(() => follow(run, tell, { background: true }));
+  flush(report).then(listen);
 }

@@ -2,7 +2,7 @@
 import { listens } from "./arming.js";
 import { recordAnswer, timeLeft } from "./eta.js";
 import { flush, keep } from "./outbox.js";
-import { $, alarm, client, given, name, page, painted, PATIENCE, run, waiting } from "./page.js";
+import { $, alarm, client, given, name, page, painted, run, waiting } from "./page.js";
 import { next, show } from "./questions.js";
 import { remark } from "./remarks.js";
 import { change, remember } from "./undo.js";
@@ -46,7 +46,7 @@ export function answer(choice) {
     return show(page.ahead);
   }
   page.player.still();
-  Promise.race([flush(report), new Promise((done) => { setTimeout(done, HASTE); })]).then(() => choice === "skip" && new Promise((done) => { setTimeout(done, OTHERS_FIRST); })).then(() => { if (!page.current && !page.lookout) next(PATIENCE); });
+  Promise.race([flush(report), new Promise((done) => { setTimeout(done, HASTE); })]).then(() => choice === "skip" && new Promise((done) => { setTimeout(done, OTHERS_FIRST); })).then(() => { if (!page.current && !page.lookout) next(); });
   wait(page.state === "question" ? "exploring" : page.state);
 }
 

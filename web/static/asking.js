@@ -4,15 +4,19 @@ import { kept } from "./kept.js";
 import { $, client, given, main, name, page, run, stage, waiting } from "./page.js";
 import { size } from "./size.js";
 
-// The form of the most urgent question, besides those that were answered here; null if there is none within `seconds`.
-export async function ask(shown = [], seconds = 0, signal = undefined, more = {}) {
-  const body = new URLSearchParams({ client_id: client, wait: seconds, ...more });
+// The form of the most urgent question, besides those that were answered here; null if there is none now.
+export async function ask(shown = [], signal = undefined, more = {}) {
+  const body = new URLSearchParams({ client_id: client, ...more });
   for (const query of new Set([...shown, ...kept()])) body.append("shown", query);
   const reply = await fetch(`/runs/${run}/parent/question`, { method: "POST", body, signal });
   if (!reply.ok) throw Object.assign(new Error(reply.statusText), { status: reply.status });
   if (reply.status === 204) return null;
+  return formOf(await reply.text());
+}
+
+export function formOf(markup) {
   const holder = document.createElement("template");
-  holder.innerHTML = await reply.text();
+  holder.innerHTML = markup;
   const form = holder.content.firstElementChild;
   return given.has(form.dataset.query) ? null : form; // two requests may bring the same question, one of them late
 }

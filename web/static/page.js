@@ -2,7 +2,6 @@
 export const $ = (id) => document.getElementById(id);
 export const main = $("main"), stage = $("stage"), waiting = $("waiting");
 export const { run, client, name } = main.dataset;
-export const PATIENCE = 1; // seconds that a request for a question may lie at the server
 export const given = new Set(); // questions that were answered on this page
 
 export const page = {
@@ -12,7 +11,10 @@ export const page = {
   player: null,
   put: null, // the form that was put on the stage last
   ahead: null, // the form after it
-  lookout: null, // aborts the request for it, which lies at the server
+  later: [], // and those after that, where the stream brought more
+  carried: () => false, // whether a stream brings what happens, and questions
+  wish() {}, // tells the stream that this page has other questions than it knows
+  lookout: null, // aborts the request for it
   asking: false, // a request for a question is under way
   again: false, // another one was wanted meanwhile
   taken: false, // somebody else took the last question over

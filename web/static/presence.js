@@ -22,14 +22,15 @@ function post(verb, body) {
 
 // Hold what is on the page as long as somebody looks at it, and learn who has it.
 export async function renew() {
-  const { current, ahead } = page, shown = [current, ahead].filter(Boolean);
+  const { current, ahead } = page, shown = [current, ahead, ...page.later].filter(Boolean);
   if (!current || current.dataset.former) return; // an answered question that is being changed is nobody's to hold
   const reply = await post("renew", { questions: shown.map(({ dataset }) => dataset.query), idle: idle() }).catch(() => null);
   if (!reply?.ok) return;
   const { yours, elsewhere } = await reply.json();
   if (ahead && ahead === page.ahead && !yours.includes(ahead.dataset.query)) {
-    page.ahead = null;
-    current.dataset.ahead = "";
+    page.ahead = page.later.shift() ?? null;
+    current.dataset.ahead = page.ahead?.dataset.query ?? "";
+    page.wish(true);
   }
   if (current !== page.current) return;
   if (yours.includes(current.dataset.query)) {
@@ -38,6 +39,7 @@ export async function renew() {
   }
   page.taken = elsewhere.includes(current.dataset.query);
   page.current = null;
+  page.wish(true);
   page.player.still();
   next();
 }
@@ -63,7 +65,9 @@ export function leave() {
 function signed() {
   const lapsed = idle() > LAPSE;
   sign = performance.now();
-  if (lapsed) renew();
+  if (!lapsed) return;
+  renew();
+  page.wish();
 }
 
 function back() {

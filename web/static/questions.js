@@ -1,16 +1,21 @@
 // Questions: keeps one ahead, and swaps one for the next.
 import { settle } from "./answers.js";
-import { ask, put } from "./asking.js";
+import { ask, formOf, put } from "./asking.js";
 import { begin } from "./begin.js";
 import { kept } from "./kept.js";
-import { page, painted, PATIENCE } from "./page.js";
+import { given, page, painted } from "./page.js";
 import { attentive, leave } from "./presence.js";
 import { wait } from "./waiting.js";
 
-const LOOKOUT = 5; // seconds that the request for the question after this one may lie at the server, while somebody thinks
+const BROUGHT = 400; // ms for which a stream may still bring the question that is known to wait
 
-// Fill the empty stage. One request at a time; what comes meanwhile is asked for once more.
-export async function next(seconds = 0) {
+// Fill the empty stage. One request at a time; what comes meanwhile is asked for once more. A stream brings what there is
+// by itself; what it did not bring, such as a question that another tab has, is asked for a little later.
+export async function next() {
+  if (page.carried()) {
+    await new Promise((done) => { setTimeout(done, BROUGHT); });
+    if (page.current) return;
+  }
   page.again = page.asking;
   if (page.asking) return;
   page.asking = true;
@@ -18,8 +23,7 @@ export async function next(seconds = 0) {
     let form;
     do {
       page.again = false;
-      form = await ask([], seconds);
-      seconds = 0;
+      form = await ask();
     } while (!form && page.again && !page.current);
     if (form && !page.current) show(form);
     else if (!page.current && page.state === "question") wait(kept().length ? "unsent" : page.taken ? "taken" : "elsewhere");
@@ -36,35 +40,50 @@ function failed({ status }) {
 
 // Answer here instead: the question comes here, whoever has it.
 export async function take() {
-  const form = await ask([], 0, undefined, { take: true }).catch(failed);
+  const form = await ask([], undefined, { take: true }).catch(failed);
   if (form && !page.current) show(form);
 }
 
-// The question after this one: its request lies at the server while somebody thinks, so that its reply leaves as soon as
-// the agent asks.
+// The question after this one, where no stream brings it.
 export async function prefetch() {
-  if (!page.current || !attentive()) return;
+  if (!page.current || !attentive() || page.carried()) return;
   page.lookout?.abort();
-  const mine = page.lookout = new AbortController(), form = page.current, began = performance.now();
+  const mine = page.lookout = new AbortController(), form = page.current;
   form.dataset.ahead = "";
-  const found = await ask([form.dataset.query], LOOKOUT, mine.signal).catch(() => null);
+  const found = await ask([form.dataset.query], mine.signal).catch(() => null);
   if (mine !== page.lookout) return;
   page.lookout = null;
   if (form === page.current) {
     page.ahead = found;
     form.dataset.ahead = found?.dataset.query ?? "";
-    if (!found && performance.now() - began > 1000 * PATIENCE) prefetch();
   } else if (!page.current) {
     if (found) show(found);
-    else next(PATIENCE);
+    else next();
   }
+}
+
+// The questions of this page besides one, the agent's guidance first: it waits for that.
+function behind(form, ...more) {
+  const others = [page.current, page.ahead, ...page.later, ...more].filter((one) =>
+    one && one.dataset.query !== form.dataset.query && !one.dataset.former && !given.has(one.dataset.query));
+  return [...others.filter(({ dataset }) => dataset.kind === "guidance"), ...others.filter(({ dataset }) => dataset.kind !== "guidance")];
+}
+
+// A question that the stream brought: it is shown, or waits behind the one that is.
+export function arrive(markup) {
+  const form = formOf(markup), here = [page.current, page.ahead, ...page.later];
+  if (!form || here.some((one) => one?.dataset.query === form.dataset.query)) return;
+  if (!page.current) return show(form);
+  [page.ahead = null, ...page.later] = behind(page.current, form);
+  page.current.dataset.ahead = page.ahead?.dataset.query ?? "";
 }
 
 export function show(form) {
   put(form);
   clearTimeout(page.quiet);
   page.quiet = 0;
-  page.ahead = null;
+  [page.ahead = null, ...page.later] = page.carried() ? behind(form) : [];
+  form.dataset.ahead = page.ahead?.dataset.query ?? "";
   page.taken = false;
   settle();
   begin(form);

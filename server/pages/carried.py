@@ -1,0 +1,145 @@
+"""One stream for all the parent's pages of a browser: what happens in their runs, and their next questions.
+
+A browser opens six connections to a host, so its pages share one stream (`web/static/carried.js`). It leases
+questions, so it is opened by a POST; the script reads it as it comes. A page has two questions at most, one
+that it shows and one for afterwards; once one of them is answered, another one is sent without a request.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterable, Sequence
+from contextlib import suppress
+from functools import partial
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+from pydantic import Field
+
+from parenting.server import runs
+from parenting.server.admission import admitted_router
+from parenting.server.api.bodies import ClientId, Strict
+from parenting.server.api.names import PublicId
+from parenting.server.db import Database
+from parenting.server.deps import Db, SettingsOf
+from parenting.server.errors import NotFound, ServerError
+from parenting.server.identity import database_id
+from parenting.server.pages.question import question_view
+from parenting.server.pages.render import render
+from parenting.server.queue.leases import lease_more
+from parenting.server.reads.names import query_numbers, run_number
+from parenting.server.streams import POLL_SECONDS, Streams, either
+from parenting.server.tables import Query, Run
+
+router = admitted_router(include_in_schema=False)
+
+PAGES = 20
+"""Pages of one stream."""
+
+
+class CarriedPage(Strict):
+    """A run that a page shows, and what it has of it."""
+
+    run: PublicId
+    client_id: ClientId
+    shown: list[PublicId] = Field(max_length=100)  # its questions, and those whose answers are on their way
+    asks: bool  # somebody looks at it, so that questions are leased for it
+
+
+class Carried(Strict):
+    """The pages of one browser."""
+
+    pages: list[CarriedPage] = Field(min_length=1, max_length=PAGES)
+
+
+async def found_runs(request: Request, body: Carried, db: Db) -> list[Run | None]:
+    """Return the runs of the pages, None for one that is not here; refuse one stream too many."""
+    streams: Streams = request.app.state.streams
+    streams.check_room()
+    return await streams.admission.read(partial(_runs, db, [page.run for page in body.pages]))
+
+
+@router.post("/runs/parent/stream", response_class=EventSourceResponse)
+async def carry(
+    request: Request,
+    body: Carried,
+    db: Db,
+    settings: SettingsOf,
+    of: Annotated[list[Run | None], Depends(found_runs)],
+) -> AsyncIterable[ServerSentEvent]:
+    """Send what happens in several runs as events whose data are `[page, what]`.
+
+    `run`, `question`, `leases` are those of a run's own stream; `asked` is the markup of a leased question,
+    `lost` the status of a run that is not here.
+    """
+    streams: Streams = request.app.state.streams
+    events: asyncio.Queue[ServerSentEvent | None] = asyncio.Queue(maxsize=100)
+    tasks = []
+    for at, (page, run) in enumerate(zip(body.pages, of, strict=True)):
+        if run is None:
+            yield _event("lost", at, 404)
+            continue
+        tasks.append(asyncio.create_task(_follow(streams, run.id, at, events)))
+        if page.asks:
+            asks = _ask(streams, db, run, page, settings.lease_seconds, at, events)
+            tasks.append(asyncio.create_task(asks))
+    try:
+        while (event := await events.get()) is not None:
+            yield event
+    finally:
+        for task in tasks:
+            task.cancel()
+
+
+async def _follow(
+    streams: Streams, run_id: int, at: int, events: asyncio.Queue[ServerSentEvent | None]
+) -> None:
+    """Pass on what happens in a run; the server's end ends the stream."""
+    async for event in streams.subscribe(run_id, None):
+        data = json.loads(event.raw_data) if event.raw_data is not None else event.data
+        await events.put(_event(event.event, at, data))
+    await events.put(None)
+
+
+async def _ask(
+    streams: Streams,
+    db: Database,
+    run: Run,
+    page: CarriedPage,
+    seconds: float,
+    at: int,
+    events: asyncio.Queue[ServerSentEvent | None],
+) -> None:
+    """Lease the next question whenever the page has room for one, and pass it on."""
+    has = set(await streams.admission.read(query_numbers, db, page.shown))
+    lease = partial(lease_more, db, run.id, page.client_id, has, seconds)
+    while not streams.closed:
+        news, query = streams.news(), None
+        with suppress(ServerError):  # busy: the next look will tell
+            query = await streams.admission.write(lease)
+        if query is None:
+            await either(news, POLL_SECONDS)
+            continue
+        has.add(query.id)
+        await events.put(_event("asked", at, await streams.admission.read(_markup, db, run, query, page)))
+
+
+def _markup(db: Database, run: Run, query: Query, page: CarriedPage) -> str:
+    shown = question_view(query, run)
+    return render("_question.html", shown=shown, client=page.client_id, database=database_id(db))
+
+
+def _event(kind: str | None, at: int, data: Any) -> ServerSentEvent:
+    return ServerSentEvent(event=kind, raw_data=json.dumps([at, data]))
+
+
+def _runs(db: Database, names: Sequence[str]) -> list[Run | None]:
+    found: list[Run | None] = []
+    for name in names:
+        try:
+            found.append(runs.get_run(db, run_number(db, name)))
+        except NotFound:
+            found.append(None)
+    return found
