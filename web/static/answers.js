@@ -61,7 +61,7 @@ export function report(outcome, reply, answer) {
   $("saved").classList.toggle("kept", outcome === "kept");
   if (outcome === "kept") {
     $("saved").textContent = "Kept here, not sent yet";
-    if (!page.current) wait("offline");
+    if (!page.current) wait(reply === undefined ? "offline" : "unsent"); // no reply, or one of a server in trouble
     return;
   }
   page.unsaved = Math.max(0, page.unsaved - 1);
