@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 
 import pytest
 from fastapi import FastAPI
@@ -21,7 +22,7 @@ STREAM = "/runs/parent/stream"
 
 
 @pytest.fixture
-def two(db: Database, settings: Settings) -> Iterator[Callable[[int], int]]:
+def two(db: Database, settings: Settings) -> Callable[[int], int]:
     """Post a question of the first or the second run, as the worker does: its number."""
     mine = [fixtures.start_run(db)[1] for _ in range(2)]
     ticks = iter(range(1, 1000))
@@ -34,6 +35,10 @@ def two(db: Database, settings: Settings) -> Iterator[Callable[[int], int]]:
         return number
 
     return post
+
+
+def stored(db: Database, count: int) -> bool:
+    return len(given(db)) == count
 
 
 def test_questions_come_without_a_request_and_answers_alone_are_sent(
@@ -49,7 +54,7 @@ def test_questions_come_without_a_request_and_answers_alone_are_sent(
         shown(page, numbers[len(given(db))])
         answered = len(given(db)) + 1
         page.keyboard.press("a")
-        until(lambda now=answered: len(given(db)) == now)
+        until(partial(stored, db, answered))
         numbers.append(ask("preference", "down down", "left"))
     assert [one for one in traffic.sent if one.endswith(("/question", "/stream"))] == []
     assert [one for one in traffic.sent if one.startswith("GET api/")] == []
@@ -104,6 +109,6 @@ def test_pages_work_without(tabs: BrowserTabs, db: Database, two: Callable[[int]
         number = two(1)
         shown(first, number)
         first.keyboard.press("a")
-        until(lambda now=count: len(given(db)) == now + 1)
+        until(partial(stored, db, count + 1))
     carried = ["stream"] if what in ("SharedWorker", "storage") else []
     seen(first, lambda: traffic.lying() == carried)
