@@ -33,6 +33,7 @@ pytestmark = [
 ]
 FLIPS = length(80, 20_000)
 ANSWERS = 24
+SAID = {"refused at the start", "the damage is said, the rest goes on"}
 GROUP = "flips of bits in the files of a database"
 
 
@@ -50,7 +51,9 @@ def test_flipped_bits_never_change_an_answer_in_silence(
     crashed = Crashed(settings.data / "parenting.db")
     crashed.put()
     assert said(settings, run, told) == "all that was told is there"
-    for _ in range(FLIPS):
+    for number in range(3 * FLIPS):
+        if number >= FLIPS and set(figures.of(GROUP)) >= SAID:  # a rare outcome needs more flips
+            break
         flip = crashed.draw(rng, told)
         crashed.put(flip)
         try:
@@ -59,7 +62,7 @@ def test_flipped_bits_never_change_an_answer_in_silence(
             error.add_note(f"{flip}")
             raise
         figures.count(GROUP, outcome)
-    assert set(figures.of(GROUP)) >= {"refused at the start", "the damage is said, the rest goes on"}
+    assert set(figures.of(GROUP)) >= SAID
 
 
 def test_changed_answer_is_told(db: Database, mine: Claim, settings: Settings) -> None:
