@@ -142,6 +142,7 @@ def test_the_waiting_page_shows_growth_a_walk_and_a_milestone_once(
         "The last answer changed what it would do in the cell of the question: up 25 % → 10 %, "
         "down 25 % → 10 %, left 25 % → 70 %, right 25 % → 10 %."
     )
+    expect(page.locator(".beside .lesson")).to_be_hidden()  # it is told once
     assert light_and_dark(page) == []
     page.get_by_role("button", name="Watch it walk").click()
     expect(dialog(page).locator(".walk.played")).to_be_visible()
@@ -149,6 +150,7 @@ def test_the_waiting_page_shows_growth_a_walk_and_a_milestone_once(
     expect(dialog(page).locator(".waits")).to_have_text("A question is waiting.")
     dialog(page).get_by_role("button", name="Close").click()
     shown(page, second)
+    expect(page.locator(".beside .lesson")).to_be_visible()
     expect(page.locator(".beside .lesson")).to_contain_text("The last answer changed: up 25 % → 10 %, down")
     page.reload()
     shown(page, second)

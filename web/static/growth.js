@@ -63,7 +63,7 @@ async function look() {
 // What the run's stream says, and whether the page waits.
 export function grown(now, idle) {
   tell(now);
-  teach(idle ? {} : now);
+  teach(now);
   const key = `${now.answers}/${now.tick}/${idle}`;
   if (!idle || key === seen || timer) return;
   seen = key;
