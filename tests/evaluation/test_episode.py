@@ -49,7 +49,7 @@ def test_it_is_cut_off_after_so_many_steps_and_its_seed_says_all() -> None:
 def test_moves_are_drawn_from_the_policy() -> None:
     """The first moves of many episodes are as likely as the arrows show, within four deviations."""
     world = registry.make("unsafe-exploration", "island", time_limit=100)
-    many, parameters = 600, 4 * random(world)
+    many, parameters = 300, 4 * random(world)
     first = Counter(play(world, parameters, keys(seed, 1), 1).actions[0] for seed in range(many))
     start = world.beginnings()
     chances = probabilities(world, parameters, start)[tuple(start.agent[0].tolist())]

@@ -96,9 +96,12 @@ def test_a_job_that_nobody_takes_fails_within_a_minute_and_is_swept(
     assert jobs.get(db, fresh.public_id).state is JobState.WAITING
 
 
-def test_few_jobs_of_a_run_are_open_and_few_are_kept(db: Database, run: Run) -> None:
+def test_few_jobs_of_a_run_are_open_and_few_are_kept(
+    db: Database, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("parenting.server.jobs.KEPT_OF_A_RUN", 5)
     asked = []
-    for _ in range(jobs.KEPT_OF_A_RUN + 2):
+    for _ in range(7):
         asked.append(ask(db, run).public_id)
         jobs.finish(db, take(db, "a"), {})
     with pytest.raises(NotFound):

@@ -81,12 +81,12 @@ def test_a_life_is_the_same_with_and_without_walks(
     monkeypatch.setattr("parenting.server.work.held.SLICE_SECONDS", 0.0)
     alone, watched = begin(db), begin(db)
     worker._claim()
-    for number in range(30):
+    for number in range(22):
         worker._round()
-        if number % 10 == 5:
+        if number in (5, 12):
             assert ended(db, worker, ask(db, watched)).state is JobState.DONE
     one, other = worker.sessions[alone], worker.sessions[watched]
-    assert one.last_tick == other.last_tick > 20
+    assert one.last_tick == other.last_tick > 15
     assert same_bits(one.saved, other.saved) == []
 
 
