@@ -182,7 +182,8 @@ def test_damaged_rows_are_named_with_their_runs_and_the_remedy(settings: Setting
     code, found = examined()
     assert (code, states(found)) == (2, {"rows": "error"})
     said = found["rows"]["said"]
-    assert said.startswith("run 1: its config, legend, brief or level has not the shape")
+    assert said.startswith("run 1: its config, ")
+    assert said.count("has not the shape that it was written with") == 10
     assert "question 2 of run 1 at tick 1: query.clips has not the shape" in said
     assert "tick 0" not in said
     assert said.endswith("and 2 more")
