@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 import sys
 import tomllib
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from latex2mathml.converter import convert
 
@@ -94,7 +96,28 @@ def skip_second(app: Sphinx, _what: str, name: str, *_rest: object) -> bool | No
     return True if app.env.docname == "reference/parenting" and name in ("Level", "LevelError") else None
 
 
+def share_navigation(
+    _app: Sphinx, name: str, _template: str, context: dict[str, Any], document: Element | None
+) -> None:
+    """Work out the navigation once for all pages of source of one depth: it takes most of a page's time."""
+    whole = context.get("toctree")
+    if document is None and whole is not None and name.startswith("_modules/"):
+        context["toctree"] = partial(_navigation, name.count("/"), whole)
+
+
+NAVIGATIONS: dict[tuple[object, ...], str] = {}
+
+
+def _navigation(depth: int, whole: Callable[..., str], **options: object) -> str:
+    """Return the navigation of a page that is not part of it; its links depend on the depth alone."""
+    key = (depth, *sorted(options.items()))
+    if key not in NAVIGATIONS:
+        NAVIGATIONS[key] = whole(**options)
+    return NAVIGATIONS[key]
+
+
 def setup(app: Sphinx) -> None:
     """Register the renderer of formulas."""
+    app.connect("html-page-context", share_navigation, priority=400)  # furo asks for the navigation at 500
     app.connect("autodoc-skip-member", skip_second)
     app.add_html_math_renderer("mathml", (inline_mathml, None), (block_mathml, None))
