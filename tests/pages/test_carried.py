@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 
 import pytest
 from fastapi import FastAPI
-from playwright.sync_api import expect
+from playwright.sync_api import Error as PlaywrightError
+from playwright.sync_api import Page, expect
 
 from parenting.server import runs
 from parenting.server.db import Database
@@ -72,17 +74,29 @@ def test_pages_of_two_runs_share_one_stream_and_each_gets_its_own_questions(
     assert site.state.streams.number() == 2
 
 
-def test_stream_is_handed_over_when_its_reader_is_closed(
-    tabs: BrowserTabs, two: Callable[[int], int]
+def crash(page: Page) -> None:
+    with suppress(PlaywrightError):  # it does not come to its reply
+        page.goto("chrome://crash", timeout=3000)
+
+
+def freeze(page: Page) -> None:
+    page.context.new_cdp_session(page).send("Page.setWebLifecycleState", {"state": "frozen"})
+
+
+@pytest.mark.parametrize("leave", [Page.close, freeze, crash])
+def test_stream_is_handed_over_when_its_reader_is_gone(
+    tabs: BrowserTabs, two: Callable[[int], int], leave: Callable[[Page], None]
 ) -> None:
     (reader, other), traffic = opened(tabs, ["/runs/1/parent", "/runs/2/parent"])
     seen(other, lambda: traffic.lying() == ["stream"])
     expect(other.get_by_role("heading", name="The agent is exploring")).to_be_visible()
     before = traffic.sent.count(f"POST {STREAM[1:]}")
-    reader.close()
-    seen(other, lambda: traffic.sent.count(f"POST {STREAM[1:]}") > before)
+    leave(reader)
+    if leave is not freeze:  # its silence is noticed, and the other page asks by itself
+        seen(other, lambda: traffic.sent.count(f"POST {STREAM[1:]}") > before)
     shown(other, two(2))
-    seen(other, lambda: traffic.lying() == ["stream"])
+    if leave is Page.close:
+        seen(other, lambda: traffic.lying() == ["stream"])
 
 
 WITHOUT = {

@@ -1,5 +1,5 @@
 // One stream a browser for its parent's pages: a visible page reads it and tells the others. A Web Lock says which one: it
-// passes on when its page is hidden or closed, and when the browser ends a page that crashed or froze.
+// passes on when its page is hidden or closed, or crashes. Where a page hears nothing, it asks by itself (live.js).
 import { client, run } from "./page.js";
 
 const NAME = "parenting.pages";
