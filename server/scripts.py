@@ -159,9 +159,9 @@ def _block(module: Module, modules: Mapping[str, Module], done: set[str], wanted
     taken = "".join(_taken(one, module, modules[one.origin], one.origin in done) for one in module.imports)
     early = {name for name in wanted if module.exports[name] in module.functions}
     live = {name for name in wanted if module.exports[name] in module.variables}
-    given = [f"{name}: {module.exports[name]}" for name in sorted(wanted - early - live)]
+    given = [_pair(name, module.exports[name]) for name in sorted(wanted - early - live)]
     given += [f"get {name}() {{ return {module.exports[name]}; }}" for name in sorted(live)]
-    first = _give(module, [f"{name}: {module.exports[name]}" for name in sorted(early)])
+    first = _give(module, [_pair(name, module.exports[name]) for name in sorted(early)])
     return f"{first}{taken}{module.text}\n{_give(module, given)}"
 
 
@@ -180,7 +180,7 @@ def _taken(taken: Import, module: Module, origin: Module, done: bool) -> str:
     lines = [f"const {taken.whole} = {scope};\n"] if taken.whole else []
     if done and taken.names:
         lines.append(
-            f"const {{ {', '.join(f'{there}: {here}' for there, here in taken.names)} }} = {scope};\n"
+            f"const {{ {', '.join(_pair(there, here) for there, here in taken.names)} }} = {scope};\n"
         )
         return "".join(lines)
     for there, here in taken.names:
@@ -198,6 +198,10 @@ def _loading(name: str, order: Sequence[str]) -> str:
     if name in order:
         return f"Promise.resolve().then(() => $m.{_key(name)})"
     return f'$load("{_key(name)}")'
+
+
+def _pair(there: str, here: str) -> str:
+    return here if there == here else f"{there}: {here}"
 
 
 def _key(name: str) -> str:

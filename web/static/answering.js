@@ -75,6 +75,7 @@ function listen() {
 // Answer what is on the stage, send what an earlier visit left behind, then follow the run.
 export function begin(form) {
   page.answer = answer;
+  import("./error_line.js").catch(() => null); // it is here when there is no connection
   addEventListener("pagehide", () => flush(report));
   waiting.addEventListener("submit", (event) => {
     if (!event.target.action.endsWith("/parent/take")) return;
