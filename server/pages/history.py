@@ -25,13 +25,14 @@ from parenting.server.reads import answers
 from parenting.server.reads.answers import Answered
 from parenting.server.schemas import Said
 from parenting.server.statuses import QueryStatus
-from parenting.server.tables import KINDS, SAID, SKIP, Run
+from parenting.server.tables import SAID, SKIP, Run
 
 router = admitted_router(include_in_schema=False)
 
 PAGE = 20
 """Answers on a page."""
 
+KIND_TEXTS = {"guidance": mark("guidance"), "preference": mark("preference")}
 CHOICE_TEXTS = {
     "left": mark("Left is better"),
     "right": mark("Right is better"),
@@ -82,7 +83,7 @@ class HistoryPage:
     newest: str | None  # that of the first page; None on it
     kind: str  # the kind that is shown alone; "" for all
     choice: str  # the same for the choice
-    kinds: Collection[str] = tuple(KINDS)
+    kinds: Collection[str] = tuple(KIND_TEXTS)
     choices: Mapping[str, str] = field(default_factory=lambda: {name: CHOICE_NAMES[name] for name in SAID})
 
 

@@ -5,14 +5,21 @@ import { flush, keep } from "./outbox.js";
 import { $, alarm, client, given, name, page, painted, run, waiting } from "./page.js";
 import { next, show } from "./questions.js";
 import { remark } from "./remarks.js";
+import { t } from "./sentences.js";
 import { change, remember } from "./undo.js";
 import { wait } from "./waiting.js";
 
 const HASTE = 40; // ms after an answer when the next question is asked for, if the answer's reply is not there before
-const elsewhere = ({ database, title, given: at }) =>
-  `${title ? `Your answer to “${title}” of ${new Date(at).toLocaleString()}` : "An answer"} belongs to the database ${database?.slice(0, 8) ?? "of an older version"}, ` +
-  "which is not the one that is served here. It was not stored; this browser keeps it and sends it once its own database is back.";
 const OTHERS_FIRST = 300; // ms after a skip in which other parents may have the next question
+const BELONGS = t("It was not stored; this browser keeps it and sends it once its own database is back.");
+
+function elsewhere({ database, title, given: at }) {
+  const values = { title, date: new Date(at).toLocaleString(), name: database?.slice(0, 8) ?? t("of an older version") };
+  const named = title ? t("Your answer to “{title}” of {date} belongs to the database {name}, which is not the one that is served here.", values)
+    : t("An answer belongs to the database {name}, which is not the one that is served here.", values);
+  return `${named} ${BELONGS}`;
+}
+
 const saved = []; // replies and their answers, until the stage changes
 
 export function count(number, retracted = 0) {
@@ -36,7 +43,7 @@ export function answer(choice) {
   for (const button of page.current.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
   page.current = null;
   page.unsaved++;
-  $("saved").textContent = "Saving";
+  $("saved").textContent = t("Saving");
   $("alert").textContent = "";
   performance.mark("answer", { detail: query });
   if (choice !== "skip") recordAnswer();
@@ -60,16 +67,16 @@ export function report(outcome, reply, answer) {
   if (outcome === "saved" && page.quiet) return saved.push([reply, answer]);
   $("saved").classList.toggle("kept", outcome === "kept");
   if (outcome === "kept") {
-    $("saved").textContent = "Kept here, not sent yet";
+    $("saved").textContent = t("Kept here, not sent yet");
     if (!page.current) wait(reply === undefined ? "offline" : "unsent"); // no reply, or one of a server in trouble
     return;
   }
   page.unsaved = Math.max(0, page.unsaved - 1);
   if (outcome === "saved") {
     if (reply.run_public_id === run && answer.choice !== "skip") count(reply.number);
-    if (!page.unsaved) $("saved").textContent = "Saved";
+    if (!page.unsaved) $("saved").textContent = t("Saved");
   } else {
-    if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? "Kept here, not stored" : "";
+    if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? t("Kept here, not stored") : "";
     alarm(outcome === "elsewhere" ? elsewhere(answer) : reply.message);
     if (outcome === "elsewhere" && given.delete(answer.question) && !page.current) next(); // a copy of its database asks the same
   }

@@ -1,6 +1,7 @@
 // Tells a parent who waits or looks elsewhere that the agent needs help, by a sound and a notification. Off until a button
 // turns it on. What makes the sound is loaded when it is first wanted.
 import { name, page, waiting } from "./page.js";
+import { t } from "./sentences.js";
 
 const KEY = "parenting.bell"; // "on" in the browser's storage
 const LONG = 5000; // ms of waiting after which a question is told of although the page is seen
@@ -35,5 +36,5 @@ page.bell = (button) => {
 document.querySelectorAll(".bell").forEach(page.bell);
 new MutationObserver(async () => {
   if (!waiting.hidden) since = performance.now();
-  else if (on && (document.hidden || performance.now() - since > LONG)) (await import("./sound.js")).ring(`The agent needs you · ${name}`);
+  else if (on && (document.hidden || performance.now() - since > LONG)) (await import("./sound.js")).ring(`${t("The agent needs you")} · ${name}`);
 }).observe(waiting, { attributeFilter: ["hidden"] });

@@ -1,4 +1,6 @@
 // How long the rest of a goal will take: by the median time between this browser's last answers.
+import { t } from "./sentences.js";
+
 const KEY = "parenting.times", LAST = 20, FEW = 3;
 let times = read(), before = 0;
 
@@ -21,5 +23,5 @@ export function recordAnswer() {
 export function timeLeft(answers) {
   if (times.length < FEW || answers <= 0) return "";
   const seconds = [...times].sort((a, b) => a - b)[times.length >> 1] * answers / 1000;
-  return seconds < 5400 ? `about ${Math.max(1, Math.round(seconds / 60))} min` : `about ${Math.round(seconds / 3600)} h`;
+  return seconds < 5400 ? t("about {count} min", { count: Math.max(1, Math.round(seconds / 60)) }) : t("about {count} h", { count: Math.round(seconds / 3600) });
 }

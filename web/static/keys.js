@@ -3,6 +3,7 @@ import { takesTurns, turn } from "./compare.js";
 import { keyName } from "./key_names.js";
 import { openGrid } from "./place.js";
 import { $, inDialog, page, speak, stage } from "./page.js";
+import { t } from "./sentences.js";
 
 const CHOICES = { a: "left", b: "right", e: "either", n: "neither", s: "skip", 1: "left", 2: "right" };
 const LETTERS = "parenting.letters"; // "off" in the browser's storage: single letters and digits answer nothing
@@ -61,7 +62,7 @@ async function openHelp() {
     const { help } = await import("./help.js");
     await help();
   } catch {
-    speak("The help did not come: there is no connection to the server.");
+    speak(t("The help did not come: there is no connection to the server."));
   } finally { page.opening = false; }
 }
 $("help-open").hidden = false;

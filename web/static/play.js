@@ -1,4 +1,6 @@
 // Moves the pieces of a question's boards, all on one clock. It draws nothing: the server drew the boards.
+import { t } from "./sentences.js";
+
 const LEAD = 650, USUAL = 520, TAIL = 1300, CELL = 20; // ms before the clip, of a step, after it; units of a cell
 const WAY = { up: [0, -1], down: [0, 1], left: [-1, 0], right: [1, 0] };
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
@@ -61,7 +63,7 @@ export function play(question, round = null, step = USUAL) {
   const count = () => held ?? Math.min(steps, Math.max(0, Math.round((parts[0].currentTime % total - LEAD) / step)));
   const tell = () => {
     if (!bar) return;
-    const words = `Step ${count()} of ${steps}`;
+    const words = t("Step {step} of {steps}", { step: count(), steps });
     if (shown.value !== words) shown.value = words;
   };
   // Whoever has taken the clock meanwhile keeps it: `state` says how it was left.

@@ -7,10 +7,11 @@ import { kept } from "./kept.js";
 import { flush } from "./outbox.js";
 import { $, alarm, client, given, inDialog, page, run } from "./page.js";
 import { show } from "./questions.js";
+import { t } from "./sentences.js";
 
 const PATIENCE = 3000; // ms for which the last answer may still be on its way
 const MOST = 20; // answers that can be taken back one after another
-const UNSENT = "Your last answer is not sent yet. Take it back once the server is here again.";
+const UNSENT = t("Your last answer is not sent yet. Take it back once the server is here again.");
 const form = $("undo"), answered = [];
 let busy = false;
 
@@ -56,7 +57,7 @@ async function undo() {
     if (!last) return again(query);
     offer();
     given.delete(query);
-    $("saved").textContent = "Taken back";
+    $("saved").textContent = t("Taken back");
     show(last.question);
   } catch ({ message }) {
     alarm(message);

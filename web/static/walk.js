@@ -1,10 +1,12 @@
 // Watch it walk: the present policy plays an episode, which a worker computes and the server draws. The life goes on, or
 // waits, as if nobody watched. Nothing here is loaded before somebody asks for it.
+import { t } from "./sentences.js";
+
 const TEXTS = {
-  ready: "The agent gets ready.",
-  no_worker: "No worker is running, so the agent cannot walk. It begins once one is started (parenting worker).",
-  gone: "The server does not answer. Try again.",
-  waits: "A question is waiting.",
+  ready: t("The agent gets ready."),
+  no_worker: t("No worker is running, so the agent cannot walk. It begins once one is started (parenting worker)."),
+  gone: t("The server does not answer. Try again."),
+  waits: t("A question is waiting."),
 };
 const POLL = 100, SLOW = 500, SOON = 20; // ms between two looks: at first, and after so many looks
 const STEP = 520, WHOLE = 15000, QUICKEST = 160; // ms of a step; a long walk is quicker, so that it ends in time
@@ -17,8 +19,8 @@ function opened() {
   dialog = document.createElement("dialog");
   dialog.className = "watch";
   dialog.setAttribute("aria-labelledby", "watch-title");
-  dialog.innerHTML = `<h1 id="watch-title">Watch it walk</h1><p class="waits" role="status"></p><p class="quiet state" role="status"></p>
-<div class="shown"></div><div class="beside"><button type="button" data-again>Another walk</button><button type="button" class="primary" data-close>Close</button></div>`;
+  dialog.innerHTML = `<h1 id="watch-title">${t("Watch it walk")}</h1><p class="waits" role="status"></p><p class="quiet state" role="status"></p>
+<div class="shown"></div><div class="beside"><button type="button" data-again>${t("Another walk")}</button><button type="button" class="primary" data-close>${t("Close")}</button></div>`;
   document.body.append(dialog);
   dialog.querySelector("[data-close]").addEventListener("click", () => dialog.close());
   dialog.querySelector("[data-again]").addEventListener("click", walk);
