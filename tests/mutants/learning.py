@@ -36,8 +36,8 @@ LEARNING = [
     Mutant(
         "mu of *either* counts twice (Eq. 1)",
         "agent/query.py",
-        "[0, 1], [0.5, 0.5], [0, 0]]",
-        "[0, 1], [1, 1], [0, 0]]",
+        "[0, 1], [0.5, 0.5], [0, 0], [0, 0]]",
+        "[0, 1], [1, 1], [0, 0], [0, 0]]",
         f"{EQUATIONS}::test_eq_1_mu",
     ),
     Mutant(
@@ -78,8 +78,8 @@ LEARNING = [
     Mutant(
         "*neither* is learnt from",
         "agent/guidance.py",
-        "(query.kind != QueryKind.NONE) & (choice != Choice.NONE) & (choice != Choice.NEITHER)",
-        "(query.kind != QueryKind.NONE) & (choice != Choice.NONE)",
+        "(query.kind != QueryKind.NONE) & answer.judges & (choice != Choice.NEITHER)",
+        "(query.kind != QueryKind.NONE) & answer.judges",
         f"{GUIDANCE}::test_neither_redraws_the_other_two_in_the_same_tick_and_stores_nothing",
     ),
     Mutant(

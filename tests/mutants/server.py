@@ -95,8 +95,8 @@ QUEUE = [
     Mutant(
         "a run that goes on asks guidance that the agent waits for no more",
         "server/queue/queries.py",
-        "    rows = rows.where(Query.withdrawn_tick.is_(None))\n    nobody",
-        "    nobody",
+        "rows.where(Query.withdrawn_tick.is_(None), Query.id.not_in(skipped))",
+        "rows.where(Query.id.not_in(skipped))",
         "tests/server/test_resume.py::test_guidance_that_the_agent_waits_for_no_more_is_not_asked_again",
     ),
     Mutant(

@@ -148,7 +148,7 @@ def cut_off(page: Page) -> list[str]:
 def test_longer_sentences_fit_a_small_screen_in_both_directions(
     tabs: BrowserTabs, db: Database, tag: str
 ) -> None:
-    """What scripts say is looked at, too: answers, undo, waiting."""
+    """The sentences of scripts are looked at, too: answers, undo, waiting."""
     tabs.expected = ("404",)
     lived(db)
     page = tabs.open("/runs/1/parent?query=5", viewport=PHONE, locale=tag)

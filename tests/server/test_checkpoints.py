@@ -252,11 +252,15 @@ def test_a_damaged_checkpoint_is_passed_over(db: Database) -> None:
 
 
 def test_a_record_that_disagrees_stops_the_run(db: Database) -> None:
-    """Replayed ticks have to ask what was asked; here the record was changed behind the agent's back."""
+    """Replayed ticks have to ask what was asked; here the record was changed behind the agent's back.
+
+    No salt is left by which an answer's digest could prove what was asked, so nothing is repaired.
+    """
     run = scripted(db)
     live_to(alive(db, run), 30)
     with db.write() as session:
         session.connection().exec_driver_sql("UPDATE query SET kind = 'preference' WHERE kind = 'guidance'")
+        session.connection().exec_driver_sql("UPDATE answer SET salt = NULL")
     with pytest.raises(ServerError, match="was replayed"):
         live_to(alive(db, run), 30)
 
