@@ -37,7 +37,8 @@ def test_a_skip_that_the_stream_tells_first_is_taken_off_once(
     assert skip is not None
     assert title is not None
     assert skip["y"] >= title["y"] + title["height"], "the button covers no word of the title on a phone"
-    page.keyboard.press("s")
-    expect(page.locator("#saved")).to_have_text("Saving")
+    with page.expect_response("**/skip"):
+        page.keyboard.press("s")
+    page.wait_for_timeout(500)  # the reply is told together with what the page shows next
     expect(page.locator("#saved")).to_have_text("Saved")
     expect(page.locator("#count")).to_have_text("1")
