@@ -30,6 +30,7 @@ ARGUMENTS = {
     "export": ["1"],
     "replay": ["1"],
     "resume": ["1"],
+    "start": ["unsafe-exploration"],
     "verify": ["1"],
     "restore": ["monday.db"],
 }

@@ -28,6 +28,7 @@ COMMANDS_OF_THE_STORE = {
     "migrate --to 0003": [],
     "backup": [],
     "doctor": [],
+    "start": ["unsafe-exploration"],
 }
 OTHERS = {"run", "experiment", "pretrain", "worlds", "answer", "restore"}
 """Commands that open no store, or that bring one back. A worker waits for a store that is away."""

@@ -195,6 +195,7 @@ def test_who_wants_no_motion_gets_steps(tabs: BrowserTabs, lives: None) -> None:
 
 def test_both_boards_play_on_one_clock(tabs: BrowserTabs, lives: None) -> None:
     page = tabs.open("/runs/1/parent?query=2")
+    expect(page.locator("#question[data-listening]")).to_be_visible()  # the player came with it
     times = (
         "[...new Set(document.getAnimations().filter(a => a.effect.target.closest('.board')).map(a => a.%s))]"
     )

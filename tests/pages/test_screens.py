@@ -104,10 +104,9 @@ def test_where_not_all_fits_it_scrolls_and_the_buttons_stay(
             small = [part for part in outside(page) if "button" in part or float(part.split()[-1]) < CELL]
             assert small == [], (width, height, share)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
-        agent, board = (
-            page.locator(".agent:visible").first.bounding_box(),
-            page.locator(".board:visible").first,
-        )
+        figure, board = page.locator(".agent:visible").first, page.locator(".board:visible").first
+        expect(figure).to_be_visible()
+        agent = figure.bounding_box()
         assert agent is not None
         assert 0 <= agent["x"] <= width - agent["width"], (width, height)
         assert board.is_visible()

@@ -100,7 +100,7 @@ def test_every_key_of_the_export_has_its_line() -> None:
 
 
 def test_its_commands_do_what_they_say(client: httpx2.Client, db: Database) -> None:
-    """In their order, on an empty database, as they stand there. The agent asks once, after its start."""
+    """In their order, on an empty database, as they stand there. The agent asks twice, after its start."""
     said: list[Any] = []
     for command in commands():
         if command.live:
@@ -110,9 +110,11 @@ def test_its_commands_do_what_they_say(client: httpx2.Client, db: Database) -> N
         assert 200 <= reply.status_code < 300, (command, reply.text)
         said.append((command.path.rpartition("/")[2], reply))
         if len(said) == 1:
-            post_query(db, claim(db, "worker-1")[0], 1, "guidance", 1, CLIPS)
+            agent = claim(db, "worker-1")[0]
+            post_query(db, agent, 1, "guidance", 1, CLIPS)
+            post_query(db, agent, 2, "preference", 1, CLIPS)
     assert [status.status_code for name, status in said if name == "lease"] == [200]
-    assert len(said) == 23
+    assert len(said) == 25
 
 
 def test_an_error_looks_as_it_says(client: httpx2.Client) -> None:
