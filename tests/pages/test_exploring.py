@@ -87,7 +87,7 @@ def test_help_tells_of_the_grid_and_its_letter_can_be_switched_off(
 ) -> None:
     ask()
     page = tabs.open("/runs/1/parent")
-    expect(page.locator("#question")).to_be_visible()
+    expect(page.locator("#question[data-listening]")).to_be_visible()  # keys are heard from then on
     press(page, "?")
     expect(page.get_by_text("explore the board: there the arrow keys go from cell to cell")).to_be_visible()
     page.get_by_label("Letters and digits").uncheck()

@@ -147,6 +147,7 @@ def test_keys_answer_as_on_the_parents_page(tabs: BrowserTabs, screen: tuple[int
         expect(page.locator(".again a")).to_be_focused()
         page.keyboard.press("Enter")
     expect(page.get_by_role("heading", name="You know how to answer.")).to_be_visible()
+    expect(page.get_by_role("button", name="Done")).to_be_focused()
     page.keyboard.press("Enter")
     expect(page).to_have_url(tabs.address + "/")
 
