@@ -6,7 +6,11 @@ lists equal. Payloads are small by their types: no text of any length, no lists.
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import BaseModel, ConfigDict, Field
+
+from parenting.server.whole import WHOLE
 
 
 class Payload(BaseModel):
@@ -18,7 +22,9 @@ class Payload(BaseModel):
 class WalkPayload(Payload):
     """A walk: an episode that the present policy plays by itself, apart from its life."""
 
-    seed: int = Field(0, ge=0, lt=2**31, description="Another seed draws other moves from the same policy.")
+    seed: Annotated[int, Field(ge=0, lt=2**31), WHOLE] = Field(
+        0, description="Another seed draws other moves from the same policy."
+    )
 
 
 class PolicyPayload(Payload):

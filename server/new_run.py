@@ -13,7 +13,6 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     AfterValidator,
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
     StringConstraints,
@@ -31,6 +30,7 @@ from parenting.server.errors import InvalidFieldsError
 from parenting.server.runs import create_run
 from parenting.server.tables import Run
 from parenting.server.weights import put as put_weights
+from parenting.server.whole import WHOLE, whole
 from parenting.weights.store import NoWeightsError, Wanted, find
 
 LARGEST_INT = 2**53 - 1
@@ -75,11 +75,6 @@ UNREAD = {
 """The message for a body that cannot be read, by Pydantic's type of error."""
 
 
-def _whole(value: Any) -> Any:
-    """Read JSON's 657.0 as the integer 657."""
-    return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
 Name = Annotated[
     str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\r\n\t]*$"), AfterValidator(plain)
 ]
@@ -91,8 +86,8 @@ PersonsName = Annotated[
     StringConstraints(min_length=1, max_length=LONGEST, pattern=r"^[^\r\n\t]*$"),
     AfterValidator(read_name),
 ]
-Seed = Annotated[int, Field(ge=0, le=LARGEST_INT), BeforeValidator(_whole)]
-Goal = Annotated[int, Field(ge=1, le=1_000_000), BeforeValidator(_whole)]
+Seed = Annotated[int, Field(ge=0, le=LARGEST_INT), WHOLE]
+Goal = Annotated[int, Field(ge=1, le=1_000_000), WHOLE]
 Pace = Annotated[float, Field(gt=0, le=1000)]
 Integer = Annotated[int, Field(ge=-LARGEST_INT, le=LARGEST_INT)]
 Setting = bool | Integer | float | Name | None
@@ -232,7 +227,7 @@ def _config(new: NewRun, wrong: list[tuple[str, str]]) -> Config | None:
         return None
     world = registry.defaults(new.world) if new.world in registry.WORLDS else {}
     waits = {"max_open_preferences": 0} if new.parent == "scripted" else {}
-    changes = waits | {name: _whole(value) for name, value in new.config.items()}
+    changes = waits | {name: whole(value) for name, value in new.config.items()}
     try:
         # Strict: pydantic would otherwise take true for 1, and "1" too.
         return Config.model_validate(merge(PRESETS[new.preset], world, changes), strict=True)

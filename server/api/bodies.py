@@ -12,6 +12,7 @@ from parenting.server.api.names import DatabaseId, PublicId
 from parenting.server.job_kinds import PolicyPayload, WalkPayload
 from parenting.server.new_run import LARGEST_INT, Goal, Pace
 from parenting.server.schemas import By
+from parenting.server.whole import WHOLE
 
 After = Annotated[
     int | None,
@@ -19,6 +20,7 @@ After = Annotated[
 ]
 ClientId = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9._:-]+$")]
 Choice = schemas.Choice
+Place = Annotated[int, Field(ge=0, le=LARGEST_INT), WHOLE]
 
 
 class Strict(BaseModel):
@@ -66,8 +68,8 @@ class PageErrorBody(Strict):
 
     message: str = Field(min_length=1, max_length=500)
     source: str | None = Field(None, max_length=300, description="The address of the script.")
-    line: int | None = Field(None, ge=0, le=LARGEST_INT)
-    column: int | None = Field(None, ge=0, le=LARGEST_INT)
+    line: Place | None = None
+    column: Place | None = None
     stack: str | None = Field(None, max_length=4000)
     page: str | None = Field(None, max_length=300, description="The path of the page.")
     run: PublicId | None = Field(None, description="The `public_id` of the run that the page shows.")

@@ -18,12 +18,12 @@ from tests.lengths import length
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import create, until, up
 
-QUESTIONS = length(8, 30)
+QUESTIONS = length(6, 30)
 STAGES = {
     1: {},
     2: {
         "stages": 2,
-        "mature_every": length(6, 12),
+        "mature_every": length(4, 12),
         "p_guid": 0.8,
     },  # clips of two steps have to come about, too
 }

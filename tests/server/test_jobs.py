@@ -136,6 +136,10 @@ def test_every_kind_has_a_payload_a_body_and_a_doer() -> None:
 def test_the_routes(client: httpx2.Client, db: Database, run: Run) -> None:
     asked = client.post(f"/api/v1/runs/{run.public_id}/jobs", json=WALK)
     assert asked.status_code == 202
+    written_otherwise = client.post(
+        f"/api/v1/runs/{run.public_id}/jobs", json=WALK | {"payload": {"seed": 7.0}}
+    )
+    assert written_otherwise.json()["payload"] == {"seed": 7}
     shown = asked.json()
     assert (shown["state"], shown["payload"], shown["worker"]) == ("waiting", {"seed": 7}, "silent")
     sign(db, "a")
