@@ -15,7 +15,7 @@ from torch import Tensor
 from parenting.agent.amendment import TickEvent
 from parenting.agent.init import network_of
 from parenting.agent.parent import Parent
-from parenting.agent.query import Answer, Choice, Query, QueryKind
+from parenting.agent.query import Answer, Query, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld, local_state
 
@@ -42,8 +42,8 @@ class Lesson:
         self._told: tuple[int, int] | None = None  # the answer's tick, and the gradient steps then
 
     def hear(self, state: AgentState, answer: Answer) -> None:
-        """Take note of an answer, before the agent hears it."""
-        if answer.choice[0] == Choice.NONE:
+        """Take note of an answer, before the agent hears it. A skip has no lesson."""
+        if not bool(answer.judges[0]):
             return
         seen, agent = answer.query.observation[:, 0, 0], answer.query.agent[:, 0, 0]
         near, (row, column) = local_state(seen, agent), agent[0].tolist()

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import pytest
+import torch
 
 from parenting.agent.init import network_of
+from parenting.agent.query import Answer, Choice, empty
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import local_state
 from parenting.server import metrics, runs
 from parenting.server.db import Database
+from parenting.server.lesson import Lesson
 from parenting.server.milestones import CALM, CALM_TICKS, GOAL
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue import worker_side
@@ -89,6 +92,15 @@ def test_a_lesson_is_the_policy_in_the_asked_cell_before_the_answer_and_now(db: 
         assert lesson["before"] == pytest.approx(before, abs=2e-6)
         assert lesson["after"] == pytest.approx(after, abs=2e-6)
         assert (lesson["before"] != lesson["after"]) == (choice != "neither")
+
+
+def test_silence_and_a_skip_have_no_lesson() -> None:
+    inline = Inline()
+    lesson = Lesson(inline.world)
+    query = empty(1, 1, inline.world.height, inline.world.width)
+    for choice in (Choice.NONE, Choice.SKIP):
+        lesson.hear(inline.saved.state, Answer(query=query, choice=torch.tensor([int(choice)])))
+        assert lesson.news(inline.saved.state) is None
 
 
 def test_growth_is_by_answers_and_rows_of_older_versions_have_no_point(db: Database, mine: Claim) -> None:
