@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import psycopg
 import pytest
@@ -141,9 +142,23 @@ def lock_of_another(where: Path | str) -> Iterator[None]:
             yield
             held.execute("ROLLBACK")
         return
-    with psycopg.connect(where) as connection, connection.transaction(force_rollback=True):
-        connection.execute("LOCK TABLE run, query, answer IN ACCESS EXCLUSIVE MODE")
+    with psycopg.connect(where) as connection:
+        _lock_tables(connection)
         yield
+        connection.rollback()
+
+
+def _lock_tables(connection: psycopg.Connection[tuple[Any, ...]]) -> None:
+    """Lock one table after the other; who holds one of them and waits for another makes a deadlock of it.
+
+    PostgreSQL then ends either transaction. Ours is begun again; the processes under test must do the same.
+    """
+    while True:
+        try:
+            connection.execute("LOCK TABLE run, query, answer IN ACCESS EXCLUSIVE MODE")
+            return
+        except psycopg.errors.DeadlockDetected:
+            connection.rollback()
 
 
 class Restarting(Cluster):
