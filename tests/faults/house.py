@@ -89,9 +89,11 @@ class House:
         """The file that says where a process was."""
         return self.settings.data / f"{name.replace(' ', '-')}.mark"
 
-    def keep(self) -> None:
-        """Start again whatever does not run."""
+    def keep(self, but: str = "") -> None:
+        """Start again whatever does not run, but for a process that is about to kill itself."""
         for name in self.orders:
+            if name == but:
+                continue
             one = self.commands.get(name)
             if one is None or not one.alive:
                 code = None if one is None else one.process.exitcode

@@ -53,7 +53,7 @@ def kill_at(house: House, name: str, points: list[Point], rng: random.Random, fi
         end = time.monotonic() + PATIENCE
         while house.commands[name].alive:
             in_time(end, lambda: f"never hit: {point.name}; {house.state()}")  # noqa: B023  # called at once
-            house.keep()
+            house.keep(but=name)  # else it might be started again, without the point, before `alive` is asked
             time.sleep(0.002)
         figures.count("SIGKILLs at named points", f"{name}: {point.name}")
         house.begin(name)

@@ -99,6 +99,7 @@ def test_where_not_all_fits_it_scrolls_and_the_buttons_stay(
     for width, height in (*WIDE, *NARROW):
         page.set_viewport_size({"width": width, "height": height})
         page.reload()
+        page.wait_for_selector("#question[data-listening]")  # the stream's question has taken its place
         for share in (0, 0.5, 1):
             page.evaluate("share => scrollTo(0, share * document.body.scrollHeight)", share)
             small = [part for part in outside(page) if "button" in part or float(part.split()[-1]) < CELL]
@@ -109,4 +110,4 @@ def test_where_not_all_fits_it_scrolls_and_the_buttons_stay(
         agent = figure.bounding_box()
         assert agent is not None
         assert 0 <= agent["x"] <= width - agent["width"], (width, height)
-        assert board.is_visible()
+        expect(board).to_be_visible()
