@@ -16,7 +16,7 @@ from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 from tests.faults import tap
 from tests.faults.ledger import Ledger
-from tests.faults.points import Mark
+from tests.faults.points import Mark, place_of
 from tests.faults.tap import Moment
 from tests.server.conftest import CLIPS
 
@@ -26,23 +26,33 @@ TICKS = 10_000
 
 
 class Nth:
-    """Kills this process at the n-th moment that passes, whichever that is."""
+    """Kills this process at the n-th moment that passes: whichever that is, or of those at one place."""
 
-    def __init__(self, number: int) -> None:
-        self.left = number
+    def __init__(self, number: int, place: str | None = None) -> None:
+        self.left, self.place = number, place
 
-    def __call__(self, _moment: Moment) -> None:
+    def __call__(self, moment: Moment) -> None:
+        if self.place not in (None, place_of(moment)):
+            return
         self.left -= 1
         if not self.left:
             os.kill(os.getpid(), signal.SIGKILL)
 
 
-def live(data: str, url: str | None, mine: Claim, number: int, seed: float, moments: int) -> None:
+def live(
+    data: str,
+    url: str | None,
+    mine: Claim,
+    number: int,
+    seed: float,
+    moments: int,
+    place: str | None = None,
+) -> None:
     """Ask, lease, answer and let go until killed at that moment; the ledger says what was stored."""
     db = connect(Settings(data=Path(data), database_url=url))
     ledger, rng, name = Ledger(Path(data) / f"ledger-{number}"), random.Random(seed), f"client-{number}"
     tap.listen(Mark(Path(data) / f"{name}.mark", ()))
-    tap.listen(Nth(moments))
+    tap.listen(Nth(moments, place))
     for tick in range(number * TICKS, (number + 1) * TICKS):
         post_query(db, mine, tick, "guidance", 1, CLIPS)
         held = lease(db, mine.run_id, name, seconds=1.0)

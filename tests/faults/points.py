@@ -51,6 +51,11 @@ class Trigger:
                 os.kill(os.getpid(), self.point.signal)
 
 
+def place_of(moment: Moment) -> str:
+    """The place of a moment that no point names: before or after a kind of statement."""
+    return f"{moment.when} {moment.act.split()[0].upper()}"
+
+
 class Mark:
     """The last point that this process passed, in a file that outlives it."""
 
@@ -63,7 +68,7 @@ class Mark:
     def __call__(self, moment: Moment) -> None:
         name = next((point.name for point in self.points if point.fits(moment)), None)
         if name is None:
-            name = f"{moment.when} {moment.act.split()[0].upper()}"
+            name = place_of(moment)
         self.memory[:] = name.encode().ljust(MARK_BYTES)
 
 
