@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,18 +18,25 @@ from parenting.envs.levels.spec import Level, WorldSpec
 if TYPE_CHECKING:
     from parenting.envs.random_boxes import Survey
 
-RANDOM = "side-effects"
-"""The world that has random levels (Sec. 3.4)."""
+BOXES, ISLANDS = "side-effects", "unsafe-exploration"
+RANDOM = f"{BOXES} or {ISLANDS}"
+"""The worlds that have random levels: boxes for Sec. 3.4, islands to choose settings on."""
+SIZES = {BOXES: "6x6", ISLANDS: "6x8"}
+"""Rows and columns of random levels."""
 
 
 def worlds(
     random: Annotated[
         str | None,
-        typer.Option(metavar="WORLD", help=f"Print random levels of a world; {RANDOM} has them (Sec. 3.4)."),
+        typer.Option(metavar="WORLD", help=f"Print random levels of {RANDOM}."),
     ] = None,
     size: Annotated[
         str | None,
-        typer.Option(metavar="HxW", help="Rows and columns of the random levels.", show_default="6x6"),
+        typer.Option(
+            metavar="HxW",
+            help="Rows and columns of the random levels.",
+            show_default=f"{SIZES[BOXES]}, islands {SIZES[ISLANDS]}",
+        ),
     ] = None,
     count: Annotated[
         int | None,
@@ -55,7 +62,8 @@ def worlds(
 ) -> None:
     """List the worlds and their levels, with the art.
 
-    With --random: levels that only moving the box solves, as texts that `parenting run --level` takes.
+    With --random: levels that only moving the box solves, or islands with water in reach, as texts that
+    `parenting run --level` takes.
 
     Example: parenting worlds --random side-effects --size 6x6 --seed 3 > level.txt
     """
@@ -64,9 +72,7 @@ def worlds(
             _only_with_random({"--size": size, "--count": count, "--seed": seed, "--out": out})
             _listed(draw, as_json)
         else:
-            found = _survey(random, _size(size or "6x6"), count or 1, seed or 0)
-            _keep(found.levels, out, draw)
-            _shown(found, as_json)
+            _random(random, size, count or 1, seed or 0, out, draw, as_json)
     except ValueError as error:
         say(str(error), err=True)
         raise typer.Exit(2) from None
@@ -111,17 +117,29 @@ def _plain(level: Level) -> dict[str, Any]:
     return {"name": level.name, "rows": list(level.rows), "text": level.text}
 
 
-def _survey(world: str, size: tuple[int, int], count: int, seed: int) -> Survey:
-    """Random levels of a world.
+def _random(
+    world: str, size: str | None, count: int, seed: int, out: Path | None, draw: Path | None, as_json: bool
+) -> None:
+    """Print random levels of a world, and keep them as files and pictures.
 
     Raises:
-        ValueError: a world that has none, or as `envs.random_boxes.survey`.
+        ValueError: a world that has none, a wrong size, or as `envs.random_boxes.survey`.
     """
-    if registry.spec(world).name != RANDOM:
+    if registry.spec(world).name not in SIZES:
         raise ValueError(f"--random: {world} has no random levels; {RANDOM} has.")
+    wanted = (count, *_size(size or SIZES[world]), seed)
+    if world == ISLANDS:
+        from parenting.envs.random_islands import island_levels
+
+        islands = island_levels(*wanted)
+        _keep(islands, out, draw)
+        _islands_shown(islands, as_json)
+        return
     from parenting.envs.random_boxes import survey
 
-    return survey(count, *size, seed)
+    found = survey(*wanted)
+    _keep(found.levels, out, draw)
+    _boxes_shown(found, as_json)
 
 
 def _keep(levels: Iterable[Level], out: Path | None, draw: Path | None) -> None:
@@ -131,8 +149,19 @@ def _keep(levels: Iterable[Level], out: Path | None, draw: Path | None) -> None:
         _draw(draw, levels)
 
 
-def _shown(found: Survey, as_json: bool) -> None:
-    """The levels; for a reader, what it took to find them is said on standard error."""
+def _islands_shown(levels: Sequence[Level], as_json: bool) -> None:
+    """Islands, each with the moves of its shortest way where a program reads."""
+    from parenting.envs.random_islands import way
+
+    if as_json:
+        said = [{**_plain(level), "moves": way(level)} for level in levels]
+        say(json.dumps({"levels": said}, indent=2))
+        return
+    say("\n".join(level.text for level in levels), nl=False)
+
+
+def _boxes_shown(found: Survey, as_json: bool) -> None:
+    """Levels with a box; for a reader, what it took to find them is said on standard error."""
     from parenting.envs.random_boxes import tempts
 
     if as_json:

@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 from parenting.commands.run import run
 from parenting.commands.worlds import worlds
 from parenting.envs import registry
+from parenting.envs.mdp import explore
+from parenting.evaluation.outcomes import distance_to_goal
 
 app = typer.Typer()
 app.command()(worlds)
@@ -102,10 +104,21 @@ def test_random_levels_as_files_and_as_pictures(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--size", "6"], "--size: 6 is for random levels. Add --random side-effects, or leave --size out."),
-        (["--count", "2"], "--count: 2 is for random levels. Add --random side-effects, or"),
+        (
+            ["--size", "6"],
+            "--size: 6 is for random levels. Add --random side-effects or unsafe-exploration, or leave --",
+        ),
+        (
+            ["--count", "2"],
+            "--count: 2 is for random levels. Add --random side-effects or ",
+        ),
         (["--random", "atoll"], "There is no world 'atoll'"),
-        (["--random", "reward-hacking"], "--random: reward-hacking has no random levels; side-effects has."),
+        (["--random", "reward-hacking"], "has no random levels; side-effects or unsafe-exploration has."),
+        (
+            ["--random", "unsafe-exploration", "--size", "4x5"],
+            "4 x 6, 5 x 5 or 6 x 4 cells at least, not 4 x 5.",
+        ),
+        (["--random", "unsafe-exploration", "--size", "4x6", "--count", "99999"], "Ask for that many"),
         (["--random", "side-effects", "--size", "6"], "--size: '6' is not HxW"),
         (["--random", "side-effects", "--size", "4x5"], "4 x 6, 5 x 5 or 6 x 4 cells at least, not 4 x 5."),
         (["--random", "side-effects", "--size", "4x6", "--count", "99999"], "Ask for "),
@@ -115,7 +128,22 @@ def test_what_cannot_be_found_is_refused_with_a_sentence(
     arguments: list[str], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("parenting.envs.random_boxes.BATCHES", 2)
+    monkeypatch.setattr("parenting.envs.random_islands.BATCHES", 2)
     assert said in refused(*arguments)
+
+
+def test_random_islands_are_levels_that_run_takes_the_same_for_a_seed() -> None:
+    arguments = ["--random", "unsafe-exploration", "--seed", "3", "--count"]
+    few, more = (json.loads(output(*arguments, count, "--json"))["levels"] for count in "25")
+    assert more[:2] == few
+    read = [registry.level("unsafe-exploration", level["text"]) for level in more]
+    assert {(level.height, level.width) for level in read} == {(6, 8)}
+    assert len({level.rows for level in read}) == 5
+    for level, said in zip(read, more, strict=True):
+        model = explore(registry.make("unsafe-exploration", level))
+        assert int(distance_to_goal(model)[0]) == said["moves"] >= 4
+        assert bool(model.unsafe.any())
+    assert output(*arguments, "2") == "\n".join(level["text"] for level in few)
 
 
 def test_a_folder_that_cannot_be_written_to_is_refused(tmp_path: Path) -> None:
