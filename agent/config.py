@@ -109,6 +109,12 @@ class Config(BaseModel):
     pretrain: bool = Field(
         False, description="Begin with weights pre-trained on mazes, and rehearse mazes (Sec. 3.1.4)."
     )
+    confirm: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="Ask guidance again, mirrored, until it is right with this probability; 0 never. (ours)",
+    )
     max_open_preferences: int = Field(
         3, ge=0, le=1000, description="The agent waits while more preference queries than this are open."
     )

@@ -12,7 +12,18 @@ from torch import Tensor
 from parenting.agent import dataset, familiarity
 from parenting.agent.config import Config
 from parenting.agent.policy import Network, network_for
-from parenting.agent.state import AgentState, Asked, Learner, Recorder, Rehearsal, Ring, RunningClip, TickInfo
+from parenting.agent.state import (
+    MOST_VOTES,
+    AgentState,
+    Asked,
+    Confirmation,
+    Learner,
+    Recorder,
+    Rehearsal,
+    Ring,
+    RunningClip,
+    TickInfo,
+)
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.levels.spec import Level, maze_legend
@@ -52,6 +63,12 @@ def init(
         waiting=zeros(dtype=torch.bool),
         refused=zeros(4, dtype=torch.bool),
         set_aside=zeros(6, dtype=torch.bool),
+        confirmation=Confirmation(
+            votes=zeros(6, MOST_VOTES),
+            mirrored=zeros(6, dtype=torch.bool),
+            repeats=zeros(),
+            dissents=zeros(),
+        ),
         x=dataset.empty(trials, world.height, world.width, device),
         recorder=_recorder(world, config.max_clip_length, trials, device),
         learner=_learner(network_of(world), config, keys, weights),

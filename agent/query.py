@@ -53,6 +53,7 @@ class Query(Struct):
     length: Int64[Tensor, "N 2"]  # clips may end early
     maturity: Int64[Tensor, "N"]  # the stage that the clips were recorded at; 1 for guidance
     level: Int64[Tensor, "N"]  # which of the world's levels
+    votes: Int64[Tensor, "N"]  # guidance: answers heard on this pair in this pause; 0 for a first asking
 
 
 class Answer(Struct):
@@ -98,6 +99,7 @@ def empty(trials: int, length: int, height: int, width: int, device: str | torch
         length=zeros(2),
         maturity=zeros(),
         level=zeros(),
+        votes=zeros(),
     )
 
 

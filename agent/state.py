@@ -13,6 +13,8 @@ from parenting.envs.gridworld import WorldState
 from parenting.envs.rng import Keys
 from parenting.envs.struct import Struct
 
+MOST_VOTES = 5
+"""Votes on one pair in a pause at most; then the majority decides."""
 PAIRS = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 """The pairs of two of the four actions, as guidance asks about them (Sec. 2.1)."""
 _PAIRS = torch.tensor(PAIRS)
@@ -88,6 +90,15 @@ class Recorder(Struct):
     asked: Asked
 
 
+class Confirmation(Struct):
+    """The votes on each pair of actions in this pause, as in `PAIRS`, and the tally of all repeats (ours)."""
+
+    votes: Int64[Tensor, "N 6 V"]  # 1 + the class of each vote, in the order of asking; 0 for none
+    mirrored: Bool[Tensor, "N 6"]  # the greater action stood left when the pair was last answered
+    repeats: Int64[Tensor, "N"]  # votes after the first ones, on pairs that were decided
+    dissents: Int64[Tensor, "N"]  # those of them that the decision overruled
+
+
 class TickInfo(Struct):
     """The events of the last tick, for display.
 
@@ -115,6 +126,7 @@ class AgentState(Struct):
     waiting: Bool[Tensor, "N"]  # paused for guidance
     refused: Bool[Tensor, "N 4"]  # actions refused in this pause
     set_aside: Bool[Tensor, "N 6"]  # pairs of actions skipped in this pause, as in `PAIRS`
+    confirmation: Confirmation
     x: Dataset
     recorder: Recorder
     learner: Learner

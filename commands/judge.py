@@ -27,7 +27,9 @@ class Judge:
         try:
             world, rule = self._knowledge(question["world"], question["parent"])
             longest = max(question["left"]["length"], question["right"]["length"])
-            query = decode(world, longest, question["kind"], question["maturity"], question)
+            query = decode(
+                world, longest, question["kind"], question["maturity"], question, question.get("votes", 0)
+            )
         except (LookupError, TypeError, ValueError) as error:
             raise UsageError(
                 f"The question cannot be read ({error!r}). Are server and command of the same version?"

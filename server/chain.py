@@ -26,7 +26,9 @@ from parenting.server.tables import Answer, Query
 BEGIN = hashlib.sha256(b"parenting: the answers of a run, 1").hexdigest()
 """The link before the first answer."""
 OF_ANSWER = ("run_id", "query_id", "number", "choice", "parent", "client_id", "supersedes", "received")
-OF_QUERY = ("tick", "kind", "maturity", "clips", "posted", "policy_stage", "policy_steps")
+OF_QUERY = ("tick", "kind", "maturity", "clips", "posted", "policy_stage", "policy_steps", "votes")
+UNLESS_ZERO = ("votes",)
+"""Columns that are part of a row's content where they are not 0: rows of before them have the same digest."""
 AT_ANSWER, AT_MIGRATION = "answer", "migration"
 """When a row was hashed: with its answer, or when the database came from a version without the chain."""
 
@@ -44,7 +46,8 @@ class Checked:
 def content(answer: Mapping[str, Any], query: Mapping[str, Any]) -> str:
     """Return the canonical text of an answer and its question."""
     values = {name: _plain(answer.get(name)) for name in OF_ANSWER}
-    values |= {f"query.{name}": _plain(query.get(name)) for name in OF_QUERY}
+    asked = {name: _plain(query.get(name)) for name in OF_QUERY}
+    values |= {f"query.{name}": asked[name] for name in OF_QUERY if asked[name] or name not in UNLESS_ZERO}
     return json.dumps(values, sort_keys=True, separators=(",", ":"))
 
 

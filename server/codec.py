@@ -1,8 +1,8 @@
 """Queries between tensors and the database: frames as rows of glyphs, actions by name, readable by eye.
 
-Reading a stored query back gives the same tensors bit for bit. Two fields are not in its clips: `kind` and
-`maturity` are columns of their own. `level`, the index among the levels of a batch, is not stored at all: a
-stored run has one level, so its index is always 0, and `encode` refuses any other.
+Reading a stored query back gives the same tensors bit for bit. Three fields are not in its clips: `kind`,
+`maturity` and `votes` are columns of their own. `level`, the index among the levels of a batch, is not stored
+at all: a stored run has one level, so its index is always 0, and `encode` refuses any other.
 """
 
 from __future__ import annotations
@@ -43,7 +43,9 @@ def kind_name(query: Query) -> str | None:
     return None if kind == QueryKind.NONE else QueryKind(kind).name.lower()
 
 
-def decode(world: Gridworld, stages: int, kind: str, maturity: int, clips: dict[str, Any]) -> Query:
+def decode(
+    world: Gridworld, stages: int, kind: str, maturity: int, clips: dict[str, Any], votes: int = 0
+) -> Query:
     """Read the query that `encode` wrote.
 
     Args:
@@ -52,12 +54,13 @@ def decode(world: Gridworld, stages: int, kind: str, maturity: int, clips: dict[
         kind: guidance or preference.
         maturity: The stage that the clips were recorded at.
         clips: What `encode` returned.
+        votes: The answers heard before on the same pair of moves in the same pause.
 
     Raises:
         LookupError, TypeError, ValueError: the clips are not as `encode` writes them.
     """
     query = queries.empty(1, stages, world.height, world.width)
-    query.kind[0], query.maturity[0] = KINDS[kind], maturity
+    query.kind[0], query.maturity[0], query.votes[0] = KINDS[kind], maturity, votes
     for side, name in enumerate(SIDES):
         _fill(world, query, side, clips[name])
     return query

@@ -169,6 +169,8 @@ class QuerySchema(Schema):
     kind: Kind
     maturity: int
     """The stage T that the clips were recorded at; 1 for guidance."""
+    votes: int
+    """Guidance that is asked again to be sure: the answers heard before on this pair of moves; else 0."""
     policy: PolicySchema
     status: QueryStatus
     posted: datetime

@@ -178,9 +178,9 @@ class RunSession:
                 checkpoint that the run went on from, which is passed over from now on.
         """
         stored = worker_side.asked_at(self.db, self.claim.run_id, self.last_tick)
-        recorded = None if stored is None else (stored.kind, readable(stored).clips)
+        recorded = None if stored is None else (stored.kind, readable(stored).clips, stored.votes)
         kind = kind_name(query)
-        if recorded == (None if kind is None else (kind, encode(self.world, query))):
+        if recorded == (None if kind is None else (kind, encode(self.world, query), int(query.votes[0]))):
             return
         if self.last_tick > self.parent.follow_until:
             diverged(self.db, self.claim, self.run, self._recalled, self.last_tick, self.record_ends)

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from parenting.agent import parenting
 from parenting.agent.config import Config
-from parenting.agent.state import AgentState, current_names
+from parenting.agent.state import AgentState, Confirmation, current_names
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
 from parenting.envs.struct import Struct
@@ -26,8 +26,8 @@ S = TypeVar("S", bound=Struct)
 
 INFO = "info."
 """Checkpoints leave `info` out: it records what the last tick did, and nothing in the agent reads it."""
-ADDED = {"set_aside", "skips"}
-"""Pieces that checkpoints of before version 0.4 lack: nothing was skipped."""
+ADDED = {"set_aside", "skips", *(f"confirmation.{name}" for name in Confirmation.__dataclass_fields__)}
+"""Pieces that old checkpoints lack: nothing was skipped before version 0.4, nor asked again before 0.5."""
 
 
 class DivergedError(ServerError):

@@ -158,6 +158,8 @@ class Query(Table):
     status: Mapped[QueryStatus] = mapped_column(default=QueryStatus.OPEN)
     put_back: Mapped[bool] = mapped_column(default=False, server_default=text("false"))  # skipped once
     posted: Mapped[datetime]
+    votes: Mapped[int] = mapped_column(default=0, server_default=text("0"))
+    """Guidance: answers heard before on the same pair in the same pause; 0 for a first asking."""
     policy_stage: Mapped[int | None]  # which policy asked: the stage T that it was in, and
     policy_steps: Mapped[int | None]  # its gradient steps in that stage; null: asked before these were kept
     leased_until: Mapped[datetime | None]  # by the wall clock, for display

@@ -13,6 +13,7 @@ from parenting.server.chain import (
     BEGIN,
     OF_ANSWER,
     OF_QUERY,
+    UNLESS_ZERO,
     content,
     digest_of,
     link_after,
@@ -25,6 +26,7 @@ down_revision = "0007"
 branch_labels = None
 depends_on = None
 
+ASKED = tuple(name for name in OF_QUERY if name not in UNLESS_ZERO)  # those of this revision
 COLUMNS = ("salt", "digest", "link", "chained")
 NOTES = ("failed", "resumed", "checkpoint_damaged", "machine_changed")
 BATCH = 500
@@ -48,7 +50,7 @@ def downgrade() -> None:
 def _chain(connection: sa.Connection, run_id: object) -> None:
     answer, query = Answer.__table__, Query.__table__
     columns = [answer.c.id, *(answer.c[name] for name in OF_ANSWER)]
-    asked = [query.c[name].label(f"query_{name}") for name in OF_QUERY]
+    asked = [query.c[name].label(f"query_{name}") for name in ASKED]
     rows = sa.select(*columns, *asked).outerjoin(query, answer.c.query_id == query.c.id)
     rows = rows.where(answer.c.run_id == run_id).order_by(answer.c.number)
     given = answer.update().where(answer.c.id == sa.bindparam("row"))
@@ -60,7 +62,7 @@ def _chain(connection: sa.Connection, run_id: object) -> None:
         hashed = []
         for row in found:
             salt = new_salt()
-            digest = digest_of(salt, content(row, {name: row[f"query_{name}"] for name in OF_QUERY}))
+            digest = digest_of(salt, content(row, {name: row[f"query_{name}"] for name in ASKED}))
             before = link_after(before, digest)
             hashes = {"salt": salt, "digest": digest, "link": before, "chained": AT_MIGRATION}
             hashed.append({"row": row["id"], **hashes})

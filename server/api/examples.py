@@ -102,6 +102,7 @@ QUERY: dict[str, Any] = {
     "tick": 5,
     "kind": "guidance",
     "maturity": 1,
+    "votes": 0,
     "policy": {"stage": 1, "gradient_steps": 3},
     "status": "open",
     "posted": NOON,
@@ -186,6 +187,7 @@ EXPORTED: dict[str, Any] = {
     "practice": "offered",
     "words": "plain",
     "remarks": True,
+    "votes": 0,
 }
 
 WALK: dict[str, Any] = {

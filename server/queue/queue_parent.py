@@ -101,8 +101,16 @@ class QueueParent:
                 return
         kind = kind_name(query)
         if kind is not None:
-            clips, maturity = encode(self.world, query), int(query.maturity[0])
-            number = worker_side.post_query(self.db, self.mine, self.tick, kind, maturity, clips, self.policy)
+            number = worker_side.post_query(
+                self.db,
+                self.mine,
+                self.tick,
+                kind,
+                int(query.maturity[0]),
+                encode(self.world, query),
+                self.policy,
+                int(query.votes[0]),
+            )
             self.posted(number, query)
             self.asked()
 
@@ -111,7 +119,12 @@ class QueueParent:
         kind = kind_name(query)
         if kind is None:
             return stored
-        asked = {"kind": kind, "maturity": int(query.maturity[0]), "clips": encode(self.world, query)}
+        asked = {
+            "kind": kind,
+            "maturity": int(query.maturity[0]),
+            "votes": int(query.votes[0]),
+            "clips": encode(self.world, query),
+        }
         if asked == {name: sound(stored, name) for name in asked}:
             return stored
         same_machine = self.tick > self.follow_until
@@ -124,7 +137,7 @@ class QueueParent:
             DamagedRowError: its row cannot be read.
         """
         with reading(row):
-            return decode(self.world, self.stages, row.kind, row.maturity, row.clips)
+            return decode(self.world, self.stages, row.kind, row.maturity, row.clips, row.votes)
 
     def posted(self, number: int, query: Query) -> None:
         """A query of this id is stored: somebody will see it."""

@@ -32,7 +32,7 @@ def repair(
         db: The database.
         mine: The worker's claim on the run.
         stored: The row, damaged or of other content than what is asked.
-        asked: Its kind, maturity and clips as the agent asks them now.
+        asked: Its kind, maturity, votes and clips as the agent asks them now.
         same_machine: This machine wrote the record of the question's tick.
 
     Raises:

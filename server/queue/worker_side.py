@@ -136,6 +136,7 @@ def post_query(
     maturity: int,
     clips: dict[str, Any],
     policy: tuple[int, int] | None = None,
+    votes: int = 0,
 ) -> int:
     """Insert the query of a tick and return its id. A tick that has one already keeps it.
 
@@ -147,6 +148,7 @@ def post_query(
         maturity: The stage that the clips were recorded at.
         clips: The clips, as `server.codec.encode` writes them.
         policy: The policy that asks: its stage, and its gradient steps in that stage.
+        votes: The answers heard before on the same pair of moves in the same pause.
 
     Raises:
         LostClaimError: another worker trains this run now.
@@ -159,6 +161,7 @@ def post_query(
         number = unused_number(session, Query)
         query = Query(id=number, run_id=mine.run_id, tick=tick, kind=kind, maturity=maturity, clips=clips)
         query.policy_stage, query.policy_steps = policy or (None, None)
+        query.votes = votes
         query.posted, query.status = (
             db.clock(),
             QueryStatus.OPEN if status in LIVING else QueryStatus.WITHDRAWN,

@@ -109,4 +109,4 @@ class StoredRecord:
         return self.nothing if row is None else self._decoded(row)
 
     def _decoded(self, row: tables.Query) -> queries.Query:
-        return decode(self.world, self.stages, row.kind, row.maturity, row.clips)
+        return decode(self.world, self.stages, row.kind, row.maturity, row.clips, row.votes)

@@ -166,7 +166,7 @@ def _query_schema(query: Query, database: str, run_public_id: str) -> QuerySchem
 
 
 def _query_fields(query: Query, database: str, run_public_id: str) -> dict[str, Any]:
-    names = ("id", "public_id", "tick", "kind", "maturity", "status", "posted", "leased_until")
+    names = ("id", "public_id", "tick", "kind", "maturity", "votes", "status", "posted", "leased_until")
     return {
         "run": query.run_id,
         "run_public_id": run_public_id,

@@ -154,6 +154,9 @@ CONSTANT = {
     "state/keys.seed",  # drawn once; the test puts another seed in its place
     "state/world.level",  # one level
     "state/recorder.ring.level",
+    *(
+        f"state/confirmation.{name}" for name in ("votes", "mirrored", "repeats", "dissents")
+    ),  # `confirm` is off
 }
 
 
