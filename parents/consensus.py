@@ -17,7 +17,7 @@ from torch import Tensor
 ROUNDS = 20
 """Rounds of EM for each question; the estimates of the panels hardly change after ten."""
 RIGHT, WRONG = 4.0, 2.0
-"""What a parent's trust begins from: answers that count as right and wrong before the first one."""
+"""The beginning of a parent's trust: answers that count as right and wrong before the first one."""
 COMMON = 1.0
 """Questions of each right answer that are taken to have come before the first one."""
 LEAST = 1e-10
@@ -30,7 +30,7 @@ Beliefs = Float64[Tensor, "N Q C"]
 
 
 class Estimate(NamedTuple):
-    """What EM has found."""
+    """The result of EM."""
 
     right: Beliefs
     common: Float64[Tensor, "N C"]  # the share of questions with each right answer

@@ -21,14 +21,14 @@ from parenting.envs.gridworld import Gridworld, local_state
 from parenting.parents.consensus import Beliefs, Consensus
 
 ANSWERS = (Choice.LEFT, Choice.RIGHT, Choice.EITHER, Choice.NEITHER)
-"""What a member may vote for. *Skip* is no vote."""
+"""The answers that count as votes; *skip* does not."""
 APART = 2**40
 """Added to a trial's seed for each member after the first, so that no two members err together."""
 SUREST = 2.0
 """The policy's opinion of a question is at most this, in nats: it has learnt from the same parents."""
 
 Opinion = Callable[[AgentState, Query], Float64[Tensor, "N C"]]
-"""What the agent itself thinks of the question: factors of the probability of each answer."""
+"""The agent's own view of the question: a factor of the probability of each answer."""
 
 
 class Panel:
@@ -111,7 +111,7 @@ class Panel:
 
 
 def policy_opinion(world: Gridworld) -> Opinion:
-    """What pi_T thinks: the odds of the two first actions, at most e^SUREST to one.
+    """The opinion of pi_T: the odds of the two first actions, at most e^SUREST to one.
 
     It says nothing of *either* and *neither*.
     """

@@ -14,7 +14,7 @@ PATIENTS = """
 2322222 1111111 1111111 1121121 1111111 3333233 1111111 2222222 2223232 4334343 2212232 2323233 3333432
 1111111 1111111 1212111 2322222 1211111 2222222
 """
-"""Table 1 of Dawid & Skene (1979): 45 patients seen by five anaesthetists, three times by the first of them."""
+"""Table 1 of Dawid & Skene (1979): 45 patients and five anaesthetists, the first of them three times."""
 
 
 def counted(cases: str, answers: int = 4) -> Votes:

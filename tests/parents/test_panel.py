@@ -47,7 +47,7 @@ class Reciting:
 
 
 def told(members: Sequence[Reciting], consensus: object = majority) -> list[list[int]]:
-    """What a panel answers in each tick, to two trials that ask wherever somebody answers."""
+    """The answers of a panel in each tick, to two trials that ask wherever somebody answers."""
     world, config = island(), Config()
     state = parenting.init(world, config, keys(0, 2))
     query = parenting.no_query(world, config, state)
