@@ -6,7 +6,7 @@ from importlib import import_module
 
 from parenting.experiments.spec import Experiment
 
-NAMES = (
+PAPER = (
     "table1",
     "reward-hacking",
     "side-effects",
@@ -18,7 +18,10 @@ NAMES = (
     "figure4",
     "calibrate",
 )
-"""In the order of the paper."""
+"""Those of the paper, in its order."""
+BEYOND: tuple[str, ...] = ()
+"""Those that go on from it, and ask what it does not."""
+NAMES = (*PAPER, *BEYOND)
 
 
 class UnknownExperimentError(ValueError):

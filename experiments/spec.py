@@ -39,12 +39,12 @@ class Results:
 
 @dataclass(frozen=True)
 class Experiment:
-    """A table, figure or claim of the paper. Its module, its page and its folder bear its name."""
+    """A table, figure or claim of the paper, or beyond it. Its module, page and folder bear its name."""
 
     name: str
     title: str
-    section: str  # of the paper
-    claim: str  # what the paper says, in a sentence of ours
+    section: str  # of the paper; empty where the experiment goes beyond it
+    claim: str  # what the paper says, or what is asked, in a sentence of ours
     trials: Mapping[Scale, int]
     config: Callable[[Request], Mapping[str, Any]]  # all that its results depend on besides the code
     tasks: Callable[[Request], Sequence[Task]]

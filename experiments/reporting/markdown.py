@@ -28,7 +28,7 @@ COUNTED: dict[Reference, str] = {
 def page(results: dict[str, Any], figures: Sequence[str]) -> str:
     """The Markdown of a results.json."""
     rows, name = [Comparison(**found) for found in results["findings"]], results["name"]
-    lines = [f"# {results['title']}", "", f"Sec. {results['section']}. {results['claim']}", ""]
+    lines = [f"# {results['title']}", "", f"{_place(results['section'])}. {results['claim']}", ""]
     lines += [verdict_sentence(rows), ""]
     for figure in figures:
         lines += [f"![{results['title']}: {figure}]({name}/{figure}.svg)", ""]
@@ -37,6 +37,10 @@ def page(results: dict[str, Any], figures: Sequence[str]) -> str:
             lines += [f"## {heading}", "", *_table(mine, reference), ""]
     lines += ["## Notes", "", *(line for words in results["words"] for line in (words, ""))]
     return "\n".join([*lines, *_origin(results)]) + "\n"
+
+
+def _place(section: str) -> str:
+    return f"Sec. {section}" if section else "Beyond the paper"
 
 
 def verdict_sentence(rows: Sequence[Comparison]) -> str:

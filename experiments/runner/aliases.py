@@ -37,10 +37,32 @@ ARGUMENTS: Mapping[str, str] = {
 """Argument of a task -> the same in version 0.1.0."""
 
 
+LATER: Mapping[str, Any] = {
+    "confirm": 0.0,
+    "fresh_pairs": False,
+    "late_steps": False,
+    "learn_refusals": False,
+    "reuse_answers": False,
+}
+"""Settings that came after version 0.4, and their values where they are off: then they change no result."""
+
+
+def without_later(data: Any) -> Any:
+    """Return plain data without the settings that came later, where they are off, at any depth."""
+    if isinstance(data, Mapping):
+        kept = {key: value for key, value in data.items() if key not in LATER or value != LATER[key]}
+        return {key: without_later(value) for key, value in kept.items()}
+    return [without_later(value) for value in data] if isinstance(data, list) else data
+
+
 def before(data: Any) -> Any:
     """Return plain data in the words of version 0.1.0: calls, and keys of mappings at any depth."""
+    return _old_words(without_later(data))
+
+
+def _old_words(data: Any) -> Any:
     if isinstance(data, Mapping):
-        return {ARGUMENTS.get(key, key): before(value) for key, value in data.items()}
+        return {ARGUMENTS.get(key, key): _old_words(value) for key, value in data.items()}
     if isinstance(data, list):
-        return [before(value) for value in data]
+        return [_old_words(value) for value in data]
     return CALLS.get(data, data) if isinstance(data, str) else data

@@ -9,10 +9,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from parenting.agent.config import PRESETS, compose, v1_names
+from parenting.agent.config import compose, v1_names
 from parenting.envs import registry
 from parenting.weights.store import SHIPPED, SUFFIX, digest
 
+PRESETS_OF_THE_PAPER = ("conservative", "lax", "direct")
 LIBRARIES = ("parenting", "torch", "numpy", "joblib")
 
 
@@ -44,12 +45,15 @@ def versions() -> dict[str, str]:
 
 
 def settings() -> dict[str, Any]:
-    """Return the settings of every experiment: presets in full, the worlds' changes, and shipped weights.
+    """Return the settings of every experiment: Table 1's presets in full, worlds' changes, shipped weights.
 
-    A task names a preset and a world; here stands what these were. Weights are named by their SHA-256.
+    A task names a preset and a world; here stands what these were. Weights are named by their SHA-256. An
+    experiment that uses another preset than those of Table 1 writes it into its own config.
     """
     return {
-        "presets": {name: compose(name, {}, {}, strict=True).model_dump(mode="json") for name in PRESETS},
+        "presets": {
+            name: compose(name, {}, {}, strict=True).model_dump(mode="json") for name in PRESETS_OF_THE_PAPER
+        },
         "worlds": {world: v1_names(registry.defaults(world)) for world in sorted(registry.WORLDS)},
         "weights": {path.name: digest(path.read_bytes()) for path in sorted(SHIPPED.glob(f"*{SUFFIX}"))},
     }

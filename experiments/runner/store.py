@@ -17,7 +17,7 @@ from time import monotonic
 from typing import Any, NamedTuple
 
 from parenting.experiments.runner import provenance
-from parenting.experiments.runner.aliases import before
+from parenting.experiments.runner.aliases import before, without_later
 
 Row = dict[str, Any]
 """Name -> number, word, truth value or null. A name that begins with HIDDEN is for other tasks alone."""
@@ -68,7 +68,7 @@ class Store:
         self._since = monotonic()
         self._of: dict[str, Any] = {}
         folder.mkdir(parents=True, exist_ok=True)
-        wanted = _plain(plan)
+        wanted = without_later(_plain(plan))
         path = folder / PLAN
         if not path.exists():
             _write(path, wanted)
@@ -145,7 +145,7 @@ def described(tasks: Sequence[Task], words: Callable[[Any], Any] = lambda said: 
         if task.key not in found:
             needs = {key: _digest(of(by_key[key])) if key in by_key else None for key in task.needs}
             said = {"call": task.call, "arguments": task.arguments, "device": task.device, "needs": needs}
-            found[task.key] = words(_plain(said))
+            found[task.key] = words(without_later(_plain(said)))
         return found[task.key]
 
     for task in tasks:

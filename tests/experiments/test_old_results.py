@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from parenting.commands.main import app
-from parenting.experiments.registry import NAMES, experiment
+from parenting.experiments.registry import PAPER, experiment
 from parenting.experiments.reporting.html import PAGE
 from parenting.experiments.runner.aliases import before
 from parenting.experiments.runner.store import PlanMismatchError, Store, described
@@ -43,7 +43,7 @@ def pieces(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("scale", ["quick", "paper"])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PAPER)
 def test_every_task_and_plan_is_the_old_one_in_its_own_words(name: str, scale: Scale) -> None:
     """Not the stored folder alone: all tasks of all experiments, at both scales, by their digests."""
     stored = json.loads((OLD / "plans.json").read_text(encoding="utf-8"))[f"{name} {scale}"]

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from parenting.agent.config import Config
 from parenting.experiments.runner import provenance
+from parenting.experiments.runner.aliases import LATER
 from parenting.experiments.runner.executor import TRIES, work
 from parenting.experiments.runner.processes import WorkersDiedError
 from parenting.experiments.runner.store import PlanMismatchError, Row, Store, Task
@@ -105,6 +107,20 @@ def test_a_piece_says_which_commit_made_it(store: Store, monkeypatch: pytest.Mon
         monkeypatch.setattr(provenance, "commit", lambda commit=commit: commit)
         work([task(first)], store, 1)
     assert store.commits(["piece-1", "piece-2", "piece-3"]) == {"early": 1, "late": 2}
+
+
+def test_a_setting_that_came_later_counts_where_it_is_on_and_only_there(tmp_path: Path) -> None:
+    """Else each new setting would refuse the folders of all versions before it."""
+    Store(tmp_path, PLAN)
+    preset = PLAN["presets"]["lax"]  # type: ignore[index]  # a mapping by name
+    for setting, off in LATER.items():
+        Store(tmp_path, {**PLAN, "presets": {"lax": {**preset, setting: off}}})
+        with pytest.raises(PlanMismatchError, match=setting):
+            Store(tmp_path, {**PLAN, "presets": {"lax": {**preset, setting: 1}}})
+    now = Config().model_dump(mode="json")
+    assert {name: now[name] for name in LATER if name in now} == {
+        name: LATER[name] for name in LATER if name in now
+    }
 
 
 def test_what_a_piece_needs_is_done_before_and_given_to_it(store: Store) -> None:
