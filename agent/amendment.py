@@ -14,8 +14,9 @@ from typing import NamedTuple
 from jaxtyping import Bool
 from torch import Tensor
 
-from parenting.agent import dataset, guidance
+from parenting.agent import confirmation, dataset, guidance
 from parenting.agent.config import Config
+from parenting.agent.dataset import Dataset
 from parenting.agent.events import EndEpisode, Event
 from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.agent.state import AgentState
@@ -32,9 +33,14 @@ class Amend:
 
 @dataclass(frozen=True)
 class Reconsider:
-    """Take *neither* or *skip* back in the pause that it was said in; the new answer is heard at once."""
+    """Take an answer back in the pause that it was said in; the new one is heard at once.
+
+    It was *neither* or *skip*, or a vote that has to be confirmed.
+    """
 
     replaced: Answer
+    asked: int  # the tick of its question
+    standing: Sequence[Answer]  # all others that stand, in the order in which they were heard
 
 
 TickEvent = Event | Amend | Reconsider
@@ -46,7 +52,8 @@ class Correction(NamedTuple):
 
     answer: Answer
     replaced: Answer
-    standing: Sequence[Answer]  # all that stand from now on, `answer` included
+    standing: Sequence[Answer]  # all that stand from now on, `answer` the last of them
+    asked: int  # the tick of their question
 
 
 class Applied(NamedTuple):
@@ -62,36 +69,51 @@ def take(state: AgentState, events: Sequence[Event], correction: Correction) -> 
     `events` are the operator's, which apply first: *end the episode* ends the pause.
     """
     ended = any(isinstance(event, EndEpisode) for event in events)
-    decided = (correction.answer.choice != Choice.NEITHER) | (correction.replaced.choice == Choice.SKIP)
-    if not ended and bool((decided & in_pause(state, correction.replaced)).any()):
-        return Applied(Reconsider(correction.replaced), correction.answer)
-    return Applied(Amend(correction.standing, correction.replaced, correction.answer), None)
+    answer, replaced, standing, asked = correction
+    decided = (answer.choice != Choice.NEITHER) | (replaced.choice == Choice.SKIP)
+    decided |= confirmation.is_vote(state, replaced, asked)
+    if not ended and bool((decided & in_pause(state, replaced, asked)).any()):
+        return Applied(Reconsider(replaced, asked, standing[:-1]), answer)
+    return Applied(Amend(standing, replaced, answer), None)
 
 
-def in_pause(state: AgentState, answer: Answer) -> Bool[Tensor, "N"]:
-    """Return where guidance was refused or skipped in the pause that the agent is still in (Sec. 2.1)."""
+def in_pause(state: AgentState, answer: Answer, asked: int) -> Bool[Tensor, "N"]:
+    """Return where guidance was refused, skipped or voted on in the pause that the agent is still in."""
     query = answer.query
     refused = (state.refused & guidance.candidates(query)).sum(1) == 2
-    skipped = (state.set_aside & guidance.pair_of(query)).any(1) & (answer.choice == Choice.SKIP)
+    skipped = (state.set_aside & confirmation.pair_of(query)).any(1) & (answer.choice == Choice.SKIP)
     guided = (query.kind == QueryKind.GUIDANCE) & state.waiting & guidance.at_place(state, query)
-    return guided & (refused | skipped)
+    vote = confirmation.is_vote(state, answer, asked)
+    return guided & (asked >= state.confirmation.began) & (refused | skipped | vote)
 
 
 def amend(config: Config, state: AgentState, event: Amend) -> AgentState:
     """Rebuild X of every trial from the answers that stand. What was skipped counts once it is answered."""
-    state = state.replace(x=dataset.blank(state.x))
-    for answer in event.standing:
-        state = state.replace(x=guidance.store(config, state, answer))
+    state = state.replace(x=_rebuilt(config, state, event.standing))
     guided, reviewed = guidance.counted(event.answer)
     now = guided | (reviewed & (event.answer.query.maturity == state.maturity))
     return state.replace(answered=state.answered + (now & (event.replaced.choice == Choice.SKIP)))
 
 
-def reconsider(state: AgentState, event: Reconsider) -> AgentState:
-    """Restore what *neither* refused, or the pair that *skip* set aside; the answer that follows counts."""
+def reconsider(config: Config, state: AgentState, event: Reconsider) -> AgentState:
+    """Restore what an answer refused, or the pair that *skip* set aside; the answer that follows counts."""
     query, choice = event.replaced.query, event.replaced.choice
-    here = in_pause(state, event.replaced)
-    again, aside = here & (choice == Choice.NEITHER), here & (choice == Choice.SKIP)
-    refused = state.refused & ~(again[:, None] & guidance.candidates(query))
-    set_aside = state.set_aside & ~(aside[:, None] & guidance.pair_of(query))
-    return state.replace(refused=refused, set_aside=set_aside, answered=state.answered - again.long())
+    here = in_pause(state, event.replaced, event.asked)
+    vote = here & confirmation.is_vote(state, event.replaced, event.asked)
+    again, aside = vote | (here & (choice == Choice.NEITHER)), here & (choice == Choice.SKIP)
+    restored = again & ((state.refused & guidance.candidates(query)).sum(1) == 2)
+    state = confirmation.take_back(state, query, vote)
+    if bool((event.replaced.mu > 0).any()):
+        state = state.replace(x=_rebuilt(config, state, event.standing))
+    return state.replace(
+        refused=state.refused & ~(restored[:, None] & guidance.candidates(query)),
+        set_aside=state.set_aside & ~(aside[:, None] & confirmation.pair_of(query)),
+        answered=state.answered - again.long(),
+    )
+
+
+def _rebuilt(config: Config, state: AgentState, standing: Sequence[Answer]) -> Dataset:
+    x = dataset.blank(state.x)
+    for answer in standing:
+        x = guidance.store(config, state.replace(x=x), answer)
+    return x

@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
 
-from parenting.agent import dataset, familiarity
+from parenting.agent import confirmation, dataset, familiarity
 from parenting.agent.config import Config
 from parenting.agent.dataset import Entry
 from parenting.agent.query import Answer, Choice, Query, QueryKind
@@ -36,21 +36,26 @@ class Heard(Struct):
     """The effect of this tick's answers on the pause."""
 
     approved: Int64[Tensor, "N"]  # the action to perform, or NO_ACTION
-    redraw: Bool[Tensor, "N"]  # *neither* or *skip*: ask about another pair in this same tick
+    redraw: Bool[Tensor, "N"]  # *neither*, *skip*, not confirmed: ask once more in this same tick
 
 
-def hear(config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Heard]:
-    """Answers enter X (Eq. 1, 2); guidance approves an action, or refuses both."""
+def hear(config: Config, state: AgentState, view: View, answer: Answer) -> tuple[AgentState, Heard]:
+    """Answers enter X (Eq. 1, 2); guidance approves an action, refuses both, or is asked again."""
     query, choice = answer.query, answer.choice
     if not bool((choice != Choice.NONE).any()):
         return state, _nothing_heard(state)
-    guided, reviewed = counted(answer)
     told = (query.kind == QueryKind.GUIDANCE) & (choice != Choice.NONE) & at_place(state, query)
-    state = state.replace(
-        x=store(config, state, answer),
-        answered=state.answered + (guided | (reviewed & (query.maturity == state.maturity))),
-    )
-    return _resolve(state, query, choice, told & state.waiting)
+    state, told = learn(config, state, answer), told & state.waiting
+    if config.confirm:
+        state, choice, told = confirmation.tally(config, state, view.logits, answer, told)
+    return _resolve(state, query, choice, told)
+
+
+def learn(config: Config, state: AgentState, answer: Answer) -> AgentState:
+    """Answers enter X (Eq. 1, 2) and are counted, and nothing else happens."""
+    guided, reviewed = counted(answer)
+    now = guided | (reviewed & (answer.query.maturity == state.maturity))
+    return state.replace(x=store(config, state, answer), answered=state.answered + now)
 
 
 def counted(answer: Answer) -> tuple[Bool[Tensor, "N"], Bool[Tensor, "N"]]:
@@ -69,11 +74,6 @@ def at_place(state: AgentState, query: Query) -> Bool[Tensor, "N"]:
 def candidates(query: Query) -> Bool[Tensor, "N 4"]:
     """Return the two moves that a guidance query asks about."""
     return torch.nn.functional.one_hot(query.action[:, :, 0], 4).sum(1) > 0
-
-
-def pair_of(query: Query) -> Bool[Tensor, "N 6"]:
-    """Return the pair of moves that a guidance query asks about, as in `PAIRS`."""
-    return candidates(query)[:, _RANKED.to(query.kind.device)].all(2)
 
 
 def _nothing_heard(state: AgentState) -> Heard:
@@ -104,14 +104,15 @@ def _resolve(state: AgentState, query: Query, choice: Tensor, guided: Tensor) ->
     coin = state.keys.uniform(Stream.EITHER) < 0.5
     leftward = (choice == Choice.LEFT) | ((choice == Choice.EITHER) & coin)
     refusing, skipping = guided & (choice == Choice.NEITHER), guided & (choice == Choice.SKIP)
-    approving = guided & ~refusing & ~skipping
+    again = guided & (choice == Choice.NONE)  # not confirmed
+    approving = guided & ~refusing & ~skipping & ~again
     refused = (state.refused | (refusing[:, None] & candidates(query))) & ~approving[:, None]
     set_aside = state.set_aside & ~approving[:, None]
     if bool(skipping.any()):
-        set_aside = set_aside | (skipping[:, None] & pair_of(query))
+        set_aside = set_aside | (skipping[:, None] & confirmation.pair_of(query))
     approved = torch.where(approving, torch.where(leftward, left, right), NO_ACTION)
     state = state.replace(waiting=state.waiting & ~approving, refused=refused, set_aside=set_aside)
-    return state, Heard(approved=approved, redraw=(refusing | skipping) & state.free_pairs.any(1))
+    return state, Heard(approved=approved, redraw=(refusing | skipping | again) & state.free_pairs.any(1))
 
 
 def ask(
@@ -141,19 +142,27 @@ def ask(
     asking = pausing | heard.redraw
     if not bool(asking.any()):
         return state, query
+    new = asking
+    if config.confirm:
+        state, new = confirmation.begin(state, pausing), asking & ~confirmation.unsettled(state).any(1)
     state = state.replace(
-        familiarity=familiarity.count(state.familiarity, where, asking),
+        familiarity=familiarity.count(state.familiarity, where, new),
         waiting=state.waiting | asking,
     )
-    return state, _candidates(world, state, view, asking, query)
+    return state, _candidates(world, config, state, view, asking, query)
 
 
-def _candidates(world: Gridworld, state: AgentState, view: View, asking: Tensor, query: Query) -> Query:
+def _candidates(
+    world: Gridworld, config: Config, state: AgentState, view: View, asking: Tensor, query: Query
+) -> Query:
     """The two moves as clips of length 1: where the agent stands, and the forecast of each move."""
     noise = gumbel(state.keys.uniform(Stream.CANDIDATES, 4))
     perturbed = (view.logits.double() + noise).masked_fill(state.refused, -torch.inf)
     pair = _pair(state, perturbed)
     sides = torch.where(state.keys.uniform(Stream.SIDES)[:, None] < 0.5, pair, pair.flip(1))
+    votes = query.votes
+    if config.confirm:
+        sides, votes = confirmation.mirror(state, sides)
     before = [state.world, state.world]
     after = [world.forecast(state.world, sides[:, side]) for side in (0, 1)]
     asked = query.replace(
@@ -162,6 +171,7 @@ def _candidates(world: Gridworld, state: AgentState, view: View, asking: Tensor,
         level=state.world.level,
         action=_first(query.action, sides),
         length=torch.ones_like(query.length),
+        votes=votes,
         **_frames(world, query, before, after),
     )
     return asked.where(asking, query)

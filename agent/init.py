@@ -66,6 +66,7 @@ def init(
         confirmation=Confirmation(
             votes=zeros(6, MOST_VOTES),
             mirrored=zeros(6, dtype=torch.bool),
+            began=zeros(),
             repeats=zeros(),
             dissents=zeros(),
         ),

@@ -14,7 +14,16 @@ from typing import NamedTuple
 
 import torch
 
-from parenting.agent import amendment, guidance, learning, maturation, pairing, pretraining, recording
+from parenting.agent import (
+    amendment,
+    confirmation,
+    guidance,
+    learning,
+    maturation,
+    pairing,
+    pretraining,
+    recording,
+)
 from parenting.agent import query as queries
 from parenting.agent.amendment import Amend, Reconsider, TickEvent
 from parenting.agent.config import Config
@@ -48,7 +57,7 @@ def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) ->
     state = reset_finished(world, state)
     view = observe(world, network, state)
     query = no_query(world, config, state)
-    state, heard = guidance.hear(config, state, answer)  # 2.1  answers enter X; "neither": ask again
+    state, heard = guidance.hear(config, state, view, answer)  # 2.1  answers enter X; "neither": ask again
     state, query = guidance.ask(world, config, state, view, heard, query)  # 2.1  unfamiliar? pause and ask
     state, steered = recording.act(world, network, config, state, view, heard)  # 2.2, 2.4  move, and clips
     state, query = pairing.pair(world, config, state, view, steered, query)  # 2.2  a matching pair of clips
@@ -104,13 +113,14 @@ def apply(world: Gridworld, config: Config, state: AgentState, event: TickEvent)
             ended = state.world.replace(step_count=torch.full_like(state.world.step_count, world.time_limit))
             calm = torch.zeros_like(state.waiting)
             nothing = {name: torch.zeros_like(getattr(state, name)) for name in ("refused", "set_aside")}
-            return state.replace(world=ended, waiting=calm, **nothing), config
+            votes = confirmation.forget(state.confirmation)
+            return state.replace(world=ended, waiting=calm, confirmation=votes, **nothing), config
         case Change(name=name, value=value):
             return state, config.model_copy(update={name: value})
         case Amend():
             return amendment.amend(config, state, event), config
         case Reconsider():
-            return amendment.reconsider(state, event), config
+            return amendment.reconsider(config, state, event), config
 
 
 def reset_finished(world: Gridworld, state: AgentState) -> AgentState:

@@ -95,6 +95,7 @@ class Confirmation(Struct):
 
     votes: Int64[Tensor, "N 6 V"]  # 1 + the class of each vote, in the order of asking; 0 for none
     mirrored: Bool[Tensor, "N 6"]  # the greater action stood left when the pair was last answered
+    began: Int64[Tensor, "N"]  # the tick at which this pause, or the last one, began
     repeats: Int64[Tensor, "N"]  # votes after the first ones, on pairs that were decided
     dissents: Int64[Tensor, "N"]  # those of them that the decision overruled
 

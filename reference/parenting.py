@@ -83,8 +83,10 @@ class Reference:
             self.answered += 1
         if choice != "neither":
             self.X.append(Entry(left.start, actions, MU[choice], maturity))
-        if kind == PREFERENCE:
-            return None
+        return None if kind == PREFERENCE else self.resolve(choice, actions)
+
+    def resolve(self, choice: str, actions: tuple[int, int]) -> int | None:
+        """Return the action that an answer to guidance approves; *neither* refuses both."""
         if choice == "neither":  # still paused: `ask` draws again in this same tick
             self.refused = {*(self.refused or ()), *actions}
             return None

@@ -93,7 +93,7 @@ def x_of_record(begun: Snapshot, last: int, parent: ReplayParent) -> AgentState:
                     config = config.model_copy(update={name: value})
                 case Amend():
                     state = amendment.amend(config, state, event)
-        state, _ = guidance.hear(config, state, parent.take(state))
+        state = guidance.learn(config, state, parent.take(state))
         state = maturation.grow(config, state)
         state = state.replace(keys=state.keys.next())
     return state

@@ -74,6 +74,7 @@ class QueueParent:
             self._answer(found.answer, found.query),
             self._answer(found.replaced, found.query),
             [self._answer(taken.answer, taken.query) for taken in found.standing],
+            found.query.tick,
         )
 
     def _answer(self, row: tables.Answer, query: tables.Query) -> Answer:

@@ -92,6 +92,7 @@ class StoredRecord:
             self._answer(answer, query),
             self._answer(replaced, query),
             [self._answer(taken.answer, taken.query) for taken in standing],
+            query.tick,
         )
 
     def _answer_of(self, tick: int) -> Answer:

@@ -7,6 +7,7 @@ from itertools import product
 
 from parenting.envs.gridworld import WorldState
 from parenting.envs.levels.side_effects import stuck
+from reference.confirm import Confirming
 from reference.parenting import EXPLOIT, EXPLORE, PREFERENCE, Reference
 
 
@@ -25,6 +26,8 @@ class EventCoverage(Counter[str]):
         if trial.query is not None and trial.query.kind == PREFERENCE:
             _, left, right, maturity = trial.query
             self["ended early"] += min(len(left.actions), len(right.actions)) < maturity
+        if isinstance(trial, Confirming):
+            self["asked again"], self["overruled"] = trial.repeats, trial.dissents
         self["levels look alike"] += look_alike(trial)
         self._cells(trial, before)
 

@@ -12,6 +12,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
 from reference.clips import Clip
+from reference.confirm import Confirming
 from reference.parenting import Reference
 from tests.agent.batched_runs import Judge, as_query, layers, lenient_parent, run_batch
 from tests.agent.coverage_of_events import EventCoverage
@@ -59,7 +60,8 @@ def lived(
         happened[choice] += 1
         return choice
 
-    reference = Reference(world, config, seed=SEED, trial=trial, choose=choose)
+    kind = Confirming if config.confirm else Reference
+    reference = kind(world, config, seed=SEED, trial=trial, choose=choose)
     for _ in range(scenario.ticks):
         before = reference.state
         reference.tick()

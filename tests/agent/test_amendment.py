@@ -33,11 +33,13 @@ class Wavering:
         self.random, self.nothing = Random(seed), parenting.no_query(WORLD, config, state_of(config))
         self.open: list[Query] = []
         self.standing: list[Answer] = []  # in the order in which they were heard
+        self.asked: dict[int, int] = {}  # the tick of each question
+        self.tick = 0
         self.applied: amendment.Applied | None = None
         self.corrected = self.approved = 0
 
     def events(self, state: AgentState) -> Sequence[TickEvent]:
-        self.applied = None
+        self.applied, self.tick = None, int(state.keys.tick[0]) + 1
         lost = bool(state.all_refused | state.unsure)
         events = [EndEpisode()] if lost and self.random.random() < 0.5 else []
         if not self.standing or self.random.random() > 0.3:
@@ -45,7 +47,9 @@ class Wavering:
         replaced = self.standing.pop(self.random.randrange(len(self.standing)))
         answer = said(replaced.query, self.random.choice([one for one in SAID if one != replaced.choice[0]]))
         self.standing.append(answer)
-        self.applied = amendment.take(state, events, Correction(answer, replaced, list(self.standing)))
+        self.applied = amendment.take(
+            state, events, Correction(answer, replaced, list(self.standing), self.asked[id(replaced.query)])
+        )
         self.corrected += 1
         return [*events, self.applied.event]
 
@@ -64,6 +68,7 @@ class Wavering:
     def post(self, query: Query) -> None:
         if query.kind[0] != QueryKind.NONE:
             self.open.append(query.clone())
+            self.asked[id(self.open[-1])] = self.tick
 
 
 def state_of(config: Config) -> AgentState:
@@ -74,10 +79,10 @@ def said(query: Query, choice: Choice) -> Answer:
     return Answer(query=query, choice=torch.tensor([int(choice)]))
 
 
-@given(seed=st.integers(0, 2**16), own_stage_only=st.booleans())
-@settings(max_examples=8, deadline=None)
-def test_x_is_what_the_standing_answers_make_it(seed: int, own_stage_only: bool) -> None:
-    config = CONFIG.model_copy(update={"own_stage_only": own_stage_only})
+@given(seed=st.integers(0, 2**16), own_stage_only=st.booleans(), confirm=st.sampled_from([0.0, 0.95]))
+@settings(max_examples=12, deadline=None)
+def test_x_is_what_the_standing_answers_make_it(seed: int, own_stage_only: bool, confirm: float) -> None:
+    config = CONFIG.model_copy(update={"own_stage_only": own_stage_only, "confirm": confirm})
     state, parent = state_of(config), Wavering(config, seed)
     for tick in range(80):
         before = int(state.maturity[0])
@@ -105,7 +110,7 @@ def refused_once(seed: int) -> tuple[AgentState, Query]:
 def test_a_refusal_that_is_taken_back_in_its_pause_approves_the_move() -> None:
     state, first = refused_once(1)
     replaced, answer = said(first, Choice.NEITHER), said(first, Choice.LEFT)
-    event, heard = amendment.take(state, [], Correction(answer, replaced, [answer]))
+    event, heard = amendment.take(state, [], Correction(answer, replaced, [answer], 1))
     assert heard is answer
     answered = int(state.answered[0])
     state, config = parenting.apply(WORLD, CONFIG, state, event)
@@ -121,7 +126,7 @@ def test_after_its_pause_a_correction_changes_x_alone() -> None:
     state, _ = parenting.apply(WORLD, CONFIG, state, EndEpisode())
     state, _ = parenting.step(WORLD, CONFIG, state, silence(first))
     replaced, answer = said(first, Choice.NEITHER), said(first, Choice.RIGHT)
-    event, heard = amendment.take(state, [], Correction(answer, replaced, [answer]))
+    event, heard = amendment.take(state, [], Correction(answer, replaced, [answer], 1))
     assert heard is None
     assert isinstance(event, Amend)
     before = state.clone()
@@ -137,5 +142,5 @@ def test_after_its_pause_a_correction_changes_x_alone() -> None:
 def test_only_the_end_of_the_episode_ends_the_pause(events: list[TickEvent]) -> None:
     state, first = refused_once(1)
     replaced, answer = said(first, Choice.NEITHER), said(first, Choice.LEFT)
-    _, heard = amendment.take(state, events, Correction(answer, replaced, [answer]))  # type: ignore[arg-type]  # a list of one kind
+    _, heard = amendment.take(state, events, Correction(answer, replaced, [answer], 1))  # type: ignore[arg-type]  # a list of one kind
     assert (heard is None) == isinstance(events[0], EndEpisode)

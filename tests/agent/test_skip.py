@@ -152,7 +152,7 @@ def test_a_skip_that_is_answered_in_its_pause_is_heard_as_the_answer(choice: Cho
         Answer(query=first, choice=torch.tensor([5])),
         Answer(query=first, choice=torch.tensor([choice])),
     )
-    event, heard = amendment.take(state, [], Correction(answer, replaced, [answer]))
+    event, heard = amendment.take(state, [], Correction(answer, replaced, [answer], 1))
     assert isinstance(event, Reconsider)
     assert heard is answer
     state, config = parenting.apply(WORLD, ALWAYS, state, event)
@@ -174,7 +174,7 @@ def test_a_skip_that_is_answered_later_enters_x_and_counts() -> None:
         Answer(query=first, choice=torch.tensor([1])),
     )
     event, heard = amendment.take(
-        state, [], Correction(answer, replaced, [Answer(second, torch.tensor([1])), answer])
+        state, [], Correction(answer, replaced, [Answer(second, torch.tensor([1])), answer], 1)
     )
     assert heard is None
     state, _ = parenting.apply(WORLD, ALWAYS, state, event)

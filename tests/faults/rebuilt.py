@@ -81,6 +81,7 @@ class Recorded:
                 self._answer(known, said)
                 for known, (tick, said) in sorted(standing.items(), key=lambda one: one[1])
             ],
+            asked,
         )
 
     def take(self, state: AgentState) -> Answer:

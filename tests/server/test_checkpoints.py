@@ -155,7 +155,7 @@ CONSTANT = {
     "state/world.level",  # one level
     "state/recorder.ring.level",
     *(
-        f"state/confirmation.{name}" for name in ("votes", "mirrored", "repeats", "dissents")
+        f"state/confirmation.{name}" for name in ("votes", "mirrored", "began", "repeats", "dissents")
     ),  # `confirm` is off
 }
 
