@@ -49,10 +49,12 @@ class BatchTrainer:
         *,
         weights: Tensor | None = None,
         parent: MakeParent | None = None,
+        note_optimal: bool = False,
     ) -> None:
         """Begin one trial for each of `keys`, with the options of `train_agents`."""
         rule = ScriptedRule(world, config.gamma, inside=config.garden_parent)
         self.world, self.config, self.until = world, config, until
+        self.notes_optimal = note_optimal or until.kind == "optimal"
         self.evaluation = evaluation(world, rule.values, config.gamma)
         self.state = parenting.init(world, config, keys, weights)
         trials, live = len(keys.seed), self.state.learner.params
@@ -93,10 +95,12 @@ class BatchTrainer:
 
     def _finish(self, changed: Bool[Tensor, "N"]) -> None:
         """Let those go that have reached their goal, and those that never will: all their ticks are empty."""
+        if self.notes_optimal:
+            self._note_optimal(changed)
         counts = self.counts
         match self.until.kind:
             case "optimal":
-                finished = self._optimal(changed & ~counts.done)
+                finished = counts.optimal_at > 0
             case "queries":
                 finished = counts.queries.sum(1) >= self.until.number
             case "ticks":
@@ -105,6 +109,16 @@ class BatchTrainer:
         stuck = self.state.all_refused & ~counts.done & ~fresh
         if bool((fresh | stuck).any()):
             self._leave(fresh, stuck)
+
+    def _note_optimal(self, changed: Bool[Tensor, "N"]) -> None:
+        """Note which policies are optimal for the first time, and what they took until then."""
+        counts = self.counts
+        first = self._optimal(changed & ~counts.done & (counts.optimal_at == 0))
+        self.counts = counts.replace(
+            optimal_at=torch.where(first, counts.ticks, counts.optimal_at),
+            optimal_deaths=torch.where(first, counts.deaths, counts.optimal_deaths),
+            optimal_queries=torch.where(first, counts.queries.sum(1), counts.optimal_queries),
+        )
 
     def _optimal(self, request: Bool[Tensor, "N"]) -> Bool[Tensor, "N"]:
         """Return which of some trials have an optimal argmax policy."""
@@ -163,6 +177,7 @@ def train_agents(
     progress: OnProgress | None = None,
     weights: Tensor | None = None,
     parent: MakeParent | None = None,
+    note_optimal: bool = False,
 ) -> TrainResult:
     """Train one agent for each of `keys` until it is finished.
 
@@ -175,5 +190,9 @@ def train_agents(
         progress: Called after each tick.
         weights: The pre-trained weights, where the config asks for them (Sec. 3.1.4).
         parent: Makes the batch's parent; None takes the scripted one (Sec. 3.1.3).
+        note_optimal: Note when each policy is first optimal, also where that does not end its trial.
     """
-    return BatchTrainer(world, config, keys, until, weights=weights, parent=parent).run(max_ticks, progress)
+    trainer = BatchTrainer(
+        world, config, keys, until, weights=weights, parent=parent, note_optimal=note_optimal
+    )
+    return trainer.run(max_ticks, progress)

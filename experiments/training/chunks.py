@@ -44,6 +44,7 @@ class TrainPlan(NamedTuple):
     until: StopRule
     max_ticks: int
     weights: bytes | None = None  # the file of pre-trained weights (Sec. 3.1.4)
+    note_optimal: bool = False  # when each policy is first optimal, also where that does not end its trial
 
 
 def chunks(trials: int) -> list[range]:
@@ -84,7 +85,14 @@ def train_chunk(plan: TrainPlan, chunk: range, progress: OnProgress | None = Non
         None if plan.weights is None else load(plan.weights, Wanted(world.spec, world.height, world.width))
     )
     result = train_agents(
-        world, plan.config, mine, plan.until, max_ticks=plan.max_ticks, progress=progress, weights=weights
+        world,
+        plan.config,
+        mine,
+        plan.until,
+        max_ticks=plan.max_ticks,
+        progress=progress,
+        weights=weights,
+        note_optimal=plan.note_optimal,
     )
     return examine(world, plan.config, result)
 

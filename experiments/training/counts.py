@@ -35,6 +35,9 @@ class Counts(Struct):
     optimal: Bool[Tensor, "N"]  # the argmax policy at the end
     finished: Bool[Tensor, "N"]
     stuck: Bool[Tensor, "N"]  # no acceptable action: it would wait without end
+    optimal_at: Int64[Tensor, "N"]  # the tick at which the policy was first optimal; 0: never, or not noted
+    optimal_deaths: Int64[Tensor, "N"]  # the deaths until then
+    optimal_queries: Int64[Tensor, "N"]  # the answered queries until then
 
     @property
     def done(self) -> Bool[Tensor, "N"]:
@@ -55,6 +58,9 @@ def no_counts(trials: int, stages: int = 1) -> Counts:
         optimal=false,
         finished=false,
         stuck=false,
+        optimal_at=zero,
+        optimal_deaths=zero,
+        optimal_queries=zero,
     )
 
 

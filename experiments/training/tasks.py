@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import torch
@@ -22,6 +22,8 @@ from parenting.weights.store import Wanted, find
 
 Goal = Literal["optimal", "queries", "ticks"]
 COUNTS = ("deaths", "guidance", "preference", "ticks")
+NOTED = ("optimal_at", "optimal_deaths", "optimal_queries")
+"""Columns of trials whose first optimal policy is noted."""
 
 
 def parent_trials(
@@ -34,12 +36,16 @@ def parent_trials(
     max_ticks: int,
     span: tuple[int, int],
     seed: int,
+    note_optimal: bool = False,
 ) -> list[Row]:
     """Raise the trials of a span by the scripted parent; `label` names what they are of."""
     config = compose(preset, registry.defaults(world), changes, strict=True)
     weights = _weights(world, level, config)
-    plan = TrainPlan(world, level, config, seed, span[1], StopRule(*until), max_ticks, weights)
-    return _rows(label, range(*span), train_chunk(plan, range(*span)), world)
+    plan = TrainPlan(
+        world, level, config, seed, span[1], StopRule(*until), max_ticks, weights, note_optimal=note_optimal
+    )
+    columns = (*COUNTS, *(NOTED if note_optimal else ()))
+    return _rows(label, range(*span), train_chunk(plan, range(*span)), world, columns)
 
 
 def reinforce_trials(
@@ -73,9 +79,9 @@ def _weights(world: str, level: str, config: Config) -> bytes | None:
     return find(Wanted(registry.spec(world), drawn.height, drawn.width)).read_bytes()
 
 
-def _rows(label: str, span: range, outcomes: Outcomes, world: str) -> list[Row]:
+def _rows(label: str, span: range, outcomes: Outcomes, world: str, counted: Sequence[str]) -> list[Row]:
     counts, spec = outcomes.counts, registry.spec(world)
-    columns = {one: getattr(counts, one).tolist() for one in (*COUNTS, "optimal", "finished", "stuck")}
+    columns = {one: getattr(counts, one).tolist() for one in (*counted, "optimal", "finished", "stuck")}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
     last = (counts.maturity - 1).tolist()
     found = [{"of": label, "trial": trial, **row} for trial, row in zip(span, rows, strict=True)]

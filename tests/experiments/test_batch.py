@@ -175,3 +175,22 @@ def test_standing_counts_no_trial_twice() -> None:
         if now.trials == 10:
             break
     assert now == Progress(10, tick, 60)
+
+
+def test_the_first_optimal_policy_is_noted_where_the_trial_goes_on() -> None:
+    """As the same trials count that end there."""
+    world, mine = world_of("unsafe-exploration", "island", ISLAND), keys(0, 4)
+    ended = raised(StopRule("optimal"), 4).counts
+    going_on = train_agents(
+        world, ISLAND, mine, StopRule("ticks", 60), max_ticks=60, note_optimal=True
+    ).counts
+    there = ended.ticks <= 60
+    assert bool(there.any())
+    assert bool((going_on.ticks == 60).all())
+    assert going_on.optimal_at.tolist() == torch.where(there, ended.ticks, 0).tolist()
+    assert going_on.optimal_deaths.tolist() == torch.where(there, ended.deaths, 0).tolist()
+    assert going_on.optimal_queries.tolist() == torch.where(there, ended.queries.sum(1), 0).tolist()
+
+
+def test_nobody_looks_for_an_optimal_policy_unasked() -> None:
+    assert not bool(raised(StopRule("ticks", 60), 4, 60).counts.optimal_at.any())
