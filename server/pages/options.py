@@ -52,6 +52,14 @@ OPTIONS = (
         "On answers that are hasty, contradict an earlier one or prefer a danger. Studies may want none.",
     ),
     Option(
+        "config.confirm",
+        "Asked again, to be sure",
+        "",
+        (("", "Never"), ("0.9", "Until it is 90 % sure"), ("0.95", "Until it is 95 % sure")),
+        "Against slips: before it moves, it asks again with the sides exchanged, at most five times. "
+        "It costs questions, and does not help against the same mistake made each time.",
+    ),
+    Option(
         "config.stages",
         "Stages (maximum clip length)",
         "",

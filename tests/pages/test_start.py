@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
+from pathlib import Path
 
 import httpx2
 import pytest
 
 from parenting.envs.registry import WORLDS
 from parenting.server.db import Database
-from parenting.server.new_run import NewRun, start
+from parenting.server.new_run import NewRun, plan, read_form, start
+from parenting.server.pages.options import OPTIONS, Option
 from parenting.server.pages.start import PAGE
 from parenting.server.queue.answers import answer
 from parenting.server.runs import get_run, let_go, list_runs, report_progress, set_goal, set_status
@@ -152,6 +155,17 @@ def test_the_settings_of_the_form_are_the_runs(client: httpx2.Client, db: Databa
     assert client.post("/runs", data={**FORM, **given}).status_code == 303
     second = get_run(db, 2)
     assert (second.config["inside"], second.config["pretrain"], second.weights) == ("left", False, None)
+
+
+@pytest.mark.parametrize("option", [one for one in OPTIONS if one.choices], ids=lambda one: one.field)
+def test_each_choice_of_a_setting_is_one_that_a_run_takes(option: Option, tmp_path: Path) -> None:
+    world = next(name for name in reversed(WORLDS) if option.needs in {"", *WORLDS[name].legend})
+    empty = plan(read_form({**FORM, "world": world, "level": ""}), tmp_path)
+    for value, name in option.choices:
+        taken = plan(read_form({**FORM, "world": world, "level": "", option.field: value}), tmp_path)
+        where = taken["config"] if option.field.startswith("config.") else taken
+        held = where[option.field.removeprefix("config.")]
+        assert json.dumps(held).strip('"') == value if value else taken == empty, name
 
 
 def test_a_size_without_weights_is_refused_beside_pre_training(client: httpx2.Client, db: Database) -> None:
