@@ -41,6 +41,8 @@ class Stream(IntEnum):
     SUPERVISED = 23  # [] : this episode is supervised if u < 0.5, where that is left to chance
     MAZE = 24  # random mazes and levels
     START = 25  # the cell of bare soil floor(n u) of n, where an experiment lets episodes begin anywhere
+    # parents who err (ours)
+    SLIP = 31  # [2] : a panel's member is wrong if u < its rate; then it names the left side if u < 0.5
     # the start: weights, one stream a layer from here on
     WEIGHTS = 64
 
