@@ -15,6 +15,8 @@ from parenting.drawing.sentences import mark, tr
 DIRECTIONS = (mark("up"), mark("down"), mark("left"), mark("right"))
 SIDES = (mark("Left"), mark("Right"))
 TITLES = {"guidance": mark("Which move is better here?"), "preference": mark("Which clip is better?")}
+TO_BE_SURE = mark("Asked again, to be sure: the two moves have changed places.")
+"""A sentence on a question that was answered before in the same pause."""
 DELUDED = mark("What is dashed is only what it believes to see.")
 CORNERED = mark("The box is stuck already.")
 WATCHED, UNWATCHED = mark("The supervisor is watching."), mark("Nobody is watching.")

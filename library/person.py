@@ -121,7 +121,7 @@ class TerminalParent(Parent):
         """
         if self._tick < self._given_until:
             return self._said_before(question)
-        print(f"\n{both_clips(question.kind, question.left, question.right)}")
+        print(f"\n{both_clips(question.kind, question.left, question.right, question.votes)}")
         self.asking = True
         try:
             while (said := input(PROMPT).strip().lower()) not in KEYS:

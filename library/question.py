@@ -97,6 +97,7 @@ class Question:
         stage: The stage T at which the clips were recorded (Sec. 2.4); 1 for guidance.
         trial: The number of the trial that asks.
         query: The same in tensors, N = 1.
+        votes: Guidance that is asked again, to be sure (`confirm`): the answers heard before; else 0.
     """
 
     kind: str
@@ -105,6 +106,7 @@ class Question:
     stage: int
     trial: int
     query: Query = field(compare=False)
+    votes: int = 0
 
     def drawing(self) -> Drawing:
         """Draw both clips; `show` does."""
@@ -112,7 +114,7 @@ class Question:
         clips = read_clips(query, query.world.legend)
         level = query.world.levels[int(query.level[0])]
         picture = draw_query(clips, level, self.kind, self.stage, query.world.spec)
-        return Drawing([picture], both_clips(self.kind, self.left, self.right))
+        return Drawing([picture], both_clips(self.kind, self.left, self.right, self.votes))
 
     def _repr_html_(self) -> str:
         return self.drawing()._repr_html_()
@@ -132,6 +134,7 @@ def question(query: Query, row: int, trial: int | None = None) -> Question:
         stage=int(one.maturity[0]),
         trial=row if trial is None else trial,
         query=one,
+        votes=int(one.votes[0]),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from parenting.drawing.query_view import TO_BE_SURE
 from parenting.library.clip import Clip
 
 WIDTH = 100
@@ -10,9 +11,12 @@ GAP = "   "
 ASKS = {"guidance": "Which move is better?", "preference": "Which clip is better?"}
 
 
-def both_clips(kind: str, left: Clip, right: Clip) -> str:
-    """Return a question as text: what it asks, then both clips, each from its first frame to its last."""
-    parts = [f"{kind}: {ASKS[kind]}"]
+def both_clips(kind: str, left: Clip, right: Clip, votes: int = 0) -> str:
+    """Return a question as text: what it asks, then both clips, each from its first frame to its last.
+
+    After `votes` answers it is asked again, and says so.
+    """
+    parts = [f"{kind}: {ASKS[kind]}", *([TO_BE_SURE] if votes else [])]
     for name, clip in (("left", left), ("right", right)):
         parts += [f"{name}: {clip}", frames(clip)]
     return "\n".join(parts)

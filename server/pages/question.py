@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from parenting.drawing.board import Board
 from parenting.drawing.candidates import with_margin
 from parenting.drawing.clip import Clip
-from parenting.drawing.query_view import QueryView, query_view
+from parenting.drawing.query_view import TO_BE_SURE, QueryView, query_view
 from parenting.drawing.sentences import tr
 from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import reading
@@ -46,6 +46,8 @@ class QuestionView(QueryView):
     around: tuple[str, ...] = ()  # the difference of the clips and the whole board, in sentences
     marks: tuple[str, str] = ("", "")  # the same for the same clip, left and right
     put_back: bool = False  # clips that somebody has skipped once
+    confirmed: bool = False  # guidance has to be confirmed, so an answer that was heard may not have moved
+    votes: int = 0  # answers heard on this pair of moves before, in the same pause
 
     @property
     def action(self) -> str:
@@ -73,9 +75,14 @@ class QuestionView(QueryView):
         return tr(PUT_BACK if self.put_back else LEADS[self.kind])
 
     @property
+    def repeat(self) -> str:
+        """A sentence where the question is asked again: it is never shown as a plain repeat."""
+        return tr(TO_BE_SURE) if self.votes else ""
+
+    @property
     def spoken(self) -> str:
         """The whole question as one text; the moves of one board have letters."""
-        return " ".join((self.asked, *self.around))
+        return " ".join(filter(None, (self.repeat, self.asked, *self.around)))
 
     @property
     def asked(self) -> str:
@@ -111,6 +118,8 @@ class QuestionView(QueryView):
             return tr(AGAIN["skipped"])
         if not self.former.heard:
             return tr(AGAIN["unheard"])
+        if self.kind == "guidance" and self.confirmed:
+            return tr(AGAIN["voted"])
         moved = self.kind == "guidance" and self.former.choice != "neither"
         return tr(AGAIN["moved" if moved else "heard"])
 
@@ -124,7 +133,8 @@ def question_view(query: Query, run: Run, former: Former | None = None) -> Quest
     with reading(query):
         one, guide = _is_on_one_board(query, run), run.words == "guide"
         described = describe(query.clips, query.kind, query.maturity, run.legend, _rows(run), one, guide)
-        described["put_back"] = query.put_back
+        described |= {"put_back": query.put_back, "votes": query.votes}
+        described["confirmed"] = bool(run.config.get("confirm"))
     return QuestionView(**described, id=query.public_id, run=run.public_id, former=former)
 
 

@@ -18,6 +18,9 @@ AGAIN = {
     "moved": mark(
         "The move has happened, and that stays. Another answer corrects what it learns from now on."
     ),
+    "voted": mark(
+        "Another answer corrects what the agent learns from now on. If it still waits, it moves by it, too."
+    ),
     "skipped": mark("If you can tell now, answer: the agent learns from it, and moves if it still waits."),
 }
 """Sentences on a question that its parent has answered, shown where the answer can be changed."""

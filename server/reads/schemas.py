@@ -10,6 +10,8 @@ from sqlalchemy import bindparam, func, select
 from sqlalchemy.orm import Session
 
 from parenting.agent.config import Config
+from parenting.drawing.query_view import TO_BE_SURE
+from parenting.drawing.sentences import tr
 from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import damage, readable, reading, sound
 from parenting.server.db import Database
@@ -125,6 +127,8 @@ def leased_schema(session: Session, query: Query) -> LeasedSchema:
     world, parent, run_public_id, guide = _shown_run(session, query.run_id)
     with reading(query):
         sentences = surroundings(query.clips, world.legend, guide=guide)
+        if query.votes:
+            sentences = (tr(TO_BE_SURE), *sentences)
     now = session.execute(_PROGRESS, {"run_id": query.run_id}).one()
     return LeasedSchema(
         **_query_fields(query, stated(now.database), run_public_id),
