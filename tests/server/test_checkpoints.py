@@ -13,6 +13,7 @@ from typing import NamedTuple
 import pytest
 import torch
 
+from parenting.agent.confirmation import unsettled
 from parenting.agent.query import Choice, Query
 from parenting.agent.state import RENAMED
 from parenting.server.db import Database
@@ -44,6 +45,8 @@ NEAR = """\
 BUTTON = Begun("interruptibility", NEAR, CONFIG)
 """Both begin pre-trained; in the first a box moves, in the second the ground changes and chance is drawn."""
 
+CONFIRMED = Begun("unsafe-exploration", "island", {**CONFIG, "confirm": 0.95})
+
 SKIPPED = "a pair set aside"
 """The moment of a life whose parent cannot always tell."""
 
@@ -53,6 +56,7 @@ MOMENTS: dict[str, tuple[Begun, Came]] = {
     SKIPPED: (ISLAND, lambda run: skips_on(run)),
     "no acceptable action": (ISLAND, lambda run: bool(run.saved.state.all_refused)),
     "mid-clip": (ISLAND, lambda run: mid_clip(run)),
+    "a pair that is asked again": (CONFIRMED, lambda run: asked_again(run)),
     "an episode's end": (ISLAND, lambda run: bool(run.saved.state.world.terminated)),
     "a truncation": (ISLAND, lambda run: bool(run.world.truncated(run.saved.state.world))),
     "a step of pre-training owed": (BOX, lambda run: bool(run.saved.state.rehearsal.owed) and mid_clip(run)),
@@ -60,6 +64,12 @@ MOMENTS: dict[str, tuple[Begun, Came]] = {
     "mid-clip, the button pressed": (BUTTON, lambda run: mid_clip(run) and pressed(run)),
     "held by the interruption": (BUTTON, lambda run: bool(run.world.frozen(run.saved.state.world))),
 }
+
+
+def asked_again(run: Inline) -> bool:
+    """A repeat was overruled before, and the greater action of the pair stood left."""
+    kept = run.saved.state.confirmation
+    return bool((kept.dissents > 0) & (kept.mirrored & unsettled(run.saved.state)).any(1))
 
 
 def mid_clip(run: Inline) -> bool:
@@ -147,16 +157,15 @@ def pieces() -> list[str]:
         born = begun.initial_snapshot()
         names |= {f"state/{name}": None for name in born.state.tensors() if not name.startswith(INFO)}
         names |= {f"tally/{name}": None for name in born.tally.tensors()}
-    return list(names)
+    return [name for name in names if name != OF_CORRECTIONS]
 
 
+OF_CORRECTIONS = "state/confirmation.began"
+"""They alone read it: tests/server/test_second_thoughts.py."""
 CONSTANT = {
     "state/keys.seed",  # drawn once; the test puts another seed in its place
     "state/world.level",  # one level
     "state/recorder.ring.level",
-    *(
-        f"state/confirmation.{name}" for name in ("votes", "mirrored", "began", "repeats", "dissents")
-    ),  # `confirm` is off
 }
 
 
