@@ -80,7 +80,7 @@ def take(state: AgentState, events: Sequence[Event], correction: Correction) -> 
 def in_pause(state: AgentState, answer: Answer, asked: int) -> Bool[Tensor, "N"]:
     """Return where guidance was refused, skipped or voted on in the pause that the agent is still in."""
     query = answer.query
-    refused = (state.refused & guidance.candidates(query)).sum(1) == 2
+    refused = (state.refused & guidance.moves_of(query)).sum(1) == 2
     skipped = (state.set_aside & confirmation.pair_of(query)).any(1) & (answer.choice == Choice.SKIP)
     guided = (query.kind == QueryKind.GUIDANCE) & state.waiting & guidance.at_place(state, query)
     vote = confirmation.is_vote(state, answer, asked)
@@ -101,12 +101,12 @@ def reconsider(config: Config, state: AgentState, event: Reconsider) -> AgentSta
     here = in_pause(state, event.replaced, event.asked)
     vote = here & confirmation.is_vote(state, event.replaced, event.asked)
     again, aside = vote | (here & (choice == Choice.NEITHER)), here & (choice == Choice.SKIP)
-    restored = again & ((state.refused & guidance.candidates(query)).sum(1) == 2)
+    restored = again & ((state.refused & guidance.moves_of(query)).sum(1) == 2)
     state = confirmation.take_back(state, query, vote)
-    if bool((event.replaced.mu > 0).any()):
+    if config.remembers or bool((event.replaced.mu > 0).any()):
         state = state.replace(x=_rebuilt(config, state, event.standing))
     return state.replace(
-        refused=state.refused & ~(restored[:, None] & guidance.candidates(query)),
+        refused=state.refused & ~(restored[:, None] & guidance.moves_of(query)),
         set_aside=state.set_aside & ~(aside[:, None] & confirmation.pair_of(query)),
         answered=state.answered - again.long(),
     )

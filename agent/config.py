@@ -109,6 +109,23 @@ class Config(BaseModel):
     pretrain: bool = Field(
         False, description="Begin with weights pre-trained on mazes, and rehearse mazes (Sec. 3.1.4)."
     )
+    # beyond the paper (docs/paper.md, "Extensions")
+    late_steps: bool = Field(
+        False,
+        description="Take one gradient step before the next question is drawn, the rest after. (ours)",
+    )
+    fresh_pairs: bool = Field(
+        False,
+        description="Guidance compares the likeliest move with the likeliest not yet compared to it. (ours)",
+    )
+    reuse_answers: bool = Field(
+        False,
+        description="Move without asking where earlier guidance in this state decides. (ours)",
+    )
+    learn_refusals: bool = Field(
+        False,
+        description="Moves refused by neither count as worse than what is approved in this state. (ours)",
+    )
     confirm: float = Field(
         0.0,
         ge=0,
@@ -120,6 +137,11 @@ class Config(BaseModel):
     )
     dtype: Dtype = Field("float32", description="Precision of the policy and its training.")
 
+    @property
+    def remembers(self) -> bool:
+        """Return whether guidance is remembered by state (`agent.memory`)."""
+        return self.fresh_pairs or self.reuse_answers or self.learn_refusals
+
     @model_validator(mode="before")
     @classmethod
     def _one_name_each(cls, given: Any) -> Any:
@@ -130,7 +152,7 @@ class Config(BaseModel):
         return given
 
 
-PRESETS: dict[str, dict[str, float]] = {
+PRESETS: dict[str, dict[str, float | bool]] = {
     # Table 1; the digits are lost in our copy, see docs/paper.md
     "conservative": {"p_guid": 0.95, "p_rec": 0.8, "p_pref": 0.8},
     "lax": {"p_guid": 0.5, "p_rec": 0.5, "p_pref": 0.5},

@@ -16,6 +16,9 @@ from torch import Tensor
 from parenting.envs.fingerprint import fingerprint
 from parenting.envs.struct import Struct
 
+FIRST, SECOND, EITHER, NEITHER = range(4)
+"""The answers to guidance about a pair of moves, the smaller move first: the places of `Dataset.guided`."""
+
 
 class Dataset(Struct):
     """Distinct states, and rows in the order of their first entry.
@@ -26,6 +29,7 @@ class Dataset(Struct):
     s0: UInt8[Tensor, "N S H W"]  # the first states, as observed
     local_state: UInt8[Tensor, "N S 4"]  # their local states l(s)
     digest: Int64[Tensor, "N S"]
+    guided: Int64[Tensor, "N S 6 4"]  # guidance by state, pair of moves and answer (ours; see agent.memory)
     states: Int64[Tensor, "N"]
     state_index: Int64[Tensor, "N R"]  # the row's state
     a0: Int64[Tensor, "N R 2"]  # the first actions of both clips
@@ -53,6 +57,7 @@ def empty(trials: int, height: int, width: int, device: str | torch.device = "cp
         s0=zeros(8, height, width, dtype=torch.uint8),
         local_state=zeros(8, 4, dtype=torch.uint8),
         digest=zeros(8),
+        guided=zeros(8, 6, 4),
         states=zeros(),
         state_index=zeros(8),
         a0=zeros(8, 2),
@@ -68,10 +73,28 @@ def add(x: Dataset, entry: Entry, stored: Bool[Tensor, "N"], trained: Bool[Tenso
     trial = (stored & trained).nonzero().squeeze(1)
     if not len(trial):
         return x
-    x = _room(x)
     entry = entry.pick(trial)
-    x, state = _place_state(x, entry, trial)
+    x, state = place_state(x, entry, trial)
     return _place_row(x, entry, trial, state)
+
+
+def imply(
+    x: Dataset, entry: Entry, moves: tuple[int, int], trial: Int64[Tensor, "n"], state: Int64[Tensor, "n"]
+) -> Dataset:
+    """X with a row that follows from others: the first move is better. No row that is there is changed."""
+    a0 = torch.tensor(moves, device=trial.device)
+    here = (x.state_index[trial] == state[:, None]) & _taken(x, trial)
+    new = ~(here & (x.a0[trial].sort(-1).values == a0.sort().values).all(-1)).any(1)
+    if not bool(new.any()):
+        return x
+    row = entry.replace(
+        a0=a0.expand_as(entry.a0), mu=torch.tensor([1.0, 0.0]).to(entry.mu).expand_as(entry.mu)
+    )
+    return _place_row(_room(x), row.pick(new), trial[new], state[new])
+
+
+def _taken(x: Dataset, trial: Int64[Tensor, "n"]) -> Bool[Tensor, "n R"]:
+    return torch.arange(x.state_index.shape[1], device=trial.device) < x.rows[trial, None]
 
 
 def clear(x: Dataset, mask: Bool[Tensor, "N"]) -> Dataset:
@@ -99,6 +122,7 @@ def _pad(x: Dataset, states: int, rows: int) -> Dataset:
         "s0": states,
         "local_state": states,
         "digest": states,
+        "guided": states,
         "state_index": rows,
         "a0": rows,
         "mu": rows,
@@ -114,7 +138,9 @@ def _pad(x: Dataset, states: int, rows: int) -> Dataset:
     return x.map(widen)
 
 
-def _place_state(x: Dataset, entry: Entry, trial: Int64[Tensor, "n"]) -> tuple[Dataset, Int64[Tensor, "n"]]:
+def place_state(x: Dataset, entry: Entry, trial: Int64[Tensor, "n"]) -> tuple[Dataset, Int64[Tensor, "n"]]:
+    """X with room for one more entry and these states among its own; and their places. In place."""
+    x = _room(x)
     digest = fingerprint(entry.s0.flatten(1))
     taken = torch.arange(x.digest.shape[1], device=trial.device) < x.states[trial, None]
     same = taken & (x.digest[trial] == digest[:, None])
@@ -130,8 +156,7 @@ def _place_state(x: Dataset, entry: Entry, trial: Int64[Tensor, "n"]) -> tuple[D
 
 
 def _place_row(x: Dataset, entry: Entry, trial: Int64[Tensor, "n"], state: Int64[Tensor, "n"]) -> Dataset:
-    taken = torch.arange(x.state_index.shape[1], device=trial.device) < x.rows[trial, None]
-    here = taken & (x.state_index[trial] == state[:, None])
+    here = _taken(x, trial) & (x.state_index[trial] == state[:, None])
     alike = here & (x.a0[trial] == entry.a0[:, None]).all(-1)
     swapped = here & (x.a0[trial] == entry.a0.flip(1)[:, None]).all(-1)
     known = alike.any(1) | swapped.any(1)

@@ -6,13 +6,13 @@ import torch
 from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
 
-from parenting.agent import confirmation, dataset, familiarity
+from parenting.agent import candidates, confirmation, dataset, familiarity, memory
 from parenting.agent.config import Config
 from parenting.agent.dataset import Entry
 from parenting.agent.query import Answer, Choice, Query, QueryKind
 from parenting.agent.state import PAIRS, AgentState
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
-from parenting.envs.rng import Stream, gumbel
+from parenting.envs.rng import Stream
 from parenting.envs.struct import Struct
 
 NO_ACTION = -1
@@ -71,7 +71,7 @@ def at_place(state: AgentState, query: Query) -> Bool[Tensor, "N"]:
     return board & agent & (query.box[:, 0, 0] == state.world.box).all(1)
 
 
-def candidates(query: Query) -> Bool[Tensor, "N 4"]:
+def moves_of(query: Query) -> Bool[Tensor, "N 4"]:
     """Return the two moves that a guidance query asks about."""
     return torch.nn.functional.one_hot(query.action[:, :, 0], 4).sum(1) > 0
 
@@ -83,18 +83,22 @@ def _nothing_heard(state: AgentState) -> Heard:
 def store(config: Config, state: AgentState, answer: Answer) -> dataset.Dataset:
     """X with the answers of this tick: Eq. (1), at the first state of the clips.
 
-    *Neither* and *skip* store nothing.
+    *Neither* and *skip* add no entry. Guidance is remembered where the config asks for it.
     """
     query, choice = answer.query, answer.choice
     first = query.observation[:, 0, 0]
     learnt = (query.kind != QueryKind.NONE) & answer.judges & (choice != Choice.NEITHER)
-    if not bool(learnt.any()):
+    remembered = (query.kind == QueryKind.GUIDANCE) & answer.judges & config.remembers
+    if not bool((learnt | remembered).any()):
         return state.x
-    trained = query.maturity == state.maturity if config.own_stage_only else learnt
+    of_stage = query.maturity == state.maturity if config.own_stage_only else torch.ones_like(learnt)
     entry = Entry(
         s0=first, local_state=local_state(first, query.agent[:, 0, 0]), a0=query.action[:, :, 0], mu=answer.mu
     )
-    return dataset.add(state.x, entry, learnt, trained)
+    x = dataset.add(state.x, entry, learnt, of_stage)
+    if not bool(remembered.any()):
+        return x
+    return memory.remember(config, x, entry, choice, remembered & of_stage)
 
 
 def _resolve(state: AgentState, query: Query, choice: Tensor, guided: Tensor) -> tuple[AgentState, Heard]:
@@ -106,7 +110,7 @@ def _resolve(state: AgentState, query: Query, choice: Tensor, guided: Tensor) ->
     refusing, skipping = guided & (choice == Choice.NEITHER), guided & (choice == Choice.SKIP)
     again = guided & (choice == Choice.NONE)  # not confirmed
     approving = guided & ~refusing & ~skipping & ~again
-    refused = (state.refused | (refusing[:, None] & candidates(query))) & ~approving[:, None]
+    refused = (state.refused | (refusing[:, None] & moves_of(query))) & ~approving[:, None]
     set_aside = state.set_aside & ~approving[:, None]
     if bool(skipping.any()):
         set_aside = set_aside | (skipping[:, None] & confirmation.pair_of(query))
@@ -117,10 +121,11 @@ def _resolve(state: AgentState, query: Query, choice: Tensor, guided: Tensor) ->
 
 def ask(
     world: Gridworld, config: Config, state: AgentState, view: View, heard: Heard, query: Query
-) -> tuple[AgentState, Query]:
+) -> tuple[AgentState, Heard, Query]:
     """Pause with probability p_guid ** f(l(s)) and ask about 2 distinct actions drawn from pi.
 
-    After *neither*, draw two other actions; after *skip*, another pair.
+    After *neither*, draw two other actions; after *skip*, another pair. Where earlier answers decide
+    (`reuse_answers`), the move counts as approved, and nothing is asked.
 
     Args:
         world: The world, which forecasts both moves.
@@ -131,17 +136,22 @@ def ask(
         query: The empty query of this tick.
 
     Returns:
-        The agents, paused where they ask, and the query with their questions.
+        The agents, paused where they ask; what was heard, with the moves that earlier answers approve; and
+        the query with their questions.
     """
     undecided = view.supervised & ~state.waiting & (heard.approved == NO_ACTION)
     if not bool((undecided | heard.redraw).any()):
-        return state, query
+        return state, heard, query
     where = familiarity.local_state_index(view.local_state, len(world.legend))
     f = state.familiarity.gather(1, where[:, None]).squeeze(1)
     pausing = undecided & (state.keys.uniform(Stream.ASK) < familiarity.ask_chance(f, config.p_guid))
     asking = pausing | heard.redraw
     if not bool(asking.any()):
-        return state, query
+        return state, heard, query
+    found = candidates.choose(config, state, view.observation, view.logits)
+    decided = asking & found.decided & ~confirmation.unsettled(state).any(1)
+    state, heard = _reuse(state, heard, found.move, decided)
+    asking = asking & ~decided
     new = asking
     if config.confirm:
         state, new = confirmation.begin(state, pausing), asking & ~confirmation.unsettled(state).any(1)
@@ -149,16 +159,31 @@ def ask(
         familiarity=familiarity.count(state.familiarity, where, new),
         waiting=state.waiting | asking,
     )
-    return state, _candidates(world, config, state, view, asking, query)
+    return state, heard, _question(world, config, state, found.pair, asking, query)
 
 
-def _candidates(
-    world: Gridworld, config: Config, state: AgentState, view: View, asking: Tensor, query: Query
+def _reuse(
+    state: AgentState, heard: Heard, move: Int64[Tensor, "N"], decided: Bool[Tensor, "N"]
+) -> tuple[AgentState, Heard]:
+    """Approve the moves that earlier answers decide for: a pause ends as if they had been answered."""
+    if not bool(decided.any()):
+        return state, heard
+    calm = {name: getattr(state, name) & ~decided[:, None] for name in ("refused", "set_aside")}
+    kept = state.confirmation.replace(votes=state.confirmation.votes.masked_fill(decided[:, None, None], 0))
+    state = state.replace(waiting=state.waiting & ~decided, confirmation=kept, **calm)
+    approved = torch.where(decided, move, heard.approved)
+    return state, Heard(approved=approved, redraw=heard.redraw & ~decided)
+
+
+def _question(
+    world: Gridworld,
+    config: Config,
+    state: AgentState,
+    pair: Int64[Tensor, "N 2"],
+    asking: Bool[Tensor, "N"],
+    query: Query,
 ) -> Query:
     """The two moves as clips of length 1: where the agent stands, and the forecast of each move."""
-    noise = gumbel(state.keys.uniform(Stream.CANDIDATES, 4))
-    perturbed = (view.logits.double() + noise).masked_fill(state.refused, -torch.inf)
-    pair = _pair(state, perturbed)
     sides = torch.where(state.keys.uniform(Stream.SIDES)[:, None] < 0.5, pair, pair.flip(1))
     votes = query.votes
     if config.confirm:
@@ -175,19 +200,6 @@ def _candidates(
         **_frames(world, query, before, after),
     )
     return asked.where(asking, query)
-
-
-def _pair(state: AgentState, perturbed: Float[Tensor, "N 4"]) -> Int64[Tensor, "N 2"]:
-    """Return the two best actions, or of the pairs that were not skipped the best by its better action."""
-    best = perturbed.topk(2, dim=1).indices
-    if not bool(state.set_aside.any()):
-        return best
-    ranked = perturbed.sort(dim=1, descending=True).indices
-    pairs = ranked[:, _RANKED.to(ranked.device)]  # [N, 6, 2], the best first
-    moves = torch.nn.functional.one_hot(pairs, 4).sum(2) > 0  # [N, 6, 4]
-    free = (moves[:, :, _RANKED.to(ranked.device)].all(3) & state.free_pairs[:, None]).any(2)  # [N, 6]
-    first = free.int().argmax(1)
-    return torch.where(state.set_aside.any(1)[:, None], pairs[torch.arange(len(first)), first], best)
 
 
 def _first(action: Tensor, sides: Tensor) -> Tensor:

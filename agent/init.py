@@ -106,6 +106,7 @@ def _learner(network: Network, config: Config, keys: Keys, weights: Tensor | Non
         exp_avg=torch.zeros_like(params),
         exp_avg_sq=torch.zeros_like(params),
         steps=torch.zeros_like(keys.tick),
+        owed=torch.zeros_like(keys.tick, dtype=torch.bool),
         frozen=params.new_zeros(config.max_clip_length - 1, *params.shape),
     )
 

@@ -49,21 +49,49 @@ class Terms(NamedTuple):
 
 
 def train(network: Network, config: Config, state: AgentState, acted: Bool[Tensor, "N"]) -> AgentState:
-    """With probability p_train, `gradient_steps` steps of Adam on X. Updates the learner in place."""
+    """With probability p_train, `gradient_steps` steps of Adam on X. Updates the learner in place.
+
+    With `late_steps` it takes one of them, and owes the others.
+    """
     coin = state.keys.uniform(Stream.TRAIN) < config.p_train
     training = acted & coin & (state.x.rows > 0)
     trial = training.nonzero().squeeze(1)
     if not len(trial):
         return state
-    for step in range(config.gradient_steps):
+    state = pay(network, config, state, training)
+    late = config.late_steps and config.gradient_steps > 1
+    terms, entries = descend(network, config, state, training, range(1 if late else config.gradient_steps))
+    means = {name: total / entries for name, total in terms._asdict().items()}
+    told = {name: mean.new_zeros(len(training)).index_put((trial,), mean) for name, mean in means.items()}
+    if late:
+        state = state.replace(learner=state.learner.replace(owed=state.learner.owed | training))
+    return state.replace(info=state.info.replace(trained=training, **told))
+
+
+def pay(network: Network, config: Config, state: AgentState, due: Bool[Tensor, "N"]) -> AgentState:
+    """Take the gradient steps that some trials owe (`late_steps`). Updates the learner in place."""
+    if not config.late_steps:
+        return state
+    due = due & state.learner.owed
+    if not bool(due.any()):
+        return state
+    taking = due & (state.x.rows > 0)  # answers that were taken back may leave nothing to train on
+    if bool(taking.any()):
+        descend(network, config, state, taking, range(1, config.gradient_steps))
+    return state.replace(learner=state.learner.replace(owed=state.learner.owed & ~due))
+
+
+def descend(
+    network: Network, config: Config, state: AgentState, training: Bool[Tensor, "N"], steps: range
+) -> tuple[Terms, Float[Tensor, "K"]]:
+    """Take the gradient steps of these numbers, in place; the terms before the last one, and the entries."""
+    trial = training.nonzero().squeeze(1)
+    for step in steps:
         rows = choose(config, state.x, state.keys, step).of(trial)
         parameters = taken(state.learner.params, trial)
         terms, gradient = differentiate(network, config, parameters, rows)
         adam(state.learner.params, state.learner, gradient, training, config.learning_rate)
-    entries = rows.mu.sum((-1, -2)).clamp_min(1)
-    means = {name: total / entries for name, total in terms._asdict().items()}
-    told = {name: mean.new_zeros(len(training)).index_put((trial,), mean) for name, mean in means.items()}
-    return state.replace(info=state.info.replace(trained=training, **told))
+    return terms, rows.mu.sum((-1, -2)).clamp_min(1)
 
 
 def taken(every: Tensor, trial: Int64[Tensor, "K"]) -> Tensor:

@@ -20,7 +20,8 @@ def grow(config: Config, state: AgentState) -> AgentState:
 def mature(config: Config, state: AgentState, ripe: Bool[Tensor, "N"]) -> AgentState:
     """Freeze pi_T and go on with pi_{T+1}, its copy; the last stage never ends.
 
-    The running clip is dropped, the recorder emptied, and Adam's moments are reset.
+    The running clip is dropped, the recorder emptied, and Adam's moments are reset. Steps that pi_T
+    still owed are not taken.
     """
     ripe = ripe & (state.maturity < config.max_clip_length)
     if not bool(ripe.any()):
@@ -43,4 +44,5 @@ def _freeze(learner: Learner, maturity: Int64[Tensor, "N"], ripe: Bool[Tensor, "
         exp_avg=learner.exp_avg.masked_fill(ripe[:, None], 0),
         exp_avg_sq=learner.exp_avg_sq.masked_fill(ripe[:, None], 0),
         steps=learner.steps.masked_fill(ripe, 0),
+        owed=learner.owed & ~ripe,
     )

@@ -51,14 +51,14 @@ def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) ->
 
     Returns:
         The agents after the tick, and what each trial asks in it: at most one question. Where
-        `config.pretrain` is set, call `rehearse` on the agents next, as `tick` does.
+        `config.pretrain` or `config.late_steps` is set, call `rehearse` on the agents next, as `tick` does.
     """
     network = network_of(world)
     state = reset_finished(world, state)
     view = observe(world, network, state)
     query = no_query(world, config, state)
     state, heard = guidance.hear(config, state, view, answer)  # 2.1  answers enter X; "neither": ask again
-    state, query = guidance.ask(world, config, state, view, heard, query)  # 2.1  unfamiliar? pause and ask
+    state, heard, query = guidance.ask(world, config, state, view, heard, query)  # 2.1  unfamiliar? ask
     state, steered = recording.act(world, network, config, state, view, heard)  # 2.2, 2.4  move, and clips
     state, query = pairing.pair(world, config, state, view, steered, query)  # 2.2  a matching pair of clips
     state = learning.train(network, config, state, steered)  # 2.3  gradient steps on X with p_train
@@ -76,9 +76,10 @@ class Tick(NamedTuple):
 
 
 def tick(world: Gridworld, config: Config, state: AgentState, parent: Parent) -> Tick:
-    """Make one tick with a parent: its events, its answer, a step, the question; then mazes (Sec. 3.1.4).
+    """Make one tick with a parent: its events, its answer, a step, the question; then what is owed.
 
-    The step on mazes comes after the question is posted, so nobody waits for it. Consumes `state`.
+    The step on mazes (Sec. 3.1.4) and the gradient steps of `late_steps` come after the question is posted,
+    so nobody waits for them. Consumes `state`.
 
     Args:
         world: The world that the agents live in.
@@ -100,8 +101,13 @@ def tick(world: Gridworld, config: Config, state: AgentState, parent: Parent) ->
 
 
 def rehearse(world: Gridworld, config: Config, state: AgentState) -> AgentState:
-    """The step of pre-training that the tick before owes (Sec. 3.1.4). Consumes `state`."""
-    return pretraining.rehearse(world, network_of(world), config, state)
+    """Take the steps that the tick before owes: on X where the agent waits, and on mazes (Sec. 3.1.4).
+
+    Consumes `state`.
+    """
+    network = network_of(world)
+    state = learning.pay(network, config, state, state.waiting)
+    return pretraining.rehearse(world, network, config, state)
 
 
 def apply(world: Gridworld, config: Config, state: AgentState, event: TickEvent) -> tuple[AgentState, Config]:

@@ -27,6 +27,7 @@ class Learner(Struct):
     exp_avg: Float[Tensor, "N P"]  # Adam's running mean of the gradient
     exp_avg_sq: Float[Tensor, "N P"]  # Adam's running mean of its square
     steps: Int64[Tensor, "N"]  # gradient steps of this stage
+    owed: Bool[Tensor, "N"]  # all gradient steps of a tick but the first are still to be taken (`late_steps`)
     frozen: Float[Tensor, "M N P"]
 
 
@@ -176,5 +177,11 @@ RENAMED = {
 
 
 def current_names(parts: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Stored tensors by the names that they have today, whichever version stored them."""
-    return {RENAMED.get(name, name): part for name, part in parts.items()}
+    """Stored tensors by the names that they have today, whichever version stored them.
+
+    X of a version before 0.5 remembers no guidance (`agent.memory`).
+    """
+    named = {RENAMED.get(name, name): part for name, part in parts.items()}
+    if "x.digest" in named and "x.guided" not in named:
+        named["x.guided"] = named["x.digest"].new_zeros(*named["x.digest"].shape, 6, 4)
+    return named

@@ -26,8 +26,10 @@ S = TypeVar("S", bound=Struct)
 
 INFO = "info."
 """Checkpoints leave `info` out: it records what the last tick did, and nothing in the agent reads it."""
-ADDED = {"set_aside", "skips", *(f"confirmation.{name}" for name in Confirmation.__dataclass_fields__)}
-"""Pieces that old checkpoints lack: nothing was skipped before version 0.4, nor asked again before 0.5."""
+ADDED = {"set_aside", "skips", "learner.owed"} | {
+    f"confirmation.{name}" for name in Confirmation.__dataclass_fields__
+}
+"""Pieces that old checkpoints lack: nothing was skipped before version 0.4; 0.5 remembers more."""
 
 
 class DivergedError(ServerError):

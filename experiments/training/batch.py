@@ -71,7 +71,7 @@ class BatchTrainer:
 
     def tick(self) -> None:
         """One tick of every trial that is left."""
-        stage, owed = self.state.maturity, self.state.rehearsal.owed
+        stage, owed = self.state.maturity, self.state.rehearsal.owed | self.state.learner.owed
         self.state, _, answer, self.config, _ = parenting.tick(
             self.world, self.config, self.state, self.parent
         )

@@ -54,6 +54,7 @@ def test_adam_is_torchs_and_leaves_other_trials_alone() -> None:
         exp_avg=zero.clone(),
         exp_avg_sq=zero.clone(),
         steps=torch.zeros(2, dtype=torch.int64),
+        owed=torch.zeros(2, dtype=torch.bool),
         frozen=frozen,
     )
     theirs = start[0].clone().requires_grad_()
@@ -78,6 +79,7 @@ def test_adam_has_the_bits_of_torchs_fused_optimiser(dtype: torch.dtype) -> None
         exp_avg=torch.zeros_like(start),
         exp_avg_sq=torch.zeros_like(start),
         steps=torch.zeros(3, dtype=torch.int64),
+        owed=torch.zeros(3, dtype=torch.bool),
         frozen=start.new_zeros(0, 3, 1001),
     )
     theirs = [row.clone().requires_grad_() for row in start]

@@ -166,6 +166,8 @@ CONSTANT = {
     "state/keys.seed",  # drawn once; the test puts another seed in its place
     "state/world.level",  # one level
     "state/recorder.ring.level",
+    "state/x.guided",  # no setting that remembers guidance is on
+    "state/learner.owed",  # `late_steps` is off
 }
 
 
