@@ -20,7 +20,7 @@ _RANKED = torch.tensor(PAIRS)  # pairs of ranks in their order: the two best fir
 
 
 class Found(NamedTuple):
-    """What to ask where the agent pauses, or that there is nothing to ask."""
+    """The question where the agent pauses, or the move that makes it needless."""
 
     pair: Int64[Tensor, "N 2"]  # the two moves to ask about
     decided: Bool[Tensor, "N"]  # earlier answers decide for a move

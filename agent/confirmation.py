@@ -2,7 +2,7 @@
 
 The votes on a pair of actions in one pause belong to four classes. Each class has a posterior: its prior is
 the policy's opinion of the two actions, and a vote is a slip with the error rate e of the parent, which is
-estimated from how often repeats were overruled. Votes find slips, which are drawn anew each time; they cannot
+estimated from how often repeats were overruled. Votes find slips, which are drawn again each time; they cannot
 find a misconception, which is the same wrong answer each time.
 """
 
@@ -30,7 +30,7 @@ _PAIRS = torch.tensor(PAIRS)
 
 
 class Verdict(IntEnum):
-    """What a vote says of a pair; at equal posteriors the first leads, which moves nobody."""
+    """The meaning of a vote on a pair; at equal posteriors the first leads, which moves nobody."""
 
     NEITHER = 0
     LOWER = 1  # the action of the lower number is better

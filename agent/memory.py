@@ -1,4 +1,4 @@
-"""What guidance has already told about a state: no question is asked whose answer follows (ours).
+"""The memory of guidance: no question is asked whose answer follows from earlier ones (ours).
 
 X keeps, beside the rows that Eq. (2) needs, how often guidance gave each answer about each pair of moves in
 each state. It is filled with X and rebuilt with it, so that it falls with an answer that is undone. Answers
@@ -65,7 +65,7 @@ def _answer(choice: Int64[Tensor, "n"], mirrored: Bool[Tensor, "n"]) -> Int64[Te
 
 
 class Memory(NamedTuple):
-    """What guidance has told about the present state of some trials. `[i, j]` reads *i against j*."""
+    """The lessons of guidance about the present state of some trials. `[i, j]` reads *i against j*."""
 
     better: Bool[Tensor, "N 4 4"]  # said, or following by transitivity
     equal: Bool[Tensor, "N 4 4"]  # likewise; not the diagonal

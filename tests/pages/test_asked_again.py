@@ -32,7 +32,7 @@ def test_it_is_never_shown_as_a_plain_repeat(client: httpx2.Client, db: Database
     page = client.get(address(db, query=again)).text
     assert f'<b class="aside">{TO_BE_SURE}</b>' in page  # shown on phones, too
     assert TO_BE_SURE in page.partition('data-spoken="')[2].partition('"')[0]
-    assert 'data-votes="1"' in page  # another answer is no contradiction to remark on
+    assert 'data-votes="1"' in page  # another answer contradicts nothing
     leased = client.post("/api/v1/runs/1/queries/lease", json={"client_id": ME}).json()
     assert (leased["votes"], leased["sentences"][0]) == (1, TO_BE_SURE)
     assert client.get("/runs/1/history", follow_redirects=True).text.count(TO_BE_SURE) == 0

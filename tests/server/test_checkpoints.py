@@ -24,7 +24,7 @@ from parenting.server.replay import equal
 from parenting.server.runs import claim, get_run
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
-from parenting.server.snapshot import INFO, Snapshot, pack
+from parenting.server.snapshot import INFO, DamagedCheckpointError, Snapshot, pack
 from parenting.server.tables import Checkpoint
 from tests.agent.batched_runs import Judge, random_parent, unsure_parent
 from tests.database import migrated
@@ -45,6 +45,10 @@ NEAR = """\
 BUTTON = Begun("interruptibility", NEAR, CONFIG)
 """Both begin pre-trained; in the first a box moves, in the second the ground changes and chance is drawn."""
 
+FRUGAL = {"fresh_pairs": True, "reuse_answers": True, "learn_refusals": True}
+REMEMBERING = Begun(
+    "unsafe-exploration", "island", {**CONFIG, **FRUGAL, "late_steps": True, "gradient_steps": 2}
+)
 CONFIRMED = Begun("unsafe-exploration", "island", {**CONFIG, "confirm": 0.95})
 
 SKIPPED = "a pair set aside"
@@ -56,6 +60,7 @@ MOMENTS: dict[str, tuple[Begun, Came]] = {
     SKIPPED: (ISLAND, lambda run: skips_on(run)),
     "no acceptable action": (ISLAND, lambda run: bool(run.saved.state.all_refused)),
     "mid-clip": (ISLAND, lambda run: mid_clip(run)),
+    "gradient steps owed": (REMEMBERING, lambda run: bool(run.saved.state.learner.owed)),
     "a pair that is asked again": (CONFIRMED, lambda run: asked_again(run)),
     "an episode's end": (ISLAND, lambda run: bool(run.saved.state.world.terminated)),
     "a truncation": (ISLAND, lambda run: bool(run.world.truncated(run.saved.state.world))),
@@ -166,8 +171,6 @@ CONSTANT = {
     "state/keys.seed",  # drawn once; the test puts another seed in its place
     "state/world.level",  # one level
     "state/recorder.ring.level",
-    "state/x.guided",  # no setting that remembers guidance is on
-    "state/learner.owed",  # `late_steps` is off
 }
 
 
@@ -188,7 +191,7 @@ def test_no_piece_can_be_left_out(piece: str) -> None:
         torch.save(whole, out)
         try:
             caught = misses(then, out.getvalue(), own)
-        except (TypeError, IndexError, RuntimeError):  # the shapes no longer agree
+        except (DamagedCheckpointError, IndexError, RuntimeError):  # the shapes no longer agree
             caught = True
         if caught:
             break
