@@ -2,8 +2,8 @@
 
 The votes on a pair of actions in one pause belong to four classes. Each class has a posterior: its prior is
 the policy's opinion of the two actions, and a vote is a slip with the error rate e of the parent, which is
-estimated from how often repeats were overruled. Votes find slips, which are drawn again each time; they cannot
-find a misconception, which is the same wrong answer each time.
+estimated from how often repeats were overruled. Votes find slips, which are drawn again each time; they
+cannot find a misconception, which is the same wrong answer each time.
 """
 
 from __future__ import annotations
