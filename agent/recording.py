@@ -52,14 +52,14 @@ def act(
 def _begin(
     config: Config, world: Gridworld, state: AgentState, view: View, heard: Heard
 ) -> tuple[Recorder, Int64[Tensor, "N"]]:
-    """Drop clips that a pause or an absence broke, and begin new ones.
+    """Drop clips that a pause, an approved move or an absence broke, and begin new ones.
 
     The result holds the first actions of the clips that begin.
     """
     recorder, keys = state.recorder, state.keys
-    free = view.supervised & ~state.waiting
+    free = view.supervised & ~state.waiting & (heard.approved == NO_ACTION)
     running = recorder.running & free
-    idle = free & ~running & (heard.approved == NO_ACTION)
+    idle = free & ~running
     fits = world.time_limit - state.world.step_count >= state.maturity
     wanted = idle & fits & (keys.uniform(Stream.RECORD) < config.p_rec)
     if not bool(wanted.any()):

@@ -35,7 +35,7 @@ def run(
     level: Annotated[
         str | None, typer.Option(help="Name of a built-in level, or a file with a level.")
     ] = None,
-    preset: Annotated[str, typer.Option(help="conservative, lax or direct.")] = "conservative",
+    preset: Annotated[str, typer.Option(help="conservative, lax, direct or frugal.")] = "conservative",
     changes: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Set a hyperparameter; may be repeated."),

@@ -29,7 +29,7 @@ def start(
     level: Annotated[
         str | None, typer.Option(help="Name of a built-in level, or a file with a level.")
     ] = None,
-    preset: Annotated[str, typer.Option(help="conservative, lax or direct.")] = "conservative",
+    preset: Annotated[str, typer.Option(help="conservative, lax, direct or frugal.")] = "conservative",
     parent: Annotated[
         str, typer.Option(help="human: people answer on the pages or by the API; scripted: the worker does.")
     ] = "human",

@@ -52,7 +52,7 @@ def train(
     Args:
         world: A world's name, a `World`, a level's text whose header names its world, or a `Level`.
         level: A built-in level's name, a level's text, a file's path, or a `Level`; None takes the default.
-        preset: A name in `PRESETS` ("conservative", "lax" or "direct": Table 1), or a `Config`.
+        preset: A name in `PRESETS` ("conservative", "lax", "direct": Table 1; "frugal": ours), or a `Config`.
         parent: "scripted" (Sec. 3.1.3), a `Parent` such as one's own, or a `Person`.
         trials: Number of agents. Trial i of a seed is the same agent whatever the number of trials is.
         until: When a trial is finished: "optimal" (its argmax policy takes a shortest safe path),

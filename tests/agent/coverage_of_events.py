@@ -8,6 +8,7 @@ from itertools import product
 from parenting.envs.gridworld import WorldState
 from parenting.envs.levels.side_effects import stuck
 from reference.confirm import Confirming
+from reference.frugal import Frugal
 from reference.parenting import EXPLOIT, EXPLORE, PREFERENCE, Reference
 
 
@@ -28,6 +29,9 @@ class EventCoverage(Counter[str]):
             self["ended early"] += min(len(left.actions), len(right.actions)) < maturity
         if isinstance(trial, Confirming):
             self["asked again"], self["overruled"] = trial.repeats, trial.dissents
+        if isinstance(trial, Frugal):
+            self["answer reused"], self["refusal learnt"] = trial.reused, trial.implied
+            self["steps paid late"] = trial.late
         self["levels look alike"] += look_alike(trial)
         self._cells(trial, before)
 

@@ -92,6 +92,9 @@ def scenarios() -> dict[str, Scenario]:
     return found
 
 
+FRUGAL = {"fresh_pairs": True, "reuse_answers": True, "learn_refusals": True, "p_guid": 0.9}
+LATE = {"late_steps": True, "gradient_steps": 3}
+
 SPECIAL: dict[str, tuple[str, str, dict[str, object]]] = {
     "direct": ("unsafe-exploration", "scripted", {**PRESETS["direct"]}),
     "conservative": ("side-effects", "random", {**PRESETS["conservative"]}),
@@ -101,11 +104,15 @@ SPECIAL: dict[str, tuple[str, str, dict[str, object]]] = {
     "own length": ("unsafe-exploration", "scripted", stages("direct", 4, own_length=True)),
     "levels that look alike": ("reward-hacking", "random", {"p_guid": 0, "p_rec": 1, "p_pref": 0.3}),
     "confirmed": ("unsafe-exploration", "random", stages("lax", 16, confirm=0.95)),
+    "frugal": ("unsafe-exploration", "random", stages("lax", 24, **FRUGAL, own_length=True)),
+    "frugal, late": ("side-effects", "random", stages("lax", 12, reuse_answers=True, **LATE, batch=3)),
     "own length, guided": ("interruptibility", "random", stages("lax", 8, own_length=True)),
 }
 ALSO = {
     "levels that look alike": {"levels look alike"},
     "own length": {"ended early"},
     "confirmed": {"asked again", "overruled", "neither"},
+    "frugal": {"answer reused", "refusal learnt", "neither"},
+    "frugal, late": {"answer reused", "steps paid late"},
 }
 """Events that must happen in these runs besides."""

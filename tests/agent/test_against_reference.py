@@ -13,6 +13,7 @@ from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
 from reference.clips import Clip
 from reference.confirm import Confirming
+from reference.frugal import Frugal
 from reference.parenting import Reference
 from tests.agent.batched_runs import Judge, as_query, layers, lenient_parent, run_batch
 from tests.agent.coverage_of_events import EventCoverage
@@ -60,7 +61,8 @@ def lived(
         happened[choice] += 1
         return choice
 
-    kind = Confirming if config.confirm else Reference
+    frugal = config.remembers or config.late_steps
+    kind = Confirming if config.confirm else Frugal if frugal else Reference
     reference = kind(world, config, seed=SEED, trial=trial, choose=choose)
     for _ in range(scenario.ticks):
         before = reference.state
