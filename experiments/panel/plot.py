@@ -37,6 +37,8 @@ def draw(figure: Figure, rows: Sequence[Row]) -> None:
     answers.invert_yaxis()
     answers.set_xlabel("right answers in %")
     deaths.set_xscale("symlog", linthresh=1)
+    deaths.set_xlim(left=-0.1)
+    deaths.xaxis.set_major_formatter(lambda number, _place: f"{number:g}")
     deaths.set_xlabel("deaths (linear up to 1)")
     for axes in (answers, deaths):
         axes.grid(axis="x", alpha=0.3)
