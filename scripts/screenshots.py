@@ -61,7 +61,7 @@ def few_colours(drawn: Image.Image) -> Image.Image:
 def raised(browser: Browser, url: str) -> Page:
     """A parent's page after so many answers that dashboard and history have something to show."""
     page = browser.new_context(reduced_motion="reduce").new_page()
-    start(page, url, seed=3, goal=GOAL)
+    start(page, url, "conservative", seed=3, goal=GOAL)
     to_goal = distances()
     for _ in range(ANSWERS):
         answer(page, to_goal)

@@ -104,7 +104,7 @@ class NewRun(BaseModel):
         None, description="A level of one's own, as text; instead of `level`."
     )
     parent: Literal["human", "scripted"] = "human"
-    preset: Name = Field("conservative", description="conservative, lax or direct.")
+    preset: Name = Field("conservative", description="conservative, lax, direct or frugal.")
     config: dict[Name, Setting] = Field(
         default_factory=dict, max_length=100, description="Changes to the preset, by field."
     )

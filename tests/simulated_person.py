@@ -68,9 +68,10 @@ def tell(url: str, run: int, verb: str, **body: Any) -> None:
     httpx2.post(f"{url}/api/v1/runs/{run}/{verb}", json=body or None).raise_for_status()
 
 
-def start(page: Page, url: str, seed: int = 3, goal: int | None = None) -> None:
+def start(page: Page, url: str, preset: str, seed: int = 3, goal: int | None = None) -> None:
     """Fill in the form on the first page, as a person does, and begin."""
     page.goto(url)
+    page.check(f"form.fields input[name=preset][value={preset}]")
     page.fill("form.fields input[name=seed]", str(seed))
     page.fill("form.fields input[name=goal]", "" if goal is None else str(goal))
     page.click("form.fields button.primary")

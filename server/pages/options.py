@@ -15,6 +15,9 @@ class Option(NamedTuple):
     hint: str
 
 
+PRESET_OR = (("", "As chosen above"),)
+"""The first choice of a setting that presets have, too."""
+
 OPTIONS = (
     Option(
         "pace",
@@ -58,6 +61,49 @@ OPTIONS = (
         (("", "Never"), ("0.9", "Until it is 90 % sure"), ("0.95", "Until it is 95 % sure")),
         "Against slips: before it moves, it asks again with the sides exchanged, at most five times. "
         "It costs questions, and does not help against the same mistake made each time.",
+    ),
+    Option(
+        "config.gradient_steps",
+        "Gradient steps",
+        "",
+        (),
+        "How often it trains at a time. Nine need fewer answers than one. Empty: as chosen above.",
+    ),
+    Option(
+        "config.late_steps",
+        "When it takes them",
+        "",
+        (
+            *PRESET_OR,
+            ("false", "All before it asks again"),
+            ("true", "One before, the others while you think"),
+        ),
+        "The next question comes sooner if it is posted first.",
+    ),
+    Option(
+        "config.fresh_pairs",
+        "Moves that it asks about",
+        "",
+        (*PRESET_OR, ("false", "Two by chance"), ("true", "The likeliest, and one not compared with it yet")),
+        "What was never compared tells it more.",
+    ),
+    Option(
+        "config.reuse_answers",
+        "Answers that follow from earlier ones",
+        "",
+        (*PRESET_OR, ("false", "Asked all the same"), ("true", "Not asked: it moves by them")),
+        "In the very same place: the same two moves again, or A before C after A before B and B before C.",
+    ),
+    Option(
+        "config.learn_refusals",
+        "Moves refused by Neither",
+        "",
+        (
+            *PRESET_OR,
+            ("false", "Forgotten after the move"),
+            ("true", "Remembered as worse, and proposed last"),
+        ),
+        "Where both moves were too dangerous.",
     ),
     Option(
         "config.stages",

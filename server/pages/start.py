@@ -9,7 +9,6 @@ from typing import Annotated, NamedTuple
 
 from fastapi import Depends, Query, Request, Response
 
-from parenting.agent.config import PRESETS
 from parenting.envs.levels.spec import WorldSpec
 from parenting.envs.registry import WORLDS
 from parenting.server.admission import admitted_router
@@ -31,11 +30,12 @@ from parenting.server.tables import Metric, Run
 router = admitted_router(include_in_schema=False)
 
 PRESET_WORDS = {
+    "frugal": "asks before every new move, and needs the fewest answers; for small levels",
     "conservative": "asks before almost every new move; hardly ever dies",
     "lax": "asks about every second new move",
     "direct": "never asks before a move; learns from clips alone",
 }
-"""The meaning of each preset for the parent, in a line; the conservative one first."""
+"""The meaning of each preset for the parent, in a line; the form begins with the first."""
 
 PAGE = 20
 """Runs on a page."""
@@ -53,7 +53,7 @@ EMPTY_FORM = {
     "level": "",
     "level_text": "",
     "parent": "human",
-    "preset": next(iter(PRESETS)),
+    "preset": next(iter(PRESET_WORDS)),
     "seed": "0",
     "goal": "",
     **{option.field: "" for option in OPTIONS},

@@ -42,8 +42,8 @@ def test_a_new_installation_has_one_picture_and_one_button_and_then_the_form(
     assert page.text.count('class="primary"') == 2  # this one, and the form's own
     width, height = re.findall(r'<img [^>]*width="(\d+)" height="(\d+)"', page.text)[0]
     assert f'width="{width}" height="{height}"' in client.get("/static/question.svg").text
-    first = page.text.index('value="conservative" checked')
-    assert first < page.text.index('value="lax"') < page.text.index('value="direct"')
+    presets = re.findall(r'name="preset" value="(\w+)"( checked)?', page.text)[1:]  # behind the button's own
+    assert presets == [("frugal", " checked"), ("conservative", ""), ("lax", ""), ("direct", "")]
 
 
 def test_the_button_of_a_new_installation_starts_the_default_run(client: httpx2.Client, db: Database) -> None:
@@ -53,7 +53,7 @@ def test_the_button_of_a_new_installation_starts_the_default_run(client: httpx2.
     assert (reply.status_code, reply.headers["location"]) == (303, address(db))
     run, default = get_run(db, 1), NewRun(world="unsafe-exploration", parent="human")
     assert (run.world, run.level, run.parent) == ("unsafe-exploration", "island", "human")
-    assert (run.preset, run.seed, run.goal) == ("conservative", default.seed, None)
+    assert (run.preset, run.seed, run.goal) == ("frugal", default.seed, None)
     assert 'class="welcome"' not in client.get("/").text
 
 

@@ -39,7 +39,7 @@ def test_the_button_starts_the_default_run_without_javascript(tabs: BrowserTabs,
     page = tabs.open("/", java_script_enabled=False)
     page.get_by_role("button", name=BUTTON).click()
     expect(page).to_have_url(tabs.address + address(db))
-    assert (get_run(db, 1).parent, get_run(db, 1).preset) == ("human", "conservative")
+    assert (get_run(db, 1).parent, get_run(db, 1).preset) == ("human", "frugal")
 
 
 def test_the_picture_stands_still_where_motion_is_unwanted(tabs: BrowserTabs) -> None:

@@ -50,6 +50,7 @@ def test_from_start_to_stop(tabs: BrowserTabs, db: Database, worker: Worker) -> 
     tabs.expected = ("422",)
     page = tabs.open("/", java_script_enabled=False)
     page.get_by_label("Level", exact=True).select_option("island")
+    page.get_by_label("Conservative").check()
     page.get_by_text("More settings").click()
     page.get_by_label("Stages").fill("two")
     page.get_by_label("Goal").fill("5")
