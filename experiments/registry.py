@@ -19,7 +19,7 @@ PAPER = (
     "calibrate",
 )
 """Those of the paper, in its order."""
-BEYOND: tuple[str, ...] = ("panel",)
+BEYOND: tuple[str, ...] = ("fallible", "panel")
 """Those that go on from it, and ask what it does not."""
 NAMES = (*PAPER, *BEYOND)
 

@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.interval_formulas import Ends, Row, numbers, stats, student, welch, widened, wilson
 from tests.tree import ROOT
 
 PUBLISHED = ROOT / "docs/results"
 NAMES = sorted(path.parent.name for path in PUBLISHED.glob("*/results.json"))
-Row = dict[str, str]
-Ends = tuple[float, float]
 ARMS = {"repeated queries": "comparing twice"}
 FIGURE2 = {
     "p_guid=0.99": "more guidance",
@@ -57,39 +56,6 @@ def trials(name: str) -> list[Row]:
 def rows(name: str) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = json.loads((PUBLISHED / name / "results.json").read_text())["findings"]
     return found
-
-
-def numbers(some: Sequence[Row], column: str) -> list[float]:
-    return [float(row[column]) for row in some]
-
-
-def stats() -> Any:
-    """Return `scipy.stats`, whose import takes a second that each process which collects tests would pay."""
-    from scipy import stats
-
-    return stats
-
-
-def student(values: Sequence[float]) -> Ends:
-    found = stats().ttest_1samp(values, 0).confidence_interval(0.95)
-    return found.low, found.high
-
-
-def welch(more: Sequence[float], less: Sequence[float]) -> Ends:
-    found = stats().ttest_ind(more, less, equal_var=False).confidence_interval(0.95)
-    return found.low, found.high
-
-
-def widened(ends: Ends, error: float) -> Ends:
-    middle, half = sum(ends) / 2, (ends[1] - ends[0]) / 2
-    return middle - hypot(half, stats().norm.ppf(0.975) * error), middle + hypot(
-        half, stats().norm.ppf(0.975) * error
-    )
-
-
-def wilson(hits: int, count: int) -> Ends:
-    low, high = stats().binomtest(hits, count).proportion_ci(0.95, "wilson")
-    return 100 * low, 100 * high
 
 
 # One function a page: the ends of a row's interval, from its words and the trials
@@ -241,6 +207,28 @@ def value_iteration(what: str, every: Sequence[Row]) -> Ends:
     done = [one[stage] for one in converged]
     trained = [row for row in done if row["greedy_before"] != row["states"]]
     return wilson(sum(row["greedy"] == row["states"] for row in trained), len(trained))
+
+
+def fallible(what: str, every: Sequence[Row]) -> Ends:
+    arms, measure = what.rsplit(": ", 1)
+
+    def measured(arm: str) -> list[float]:
+        mine = [row for row in every if row["of"] == arm]
+        if measure == "questions":
+            return [float(row["guidance"]) + float(row["preference"]) for row in mine]
+        if not measure.endswith(" until optimal"):
+            return numbers(mine, measure)
+        column = "optimal_deaths" if measure.startswith("deaths") else "optimal_queries"
+        return numbers([row for row in mine if row["optimal_at"] != "0"], column)
+
+    if measure == "optimal at the end":
+        mine = [row for row in every if row["of"] == arms]
+        return wilson(sum(row["optimal"] == "True" for row in mine), len(mine))
+    if measure == "optimal once, not at the end":
+        once = [row for row in every if row["of"] == arms and row["optimal_at"] != "0"]
+        return wilson(sum(row["optimal"] == "False" for row in once), len(once))
+    one, _, other = arms.partition(" minus ")
+    return welch(measured(one), measured(other)) if other else student(measured(one))
 
 
 PAGES: dict[str, Callable[[str, Sequence[Row]], Ends]] = {

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from parenting.experiments.calibrate.settings import SOME
+from parenting.experiments.fallible.settings import ARMS
 from parenting.experiments.panel.settings import RULES
 from parenting.experiments.registry import BEYOND, experiment
 from parenting.experiments.reporting.comparison import count_verdicts
@@ -67,6 +68,8 @@ def wanted(name: str, of: str, asked: int) -> int:
     """The number of trials that an arm must have."""
     if name == "reward-hacking":
         return -(-asked // VARIANTS[of].one_of)
+    if name == "fallible":
+        return ARMS[of].trials(asked)
     if name == "calibrate" and of.startswith("search"):
         return SOME["paper"]
     return 1 if of in (PRETRAINED, "coverage") else asked
