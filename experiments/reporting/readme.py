@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 
 from parenting.experiments.registry import NAMES
+from parenting.experiments.reporting.beyond import beyond
 from parenting.experiments.reporting.comparison import REFERENCES, Comparison, Reference, count_verdicts
 from parenting.experiments.reporting.markdown import RESULTS
 from parenting.experiments.reporting.summary import Published, summary
@@ -38,7 +39,7 @@ def published(root: Path) -> Published:
 
 def summary_table(pages: Published) -> str:
     """The table of README.md."""
-    lines = map(str, summary(pages))
+    lines = map(str, [*summary(pages), *beyond(pages)])
     return "\n".join(["| result | paper | here | verdict |", "|---|---|---|---|", *lines])
 
 
