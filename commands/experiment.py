@@ -79,7 +79,7 @@ def experiment(
         typer.Option("--pages", help="With report: write the Markdown pages from the stored trials again."),
     ] = False,
 ) -> None:
-    """Run an experiment of the paper, or continue it, and write its page, figures and data.
+    """Run an experiment of the paper or beyond it, or continue it, and write its page, figures and data.
 
     Every finished chunk of trials is stored, so an experiment that was stopped continues from there.
     `parenting experiment report` builds one HTML page of all results below --out.
