@@ -66,7 +66,7 @@ def test_the_last_vote_that_is_allowed_decides() -> None:
     assert decided(0.999, 1.0, 0.1, *parted, Verdict.EITHER) == (Verdict.LOWER, True)  # the policy's
 
 
-def test_a_question_is_asked_again_mirrored_and_is_no_new_situation() -> None:
+def test_a_question_is_asked_again_mirrored_and_is_not_a_new_situation() -> None:
     state, first = asked()
     first = first.clone()
     familiar = int(state.familiarity.sum())
