@@ -10,6 +10,7 @@ from math import exp
 from parenting.agent.config import Config
 from parenting.envs.gridworld import Gridworld
 from reference.clips import Clip, Query
+from reference.frugal import Frugal
 from reference.parenting import GUIDANCE, Reference
 
 MOST = 5
@@ -65,12 +66,29 @@ class Confirming(Reference):
         return best, weight[best] / sum(weight.values())
 
     def ask(self) -> None:
-        """Ask about a pair that is not decided once more, its sides swapped; no familiarity grows."""
-        if self.refused is not None:
-            for pair in sorted(self.votes):
-                if not self.refused & set(pair):
-                    lower, higher = pair
-                    left, right = (higher, lower) if self.left[pair] == lower else pair
-                    self.post(Query(GUIDANCE, self.forecast(left), self.forecast(right), 1))
-                    return
-        super().ask()
+        """Ask about a pair that is not decided once more, or as ever."""
+        if not self.ask_again():
+            super().ask()
+
+    def ask_again(self) -> bool:
+        """Ask about a pair that is not decided, its sides swapped; return False if there is none."""
+        open_pairs = [pair for pair in sorted(self.votes) if not (self.refused or set()) & set(pair)]
+        if self.refused is None or not open_pairs:
+            return False
+        lower, higher = open_pairs[0]
+        left, right = (higher, lower) if self.left[open_pairs[0]] == lower else (lower, higher)
+        self.post(Query(GUIDANCE, self.forecast(left), self.forecast(right), 1))
+        return True
+
+
+class FrugalConfirming(Frugal, Confirming):
+    """One trial that remembers every vote, and asks again before it is moved by any."""
+
+    def ask_or_reuse(self) -> int | None:
+        """Ask about a pair that is not decided once more; else ask or reuse. No vote outlives its pause."""
+        if self.ask_again():
+            return None
+        approved = super().ask_or_reuse()
+        if self.refused is None:
+            self.votes = {}
+        return approved

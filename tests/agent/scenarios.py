@@ -106,6 +106,11 @@ SPECIAL: dict[str, tuple[str, str, dict[str, object]]] = {
     "confirmed": ("unsafe-exploration", "random", stages("lax", 16, confirm=0.95)),
     "frugal": ("unsafe-exploration", "random", stages("lax", 24, **FRUGAL, own_length=True)),
     "frugal, late": ("side-effects", "random", stages("lax", 12, reuse_answers=True, **LATE, batch=3)),
+    "frugal, confirmed": (
+        "unsafe-exploration",
+        "random",
+        stages("lax", 24, **{**FRUGAL, "p_guid": 0.5}, confirm=0.95),
+    ),
     "own length, guided": ("interruptibility", "random", stages("lax", 8, own_length=True)),
 }
 ALSO = {
@@ -113,6 +118,7 @@ ALSO = {
     "own length": {"ended early"},
     "confirmed": {"asked again", "overruled", "neither"},
     "frugal": {"answer reused", "refusal learnt", "neither"},
+    "frugal, confirmed": {"answer reused", "refusal learnt", "asked again", "overruled"},
     "frugal, late": {"answer reused", "steps paid late"},
 }
 """Events that must happen in these runs besides."""

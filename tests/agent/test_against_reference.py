@@ -12,7 +12,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.parents.scripted import ScriptedRule
 from parenting.server.codec import CHOICE_NAMES
 from reference.clips import Clip
-from reference.confirm import Confirming
+from reference.confirm import Confirming, FrugalConfirming
 from reference.frugal import Frugal
 from reference.parenting import Reference
 from tests.agent.batched_runs import Judge, as_query, layers, lenient_parent, run_batch
@@ -62,7 +62,8 @@ def lived(
         return choice
 
     frugal = config.remembers or config.late_steps
-    kind = Confirming if config.confirm else Frugal if frugal else Reference
+    kinds = {(False, False): Reference, (True, False): Frugal, (False, True): Confirming}
+    kind = kinds.get((frugal, config.confirm > 0), FrugalConfirming)
     reference = kind(world, config, seed=SEED, trial=trial, choose=choose)
     for _ in range(scenario.ticks):
         before = reference.state
