@@ -14,6 +14,7 @@ import pytest
 from parenting.experiments.calibrate.settings import SOME
 from parenting.experiments.fallible.settings import ARMS
 from parenting.experiments.panel.settings import RULES
+from parenting.experiments.questions.settings import trials_of
 from parenting.experiments.registry import BEYOND, experiment
 from parenting.experiments.reporting.comparison import count_verdicts
 from parenting.experiments.reporting.markdown import RESULTS, TRIALS, page
@@ -35,6 +36,7 @@ ARM = {
     "figure4": ("shift",),
     "value-iteration": ("stage", "level"),
     "panel": ("panel",),
+    "questions": ("window",),
     "calibrate": ("layout", "p_rec", "lambda_global", "lambda_local", "recompare", "entropy"),
 }
 """Columns that tell the arms of a page apart beside `of`: within one, each trial has one row."""
@@ -68,6 +70,8 @@ def wanted(name: str, of: str, asked: int) -> int:
     """The number of trials that an arm must have."""
     if name == "reward-hacking":
         return -(-asked // VARIANTS[of].one_of)
+    if name == "questions":
+        return trials_of(of, asked)
     if name == "fallible":
         return ARMS[of].trials(asked)
     if name == "calibrate" and of.startswith("search"):

@@ -1,0 +1,103 @@
+"""The rows of the page on questions: the verdicts, then answers and deaths of every arm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from parenting.experiments.questions.measures import (
+    answers,
+    deaths,
+    interval,
+    left_out,
+    raised,
+    shown,
+)
+from parenting.experiments.questions.settings import (
+    ANSWERS,
+    ARMS,
+    BASELINES,
+    DEATHS_GOAL,
+    IDEAL,
+    ISLAND,
+    LASTING,
+    LEVELS,
+    LONG,
+    MAX_TICKS,
+    PRESETS,
+    RANDOM,
+    SILENT_TICKS,
+    STAGE_TICKS,
+    STARTS,
+    WINDOW,
+)
+from parenting.experiments.questions.verdicts import GOALS, verdicts
+from parenting.experiments.reporting.comparison import (
+    Comparison,
+    compare_mean,
+    mean_sd,
+)
+from parenting.experiments.reporting.prose import paragraphs
+from parenting.experiments.runner.store import Row
+
+
+def findings(rows: Sequence[Row]) -> list[Comparison]:
+    """Verdicts first, then every number."""
+    return [*verdicts(rows), *_numbers(rows)]
+
+
+def _numbers(rows: Sequence[Row]) -> Iterator[Comparison]:
+    for world, level in LEVELS:
+        yield from _bounds(world, level, rows)
+    for name in ARMS:
+        mine = raised(name, rows)
+        if not mine:
+            continue
+        yield compare_mean(f"{name}: answers until optimal", answers(mine), left_out(mine))
+        died = deaths(mine)
+        yield Comparison(
+            f"{name}: deaths", "-", mean_sd(died), interval=shown(interval(died)), reference=None
+        )
+        if name.split(", ")[0] in (*PRESETS, *BASELINES) and name.count(", ") == 1:
+            for what in ("deaths", "regret"):
+                area = _column(mine, f"area_{what}")
+                yield compare_mean(f"{name}: area under {what}, up to {ANSWERS} answers", area)
+    yield from _starts(rows)
+
+
+def _column(rows: Sequence[Row], column: str) -> list[float]:
+    return [row[column] for row in rows]
+
+
+def _bounds(world: str, level: str, rows: Sequence[Row]) -> Iterator[Comparison]:
+    mine = raised(f"{IDEAL}, {level}", rows)
+    if not mine:
+        return
+    least, certain = mine[0]["least_mean"], mine[0]["certain"]
+    yield Comparison(f"{level}: mean answers, at least, by information", "-", f"{least:.2f}", reference=None)
+    yield Comparison(f"{level}: answers to be certain, at least", "-", f"{certain}", reference=None)
+    yield compare_mean(f"{level}: answers of the {IDEAL}", answers(mine), left_out(mine))
+
+
+def _starts(rows: Sequence[Row]) -> Iterator[Comparison]:
+    """What the agents of random islands were asked before."""
+    for level in GOALS:
+        mine = [row for row in rows if row["of"] == f"pre-parented, {level}"]
+        if mine:
+            yield compare_mean(f"pre-parenting for {level}: answers of each agent", _column(mine, "guidance"))
+
+
+def words(rows: Sequence[Row]) -> list[str]:
+    """The prose of the page."""
+    return paragraphs(
+        "questions/page.md",
+        last=ANSWERS - 1,
+        random=RANDOM,
+        random_start=STARTS[ISLAND].number,
+        goal=DEATHS_GOAL,
+        max_ticks=MAX_TICKS,
+        silent_ticks=SILENT_TICKS,
+        stage_ticks=STAGE_TICKS["paper"],
+        window=WINDOW,
+        long=LONG["paper"],
+        lasting=LASTING["paper"],
+    )
