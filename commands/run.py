@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from parenting.experiments.training.counts import OnProgress
     from parenting.experiments.training.counts import Progress as Now
     from parenting.experiments.training.stop_rule import StopRule
+    from parenting.parents.grammar import ParentSpec
 
 
 def run(
@@ -36,6 +37,9 @@ def run(
         str | None, typer.Option(help="Name of a built-in level, or a file with a level.")
     ] = None,
     preset: Annotated[str, typer.Option(help="conservative, lax, direct or frugal.")] = "conservative",
+    parent: Annotated[
+        str, typer.Option(metavar="NAME[:KEY=VALUE,...]", help="The parent; several errors are joined by +.")
+    ] = "scripted",
     changes: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Set a hyperparameter; may be repeated."),
@@ -62,7 +66,7 @@ def run(
         bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
     ] = False,
 ) -> None:
-    """Train agents with the scripted parent (Sec. 3.1.3), all at once, and count deaths and queries.
+    """Train agents with a scripted parent (Sec. 3.1.3), all at once, and count deaths and queries.
 
     The last lines report the outcomes of their argmax policies.
 
@@ -75,13 +79,14 @@ def run(
         goal = _until(world, until)
         config = _mature(config, goal)
         weights = _weights(found, config)
+        spec = _parent(parent)
     from parenting._process import settle
     from parenting.experiments.runner.processes import WorkersDiedError
     from parenting.experiments.training.chunks import TrainPlan, train_in_chunks
     from parenting.experiments.training.summary import summarise
 
     settle()
-    plan = TrainPlan(world, found.text, config, seed, trials, goal, max_ticks, weights)
+    plan = TrainPlan(world, found.text, config, seed, trials, goal, max_ticks, weights, str(spec))
     began = time.monotonic()
     try:
         with exit_on_interrupt(), _bar(plan) as progress:
@@ -105,6 +110,20 @@ def _known(world: str, preset: str) -> None:
         raise UsageError(f"WORLD: {error}") from None
     if preset not in PRESETS:
         raise UsageError(f"--preset: {UnknownPresetError(preset)}")
+
+
+def _parent(text: str) -> ParentSpec:
+    """The parent that a text names.
+
+    Raises:
+        UsageError: it names none.
+    """
+    from parenting.parents.grammar import ParentError, read_parent
+
+    try:
+        return read_parent(text)
+    except ParentError as error:
+        raise UsageError(f"--parent: {error}") from None
 
 
 def chosen_level(world: str, name_or_file: str | None) -> Level:

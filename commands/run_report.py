@@ -26,6 +26,8 @@ def page(results: dict[str, Any]) -> str:
         f"{results['world']}, {results['level']}: {counted(number, 'trial')}"
         f" until {results['until']}, {results['seconds']} s"
     ]
+    if "parent" in results:
+        lines.append(_line("parent", results["parent"]))
     if "waterings" not in results["evaluation"]:
         lines.append(_line("optimal", f"{sum(row['optimal'] for row in results['trials'])} of {number}"))
     lines += [_line(name, _spread(results["mean"][name], results["sd"][name])) for name in COUNTS]

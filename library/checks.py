@@ -47,7 +47,7 @@ def check_parent(parent: object) -> Parent:
     if not all(hasattr(parent, verb) for verb in ("events", "take", "post")):
         raise ValueError(
             f"parent: {parent!r} is not a parent. Give an instance of pt.ScriptedParent or of your own"
-            ' subclass of parenting.Parent; train also takes "scripted" and pt.Person().'
+            ' subclass of parenting.Parent; train also takes a text such as "noisy:0.1" and pt.Person().'
         )
     return parent  # type: ignore[return-value]  # it has the verbs
 

@@ -29,6 +29,9 @@ from parenting.library.scripted import ScriptedParent
 from parenting.library.task import Task, prepare, stop_rule
 from parenting.library.threads import one_thread
 from parenting.library.worlds import AnyLevel, World
+from parenting.parents.fallible import FallibleParent, FallibleRule
+from parenting.parents.grammar import ParentError, read_parent
+from parenting.parents.scripted import ScriptedParent as BatchScripted
 
 Callback = Callable[[Progress], bool | None]
 
@@ -53,7 +56,8 @@ def train(
         world: A world's name, a `World`, a level's text whose header names its world, or a `Level`.
         level: A built-in level's name, a level's text, a file's path, or a `Level`; None takes the default.
         preset: A name in `PRESETS` ("conservative", "lax", "direct": Table 1; "frugal": ours), or a `Config`.
-        parent: "scripted" (Sec. 3.1.3), a `Parent` such as one's own, or a `Person`.
+        parent: "scripted" (Sec. 3.1.3), a parent who errs such as "noisy:0.1" (docs/commands.md, "Parents who
+            err"), a `Parent` such as one's own, or a `Person`.
         trials: Number of agents. Trial i of a seed is the same agent whatever the number of trials is.
         until: When a trial is finished: "optimal" (its argmax policy takes a shortest safe path),
             "queries:N" (N answered queries) or "ticks:N".
@@ -125,21 +129,33 @@ def _train(
     return collect(task, parts, log.records(), seed=seed, until=str(rule), events=log.events), ended
 
 
-def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | None:
+def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | FallibleRule | None:
     """Return a parent of the caller's, ready for these trials; None stands for the scripted one."""
     if parent == "scripted" or type(parent) is ScriptedParent:  # a subclass may answer otherwise
         return None
+    if isinstance(parent, str):
+        try:
+            spec = read_parent(parent)
+        except ParentError as error:
+            raise ValueError(f"parent: {error}") from None
+        return FallibleRule(task.world, task.config, spec)
     known = check_parent(parent)
     if isinstance(known, Parent):
         known.begin(task.world, task.config, trials)
     return known
 
 
-def _logged(own: AnyParent | None, log: AnswerLog, task: Task, trials: int, chunk: range) -> MakeParent:
+def _logged(
+    own: AnyParent | FallibleRule | None, log: AnswerLog, task: Task, trials: int, chunk: range
+) -> MakeParent:
     """Return how a batch's parent is made: the caller's own or the scripted one, its answers written down."""
 
-    def make(scripted: BatchParent, done: Callable[[], Tensor]) -> BatchParent:
-        heard = scripted if own is None else WholeBatch(own, task, trials, chunk, done)
+    def make(scripted: BatchScripted, done: Callable[[], Tensor]) -> BatchParent:
+        heard: BatchParent = scripted
+        if isinstance(own, FallibleRule):
+            heard = FallibleParent(own, scripted.query)
+        elif own is not None:
+            heard = WholeBatch(own, task, trials, chunk, done)
         return LoggedParent(heard, log, chunk)
 
     return make

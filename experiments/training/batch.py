@@ -25,7 +25,7 @@ LEAVE = 0.1
 """Trials that are done leave the batch when they are this share of it: moving the rest costs something, too.
 """
 
-MakeParent = Callable[[BatchParent, Callable[[], Bool[Tensor, "N"]]], BatchParent]
+MakeParent = Callable[[ScriptedParent, Callable[[], Bool[Tensor, "N"]]], BatchParent]
 """Makes the parent of a batch. It is given the scripted parent, and which of the trials left are done."""
 
 

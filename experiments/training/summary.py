@@ -38,6 +38,7 @@ def summarise(plan: TrainPlan, level: str, outcomes: Outcomes, seconds: float) -
         "until": str(plan.until),
         "max_ticks": plan.max_ticks,
         "config": plan.config.model_dump(mode="json"),
+        **({} if plan.parent == "scripted" else {"parent": plan.parent}),
         "weights": None if plan.weights is None else digest(plan.weights),
         "trials": _rows(outcomes, report),
         "unfinished": int((~counts.finished).sum()),

@@ -37,12 +37,13 @@ def parent_trials(
     span: tuple[int, int],
     seed: int,
     note_optimal: bool = False,
+    parent: str = "scripted",
 ) -> list[Row]:
-    """Raise the trials of a span by the scripted parent; `label` names what they are of."""
+    """Raise the trials of a span by a parent of `parents.grammar`; `label` names what they are of."""
     config = compose(preset, registry.defaults(world), changes, strict=True)
     weights = _weights(world, level, config)
     plan = TrainPlan(
-        world, level, config, seed, span[1], StopRule(*until), max_ticks, weights, note_optimal=note_optimal
+        world, level, config, seed, span[1], StopRule(*until), max_ticks, weights, parent, note_optimal
     )
     columns = (*COUNTS, *(NOTED if note_optimal else ()))
     return _rows(label, range(*span), train_chunk(plan, range(*span)), world, columns)

@@ -95,7 +95,7 @@ def test_a_panel_of_perfect_parents_raises_the_agents_that_one_of_them_raises() 
         return Panel(members, trusted, scripted.query, policy_opinion(world))
 
     alone, together = (
-        train_agents(world, config, keys(5, 12), StopRule("queries", 6), max_ticks=40, parent=parent)  # type: ignore[arg-type]  # a batch's parent is always a ScriptedParent
+        train_agents(world, config, keys(5, 12), StopRule("queries", 6), max_ticks=40, parent=parent)
         for parent in (None, three)
     )
     assert torch.equal(alone.policies, together.policies)

@@ -1,0 +1,69 @@
+"""Parents who err: the scripted parent's answers, changed by the parts of a `ParentSpec` in turn (ours)."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Int64
+from torch import Tensor
+
+from parenting.agent.config import Config
+from parenting.agent.query import Answer, Query, QueryKind
+from parenting.agent.state import AgentState
+from parenting.envs.gridworld import Gridworld
+from parenting.envs.rng import Keys
+from parenting.parents.errors import Asked
+from parenting.parents.grammar import ParentSpec
+from parenting.parents.scripted import ScriptedParent, ScriptedRule
+
+
+class FallibleRule:
+    """The answers of a parent as a function of the questions, their ticks and the number of answers before.
+
+    An error is drawn by the trial's seed and the tick in which it asked, so that a run that is taken up again
+    hears the same answers, and so do batches of any size.
+    """
+
+    def __init__(self, world: Gridworld, config: Config, spec: ParentSpec) -> None:
+        """Compute the exact values of the world, by the discount of this parent.
+
+        Raises:
+            ValueError: as `ScriptedRule`.
+        """
+        gamma = config.gamma
+        for part in spec.parts:
+            gamma = part.discount(gamma)
+        self.spec, self.rule = spec, ScriptedRule(world, gamma, inside=config.garden_parent)
+
+    def answer(self, query: Query, keys: Keys, answers: Int64[Tensor, "N"]) -> Int64[Tensor, "N"]:
+        """Return each trial's `Choice`.
+
+        Args:
+            query: The questions.
+            keys: Of each trial, at the tick in which it asked.
+            answers: How many answers the parent of each trial has given before.
+        """
+        asked = Asked(query, self.rule.values.advantage_gap(query), self.rule.refuses(query), keys, answers)
+        choice = self.rule.answer(query)
+        for place, part in enumerate(self.spec.parts):
+            choice = part.change(asked, choice, place)
+        return choice
+
+
+class FallibleParent(ScriptedParent):
+    """Answers a batch in the tick after it was asked, as a `ParentSpec` has it."""
+
+    def __init__(self, fallible: FallibleRule, query: Query) -> None:
+        """Begin with `query`, the empty query of the run."""
+        super().__init__(fallible.rule, query)
+        self.fallible, self.answers = fallible, torch.zeros_like(query.kind)
+
+    def take(self, state: AgentState) -> Answer:
+        """The answers to what was asked a tick ago: `state` is as that tick left it."""
+        choice = self.fallible.answer(self.query, state.keys, self.answers)
+        self.answers = self.answers + (self.query.kind != QueryKind.NONE)
+        return Answer(query=self.query, choice=choice)
+
+    def pick(self, index: Tensor) -> None:
+        """Go on with some of the trials alone."""
+        super().pick(index)
+        self.answers = self.answers[index]

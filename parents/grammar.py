@@ -1,0 +1,108 @@
+"""The grammar of parents: `NAME[:key=value,...]`, several joined by `+` (docs/commands.md, "Parents")."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import NamedTuple
+
+from pydantic import ValidationError
+
+from parenting.envs.names import did_you_mean
+from parenting.parents.errors import PARTS, Part
+
+
+class ParentError(ValueError):
+    """A text does not name a parent; the sentence says why, and what would."""
+
+
+class ParentSpec(NamedTuple):
+    """A parent by its parts, in the order in which they change an answer. Plain data."""
+
+    parts: tuple[Part, ...]
+
+    def __str__(self) -> str:
+        """The shortest text that reads as this parent."""
+        return "+".join(_written(part) for part in self.parts)
+
+    @property
+    def errs(self) -> bool:
+        """Return whether it is another than the paper's."""
+        return any(part.name != "scripted" for part in self.parts)
+
+
+SCRIPTED = ParentSpec((PARTS["scripted"](),))
+"""The paper's parent, who never errs (Sec. 3.1.3)."""
+
+
+def read_parent(text: str) -> ParentSpec:
+    """Return the parent that a text names, such as `noisy:0.1` or `boltzmann:beta=5+tiring`.
+
+    A first value without a key belongs to the first parameter of its part.
+
+    Raises:
+        ParentError: there is no such parent or parameter, or a value is out of bounds.
+    """
+    parts = tuple(_part(one.strip()) for one in text.split("+"))
+    for place, part in enumerate(parts):
+        if part.judges and place:
+            raise ParentError(
+                f"{part.name} judges by itself, so it stands first: {part.name}+{parts[0].name}, for example."
+            )
+    return ParentSpec(parts)
+
+
+def _part(text: str) -> Part:
+    name, colon, rest = text.partition(":")
+    kind = _imported(name) if "." in name else PARTS.get(name)
+    if kind is None:
+        hint = did_you_mean(name, PARTS)
+        raise ParentError(f"There is no parent '{name}'.{hint} The parents are: {', '.join(PARTS)}.")
+    given = _values(kind, rest.split(",") if colon else [])
+    try:
+        return kind.model_validate(given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ParentError(f"{name}:{first['loc'][0]}={first['input']}: {first['msg']}.") from None
+
+
+def _imported(path: str) -> type[Part]:
+    """Return the class at an import path.
+
+    Raises:
+        ParentError: it cannot be imported, or is no `Part`.
+    """
+    module, _, name = path.rpartition(".")
+    try:
+        found = getattr(import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ParentError(f"The parent '{path}' cannot be imported: {error}.") from None
+    if not (isinstance(found, type) and issubclass(found, Part)):
+        raise ParentError(f"'{path}' is not a subclass of parenting.parents.errors.Part.")
+    return found
+
+
+def _values(kind: type[Part], written: list[str]) -> dict[str, str]:
+    names, given = list(kind.model_fields), dict[str, str]()
+    for place, one in enumerate(written):
+        key, equals, value = (word.strip() for word in one.partition("="))
+        if not equals and place == 0 and names:
+            key, value = names[0], key
+        if key not in names:
+            known = f"It has: {', '.join(names)}." if names else "It has none."
+            raise ParentError(
+                f"{kind.__name__.lower()} has no parameter '{key}'.{did_you_mean(key, names)} {known}"
+            )
+        if key in given:
+            raise ParentError(f"{kind.__name__.lower()}: {key} is given twice.")
+        given[key] = value
+    return given
+
+
+def _written(part: Part) -> str:
+    fields = type(part).model_fields
+    values = part.model_dump()
+    changed = {name: value for name, value in values.items() if value != fields[name].default}
+    text = ",".join(f"{name}={value}" for name, value in changed.items())
+    kind = type(part)
+    name = part.name if PARTS.get(part.name) is kind else f"{kind.__module__}.{kind.__name__}"
+    return f"{name}:{text}" if text else name
