@@ -22,7 +22,7 @@ PRIME = 2_147_483_647
 
 
 class Asked(NamedTuple):
-    """What a parent knows of the questions of N trials."""
+    """The knowledge that a parent has of the questions of N trials."""
 
     query: Query
     gap: Float64[Tensor, "N"]  # the advantage of the left clip less that of the right one
@@ -226,7 +226,7 @@ def _draws(keys: Keys, place: int) -> tuple[Tensor, Tensor]:
 
 
 def likeness(query: Query) -> Float64[Tensor, "N"]:
-    """Return the likeness of two clips: 1 where they end on diagonal neighbours, 0 two cells apart or more."""
+    """Return the likeness of two clips: 1 if they end on diagonal neighbours, 0 if two cells apart."""
     last = query.length[:, :, None, None].expand(-1, -1, 1, 2)
     ends = query.agent.gather(2, last).squeeze(2).double()
     apart = (ends[:, 0] - ends[:, 1]).square().sum(1).sqrt()

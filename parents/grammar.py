@@ -21,7 +21,7 @@ class ParentSpec(NamedTuple):
     parts: tuple[Part, ...]
 
     def __str__(self) -> str:
-        """The shortest text that reads as this parent."""
+        """The text of this parent, with the value of every parameter."""
         return "+".join(_written(part) for part in self.parts)
 
     @property
@@ -99,10 +99,7 @@ def _values(kind: type[Part], written: list[str]) -> dict[str, str]:
 
 
 def _written(part: Part) -> str:
-    fields = type(part).model_fields
-    values = part.model_dump()
-    changed = {name: value for name, value in values.items() if value != fields[name].default}
-    text = ",".join(f"{name}={value}" for name, value in changed.items())
+    text = ",".join(f"{name}={value}" for name, value in part.model_dump().items())
     kind = type(part)
     name = part.name if PARTS.get(part.name) is kind else f"{kind.__module__}.{kind.__name__}"
     return f"{name}:{text}" if text else name

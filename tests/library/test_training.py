@@ -127,7 +127,7 @@ def test_the_number_of_threads_is_left_as_it_was() -> None:
         ({"preset": {"p_guid": 1.0}}, TypeError, ["preset", "p_guid", "Config"]),
         ({"trials": 0}, ValueError, ["trials", "0", "from 1"]),
         ({"seed": -1}, ValueError, ["seed", "-1", "from 0"]),
-        ({"parent": "mother"}, ValueError, ["parent", "mother", "parenting.Parent"]),
+        ({"parent": "mother"}, ValueError, ["parent", "mother", "scripted, noisy"]),
         ({"world": "\nWWW\nWAW\nWWW\n"}, ValueError, ["world", "world: unsafe-exploration"]),
     ],
 )

@@ -23,7 +23,7 @@ N = 2000
 WORLD = registry.make("unsafe-exploration", "island")
 CONFIG = compose("lax", registry.defaults("unsafe-exploration"), {}, strict=True)
 UP, DOWN, LEFT, RIGHT = range(4)
-ALIKE, CLEAR = (UP, RIGHT), (UP, DOWN)
+CLEAR = (UP, DOWN)
 
 
 def question(world: Gridworld, left: int, right: int, trials: int = N) -> Query:
@@ -78,10 +78,12 @@ def test_a_boltzmann_parent_errs_as_its_softmax_says(sided: Query) -> None:
 
 
 def test_likeness_errs_more_where_clips_are_alike() -> None:
-    alike, apart = (question(WORLD, *pair) for pair in (ALIKE, CLEAR))
-    wrong = [int((said("likeness:0.4", asked) != right_answer(asked)).sum()) for asked in (alike, apart)]
-    assert binomtest(wrong[0], N, 0.4).pvalue > 0.001, "the ends are diagonal neighbours"
-    assert wrong[1] == 0, "the ends are two cells apart"
+    pairs = (UP, RIGHT), (DOWN, RIGHT), (LEFT, RIGHT)  # up is a wall: its end is the start
+    asked = [question(WORLD, *pair) for pair in pairs]
+    near, diagonal, apart = (int((said("likeness:0.4", one) != right_answer(one)).sum()) for one in asked)
+    assert binomtest(near, N, 0.5).pvalue > 0.001, "half of the time at most"
+    assert binomtest(diagonal, N, 0.4).pvalue > 0.001
+    assert apart == 0
 
 
 def test_a_slip_is_drawn_again_and_a_misconception_is_not(sided: Query) -> None:
@@ -150,7 +152,8 @@ def test_the_experiment_on_parents_who_err_hears_the_same_answers(text: str) -> 
 
 
 @pytest.mark.parametrize(
-    "text", ["scripted", "noisy:eps=0.2", "boltzmann+tiring:half=9.0", "sided:side=right"]
+    "text",
+    ["scripted", "noisy:eps=0.2", "boltzmann:beta=5.0+tiring:eps=0.3,half=9.0", "sided:p=0.2,side=right"],
 )
 def test_the_text_of_a_parent_reads_as_the_same(text: str) -> None:
     assert str(read_parent(text)) == text
