@@ -105,40 +105,42 @@ def noisy(eps: float) -> str:
     return f"noisy:{eps:g}" if eps else "scripted"
 
 
-DOUBLE, HALF, QUARTER, FIFTH, TENTH = 2.0, 0.5, 0.25, 0.2, 0.1
+DOUBLE, HALF, THIRD, QUARTER, FIFTH, TENTH, TWENTIETH = 2.0, 0.5, 0.3, 0.25, 0.2, 0.1, 0.05
 """Shares of a request's trials: more for what the findings are about, fewer for what is slow."""
+
+SHARES = {0.0: DOUBLE, 0.1: DOUBLE, 0.2: 1.0}
 
 
 def _sweep() -> Iterator[Arm]:
     """Errors of a growing rate, with the presets of the paper."""
-    yield from (Arm(ISLAND, TODAY, noisy(eps), DOUBLE if eps in (0, 0.1) else 1) for eps in EPS)
+    yield from (Arm(ISLAND, TODAY, noisy(eps), SHARES.get(eps, HALF)) for eps in EPS)
     yield from (Arm(BOTTLENECK, TODAY, noisy(eps), HALF) for eps in EPS)
     for preset in PRESETS[1:]:
-        yield from (Arm(ISLAND, preset, noisy(eps), HALF) for eps in EPS)
-        yield from (Arm(BOTTLENECK, preset, noisy(eps), QUARTER) for eps in EPS)
+        yield from (Arm(ISLAND, preset, noisy(eps), THIRD) for eps in EPS)
+        yield from (Arm(BOTTLENECK, preset, noisy(eps), FIFTH) for eps in EPS)
     for level in ELSEWHERE:
         for preset in PRESETS:
-            share = FIFTH if preset == TODAY and level != "garden" else TENTH
+            share = TWENTIETH if level == "garden" else FIFTH if preset == TODAY else TENTH
             yield from (Arm(level, preset, noisy(eps), share) for eps in FEW)
 
 
 def _kinds() -> Iterator[Arm]:
     """Errors that depend on what is asked: by advantage, and by likeness."""
     for kind, values in (("boltzmann", BETA), ("likeness", LIKENESS)):
-        yield from (Arm(ISLAND, TODAY, f"{kind}:{value:g}") for value in values)
+        yield from (Arm(ISLAND, TODAY, f"{kind}:{value:g}", HALF) for value in values)
         for preset in PRESETS[1:]:
-            yield from (Arm(ISLAND, preset, f"{kind}:{value:g}", QUARTER) for value in values)
-        yield from (Arm(BOTTLENECK, TODAY, f"{kind}:{value:g}", QUARTER) for value in values)
+            yield from (Arm(ISLAND, preset, f"{kind}:{value:g}", FIFTH) for value in values)
+        yield from (Arm(BOTTLENECK, TODAY, f"{kind}:{value:g}", FIFTH) for value in values)
 
 
 def _frontier() -> Iterator[Arm]:
     """Ways to withstand slips, and errors by likeness."""
     for way in ROBUST:
         slow = WAYS[way].work > 1
-        most = {CONFIRM: DOUBLE, BOTH: HALF, "frugal": HALF, "9 steps": QUARTER}
-        yield Arm(ISLAND, way, noisy(0.1), most.get(way, 1))
+        most = {CONFIRM: DOUBLE, THRICE: 1, "9 steps": QUARTER}
+        yield Arm(ISLAND, way, noisy(0.1), most.get(way, HALF))
         yield Arm(ISLAND, way, noisy(0.2), QUARTER if slow else HALF)
-        yield Arm(BOTTLENECK, way, noisy(0.1), QUARTER if slow else HALF)
+        yield Arm(BOTTLENECK, way, noisy(0.1), HALF if way in (REPEATED, CONFIRM, THRICE) else QUARTER)
         yield Arm(BOTTLENECK, way, noisy(0.2), TENTH if slow else QUARTER)
     yield from (Arm(ISLAND, CONFIRM, f"likeness:{eps:g}", HALF) for eps in SLIPS)
 
@@ -146,7 +148,7 @@ def _frontier() -> Iterator[Arm]:
 def _misconceptions() -> Iterator[Arm]:
     """Errors that are the same each time."""
     for way in AGAINST_MISCONCEPTIONS:
-        yield Arm(ISLAND, way, "misconceived:0.1", QUARTER if WAYS[way].work > 1 else HALF)
+        yield Arm(ISLAND, way, "misconceived:0.1", FIFTH if WAYS[way].work > 1 else HALF)
 
 
 ARMS: Mapping[str, Arm] = {arm.name: arm for arm in (*_sweep(), *_kinds(), *_frontier(), *_misconceptions())}
