@@ -116,8 +116,8 @@ def _sweep() -> Iterator[Arm]:
     yield from (Arm(ISLAND, TODAY, noisy(eps), SHARES.get(eps, HALF)) for eps in EPS)
     yield from (Arm(BOTTLENECK, TODAY, noisy(eps), HALF) for eps in EPS)
     for preset in PRESETS[1:]:
-        yield from (Arm(ISLAND, preset, noisy(eps), THIRD) for eps in EPS)
-        yield from (Arm(BOTTLENECK, preset, noisy(eps), FIFTH) for eps in EPS)
+        yield from (Arm(ISLAND, preset, noisy(eps), FIFTH) for eps in EPS)
+        yield from (Arm(BOTTLENECK, preset, noisy(eps), TENTH) for eps in EPS)
     for level in ELSEWHERE:
         for preset in PRESETS:
             share = TWENTIETH if level == "garden" else FIFTH if preset == TODAY else TENTH
@@ -127,10 +127,10 @@ def _sweep() -> Iterator[Arm]:
 def _kinds() -> Iterator[Arm]:
     """Errors that depend on what is asked: by advantage, and by likeness."""
     for kind, values in (("boltzmann", BETA), ("likeness", LIKENESS)):
-        yield from (Arm(ISLAND, TODAY, f"{kind}:{value:g}", HALF) for value in values)
+        yield from (Arm(ISLAND, TODAY, f"{kind}:{value:g}", THIRD) for value in values)
         for preset in PRESETS[1:]:
-            yield from (Arm(ISLAND, preset, f"{kind}:{value:g}", FIFTH) for value in values)
-        yield from (Arm(BOTTLENECK, TODAY, f"{kind}:{value:g}", FIFTH) for value in values)
+            yield from (Arm(ISLAND, preset, f"{kind}:{value:g}", TENTH) for value in values)
+        yield from (Arm(BOTTLENECK, TODAY, f"{kind}:{value:g}", TENTH) for value in values)
 
 
 def _frontier() -> Iterator[Arm]:
