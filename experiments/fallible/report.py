@@ -13,6 +13,7 @@ from parenting.experiments.fallible.settings import (
     BOTH,
     BOTTLENECK,
     CONFIRM,
+    FRUGAL,
     ISLAND,
     PRESETS,
     REPEATED,
@@ -122,7 +123,9 @@ def _robust(rows: Rows) -> Iterator[Comparison]:
             today = Arm(level, TODAY, noisy(eps))
             for way in (CONFIRM, THRICE, BOTH):
                 yield from _less(rows, Arm(level, way, noisy(eps)), today, DEATHS)
-            yield from _less(rows, Arm(level, BOTH, noisy(eps)), today, UNTIL)
+            both, frugal = (Arm(level, way, noisy(eps)) for way in (BOTH, FRUGAL))
+            yield from _less(rows, both, frugal, DEATHS)
+            yield from _less(rows, both, today, UNTIL)
             confirmed, thrice = (Arm(level, way, noisy(eps)) for way in (CONFIRM, THRICE))
             yield from _less(rows, confirmed, thrice, UNTIL)
             yield from _less(rows, Arm(level, REPEATED, noisy(eps)), today, DEATHS, "above 0")
@@ -149,8 +152,8 @@ def _kinds(rows: Rows) -> Iterator[Comparison]:
 def _lost(rows: Rows) -> Iterator[Comparison]:
     """Policies that were optimal and are not any more."""
     for level in (ISLAND, BOTTLENECK):
-        for eps in (0.0, 0.1):
-            name = Arm(level, TODAY, noisy(eps)).name
+        for way, eps in ((TODAY, 0.0), (TODAY, 0.1), (CONFIRM, 0.1), (FRUGAL, 0.1), (BOTH, 0.1)):
+            name = Arm(level, way, noisy(eps)).name
             once = [row for row in rows.get(name, ()) if row["optimal_at"]]
             if once:
                 lost = sum(not row["optimal"] for row in once)

@@ -31,7 +31,8 @@ class Way(NamedTuple):
     thrice: bool = False  # every question is asked until two of at most three answers agree
 
 
-TODAY, REPEATED, CONFIRM, BOTH = "conservative", "repeated queries", "confirm 0.95", "frugal, confirm 0.95"
+TODAY, REPEATED, CONFIRM = "conservative", "repeated queries", "confirm 0.95"
+FRUGAL, BOTH = "frugal", "frugal, confirm 0.95"
 WAYS: Mapping[str, Way] = {
     TODAY: Way(),
     "lax": Way("lax"),
@@ -43,12 +44,12 @@ WAYS: Mapping[str, Way] = {
     THRICE: Way(thrice=True),
     "fresh pairs": Way(changes={"fresh_pairs": True}),
     "9 steps": Way(changes={"gradient_steps": 9}, work=5.0),
-    "frugal": Way("frugal", work=5.0),
+    FRUGAL: Way("frugal", work=5.0),
     BOTH: Way("frugal", {"confirm": 0.95}, 5.0),
 }
 """By name. All but the first three are ways to withstand errors; those without a preset are conservative."""
-ROBUST = (REPEATED, "confirm 0.8", CONFIRM, "confirm 0.99", THRICE, "fresh pairs", "9 steps", "frugal", BOTH)
-AGAINST_MISCONCEPTIONS = (TODAY, CONFIRM, "frugal", BOTH)
+ROBUST = (REPEATED, "confirm 0.8", CONFIRM, "confirm 0.99", THRICE, "fresh pairs", "9 steps", FRUGAL, BOTH)
+AGAINST_MISCONCEPTIONS = (TODAY, CONFIRM, FRUGAL, BOTH)
 
 
 class Place(NamedTuple):
