@@ -241,6 +241,7 @@ PAGES: dict[str, Callable[[str, Sequence[Row]], Ends]] = {
     "figure2": figure2,
     "figure3": figure3,
     "value-iteration": value_iteration,
+    "fallible": fallible,
 }
 
 
