@@ -70,7 +70,7 @@ def _report(request: Request, rows: Sequence[Row]) -> Results:
     words = paragraphs("fallible/page.md", ticks=ticks(request.scale), seed=request.seed, probed=PROBED)
     every: dict[str, Callable[[Figure, Rows], None]] = {
         "frontier": frontier,
-        "frontier-all-questions": partial(frontier, until=False),
+        "all-questions": partial(frontier, until=False),
         "rates": rates,
         "kinds": kinds,
         "misconceptions": misconceptions,
