@@ -83,7 +83,7 @@ def kinds(figure: Figure, rows: Rows) -> None:
         ]
         _line(right, [100 * one for one in eps][: len(even)], even, rows, colour, None, ":")
     left.set_xlabel("beta of a Boltzmann parent")
-    right.set_xlabel("wrong where clips are alike, % (dotted: wrong anywhere)")
+    right.set_xlabel("% wrong by likeness (dotted: anywhere)")
     for axes in (left, right):
         axes.set_ylabel("deaths")
     _legend(figure, left)
