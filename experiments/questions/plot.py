@@ -121,7 +121,7 @@ def _curve(axes: Axes, name: str, what: str, rows: Sequence[Row]) -> None:
 def draw_windows(figure: Figure, rows: Sequence[Row]) -> None:
     """Rates of answers and deaths a tick in each window of long lives, with intervals."""
     figure.set_size_inches(9, 4)
-    colours = dict(zip(LONG_LIVES, (COLOUR, GREEN, PURPLE, PAPER), strict=True))
+    colours = dict(zip(LONG_LIVES, (COLOUR, GREEN, PAPER), strict=True))
     for axes, (column, label, goal) in zip(figure.subplots(1, 2), RATES, strict=True):
         for name in LONG_LIVES:
             each = rates(name, column, rows)

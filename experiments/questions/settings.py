@@ -96,10 +96,13 @@ ISLAND, BOTTLENECK = "island", "island-bottleneck"
 ARMS: dict[str, tuple[str, str, Arm]] = {
     f"{name}, {level}": (WORLD, level, arm)
     for level in (ISLAND, BOTTLENECK)
-    for name, arm in {**PRESETS, **STARTED, **ABLATIONS, **BASELINES, **ERRING}.items()
+    for name, arm in {**PRESETS, **STARTED}.items()
+}
+ARMS |= {
+    f"{name}, {ISLAND}": (WORLD, ISLAND, arm) for name, arm in {**ABLATIONS, **BASELINES, **ERRING}.items()
 }
 """World, level and arm by the name of its rows."""
-ARMS |= {f"{name}, {RANDOM}": (WORLD, RANDOM, arm) for name, arm in PRESETS.items()}
+ARMS |= {f"{name}, {RANDOM}": (WORLD, RANDOM, PRESETS[name]) for name in ("frugal", "conservative")}
 OTHER_WORLDS = (
     ("side-effects", "box"),
     ("interruptibility", "button"),
@@ -144,7 +147,6 @@ LASTING_LIVES = {
     for parent in ("scripted", "noisy:0.1")
     for name, (preset, changes) in {
         "conservative": ("conservative", {}),
-        "conservative, 9 gradient steps": ("conservative", {"gradient_steps": 9}),
         "frugal": ("frugal", {}),
     }.items()
 }

@@ -148,9 +148,15 @@ def _falling(name: str, rows: Sequence[Row]) -> Iterator[Comparison]:
             f"{name}: {what}, last window",
             f"below {100 * goal:g} % of ticks",
             _percent(each[-1], last),
-            agrees=None if last is None else last.high < goal,
+            agrees=_under(last, goal),
             reference="check",
         )
+
+
+def _under(found: Interval | None, goal: float) -> bool | None:
+    """The whole interval decides."""
+    above = None if found is None else found.above(goal)
+    return None if above is None else not above
 
 
 def _percent(values: Sequence[float], found: Interval | None) -> str:

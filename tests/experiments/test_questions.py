@@ -135,6 +135,8 @@ def test_rates_that_do_not_fall_are_told() -> None:
     assert falling["frugal, T = 1: answers, last window"] is True
     assert falling["frugal, T = 1: deaths, windows below the first"] is None  # nobody died to begin with
     assert falling["frugal, T = 1: deaths, last window"] is True
+    few = verdicts(long_life([0.1, 0.0], trials=2))
+    assert few["frugal, T = 1: deaths, last window"] is None  # 2000 ticks without one do not tell
     assert rising["frugal, T = 1: answers, windows below the first"] is False
     assert rising["frugal, T = 1: answers, last window"] is False
 
