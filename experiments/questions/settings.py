@@ -141,14 +141,9 @@ LONG_LIVES = {
 """Lives of ten windows in the last stage."""
 LASTING: dict[Scale, int] = {"quick": 40, "paper": 120}
 LASTING_LIVES = {
-    f"{name}, {parent}, {LASTING['paper']} ticks": LongLife(
-        preset, changes, LASTING, parent=parent, one_of=10
-    )
+    f"{preset}, {parent}, {LASTING['paper']} ticks": LongLife(preset, {}, LASTING, parent=parent, one_of=10)
     for parent in ("scripted", "noisy:0.1")
-    for name, (preset, changes) in {
-        "conservative": ("conservative", {}),
-        "frugal": ("frugal", {}),
-    }.items()
+    for preset in ("conservative", "frugal")
 }
 """Lives that go on after the policy was first optimal."""
 IDEAL = "ideal tabular agent"
