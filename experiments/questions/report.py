@@ -79,7 +79,7 @@ def _bounds(world: str, level: str, rows: Sequence[Row]) -> Iterator[Comparison]
 
 
 def _starts(rows: Sequence[Row]) -> Iterator[Comparison]:
-    """What the agents of random islands were asked before."""
+    """The answers that the agents of random islands had before."""
     for level in GOALS:
         mine = [row for row in rows if row["of"] == f"pre-parented, {level}"]
         if mine:

@@ -24,7 +24,7 @@ MAX_STEPS = 100_000
 
 
 class Table(NamedTuple):
-    """What the parent knows of a level, as plain lists over the states."""
+    """The parent's knowledge of a level, as plain lists over the states."""
 
     next_state: list[list[int]]
     q: list[list[float]]

@@ -37,7 +37,7 @@ ENDLESS = StopRule("ticks", 10**9)
 
 
 class Life(NamedTuple):
-    """What the trials of a task have in common."""
+    """The settings that the trials of a task share."""
 
     world: str
     level: str  # a built-in one, or a name of `ISLANDS`
