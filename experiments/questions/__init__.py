@@ -91,7 +91,7 @@ def _raised(name: str, request: Request) -> list[Task]:
 
 
 def _starts(name: str, request: Request) -> list[Task]:
-    """The task that makes the policies with which an arm begins, if it does not begin with weights of its own."""
+    """The task that makes the policies with which an arm begins, if not its own weights."""
     _world, level, arm = ARMS[name]
     given = {"level": level, "preset": arm.preset, "seed": request.seed}
     if arm.start == PARENTED:
