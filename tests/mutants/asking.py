@@ -19,13 +19,13 @@ ASKING = [
     Mutant(
         "redrawn questions do not make a place familiar",
         "agent/guidance.py",
-        "familiarity.count(state.familiarity, where, asking)",
-        "familiarity.count(state.familiarity, where, pausing)",
+        "    new = asking\n",
+        "    new = pausing\n",
         f"{REFERENCE}[unsafe-exploration, random]",
     ),
     Mutant(
         "refused actions are asked about again",
-        "agent/guidance.py",
+        "agent/candidates.py",
         ".masked_fill(state.refused, -torch.inf)",
         "",
         f"{GUIDANCE}::test_neither_redraws_the_other_two_in_the_same_tick_and_stores_nothing",
