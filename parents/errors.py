@@ -35,7 +35,7 @@ class Part(BaseModel):
     """One way to err. `change` is given the answer so far."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-    name: ClassVar[str]
+    name: ClassVar[str] = ""  # an imported one is written as its path
     judges: ClassVar[bool] = False  # it judges by itself, so it stands first
 
     def change(self, asked: Asked, choice: Int64[Tensor, "N"], place: int) -> Int64[Tensor, "N"]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from typing import NamedTuple
 
@@ -9,6 +10,10 @@ from pydantic import ValidationError
 
 from parenting.envs.names import did_you_mean
 from parenting.parents.errors import PARTS, Part
+
+
+PLUS = re.compile(r"(?<![0-9.][eE])\+")
+"""Joins parents; the plus of 1e+16 does not."""
 
 
 class ParentError(ValueError):
@@ -27,7 +32,7 @@ class ParentSpec(NamedTuple):
     @property
     def errs(self) -> bool:
         """Return whether it is another than the paper's."""
-        return any(part.name != "scripted" for part in self.parts)
+        return any(type(part) is not PARTS["scripted"] for part in self.parts)
 
 
 SCRIPTED = ParentSpec((PARTS["scripted"](),))
@@ -42,7 +47,11 @@ def read_parent(text: str) -> ParentSpec:
     Raises:
         ParentError: there is no such parent or parameter, or a value is out of bounds.
     """
-    parts = tuple(_part(one.strip()) for one in text.split("+"))
+    parts = tuple(_part(one.strip()) for one in PLUS.split(text))
+    judging = [part for part in parts if part.judges]
+    if len(judging) > 1:
+        names = " and ".join(part.name for part in judging)
+        raise ParentError(f"{names} each judge by themselves: give one of them.")
     for place, part in enumerate(parts):
         if part.judges and place:
             raise ParentError(

@@ -153,7 +153,13 @@ def test_the_experiment_on_parents_who_err_hears_the_same_answers(text: str) -> 
 
 @pytest.mark.parametrize(
     "text",
-    ["scripted", "noisy:eps=0.2", "boltzmann:beta=5.0+tiring:eps=0.3,half=9.0", "sided:p=0.2,side=right"],
+    [
+        "scripted",
+        "noisy:eps=0.2",
+        "boltzmann:beta=5.0+tiring:eps=0.3,half=9.0",
+        "sided:p=0.2,side=right",
+        "boltzmann:beta=1e+16",
+    ],
 )
 def test_the_text_of_a_parent_reads_as_the_same(text: str) -> None:
     assert str(read_parent(text)) == text
@@ -168,6 +174,7 @@ def test_the_text_of_a_parent_reads_as_the_same(text: str) -> None:
         ("noisy:rate=1", "noisy has no parameter 'rate'. It has: eps."),
         ("noisy:0.1,eps=0.2", "noisy: eps is given twice."),
         ("noisy+boltzmann", "boltzmann judges by itself, so it stands first"),
+        ("boltzmann+myopic", "boltzmann and myopic each judge by themselves"),
         ("scripted:1", "scripted has no parameter '1'. It has none."),
         ("", "There is no parent ''."),
         ("no_such.module.Parent", "The parent 'no_such.module.Parent' cannot be imported"),

@@ -57,7 +57,9 @@ def test_greater_advantage_is_preferred(rule: ScriptedRule, kind: QueryKind) -> 
 def test_the_sides_mean_nothing(rule: ScriptedRule, kind: QueryKind) -> None:
     asked = random_queries(island(), rule.model, 200, kind, seed=2)
     swapped = asked.map(
-        lambda name, tensor, _axis: tensor if name in ("kind", "maturity", "level", "votes") else tensor.flip(1)
+        lambda name, tensor, _axis: (
+            tensor if name in ("kind", "maturity", "level", "votes") else tensor.flip(1)
+        )
     )
     mirror = {Choice.LEFT: Choice.RIGHT, Choice.RIGHT: Choice.LEFT}
     expected = [mirror.get(one, one) for one in said(rule.answer(asked))]
