@@ -11,7 +11,6 @@ from pydantic import ValidationError
 from parenting.envs.names import did_you_mean
 from parenting.parents.errors import PARTS, Part
 
-
 PLUS = re.compile(r"(?<![0-9.][eE])\+")
 """Joins parents; the plus of 1e+16 does not."""
 
