@@ -54,3 +54,12 @@ class Experiment:
 def chunk_ranges(trials: int, chunk: int = CHUNK) -> list[range]:
     """The trials of every task. Those of fewer trials are the first of those of more."""
     return [range(first, min(first + chunk, trials)) for first in range(0, trials, chunk)]
+
+
+def share_of(asked: int, part: int, of: int) -> int:
+    """The trials of an arm with `part` trials where `of` are asked, if `asked` are.
+
+    A part smaller than all grows by whole parts, so that its pieces stay pieces when more trials are asked.
+    It is exact where fewer than `of` are asked.
+    """
+    return part * (asked // of) if part < of <= asked else -(-asked * part // of)

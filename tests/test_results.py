@@ -111,6 +111,18 @@ def test_every_arm_has_one_row_for_each_of_its_trials(name: str) -> None:
         assert sorted(numbers) == list(range(wanted(name, arm[0], asked))), arm
 
 
+@pytest.mark.parametrize("name", ["fallible", "questions"])
+def test_the_published_request_still_asks_for_the_published_trials(name: str) -> None:
+    """Arms have shares of it: were they others, the page could not be made again."""
+    there = {(one["of"], int(one["trial"])) for one in trials(name) if one["trial"]}
+    request, one = Request(**results(name)["asked"]), experiment(name)
+    of = [task.arguments for task in one.tasks(request) if "span" in task.arguments]
+    asked = [(mine["label"], trial) for mine in of for trial in range(*mine["span"])]
+    assert len(asked) == len(set(asked))
+    assert set(asked) == there
+    assert json.loads(json.dumps(dict(one.config(request)))) == results(name)["config"]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_no_arm_is_left_out(name: str) -> None:
     there = {one["of"] for one in trials(name)}

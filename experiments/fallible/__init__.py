@@ -10,7 +10,10 @@ from parenting.agent.config import PRESETS
 from parenting.experiments.fallible.plot import frontier, kinds, misconceptions, rates
 from parenting.experiments.fallible.report import PROBED, Rows, by_arm, findings
 from parenting.experiments.fallible.settings import (
+    ARMS,
     PLACES,
+    TICKS,
+    TRIALS,
     WAYS,
     Arm,
     ticks,
@@ -29,11 +32,11 @@ TOGETHER = 100
 
 def _config(request: Request) -> Mapping[str, Any]:
     return {
-        "ticks": ticks(request.scale),
+        "ticks": TICKS,
         "frugal": PRESETS["frugal"],
         "variants": {
             name: [PLACES[arm.level].world, arm.level, WAYS[arm.way].preset, arm.changes, arm.parent]
-            for name, arm in tried(request.scale).items()
+            for name, arm in ARMS.items()
         },
     }
 
@@ -42,7 +45,7 @@ def _tasks(request: Request) -> list[Task]:
     return [
         _task(arm, span, request)
         for arm in tried(request.scale).values()
-        for span in chunk_ranges(arm.trials(request.trials), TOGETHER)
+        for span in chunk_ranges(arm.trials(request.trials), min(arm.part, TOGETHER))
     ]
 
 
@@ -89,7 +92,7 @@ EXPERIMENT = Experiment(
     title="Parents who err",
     section="",
     claim="A parent errs: do deaths grow with the errors, and does asking again, to be sure, prevent them?",
-    trials={"quick": 2, "paper": 100},
+    trials={"quick": 2, "paper": TRIALS},
     config=_config,
     tasks=_tasks,
     report=_report,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import ceil
 from typing import Any, NamedTuple
 
-from parenting.experiments.spec import Scale
+from parenting.experiments.spec import Scale, share_of
 
+TRIALS = 100
+"""Trials asked at the paper's scale; shares are shares of them."""
 TICKS = 400
 """A trial's ticks from the start, also after its policy is first optimal."""
 ISLAND, BOTTLENECK = "island", "island-bottleneck"
@@ -96,9 +97,14 @@ class Arm(NamedTuple):
         """The work of a trial, against one on the island."""
         return WAYS[self.way].work * PLACES[self.level].work
 
+    @property
+    def part(self) -> int:
+        """The number of trials at the paper's scale."""
+        return round(TRIALS * self.share)
+
     def trials(self, asked: int) -> int:
-        """The number of trials where a request asks for so many. At the paper's scale 100 is a share of 1."""
-        return max(1, ceil(asked * self.share))
+        """The number of trials where a request asks for so many."""
+        return share_of(asked, self.part, TRIALS)
 
 
 def noisy(eps: float) -> str:

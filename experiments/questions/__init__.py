@@ -28,9 +28,11 @@ from parenting.experiments.questions.settings import (
     START_AGENTS,
     START_TICKS,
     STARTS,
+    TRIALS,
     WINDOW,
     WORLD,
     LongLife,
+    trials_of,
 )
 from parenting.experiments.runner.store import Row, Task
 from parenting.experiments.spec import Experiment, Request, Results, chunk_ranges
@@ -86,7 +88,7 @@ def _raised(name: str, request: Request) -> list[Task]:
             arm.cost * len(span),
             needs=needs,
         )
-        for span in chunk_ranges(_share(request, arm.one_of), TOGETHER)
+        for span in _spans(name, arm.one_of, request)
     ]
 
 
@@ -132,7 +134,7 @@ def _lives(request: Request) -> list[Task]:
         _life(call, name, life, span, request)
         for call, name, life in lives
         if request.scale == "paper" or name in ("frugal, T = 1", next(iter(LASTING_LIVES)))
-        for span in chunk_ranges(_share(request, life.one_of), TOGETHER)
+        for span in _spans(name, life.one_of, request)
     ]
 
 
@@ -150,8 +152,8 @@ def _life(call: str, name: str, life: LongLife, span: range, request: Request) -
     return Task(_key(f"{name} {ticks}", span), f"{CALL}:{call}", mine, life.cost * len(span))
 
 
-def _share(request: Request, one_of: int) -> int:
-    return -(-request.trials // one_of)
+def _spans(name: str, one_of: int, request: Request) -> list[range]:
+    return chunk_ranges(trials_of(name, request.trials), min(TRIALS // one_of, TOGETHER))
 
 
 def _key(name: str, span: range, needs: Sequence[str] = ()) -> str:
@@ -177,7 +179,7 @@ EXPERIMENT = Experiment(
     title="Questions: a third of them",
     section="",
     claim="An agent that asks what it does not know, and nothing twice, spares its parent most questions.",
-    trials={"quick": 3, "paper": 300},
+    trials={"quick": 3, "paper": TRIALS},
     config=_config,
     tasks=_tasks,
     report=_report,

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from parenting.experiments.spec import Scale
+from parenting.experiments.spec import Scale, share_of
 
+TRIALS = 300
+"""Trials asked at the paper's scale."""
 ANSWERS = 60
 """Answers up to which the areas go."""
 MARKS = (*range(20), *range(20, ANSWERS + 1, 4))
@@ -160,4 +162,4 @@ def trials_of(name: str, asked: int) -> int:
     if name.startswith(IDEAL):
         return IDEAL_TRIALS
     one_of = ARMS[name][2].one_of if name in ARMS else {**LONG_LIVES, **LASTING_LIVES}[name].one_of
-    return -(-asked // one_of)
+    return share_of(asked, TRIALS // one_of, TRIALS)

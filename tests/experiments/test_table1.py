@@ -13,7 +13,7 @@ from parenting.commands.main import app
 from parenting.experiments.registry import NAMES, experiment
 from parenting.experiments.reporting.markdown import page
 from parenting.experiments.runner.store import described
-from parenting.experiments.spec import Request, Scale, chunk_ranges
+from parenting.experiments.spec import Request, Scale, chunk_ranges, share_of
 
 run = CliRunner().invoke
 SCALES: tuple[Scale, Scale] = "quick", "paper"
@@ -52,6 +52,14 @@ def test_more_trials_go_on_from_fewer(name: str) -> None:
 
 def test_spans_cover_every_trial_once() -> None:
     assert [list(span) for span in chunk_ranges(5, 2)] == [[0, 1], [2, 3], [4]]
+
+
+@pytest.mark.parametrize(
+    ("asked", "part", "trials"),
+    [(1, 5, 1), (60, 30, 18), (99, 30, 30), (100, 30, 30), (199, 30, 30), (200, 30, 60), (150, 100, 150)],
+)
+def test_a_share_grows_by_whole_parts(asked: int, part: int, trials: int) -> None:
+    assert share_of(asked, part, 100) == trials
 
 
 def test_the_order_of_the_four_algorithms(tmp_path: Path) -> None:
