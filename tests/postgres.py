@@ -33,6 +33,8 @@ FAST = {
     "max_connections": "200",
 }
 USER = "parenting"
+PATIENCE = 2.0
+"""Seconds for a connection that was closed to leave the list of the server."""
 """It owns the databases of the tests, and has no other rights."""
 # Ends with the test process, however that ends: nobody else holds the other end of its standard input.
 GUARDED = """
@@ -151,7 +153,10 @@ class Cluster:
                 empty = recycled.empty(connection, template)
         except psycopg.OperationalError:  # the test has removed it, or lets nobody in
             return False
+        end = time.monotonic() + PATIENCE
         while self.admin.execute(others.replace("pg_terminate_backend(pid, 5000)", "1"), [name]).fetchone():
+            if time.monotonic() > end:  # not ours, which has been closed: a thread of the test has come back
+                return False
             time.sleep(0.001)
         self.empty += [(name, template)] * empty
         return empty

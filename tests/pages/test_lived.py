@@ -39,7 +39,7 @@ def lived(world: str, level: str) -> Questions:
     life = Inline(Begun(world, level, CONFIG, preset="lax", seed=7))
     found = []
     spec, art = registry.spec(world), registry.level(world, level)
-    run = Run(id=1, legend=dict(spec.legend), level=level, level_text=art.text)
+    run = Run(id=1, config={}, legend=dict(spec.legend), level=level, level_text=art.text)
     for _ in range(TICKS):
         life.tick()
         if kind := kind_name(life.query):
