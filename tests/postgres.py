@@ -33,9 +33,9 @@ FAST = {
     "max_connections": "200",
 }
 USER = "parenting"
+"""It owns the databases of the tests, and has no other rights."""
 PATIENCE = 2.0
 """Seconds for a connection that was closed to leave the list of the server."""
-"""It owns the databases of the tests, and has no other rights."""
 # Ends with the test process, however that ends: nobody else holds the other end of its standard input.
 GUARDED = """
 "$0" -D "$1" -k "$1" "${@:2}" < /dev/null > "$1/log" 2>&1 &

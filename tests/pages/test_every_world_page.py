@@ -60,7 +60,8 @@ def seen(page: Page, parts: str) -> list[tuple[int, float]]:
 
 
 def at(page: Page, moment: float) -> None:
-    """Hold both boards at a moment of their clock."""
+    """Hold both boards at a moment of their clock, once the player has set it."""
+    page.wait_for_selector("#question[data-listening]")
     page.evaluate("at => document.getAnimations().forEach(a => { a.pause(); a.currentTime = at; })", moment)
 
 
