@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from tests.interval_formulas import Ends, Row, numbers, stats, student, welch, widened, wilson
+from tests.intervals_beyond import fallible, panel, questions
 from tests.tree import ROOT
 
 PUBLISHED = ROOT / "docs/results"
@@ -209,28 +210,6 @@ def value_iteration(what: str, every: Sequence[Row]) -> Ends:
     return wilson(sum(row["greedy"] == row["states"] for row in trained), len(trained))
 
 
-def fallible(what: str, every: Sequence[Row]) -> Ends:
-    arms, measure = what.rsplit(": ", 1)
-
-    def measured(arm: str) -> list[float]:
-        mine = [row for row in every if row["of"] == arm]
-        if measure == "questions":
-            return [float(row["guidance"]) + float(row["preference"]) for row in mine]
-        if not measure.endswith(" until optimal"):
-            return numbers(mine, measure)
-        column = "optimal_deaths" if measure.startswith("deaths") else "optimal_queries"
-        return numbers([row for row in mine if row["optimal_at"] != "0"], column)
-
-    if measure == "optimal at the end":
-        mine = [row for row in every if row["of"] == arms]
-        return wilson(sum(row["optimal"] == "True" for row in mine), len(mine))
-    if measure == "optimal once, not at the end":
-        once = [row for row in every if row["of"] == arms and row["optimal_at"] != "0"]
-        return wilson(sum(row["optimal"] == "False" for row in once), len(once))
-    one, _, other = arms.partition(" minus ")
-    return welch(measured(one), measured(other)) if other else student(measured(one))
-
-
 PAGES: dict[str, Callable[[str, Sequence[Row]], Ends]] = {
     "table1": table1,
     "calibrate": table1,
@@ -242,6 +221,8 @@ PAGES: dict[str, Callable[[str, Sequence[Row]], Ends]] = {
     "figure3": figure3,
     "value-iteration": value_iteration,
     "fallible": fallible,
+    "panel": panel,
+    "questions": questions,
 }
 
 

@@ -1,0 +1,88 @@
+"""The ends of the intervals on the pages beyond the paper, from a row's words and the trials."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from tests.interval_formulas import Ends, Row, numbers, student, welch, wilson
+
+IDEAL = "ideal tabular agent"
+
+
+def fallible(what: str, every: Sequence[Row]) -> Ends:
+    arms, measure = what.rsplit(": ", 1)
+
+    def measured(arm: str) -> list[float]:
+        mine = [row for row in every if row["of"] == arm]
+        if measure == "questions":
+            return [float(row["guidance"]) + float(row["preference"]) for row in mine]
+        if not measure.endswith(" until optimal"):
+            return numbers(mine, measure)
+        column = "optimal_deaths" if measure.startswith("deaths") else "optimal_queries"
+        return numbers([row for row in mine if row["optimal_at"] != "0"], column)
+
+    if measure == "optimal at the end":
+        mine = [row for row in every if row["of"] == arms]
+        return wilson(sum(row["optimal"] == "True" for row in mine), len(mine))
+    if measure == "optimal once, not at the end":
+        once = [row for row in every if row["of"] == arms and row["optimal_at"] != "0"]
+        return wilson(sum(row["optimal"] == "False" for row in once), len(once))
+    one, _, other = arms.partition(" minus ")
+    return welch(measured(one), measured(other)) if other else student(measured(one))
+
+
+def panel(what: str, every: Sequence[Row]) -> Ends:
+    def measured(group: str, rule: str, measure: str) -> list[float]:
+        mine = [row for row in every if (row["panel"], row["of"]) == (group, rule)]
+        if measure == "deaths":
+            return numbers(mine, "deaths")
+        if measure == "questions":
+            return [float(row["guidance"]) + float(row["preference"]) for row in mine]
+        return [100 * float(row["right"]) / float(row["asked"]) for row in mine if row["asked"] != "0"]
+
+    if claim := re.fullmatch(r"(.*): (right answers|deaths), (.*) minus (.*)", what):
+        group, measure, one, other = claim.groups()
+        more, less = measured(group, one, measure), measured(group, other, measure)
+        if len(set(less)) == 1:  # never wrong: only the other sample varies
+            return student([value - less[0] for value in more])
+        return welch(more, less)
+    arm, measure = what.split(": ")
+    group, rule = arm.rsplit(", ", 1)
+    if measure == "optimal at the end":
+        mine = [row for row in every if (row["panel"], row["of"]) == (group, rule)]
+        return wilson(sum(row["optimal"] == "True" for row in mine), len(mine))
+    return student(measured(group, rule, measure))
+
+
+def questions(what: str, every: Sequence[Row]) -> Ends:
+    def of(arm: str) -> list[Row]:
+        return [row for row in every if row["of"] == arm and row["trial"]]
+
+    def answers(arm: str) -> list[float]:
+        done = [row for row in of(arm) if row["finished"] == "True"]
+        return [float(row["guidance"]) + float(row["preference"] or 0) for row in done]
+
+    if level := re.fullmatch(f"(.*): answers of the {IDEAL}", what):
+        return student(answers(f"{IDEAL}, {level[1]}"))
+    if started := re.fullmatch("pre-parenting for (.*): answers of each agent", what):
+        return student(
+            numbers([row for row in every if row["of"] == f"pre-parented, {started[1]}"], "guidance")
+        )
+    arm, measure = what.rsplit(": ", 1)
+    if measure == "deaths, frugal minus conservative":
+        ours, theirs = (numbers(of(f"{name}, {arm}"), "deaths") for name in ("frugal", "conservative"))
+        if any((*ours, *theirs)):
+            return welch(ours, theirs)
+        return -wilson(0, len(theirs))[1] / 100, wilson(0, len(ours))[1] / 100
+    if measure.startswith("answers minus"):
+        return welch(answers(arm), answers(f"{IDEAL}, {arm.rsplit(', ', 1)[1]}"))
+    if measure == "optimal at the end":
+        return wilson(sum(row["optimal"] == "1" or row["optimal"] == "True" for row in of(arm)), len(of(arm)))
+    if area := re.match("area under (deaths|regret)", measure):
+        return student(numbers(of(arm), f"area_{area[1]}"))
+    values = numbers(of(arm), "deaths") if measure == "deaths" else answers(arm)
+    if any(values):
+        return student(values)
+    low, high = wilson(0, len(values))
+    return low / 100, high / 100
