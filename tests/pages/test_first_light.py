@@ -6,7 +6,7 @@ from pathlib import Path
 
 import httpx2
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import answer, distances, up
@@ -25,9 +25,9 @@ def test_the_first_agent_is_raised_by_at_most_ten_answers(browser: Browser, tmp_
         dashboard = tabs.open("/runs/1")
         to_goal = distances()
         keys: list[str] = []
-        while page.locator("#optimal").is_hidden():
-            assert len(keys) < ENOUGH, "the agent did not become optimal"
+        while page.locator("#optimal").is_hidden() and len(keys) < ENOUGH:  # told once a second at most
             keys.append(answer(page, to_goal))
+        expect(page.locator("#optimal")).to_be_visible(timeout=60_000)
         run = httpx2.get(f"{url}/api/v1/runs/1").json()
         rows = httpx2.get(f"{url}/api/v1/runs/1/metrics").json()["rows"]
         assert run["optimal"]
