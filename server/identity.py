@@ -8,13 +8,15 @@ are refused here.
 
 from __future__ import annotations
 
+import uuid
+
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from parenting.server.columns import Damaged
 from parenting.server.db import Database
 from parenting.server.errors import DamagedRowError
-from parenting.server.tables import Identity, Query, Run, new_uuid
+from parenting.server.tables import Identity, Query, Run
 
 UNREADABLE = (
     "The identity of this database cannot be read, so no answer can be held to be meant for it. "
@@ -56,7 +58,7 @@ def renew(db: Database) -> str:
     """
     with db.write() as session:
         mine = session.scalars(select(Identity).with_for_update()).one()
-        mine.copied_from, mine.uuid, mine.since = mine.uuid, new_uuid(), db.clock()
+        mine.copied_from, mine.uuid, mine.since = mine.uuid, str(uuid.uuid4()), db.clock()
         return mine.uuid
 
 

@@ -31,5 +31,11 @@ class PolicyPayload(Payload):
     """The present policy in every cell; nothing else needs to be said."""
 
 
-KINDS: dict[str, type[Payload]] = {"walk": WalkPayload, "policy": PolicyPayload}
+class EpisodePayload(Payload):
+    """An episode of the life, shown again."""
+
+    tick: Annotated[int, Field(ge=1, lt=2**53), WHOLE] = Field(1, description="A tick of the episode.")
+
+
+KINDS: dict[str, type[Payload]] = {"walk": WalkPayload, "policy": PolicyPayload, "episode": EpisodePayload}
 """The payload of each kind of job."""

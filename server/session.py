@@ -21,6 +21,7 @@ from parenting.server.counters import count
 from parenting.server.damage import readable
 from parenting.server.db import Database
 from parenting.server.growth import Growth
+from parenting.server.lived import Lived
 from parenting.server.machine import diverged, follow, take_up
 from parenting.server.metrics_row import NOTHING_LEARNT, learnt, measure
 from parenting.server.queue import worker_side
@@ -67,6 +68,7 @@ class RunSession:
         self.saved = self._recalled.saved
         self.record_ends = self.parent.record_ends = worker_side.high_water(db, claim.run_id)
         self.growth = Growth(self.world, run, self.evaluation, self.saved.state, self.saved.tally)
+        self.lived = Lived(self.world, db, claim, self.saved)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
@@ -159,6 +161,7 @@ class RunSession:
         tally = count(self.world, self.saved.tally, answer, state, events)
         self.saved = Snapshot(state, tally, config)
         self.growth.milestones.see(state, tally)
+        self.lived.see(state, tally, events)
         if self.last_tick <= self.record_ends:
             self._hold_to_the_record(query)
         self._note(answer)
@@ -187,6 +190,7 @@ class RunSession:
             self.parent.follow_until = self.record_ends
         asked = None if stored is None else self.parent.read(stored)
         self.saved = self.saved._replace(state=follow(self.saved.state, asked, query))
+        self.lived.forget(self.saved.state)
 
     def _note(self, answer: Answer) -> None:
         """Keep what the next row of metrics needs of this tick."""
@@ -256,6 +260,7 @@ class RunSession:
 
     def save(self) -> None:
         """Write a checkpoint. The next one waits the longer, the longer this one took."""
+        self.lived.write()
         began, blob = time.monotonic(), pack(self.saved)
         checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, blob)
         self._saved_tick, self._saved_at = self.last_tick, time.monotonic()

@@ -1,4 +1,4 @@
-"""The tables: identity, runs, queries, answers, events, metrics, checkpoints, workers, jobs, weights.
+"""The tables: identity, runs, queries, answers, events, metrics, checkpoints, moves, workers, jobs, weights.
 
 The database enforces the invariants: one query for each run and tick, one standing answer for each query,
 known words only. Times are UTC. JSON is readable by eye; `Query.clips` describes the shape of a clip.
@@ -6,7 +6,6 @@ known words only. Times are UTC. JSON is readable by eye; `Query.clips` describe
 
 from __future__ import annotations
 
-import uuid
 from datetime import datetime
 from typing import Any
 
@@ -14,6 +13,7 @@ from sqlalchemy import CheckConstraint, ForeignKey, Index, UniqueConstraint, eve
 from sqlalchemy.orm import Mapped, mapped_column
 
 from parenting.server.columns import Big, OneOf, name_places
+from parenting.server.moves_table import Moves
 from parenting.server.public_ids import public_id
 from parenting.server.statuses import (
     JOB_STATES,
@@ -28,7 +28,7 @@ from parenting.server.statuses import (
 from parenting.server.table_root import Table, one_of, unique_where
 from parenting.server.triggers import keep_deleted_numbers
 
-__all__ = ["Table"]
+__all__ = ["Moves", "Table"]
 
 KINDS = ("guidance", "preference")
 CHOICES = ("left", "right", "either", "neither")
@@ -40,11 +40,6 @@ PARENTS = ("human", "scripted")
 def _public_id() -> Mapped[str]:
     """Return the column of a name that means the same forever, in whatever copy of the database."""
     return mapped_column(default=public_id, server_default=text("''"), unique=True, index=True)
-
-
-def new_uuid() -> str:
-    """Draw a new UUID for a database."""
-    return str(uuid.uuid4())
 
 
 class Identity(Table):

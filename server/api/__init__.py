@@ -4,8 +4,18 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from parenting.server.api import jobs, operator, page_errors, presence, queries, revisions, runs, streams
+from parenting.server.api import (
+    episodes,
+    jobs,
+    operator,
+    page_errors,
+    presence,
+    queries,
+    revisions,
+    runs,
+    streams,
+)
 
 router = APIRouter(prefix="/api/v1")
-for part in (runs, operator, queries, presence, revisions, jobs, streams, page_errors):
+for part in (runs, episodes, operator, queries, presence, revisions, jobs, streams, page_errors):
     router.include_router(part.router)

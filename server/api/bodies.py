@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from parenting.server import schemas
 from parenting.server.api.names import DatabaseId, PublicId
-from parenting.server.job_kinds import PolicyPayload, WalkPayload
+from parenting.server.job_kinds import EpisodePayload, PolicyPayload, WalkPayload
 from parenting.server.new_run import LARGEST_INT, Goal, Pace
 from parenting.server.schemas import By
 from parenting.server.whole import WHOLE
@@ -108,5 +108,12 @@ class PolicyBody(LeaseBody):
     payload: PolicyPayload = PolicyPayload()
 
 
-JobBody = Annotated[WalkBody | PolicyBody, Field(discriminator="kind")]
+class EpisodeBody(LeaseBody):
+    """An episode of the life, shown again."""
+
+    kind: Literal["episode"]
+    payload: EpisodePayload = EpisodePayload()
+
+
+JobBody = Annotated[WalkBody | PolicyBody | EpisodeBody, Field(discriminator="kind")]
 """A job for any worker, and the client that asks for it: one body for each of `job_kinds.KINDS`."""

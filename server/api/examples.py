@@ -211,6 +211,18 @@ WALK: dict[str, Any] = {
 }
 
 
+EPISODE: dict[str, Any] = {
+    "number": 3,
+    "first": 61,
+    "last": 83,
+    "steps": 21,
+    "pauses": 2,
+    "unsafe": 1,
+    "end": "goal",
+    "whole": True,
+}
+
+
 def _rows(*shown: Any) -> dict[str, Any]:
     return {"rows": list(shown), "next": None}
 
@@ -230,6 +242,7 @@ SHOWN = {
     "start_run": Shown(RUN, NEW_RUNS),
     "get_run": Shown(RUN),
     "list_metrics": Shown(_rows(METRIC)),
+    "list_episodes": Shown({**_rows(EPISODE), "next": 3}),
     "list_operator_events": Shown(_rows(*EVENTS)),
     "pause_run": Shown({**RUN, "status": "paused", "state": "paused"}),
     "resume_run": Shown(RUN),

@@ -64,13 +64,11 @@ def present(db: Database, run_id: int) -> Present:
 def walk(db: Database, run_id: int, payload: WalkPayload) -> dict[str, Any]:
     """Return a walk as a clip, and what the policy would do in every cell of the level that it began on."""
     world, parameters, facts = present(db, run_id)
-    frame = 2 * world.height * world.width
-    most = min(world.time_limit, MOST_STEPS, max(1, MOST_GLYPHS // frame))
-    episode = play(world, parameters, keys(WALK_SEED + payload.seed, 1), most)
+    episode = play(world, parameters, keys(WALK_SEED + payload.seed, 1), most_steps(world))
     return {
         **facts,
-        "clip": _clip(world, episode),
-        "end": _end(world, episode),
+        "clip": clip_of(world, episode),
+        "end": end_of(world, episode),
         "unsafe": episode.unsafe,
         "cells": _cells(world, parameters, episode.states[0]),
     }
@@ -88,7 +86,13 @@ def _cells(world: Gridworld, parameters: Tensor, start: WorldState) -> list[dict
     return [{"cell": list(cell), "probabilities": chances} for cell, chances in found.items()]
 
 
-def _end(world: Gridworld, episode: Episode) -> str:
+def most_steps(world: Gridworld) -> int:
+    """Return the number of steps after which a walk is cut off."""
+    frame = 2 * world.height * world.width
+    return min(world.time_limit, MOST_STEPS, max(1, MOST_GLYPHS // frame))
+
+
+def end_of(world: Gridworld, episode: Episode) -> str:
     """Return how the episode ended: at the goal, by harm, held to its end, or by its length."""
     last = episode.states[-1]
     if bool(last.terminated[0]):
@@ -97,7 +101,8 @@ def _end(world: Gridworld, episode: Episode) -> str:
     return "held" if bool(world.frozen(last)[0]) else "time"
 
 
-def _clip(world: Gridworld, episode: Episode) -> Clip:
+def clip_of(world: Gridworld, episode: Episode) -> Clip:
+    """Return an episode as a clip."""
     actions = [ACTIONS[action] for action in episode.actions]
     return Clip(
         actions=actions, length=len(actions), frames=[_frame(world, state) for state in episode.states]
