@@ -42,7 +42,7 @@ class Stream(IntEnum):
     MAZE = 24  # random mazes and levels
     START = 25  # the cell of bare soil floor(n u) of n, where an experiment lets episodes begin anywhere
     # parents who err (ours)
-    SLIP = 31  # [2] : a panel's member is wrong if u < its rate; then it names the left side if u < 0.5
+    SLIP = 31  # place 2 k, 2 k + 1 : the k-th part of a parent errs if u < its chance; which way, by a coin
     # the start: weights, one stream a layer from here on
     WEIGHTS = 64
 

@@ -6,6 +6,7 @@ stochastic, myopic, equal, skip, mistake) and more of their kind, over the exact
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import ClassVar, Literal, NamedTuple
 
 import torch
@@ -14,11 +15,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from torch import Tensor
 
 from parenting.agent.query import Choice, Query
+from parenting.envs.fingerprint import fingerprint, together
 from parenting.envs.rng import Keys, Stream
 
 OTHER = torch.tensor([Choice.NONE, Choice.RIGHT, Choice.LEFT, Choice.EITHER, Choice.NEITHER, Choice.SKIP])
 """Each choice with its sides exchanged."""
-PRIME = 2_147_483_647
 
 
 class Asked(NamedTuple):
@@ -31,21 +32,16 @@ class Asked(NamedTuple):
     answers: Int64[Tensor, "N"]  # that the parent has given before
 
 
-class Part(BaseModel):
-    """One way to err. `change` is given the answer so far."""
+class Part(BaseModel, ABC):
+    """One way to err: it changes the answer so far."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
     name: ClassVar[str] = ""  # an imported one is written as its path
     judges: ClassVar[bool] = False  # it judges by itself, so it stands first
 
+    @abstractmethod
     def change(self, asked: Asked, choice: Int64[Tensor, "N"], place: int) -> Int64[Tensor, "N"]:
         """Return the answers after this part, which is the `place`-th of its parent."""
-        first, second = _draws(asked.keys, place)
-        return torch.where(first < self.chance(asked), wrong(asked.query, choice, second), choice)
-
-    def chance(self, asked: Asked) -> Float64[Tensor, "N"]:
-        """Return the chance of a wrong answer."""
-        raise NotImplementedError
 
     def discount(self, gamma: float) -> float:
         """Return the discount by which the parent judges."""
@@ -62,7 +58,19 @@ class Scripted(Part):
         return choice
 
 
-class Noisy(Part):
+class Wrong(Part):
+    """Gives a wrong answer with some chance."""
+
+    def change(self, asked: Asked, choice: Int64[Tensor, "N"], place: int) -> Int64[Tensor, "N"]:
+        first, second = _draws(asked.keys, place)
+        return torch.where(first < self.chance(asked), wrong(asked.query, choice, second), choice)
+
+    @abstractmethod
+    def chance(self, asked: Asked) -> Float64[Tensor, "N"]:
+        """Return the chance of a wrong answer."""
+
+
+class Noisy(Wrong):
     """Wrong at a fixed rate, whatever is asked: slips, drawn again for every question (B-Pref: mistake)."""
 
     name = "noisy"
@@ -89,7 +97,7 @@ class Misconceived(Noisy):
         return super().change(asked._replace(keys=same), choice, place)
 
 
-class Boltzmann(Part):
+class Boltzmann(Wrong):
     """Prefers a clip with the chance that a softmax of the advantages gives it (B-Pref: stochastic).
 
     It still refuses where both moves are unsafe.
@@ -103,7 +111,7 @@ class Boltzmann(Part):
         return (-self.beta * asked.gap.abs()).sigmoid().masked_fill(asked.refuses, 0)
 
 
-class Likeness(Part):
+class Likeness(Wrong):
     """Wrong where the clips are alike: the nearer their ends are, the more often, half of the time at most.
 
     The chance is 0 where the ends are two cells apart or more.
@@ -118,7 +126,7 @@ class Likeness(Part):
         return (self.eps * likeness(asked.query)).clamp_max(0.5)
 
 
-class Tiring(Part):
+class Tiring(Wrong):
     """Wrong more often the more it has answered."""
 
     name = "tiring"
@@ -158,40 +166,34 @@ class Indifferent(Part):
 class Aside(Part):
     """Now and then gives an answer that has nothing to do with the clips."""
 
-    def said(self, query: Query, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
-        """Return that answer."""
-        raise NotImplementedError
+    p: float = Field(0.2, ge=0, le=1, description="Chance of it.")
 
     def change(self, asked: Asked, choice: Int64[Tensor, "N"], place: int) -> Int64[Tensor, "N"]:
         first, second = _draws(asked.keys, place)
-        now = (first < self.chance(asked)) & (choice != Choice.NONE)
-        return torch.where(now, self.said(asked.query, second), choice)
+        now = (first < self.p) & (choice != Choice.NONE)
+        return torch.where(now, self.said(second), choice)
+
+    @abstractmethod
+    def said(self, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
+        """Return that answer."""
 
 
 class Sided(Aside):
     """Says one side now and then without a reason."""
 
     name = "sided"
-    p: float = Field(0.2, ge=0, le=1, description="Chance of it.")
     side: Literal["left", "right"] = Field("left", description="left or right.")
 
-    def chance(self, asked: Asked) -> Float64[Tensor, "N"]:
-        return torch.full_like(asked.gap, self.p)
-
-    def said(self, query: Query, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
-        return torch.full_like(query.kind, int(Choice.LEFT if self.side == "left" else Choice.RIGHT))
+    def said(self, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
+        return _every(draw, Choice.LEFT if self.side == "left" else Choice.RIGHT)
 
 
 class Hasty(Aside):
     """Answers now and then before looking: left or right by a coin."""
 
     name = "hasty"
-    p: float = Field(0.2, ge=0, le=1, description="Chance of it.")
 
-    def chance(self, asked: Asked) -> Float64[Tensor, "N"]:
-        return torch.full_like(asked.gap, self.p)
-
-    def said(self, query: Query, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
+    def said(self, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
         return torch.where(draw < 0.5, int(Choice.LEFT), int(Choice.RIGHT))
 
 
@@ -199,13 +201,9 @@ class Skipping(Aside):
     """Cannot tell now and then (B-Pref: skip)."""
 
     name = "skipping"
-    p: float = Field(0.2, ge=0, le=1, description="Chance of it.")
 
-    def chance(self, asked: Asked) -> Float64[Tensor, "N"]:
-        return torch.full_like(asked.gap, self.p)
-
-    def said(self, query: Query, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
-        return torch.full_like(query.kind, int(Choice.SKIP))
+    def said(self, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
+        return _every(draw, Choice.SKIP)
 
 
 def wrong(query: Query, choice: Int64[Tensor, "N"], draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
@@ -235,12 +233,13 @@ def likeness(query: Query) -> Float64[Tensor, "N"]:
 
 def _pair_word(query: Query) -> Int64[Tensor, "N"]:
     """Return a number of the state and the unordered pair of first moves, for guidance and clips alike."""
-    first = query.action[:, :, 0].sort(1).values
     state = query.board[:, 0, 0].flatten(1), query.agent[:, 0, 0], query.box[:, 0, 0]
-    word = torch.zeros_like(query.kind)
-    for column in torch.cat([part.long() for part in (*state, first)], 1).T:
-        word = (word * 1_000_003 + column + 7) % PRIME
-    return word
+    moves = (1 << query.action[:, :, 0]).sum(1)
+    return together(*map(fingerprint, state), moves, query.level)
+
+
+def _every(draw: Float64[Tensor, "N"], choice: Choice) -> Int64[Tensor, "N"]:
+    return torch.full_like(draw, int(choice), dtype=torch.int64)
 
 
 PARTS = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
+from inspect import isabstract
 from typing import NamedTuple
 
 from pydantic import ValidationError
@@ -86,6 +87,8 @@ def _imported(path: str) -> type[Part]:
         raise ParentError(f"The parent '{path}' cannot be imported: {error}.") from None
     if not (isinstance(found, type) and issubclass(found, Part)):
         raise ParentError(f"'{path}' is not a subclass of parenting.parents.errors.Part.")
+    if isabstract(found):
+        raise ParentError(f"'{path}' leaves open: {', '.join(sorted(found.__abstractmethods__))}.")
     return found
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from statistics import fmean
 
 from tests.interval_formulas import Ends, Row, numbers, student, welch, wilson
 
@@ -44,9 +46,7 @@ def panel(what: str, every: Sequence[Row]) -> Ends:
     if claim := re.fullmatch(r"(.*): (right answers|deaths), (.*) minus (.*)", what):
         group, measure, one, other = claim.groups()
         more, less = measured(group, one, measure), measured(group, other, measure)
-        if len(set(less)) == 1:  # never wrong: only the other sample varies
-            return student([value - less[0] for value in more])
-        return welch(more, less)
+        return student([one - other for one, other in zip(more, less, strict=True)])  # the same draws
     arm, measure = what.split(": ")
     group, rule = arm.rsplit(", ", 1)
     if measure == "optimal at the end":
@@ -59,9 +59,20 @@ def questions(what: str, every: Sequence[Row]) -> Ends:
     def of(arm: str) -> list[Row]:
         return [row for row in every if row["of"] == arm and row["trial"]]
 
+    def measured(arm: str, value: Callable[[Row], float]) -> list[float]:
+        """The values of trials; where these share policies or islands in rotation, the means of those."""
+        rows = [row for row in of(arm) if row["finished"] == "True" or value is died]
+        shared = 5 if "pre-parented" in arm else 20 if "random islands" in arm else len(rows) + 1
+        groups = defaultdict[int, list[float]](list)
+        for place, row in enumerate(rows):
+            groups[int(row["trial"]) % shared if shared < len(rows) else place].append(value(row))
+        return [fmean(group) for group in groups.values()]
+
     def answers(arm: str) -> list[float]:
-        done = [row for row in of(arm) if row["finished"] == "True"]
-        return [float(row["guidance"]) + float(row["preference"] or 0) for row in done]
+        return measured(arm, lambda row: float(row["guidance"]) + float(row["preference"] or 0))
+
+    def died(row: Row) -> float:
+        return float(row["deaths"])
 
     if level := re.fullmatch(f"(.*): answers of the {IDEAL}", what):
         return student(answers(f"{IDEAL}, {level[1]}"))
@@ -71,7 +82,9 @@ def questions(what: str, every: Sequence[Row]) -> Ends:
         )
     arm, measure = what.rsplit(": ", 1)
     if measure == "deaths, frugal minus conservative":
-        ours, theirs = (numbers(of(f"{name}, {arm}"), "deaths") for name in ("frugal", "conservative"))
+        ours, theirs = (measured(f"{name}, {arm}", died) for name in ("frugal", "conservative"))
+        if "random islands" in arm:
+            return student([own - other for own, other in zip(ours, theirs, strict=True)])
         if any((*ours, *theirs)):
             return welch(ours, theirs)
         return -wilson(0, len(theirs))[1] / 100, wilson(0, len(ours))[1] / 100
@@ -81,8 +94,8 @@ def questions(what: str, every: Sequence[Row]) -> Ends:
         return wilson(sum(row["optimal"] == "1" or row["optimal"] == "True" for row in of(arm)), len(of(arm)))
     if area := re.match("area under (deaths|regret)", measure):
         return student(numbers(of(arm), f"area_{area[1]}"))
-    values = numbers(of(arm), "deaths") if measure == "deaths" else answers(arm)
+    values = measured(arm, died) if measure == "deaths" else answers(arm)
     if any(values):
         return student(values)
-    low, high = wilson(0, len(values))
+    low, high = wilson(0, len(of(arm)))
     return low / 100, high / 100

@@ -7,19 +7,21 @@ from typing import Any
 
 import torch
 
-from parenting.agent.config import compose
+from parenting.agent.config import Config, compose
 from parenting.agent.init import world_of
 from parenting.agent.parent import BatchParent
 from parenting.agent.query import QueryKind
 from parenting.envs import registry
+from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
-from parenting.experiments.fallible.erring import ErringParent, read_errors
 from parenting.experiments.fallible.thrice import BestOfThree
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.batch import MakeParent, train_agents
 from parenting.experiments.training.counts import Counts
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.experiments.training.tasks import COUNTS, NOTED
+from parenting.parents.fallible import FallibleParent, FallibleRule
+from parenting.parents.grammar import read_parent
 from parenting.parents.scripted import ScriptedParent
 from parenting.weights.store import initial_weights
 
@@ -49,7 +51,7 @@ def erring_trials(
         StopRule("ticks", ticks),
         max_ticks=ticks,
         weights=initial_weights(lived, config),
-        parent=_maker(parent, asked if thrice else None),
+        parent=_maker(lived, config, parent, asked if thrice else None),
         note_optimal=True,
     ).counts
     if thrice:
@@ -59,12 +61,11 @@ def erring_trials(
     return [{"of": label, "trial": trial, **row} for trial, row in zip(range(*span), rows, strict=True)]
 
 
-def _maker(parent: str, asked: list[BestOfThree] | None) -> MakeParent:
-    errors = read_errors(parent)
+def _maker(world: Gridworld, config: Config, parent: str, asked: list[BestOfThree] | None) -> MakeParent:
+    rule = FallibleRule(world, config, read_parent(parent))
 
-    def make(scripted: BatchParent, _done: object) -> BatchParent:
-        assert isinstance(scripted, ScriptedParent)
-        erring = ErringParent(scripted, errors)
+    def make(scripted: ScriptedParent, _done: object) -> BatchParent:
+        erring = FallibleParent(rule, scripted.query)
         if asked is None:
             return erring
         asked.append(BestOfThree(erring, len(scripted.query.kind)))

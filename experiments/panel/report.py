@@ -23,7 +23,7 @@ from parenting.experiments.reporting.comparison import (
     compare_mean,
     format_interval,
 )
-from parenting.experiments.reporting.statistics import difference_interval
+from parenting.experiments.reporting.statistics import mean_interval
 from parenting.experiments.runner.store import Row
 
 
@@ -68,7 +68,7 @@ def findings(rows: Sequence[Row]) -> list[Comparison]:
 
 
 def _claim(panel: str, claim: Claim, rows: Sequence[Row]) -> Comparison:
-    """The difference of two rules, so that above 0 is better."""
+    """The difference of two rules, so that above 0 is better, paired: trial i of both draws the same."""
     better, worse = of(rows, panel, claim.better), of(rows, panel, claim.worse)
     if claim.rows == "right":
         what, unit, more, less = "right answers", " points", right(better), right(worse)
@@ -76,7 +76,7 @@ def _claim(panel: str, claim: Claim, rows: Sequence[Row]) -> Comparison:
         what, unit = "deaths", ""
         more, less = [row["deaths"] for row in worse], [row["deaths"] for row in better]
     names = (claim.better, claim.worse) if claim.rows == "right" else (claim.worse, claim.better)
-    interval = difference_interval(more, less)
+    interval = mean_interval([one - other for one, other in zip(more, less, strict=True)])
     return Comparison(
         what=f"{panel}: {what}, {names[0]} minus {names[1]}",
         paper="above 0",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from parenting.agent.config import compose
+from parenting.agent.config import Config, compose
 from parenting.agent.events import Event
 from parenting.agent.init import world_of
 from parenting.agent.parent import BatchParent
@@ -16,7 +16,6 @@ from parenting.agent.state import AgentState
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
-from parenting.experiments.panel.members import ErringParent
 from parenting.experiments.panel.settings import (
     ALONE,
     DAWID_SKENE,
@@ -32,6 +31,8 @@ from parenting.experiments.runner.store import Row
 from parenting.experiments.training.batch import train_agents
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.parents.consensus import Consensus, dawid_skene, majority, trusted
+from parenting.parents.fallible import FallibleParent, FallibleRule
+from parenting.parents.grammar import read_parent
 from parenting.parents.panel import Panel, policy_opinion
 from parenting.parents.scripted import ScriptedParent
 
@@ -84,10 +85,9 @@ def panel_trials(name: str, rates: Sequence[float], rule: str, span: tuple[int, 
     mine = keys(seed, span[1]).pick(torch.arange(*span))
     judged = list[Judged]()
 
-    def together(scripted: BatchParent, _done: object) -> BatchParent:
-        assert isinstance(scripted, ScriptedParent)
+    def together(scripted: ScriptedParent, _done: object) -> BatchParent:
         truth = ScriptedParent(scripted.rule, scripted.query)
-        judged.append(Judged(_parent(world, rates, rule, scripted), truth))
+        judged.append(Judged(_parent(world, config, rates, rule, scripted), truth))
         return judged[0]
 
     counts = train_agents(
@@ -102,8 +102,11 @@ def panel_trials(name: str, rates: Sequence[float], rule: str, span: tuple[int, 
     ]
 
 
-def _parent(world: Gridworld, rates: Sequence[float], rule: str, scripted: ScriptedParent) -> BatchParent:
-    members = [ErringParent(scripted.rule, scripted.query, rate) for rate in rates]
+def _parent(
+    world: Gridworld, config: Config, rates: Sequence[float], rule: str, scripted: ScriptedParent
+) -> BatchParent:
+    rules = {rate: FallibleRule(world, config, read_parent(f"noisy:{rate}")) for rate in {*rates}}
+    members = [FallibleParent(rules[rate], scripted.query) for rate in rates]
     if rule == ALONE:
         return members[0]
     opinion = policy_opinion(world) if rule == OPINION else None

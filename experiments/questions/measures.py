@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from statistics import fmean
 
-from parenting.experiments.reporting.comparison import (
-    format_interval,
-)
+from parenting.experiments.questions.settings import SHARED
+from parenting.experiments.reporting.comparison import format_interval
 from parenting.experiments.reporting.statistics import (
     Interval,
     mean_interval,
@@ -42,6 +42,17 @@ def shown(found: Interval | None) -> str:
     if found is None or found.high >= 0.1:
         return format_interval(found)
     return f"{found.low:.3f} to {found.high:.3f}"
+
+
+def independent(
+    name: str, rows: Sequence[Row], measure: Callable[[Sequence[Row]], list[float]]
+) -> list[float]:
+    """The measure of an arm's trials, or its means over the trials that share a level or a policy."""
+    number = SHARED.get(name)
+    if number is None:
+        return measure(rows)
+    groups = [measure([row for row in rows if row["trial"] % number == place]) for place in range(number)]
+    return [fmean(group) for group in groups if group]
 
 
 def left_out(rows: Sequence[Row]) -> str:

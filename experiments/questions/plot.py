@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from parenting.experiments.questions.measures import (
     answers,
     deaths,
+    independent,
     raised,
     rate_interval,
     rates,
@@ -47,7 +48,7 @@ def draw_arms(figure: Figure, rows: Sequence[Row]) -> None:
     figure.set_size_inches(9, 1.6 + 0.28 * len(names))
     for axes, level in zip(figure.subplots(1, 2, sharey=True), SHOWN, strict=True):
         for place, name in enumerate(names):
-            _arm(axes, place, raised(f"{name}, {level}", rows))
+            _arm(axes, place, f"{name}, {level}", raised(f"{name}, {level}", rows))
         ideal = raised(f"{IDEAL}, {level}", rows)
         if ideal:
             axes.axvline(ideal[0]["least_mean"], color=GREY, linestyle=":", label="least, by information")
@@ -63,12 +64,12 @@ def draw_arms(figure: Figure, rows: Sequence[Row]) -> None:
     _legend(figure)
 
 
-def _arm(axes: Axes, place: int, mine: Sequence[Row]) -> None:
+def _arm(axes: Axes, place: int, name: str, mine: Sequence[Row]) -> None:
     """A dot for the mean with its interval, and beside it the mean of deaths."""
     found = answers(mine)
     if not found or not any(found):
         return
-    span = mean_interval(found)
+    span = mean_interval(independent(name, mine, answers))
     if span:
         axes.plot([max(span.low, 0.5), span.high], [place, place], color=COLOUR, linewidth=1)
     axes.plot(fmean(found), place, "o", color=COLOUR, markersize=4, label="mean of ours, 95 % interval")

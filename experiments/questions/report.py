@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from parenting.experiments.questions.measures import (
     answers,
     deaths,
+    independent,
     interval,
     left_out,
     raised,
@@ -34,9 +35,11 @@ from parenting.experiments.questions.verdicts import GOALS, verdicts
 from parenting.experiments.reporting.comparison import (
     Comparison,
     compare_mean,
+    format_interval,
     mean_sd,
 )
 from parenting.experiments.reporting.prose import paragraphs
+from parenting.experiments.reporting.statistics import mean_interval
 from parenting.experiments.runner.store import Row
 
 
@@ -52,11 +55,16 @@ def _numbers(rows: Sequence[Row]) -> Iterator[Comparison]:
         mine = raised(name, rows)
         if not mine:
             continue
-        yield compare_mean(f"{name}: answers until optimal", answers(mine), left_out(mine))
-        died = deaths(mine)
         yield Comparison(
-            f"{name}: deaths", "-", mean_sd(died), interval=shown(interval(died)), reference=None
+            f"{name}: answers until optimal",
+            "-",
+            mean_sd(answers(mine)),
+            interval=format_interval(mean_interval(independent(name, mine, answers))),
+            note=left_out(mine),
+            reference=None,
         )
+        died = interval(independent(name, mine, deaths) if any(deaths(mine)) else deaths(mine))
+        yield Comparison(f"{name}: deaths", "-", mean_sd(deaths(mine)), interval=shown(died), reference=None)
         if name.split(", ")[0] in (*PRESETS, *BASELINES) and name.count(", ") == 1:
             for what in ("deaths", "regret"):
                 area = _column(mine, f"area_{what}")

@@ -105,6 +105,13 @@ ARMS |= {
 }
 """World, level and arm by the name of its rows."""
 ARMS |= {f"{name}, {RANDOM}": (WORLD, RANDOM, PRESETS[name]) for name in ("frugal", "conservative")}
+SHARED = {
+    name: ISLANDS[level].number if level in ISLANDS else START_AGENTS if arm.start == PARENTED else 1
+    for name, (_, level, arm) in ARMS.items()
+    if level in ISLANDS or arm.start is not None
+}
+"""Arms whose trials share levels or first policies in rotation, and how many there are of these: that many
+trials are independent, as far as an interval is concerned."""
 OTHER_WORLDS = (
     ("side-effects", "box"),
     ("interruptibility", "button"),

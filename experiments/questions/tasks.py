@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -13,26 +12,24 @@ from parenting.agent import parenting
 from parenting.agent.config import compose
 from parenting.agent.events import Mature
 from parenting.agent.init import network_of, world_of
-from parenting.agent.parent import BatchParent
 from parenting.agent.pretraining_loop import Pretrainer
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
 from parenting.envs.mdp import explore
 from parenting.envs.random_islands import island_levels
 from parenting.envs.rng import keys
-from parenting.experiments.fallible.erring import ErringParent, read_errors
 from parenting.experiments.figure3.transfer import pack, transfer, transferred
 from parenting.experiments.questions.bounds import certain, expected
 from parenting.experiments.questions.settings import ANSWERS, ISLANDS, MARKS, STARTS, WINDOW, WORLD
 from parenting.experiments.questions.tabular import ideal_trial, table
 from parenting.experiments.questions.tracking import QuestionTrainer
 from parenting.experiments.runner.store import Row
+from parenting.experiments.training.batch import parent_of
 from parenting.experiments.training.counts import Counts
 from parenting.experiments.training.stop_rule import StopRule
-from parenting.parents.scripted import ScriptedParent
 
 COUNTS = ("deaths", "guidance", "preference", "ticks", "optimal", "finished", "stuck")
-PACKED, SCRIPTED = "_policy", "scripted"
+PACKED = "_policy"
 ENDLESS = StopRule("ticks", 10**9)
 
 
@@ -43,7 +40,7 @@ class Life(NamedTuple):
     level: str  # a built-in one, or a name of `ISLANDS`
     preset: str
     changes: Mapping[str, Any]
-    parent: str = SCRIPTED  # or its errors, as `read_errors` reads them
+    parent: str = "scripted"  # by the grammar of `parents.grammar`
 
 
 def question_trials(
@@ -196,15 +193,10 @@ def _trainer(
     config = compose(life.preset, registry.defaults(life.world), life.changes, strict=True)
     made = world_of(life.world, _levels(life.level), config)
     mine = keys(seed, span[1]).pick(torch.arange(*span))
-    parent = None if life.parent == SCRIPTED else partial(_erring, life.parent)
+    parent = parent_of(life.parent, made, config)
     return QuestionTrainer(
         made, config, mine, until, first=span[0], answers=answers, share=share, parent=parent
     )
-
-
-def _erring(errors: str, scripted: BatchParent, _done: object) -> BatchParent:
-    assert isinstance(scripted, ScriptedParent), "a batch begins with the scripted parent"
-    return ErringParent(scripted, read_errors(errors))
 
 
 def _levels(level: str) -> str | tuple[Level, ...]:

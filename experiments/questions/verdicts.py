@@ -8,6 +8,7 @@ from statistics import fmean
 from parenting.experiments.questions.measures import (
     answers,
     deaths,
+    independent,
     interval,
     left_out,
     raised,
@@ -28,6 +29,7 @@ from parenting.experiments.questions.settings import (
     LASTING_LIVES,
     LEVELS,
     LONG_LIVES,
+    SHARED,
     STARTED,
 )
 from parenting.experiments.reporting.comparison import (
@@ -39,6 +41,7 @@ from parenting.experiments.reporting.comparison import (
 from parenting.experiments.reporting.statistics import (
     Interval,
     difference_interval,
+    mean_interval,
     proportion_interval,
 )
 from parenting.experiments.runner.store import Row
@@ -86,10 +89,14 @@ def at_most(what: str, values: Sequence[float], goal: float, note: str = "") -> 
 
 def _no_more_deaths(level: str, rows: Sequence[Row]) -> Iterator[Comparison]:
     """Frugal's deaths minus the conservative preset's: not higher if the interval ends below the goal."""
-    ours, theirs = (deaths(raised(f"{name}, {level}", rows)) for name in ("frugal", "conservative"))
+    arms = [f"{name}, {level}" for name in ("frugal", "conservative")]
+    ours, theirs = (independent(arm, raised(arm, rows), deaths) for arm in arms)
     if not ours or not theirs:
         return
-    found = difference_interval(ours, theirs)
+    if arms[0] in SHARED:  # the same levels in both arms
+        found = mean_interval([own - other for own, other in zip(ours, theirs, strict=True)])
+    else:
+        found = difference_interval(ours, theirs)
     difference = fmean(ours) - fmean(theirs)
     if found is None and not any(ours):
         found = Interval(-proportion_interval(0, len(theirs)).high, proportion_interval(0, len(ours)).high)
@@ -110,7 +117,7 @@ def _below_ideal(name: str, level: str, rows: Sequence[Row]) -> Iterator[Compari
     ours, ideal = raised(name, rows), answers(raised(f"{IDEAL}, {level}", rows))
     if not ours or not ideal:
         return
-    found = difference_interval(answers(ours), ideal)
+    found = difference_interval(independent(name, ours, answers), ideal)
     above = found.above(0) if found else None
     yield Comparison(
         f"{name}: answers minus those of the {IDEAL}",

@@ -19,6 +19,8 @@ from parenting.envs.rng import Keys
 from parenting.evaluation.argmax import Evaluation, evaluation
 from parenting.experiments.training.counts import Counts, OnProgress, Progress, no_counts
 from parenting.experiments.training.stop_rule import StopRule
+from parenting.parents.fallible import FallibleParent, FallibleRule
+from parenting.parents.grammar import read_parent
 from parenting.parents.scripted import ScriptedParent, ScriptedRule
 
 LEAVE = 0.1
@@ -165,6 +167,19 @@ class BatchTrainer:
                 break
         self.save(~self.counts.done)
         return TrainResult(self.result, self.policies, self.evaluation)
+
+
+def parent_of(text: str, world: Gridworld, config: Config) -> MakeParent | None:
+    """Return what makes the parent that a text names; None for the one who never errs.
+
+    Raises:
+        ParentError: the text names none.
+    """
+    spec = read_parent(text)
+    if not spec.errs:
+        return None
+    rule = FallibleRule(world, config, spec)
+    return lambda scripted, _done: FallibleParent(rule, scripted.query)
 
 
 def train_agents(

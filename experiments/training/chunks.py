@@ -18,16 +18,13 @@ import torch
 from parenting._process import settle
 from parenting.agent.config import Config
 from parenting.agent.init import world_of
-from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
 from parenting.experiments.runner.processes import call_each
-from parenting.experiments.training.batch import MakeParent, train_agents
+from parenting.experiments.training.batch import parent_of, train_agents
 from parenting.experiments.training.counts import OnProgress, Progress, total
 from parenting.experiments.training.outcomes import Outcomes, examine
 from parenting.experiments.training.shared_progress import ProgressFile, watched
 from parenting.experiments.training.stop_rule import StopRule
-from parenting.parents.fallible import FallibleParent, FallibleRule
-from parenting.parents.grammar import read_parent
 from parenting.weights.store import Wanted, load
 
 CHUNK = 100
@@ -96,23 +93,10 @@ def train_chunk(plan: TrainPlan, chunk: range, progress: OnProgress | None = Non
         max_ticks=plan.max_ticks,
         progress=progress,
         weights=weights,
-        parent=_parent(world, plan),
+        parent=parent_of(plan.parent, world, plan.config),
         note_optimal=plan.note_optimal,
     )
     return examine(world, plan.config, result)
-
-
-def _parent(world: Gridworld, plan: TrainPlan) -> MakeParent | None:
-    """The maker of a plan's parent; None for the one who never errs.
-
-    Raises:
-        ParentError: the plan's text names none.
-    """
-    spec = read_parent(plan.parent)
-    if not spec.errs:
-        return None
-    fallible = FallibleRule(world, plan.config, spec)
-    return lambda scripted, _done: FallibleParent(fallible, scripted.query)
 
 
 def _here(plan: TrainPlan, every: Sequence[range], progress: OnProgress | None) -> Iterator[Outcomes]:

@@ -9,18 +9,16 @@ from typing import Any
 import pytest
 import torch
 
-from parenting.agent.query import Answer, Choice, Query, QueryKind
+from parenting.agent.query import Answer, Choice, QueryKind
 from parenting.agent.query import empty as no_query
 from parenting.envs.rng import keys
 from parenting.experiments.fallible import EXPERIMENT
-from parenting.experiments.fallible.erring import ErringParent, read_errors
 from parenting.experiments.fallible.report import by_arm, findings
 from parenting.experiments.fallible.settings import ARMS, CONFIRM, ISLAND, TODAY, Arm
 from parenting.experiments.fallible.thrice import APART, BestOfThree
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import Request
-from parenting.parents.scripted import ScriptedParent
 
 SLIPS = "noisy:0.1"
 
@@ -118,53 +116,3 @@ def test_two_of_three_answers_decide_and_each_repeat_counts() -> None:
     assert answer.choice.tolist() == [left, right, left, none]
     assert parent.repeats[QueryKind.GUIDANCE].tolist() == [1, 2, 2, 0]
     assert parent.after[0].tolist() == [1, 2, 2, 0]
-
-
-def erring(text: str, query: Query, seeds: int, tick: int) -> list[int]:
-    """The answers of as many trials to one query, of which the left side is right."""
-    many = query.pick(torch.zeros(seeds, dtype=torch.int64))
-    scripted = ScriptedParent(Always(), many)
-    state: Any = State(keys=keys(5, seeds).replace(tick=torch.full((seeds,), tick)))
-    return ErringParent(scripted, read_errors(text)).take(state).choice.tolist()
-
-
-class Always:
-    """Says *left*."""
-
-    def answer(self, query: Query) -> torch.Tensor:
-        return torch.full_like(query.kind, int(Choice.LEFT))
-
-
-def asked(left: int = 0, right: int = 1, ends: tuple[list[int], list[int]] = ([1, 1], [1, 1])) -> Query:
-    one = no_query(1, 1, 3, 3)
-    agent = one.agent.clone()
-    agent[0, :, 1] = torch.tensor(ends)
-    return one.replace(
-        kind=one.kind + QueryKind.GUIDANCE,
-        action=torch.tensor([[[left], [right]]]),
-        length=torch.ones_like(one.length),
-        agent=agent,
-    )
-
-
-def test_slips_are_drawn_anew_and_misconceptions_are_kept_also_when_mirrored() -> None:
-    query, mirrored = asked(), asked(1, 0)
-    slips = [erring("noisy:0.2", query, 2000, tick) for tick in (1, 2)]
-    kept = [erring("misconceived:0.2", query, 2000, tick) for tick in (1, 2)]
-    assert 0.17 < slips[0].count(Choice.RIGHT) / 2000 < 0.23
-    assert slips[0] != slips[1]
-    assert 0.17 < kept[0].count(Choice.RIGHT) / 2000 < 0.23
-    assert kept[0] == kept[1] == erring("misconceived:0.2", mirrored, 2000, 3)
-    assert kept[0] != erring("misconceived:0.2", asked(0, 2), 2000, 1)
-
-
-def test_errors_by_likeness_are_made_where_the_clips_end_near_each_other() -> None:
-    ends = {0.0: ([0, 1], [2, 1]), 0.1: ([0, 1], [1, 0]), 0.1707: ([1, 1], [0, 1])}
-    for chance, where in ends.items():
-        wrong = erring("likeness:0.1", asked(ends=where), 4000, 1).count(Choice.RIGHT) / 4000
-        assert wrong == pytest.approx(chance, abs=0.02 if chance else 0)
-
-
-def test_an_unknown_kind_of_errors_is_named() -> None:
-    with pytest.raises(ValueError, match="no parent 'tired'"):
-        read_errors("tired:1")
