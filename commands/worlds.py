@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from parenting._plural import counted
 from parenting.agent.config import v1_names
 from parenting.commands.printing import say
 from parenting.envs import registry
@@ -169,7 +170,8 @@ def _boxes_shown(found: Survey, as_json: bool) -> None:
         say(json.dumps({"levels": levels, "solvable": found.solvable}, indent=2))
         return
     say("\n".join(level.text for level in found.levels), nl=False)
-    said = f"{found.solvable} levels that only moving the box solves: {len(found.levels)} with a safe way, "
+    solvable = counted(found.solvable, "level")
+    said = f"{solvable} that only moving the box solves: {len(found.levels)} with a safe way, "
     say(f"{said}{found.tempting} of them tempt (the shortest way is unsafe).", err=True)
 
 

@@ -58,7 +58,9 @@ def test_each_level_stands_there_with_its_picture(name: str) -> None:
 
 def test_the_numbers_of_random_levels_are_what_the_command_prints() -> None:
     found = survey(1000, 6, 6, seed=0)
-    said = f"{found.solvable} levels that only moving the box solves: 1000 with a safe way, {found.tempting}"
+    said = (
+        f"{found.solvable:,} levels that only moving the box solves: 1000 with a safe way, {found.tempting}"
+    )
     assert f"--size 6x6 --count 1000 --seed 0 > levels.txt\n    {said} of them tempt" in PAGE
 
 

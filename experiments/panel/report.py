@@ -71,7 +71,9 @@ def _claim(panel: str, claim: Claim, rows: Sequence[Row]) -> Comparison:
     """The difference of two rules, so that above 0 is better, paired: trial i of both draws the same."""
     better, worse = of(rows, panel, claim.better), of(rows, panel, claim.worse)
     if claim.rows == "right":
-        what, unit, more, less = "right answers", " points", right(better), right(worse)
+        pairs = [pair for pair in zip(better, worse, strict=True) if pair[0]["asked"] and pair[1]["asked"]]
+        what, unit = "right answers", " points"
+        more, less = right([pair[0] for pair in pairs]), right([pair[1] for pair in pairs])
     else:
         what, unit = "deaths", ""
         more, less = [row["deaths"] for row in worse], [row["deaths"] for row in better]

@@ -81,7 +81,9 @@ def test_what_it_took_is_said_beside_the_levels() -> None:
     tempting = sum(level["tempts"] for level in shown["levels"])
     assert shown["solvable"] > len(shown["levels"]) == 50
     assert 0 < tempting < 50
-    assert f"{shown['solvable']} levels that only moving the box solves: 50 with a safe way" in result.stderr
+    assert (
+        f"{shown['solvable']:,} levels that only moving the box solves: 50 with a safe way" in result.stderr
+    )
     assert f"{tempting} of them tempt" in result.stderr
     assert result.stdout == "\n".join(level["text"] for level in shown["levels"])
 

@@ -49,12 +49,12 @@ def test_the_report_says_no_where_the_others_are_better() -> None:
             "of": rule,
             "panel": panel.name,
             "trial": trial,
-            "deaths": trial % 2 + 3 * place,
+            "deaths": trial % (2 + place) + 3 * place,
             "guidance": 40,
             "preference": 0,
             "optimal": True,
             "asked": 40,
-            "right": 40 - trial % 2 - 4 * place,
+            "right": 40 - trial % (2 + place) - 4 * place,
         }
         for panel in PANELS
         for place, rule in enumerate(RULES)
