@@ -10,7 +10,7 @@ import httpx2
 from parenting.server.tables import Run
 
 WARM, ROUNDS, TIMES = 6, 4, 3
-"""Libraries fill caches in their first calls, and a thread or connection may come later; a leak grows each time."""
+"""Libraries fill caches in their first calls, a thread may start later; a leak grows each time."""
 PATHS = (
     "/",
     "/runs/{name}",
