@@ -30,6 +30,7 @@ COMMANDS = {
     "runs": "List the runs, and who waits for whom.",
     "resume": "Let a paused or failed run go on.",
     "export": "Write the answers of a run as JSON lines.",
+    "policy": "Write the present policy of a run to a file.",
     "replay": "Replay a stored run and compare it bit for bit.",
     "doctor": "Examine the installation, the data folder and the database.",
     "verify": "Verify a stored run's answers, bits and X.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from parenting.library import observation as observations
 from parenting.library.checks import path_of
 from parenting.library.pictures import Drawing
 from parenting.library.policy_drawing import drawn
-from parenting.library.policy_file import FormatError, about_world, read_tensors, world_from, write_tensors
+from parenting.library.policy_file import FormatError, about_world, read_policy, world_from, write_policy
 from parenting.library.worlds import World
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ class Policy:
         stage: The stage T that it came to (Sec. 2.4).
         trial: Its trial's number in the run.
         seed: The run's seed.
+        about: What its file says of it, where it was read from one: `card` is its model card in Markdown, and
+            `source` the run of a database that it was taken from.
     """
 
     def __init__(
@@ -45,6 +48,7 @@ class Policy:
         stage: int = 1,
         trial: int = 0,
         seed: int = 0,
+        about: Mapping[str, Any] | None = None,
     ) -> None:
         """Copy the parameters, so that no later training changes this policy.
 
@@ -60,6 +64,7 @@ class Policy:
         self.world, self.config = world, config
         self.parameters: Float[Tensor, "P"] = parameters.detach().clone()
         self.stage, self.trial, self.seed = stage, trial, seed
+        self.about: Mapping[str, Any] = about or {}
         self._generator = np.random.default_rng(seed)
 
     def predict(
@@ -125,8 +130,8 @@ class Policy:
     def save(self, path: str | Path) -> Path:
         """Write the policy to a file of safetensors, whole or not at all.
 
-        The file holds the weights and, as metadata, the world, its level, the config and the format's
-        version. Nothing in it is code. `parenting.load_policy` reads it.
+        The file holds the weights and, as metadata, a model card: the world, its level, the config, the
+        format's version and a hash of the weights. Nothing in it is code. `parenting.load_policy` reads it.
 
         Returns:
             The path of the file.
@@ -138,7 +143,8 @@ class Policy:
             "trial": self.trial,
             "seed": self.seed,
         }
-        write_tensors(Path(path), {"parameters": self.parameters}, "policy", about)
+        source = {"source": self.about["source"]} if "source" in self.about else {}
+        write_policy(Path(path), self.parameters, {**about, **source})
         return Path(path)
 
     def seed_actions(self, seed: int) -> None:
@@ -167,7 +173,7 @@ class Policy:
 
 
 def load_policy(path: str | Path) -> Policy:
-    """Read a policy that `Policy.save` wrote.
+    """Read a policy that `Policy.save`, `parenting policy` or a run's dashboard wrote.
 
     Args:
         path: The file.
@@ -176,7 +182,8 @@ def load_policy(path: str | Path) -> Policy:
         The policy, on the world and level that it was trained in.
 
     Raises:
-        FormatError: There is no such file, it is not a policy, it is damaged, or a later version wrote it.
+        FormatError: There is no such file, it is not a policy, it is damaged (its weights do not have its
+            hash), or a later version wrote it.
 
     Example:
         >>> import parenting as pt
@@ -185,10 +192,10 @@ def load_policy(path: str | Path) -> Policy:
         >>> pt.load_policy(file)
         <Policy unsafe-exploration, level island, stage 1>
     """
-    tensors, about = read_tensors(path_of("path", path), "policy")
+    parameters, about = read_policy(path_of("path", path))
     try:
         config = Config.model_validate(about["config"])
         own = {name: about[name] for name in ("stage", "trial", "seed")}
-        return Policy(world_from(about, config), config, tensors["parameters"], **own)
+        return Policy(world_from(about, config), config, parameters, **own, about=about)
     except (KeyError, TypeError, ValueError) as error:
         raise FormatError(f"{path} is damaged: {error}.") from None

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import torch
 from safetensors import SafetensorError
 from safetensors.torch import load as unpack
 from safetensors.torch import save as pack
@@ -15,10 +17,21 @@ from torch import Tensor
 from parenting.agent.config import Config
 from parenting.envs import registry
 from parenting.library.worlds import World
+from parenting.weights import policy_file
+from parenting.weights.policy_file import FORMAT, PolicyFileError, check_header
 from parenting.weights.store import metadata
 
-FORMAT = 1
-"""The version of the files; a reader refuses those of a later one."""
+__all__ = [
+    "FORMAT",
+    "FormatError",
+    "about_world",
+    "check_format",
+    "read_policy",
+    "read_tensors",
+    "world_from",
+    "write_policy",
+    "write_tensors",
+]
 
 
 class FormatError(ValueError):
@@ -44,7 +57,38 @@ def write_tensors(path: Path, tensors: dict[str, Tensor], kind: str, about: dict
     """Write tensors and what they are, whole or not at all."""
     # one entry of metadata: safetensors writes several in an order that changes from call to call
     header = json.dumps({"format": FORMAT, "kind": kind, **about}, sort_keys=True)
-    blob = pack({name: one.contiguous() for name, one in tensors.items()}, metadata={"about": header})
+    _write(path, pack({name: one.contiguous() for name, one in tensors.items()}, metadata={"about": header}))
+
+
+def write_policy(path: Path, parameters: Tensor, about: Mapping[str, Any]) -> None:
+    """Write a policy with its model card, whole or not at all."""
+    row = parameters.detach().cpu().contiguous()
+    dtype = str(row.dtype).removeprefix("torch.")
+    _write(path, policy_file.pack(row.numpy().tobytes(), dtype, about))
+
+
+def read_policy(path: Path) -> tuple[Tensor, dict[str, Any]]:
+    """Read the parameters of a policy and its header.
+
+    Raises:
+        FormatError: as `load_policy`.
+    """
+    try:
+        found = policy_file.unpack(_bytes(path))
+    except PolicyFileError as error:
+        raise FormatError(f"{path} cannot be read as a policy: {error}.") from None
+    row = torch.frombuffer(bytearray(found.data), dtype=getattr(torch, found.dtype))
+    return row, found.about
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise FormatError(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def _write(path: Path, blob: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -60,10 +104,7 @@ def read_tensors(path: Path, kind: str) -> tuple[dict[str, Tensor], dict[str, An
     Raises:
         FormatError: as `load_policy`.
     """
-    try:
-        blob = path.read_bytes()
-    except OSError as error:
-        raise FormatError(f"{path} cannot be read: {error.strerror}.") from None
+    blob = _bytes(path)
     try:
         tensors, about = unpack(blob), dict[str, Any](metadata(blob))
     except (SafetensorError, ValueError, KeyError, TypeError) as error:
@@ -74,10 +115,7 @@ def read_tensors(path: Path, kind: str) -> tuple[dict[str, Tensor], dict[str, An
 
 def check_format(path: Path, about: dict[str, Any], kind: str) -> None:
     """Refuse what is of another kind or of a later version."""
-    if about.get("kind") != kind or not isinstance(about.get("format"), int):
-        raise FormatError(f"{path} is not a {kind} of Parenting; it says '{about.get('kind')}'.")
-    if about["format"] > FORMAT:
-        raise FormatError(
-            f"{path} has format {about['format']}, and this version reads up to {FORMAT}."
-            " Install a newer version of parenting."
-        )
+    try:
+        check_header(about, kind)
+    except PolicyFileError as error:
+        raise FormatError(f"{path} cannot be read: {error}.") from None

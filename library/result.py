@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -145,7 +146,7 @@ def collect(
         final = trained.policies[last, torch.arange(len(last))]
         for row, parameters in enumerate(final):
             number, stage = len(trials), int(last[row]) + 1
-            own = {"stage": stage, "trial": number, "seed": seed}
+            own: dict[str, Any] = {"stage": stage, "trial": number, "seed": seed}
             policies.append(Policy(task.world, task.config, parameters, **own))
             trials.append(_record(task.world, outcomes, row, number))
     return TrainResult(task.world, task.config, seed, until, policies, trials, answers, [*events])

@@ -273,5 +273,6 @@ SHOWN = {
     "report_page_error": Shown(None, {"a fault": {"message": "x is not a function", "page": "/runs/3"}}),
     "follow_run": Shown(STREAM),
     "export_run": Shown(json.dumps(EXPORTED) + "\n"),
+    "download_policy": Shown("the bytes of a file of safetensors"),
 }
 """By operationId."""

@@ -1,11 +1,11 @@
-"""Streamed replies: the live stream of a run, and its answers as JSON lines."""
+"""Replies that are not JSON: the live stream of a run, its answers as JSON lines, its policy as a file."""
 
 from __future__ import annotations
 
 from collections.abc import AsyncIterable
 from typing import Annotated
 
-from fastapi import Depends, Header, Request
+from fastapi import Depends, Header, Request, Response
 from fastapi.responses import StreamingResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
@@ -15,11 +15,18 @@ from parenting.server.api.names import RunId
 from parenting.server.api.responses import streams
 from parenting.server.deps import Db
 from parenting.server.export import lines
+from parenting.server.policies import present_policy
 from parenting.server.runs import get_run
 
 router = admitted_router(tags=["runs"])
 
 LINES = "application/x-ndjson"
+
+
+class PolicyResponse(Response):
+    """A file of safetensors."""
+
+    media_type = "application/octet-stream"
 
 
 class LinesResponse(StreamingResponse):
@@ -79,3 +86,20 @@ def export_run(run_id: RunId, db: Db) -> LinesResponse:
     """
     file = f'attachment; filename="run-{run_id}.jsonl"'
     return LinesResponse(lines(db, run_id), headers={"Content-Disposition": file})
+
+
+@router.get(
+    "/runs/{run_id}/policy",
+    summary="Download the policy",
+    response_class=PolicyResponse,
+    responses=streams("application/octet-stream", "A file of safetensors with a model card.", 404),
+)
+def download_policy(run_id: RunId, db: Db) -> PolicyResponse:
+    """Download the present policy as a file of safetensors, as the run's last checkpoint has it.
+
+    Its metadata holds a model card: world, level, config, the size of X, hashes, the run, and how to load it
+    (`parenting.load_policy`). A run without a checkpoint has none yet: 404.
+    """
+    found = present_policy(db, run_id)
+    file = f'attachment; filename="{found.name}"'
+    return PolicyResponse(found.blob, headers={"Content-Disposition": file})

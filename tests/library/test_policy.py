@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -162,3 +163,23 @@ def test_what_cannot_be_read_is_told_by_the_file(content: bytes | None, words: s
     with pytest.raises(pt.FormatError, match=words) as found:
         pt.load_policy(file)
     assert str(file) in str(found.value)
+
+
+@pytest.mark.parametrize("place", [-1, -1000])
+def test_a_changed_number_is_found_by_the_hash(place: int, policy: pt.Policy, tmp_path: Path) -> None:
+    file = policy.save(tmp_path / "policy.safetensors")
+    blob = bytearray(file.read_bytes())
+    blob[place] ^= 1
+    file.write_bytes(blob)
+    with pytest.raises(pt.FormatError, match="its parameters are not those that were written"):
+        pt.load_policy(file)
+
+
+def test_a_file_of_version_0_4_has_no_hash_and_is_read(policy: pt.Policy, tmp_path: Path) -> None:
+    from parenting.library.policy_file import about_world
+
+    file = tmp_path / "old.safetensors"
+    about = {**about_world(policy.world), "config": policy.config.model_dump(mode="json"), "stage": 1}
+    header = {"format": 1, "kind": "policy", "trial": 0, "seed": 5, **about}
+    file.write_bytes(save({"parameters": policy.parameters}, {"about": json.dumps(header)}))
+    assert torch.equal(pt.load_policy(file).parameters, policy.parameters)
