@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -16,6 +15,7 @@ from pydantic import ValidationError
 
 from parenting.agent.config import FIELDS, PRESETS, Config, UnknownPresetError, compose
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
+from parenting.commands.level_file import LEVEL, chosen_level
 from parenting.commands.printing import say
 from parenting.commands.run_report import page
 from parenting.envs import registry
@@ -33,9 +33,7 @@ if TYPE_CHECKING:
 
 def run(
     world: Annotated[str, typer.Argument(help="A world; `parenting worlds` lists them.")],
-    level: Annotated[
-        str | None, typer.Option(help="Name of a built-in level, or a file with a level.")
-    ] = None,
+    level: Annotated[str | None, LEVEL] = None,
     preset: Annotated[str, typer.Option(help="conservative, lax, direct or frugal.")] = "conservative",
     parent: Annotated[
         str, typer.Option(metavar="NAME[:KEY=VALUE,...]", help="The parent; several errors are joined by +.")
@@ -124,27 +122,6 @@ def _parent(text: str) -> ParentSpec:
         return read_parent(text)
     except ParentError as error:
         raise UsageError(f"--parent: {error}") from None
-
-
-def chosen_level(world: str, name_or_file: str | None) -> Level:
-    """A built-in level, or one from a file: a name that is not built in and exists as a file is one.
-
-    Raises:
-        UsageError: it is neither, or the file cannot be read as text.
-        UnknownNameError: there is no such world.
-        LevelError: the file's level breaks a rule of its world.
-    """
-    if name_or_file is None or name_or_file in registry.spec(world).levels:
-        return registry.level(world, name_or_file)
-    path = Path(name_or_file)
-    if not path.is_file():
-        known = ", ".join(registry.spec(world).levels)
-        raise UsageError(f"--level: '{name_or_file}' is neither a level of {world} ({known}) nor a file.")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"--level: {name_or_file} cannot be read as text: {error}.") from None
-    return registry.read_level(world, text, source=name_or_file)
 
 
 def _config(world: str, preset: str, changes: list[str]) -> Config:

@@ -10,8 +10,8 @@ import typer
 from parenting.agent.config import FIELDS, Config, v1_names
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, friendly_errors, settings
+from parenting.commands.level_file import LEVEL, chosen_level
 from parenting.commands.printing import say
-from parenting.commands.run import chosen_level
 from parenting.envs import registry
 from parenting.envs.names import did_you_mean
 from parenting.server import new_run
@@ -26,9 +26,7 @@ OPTIONS = ("world", "level", "level_text", "preset", "parent", "seed", "goal", "
 
 def start(
     world: Annotated[str, typer.Argument(help="A world; `parenting worlds` lists them.")],
-    level: Annotated[
-        str | None, typer.Option(help="Name of a built-in level, or a file with a level.")
-    ] = None,
+    level: Annotated[str | None, LEVEL] = None,
     preset: Annotated[str, typer.Option(help="conservative, lax, direct or frugal.")] = "conservative",
     parent: Annotated[
         str, typer.Option(help="human: people answer on the pages or by the API; scripted: the worker does.")

@@ -27,14 +27,14 @@ LEVEL_CHARACTERS = 8192
 """Characters of a level's text."""
 
 
-def check_text(text: str, source: str = "level") -> None:
+def check_text(text: str, source: str = "level", longest: int = LEVEL_CHARACTERS) -> None:
     """Refuse a text of a person that is too long or holds control characters.
 
     Raises:
         LevelError: the text is such; names `source`, line, column and rule.
     """
-    if len(text) > LEVEL_CHARACTERS:
-        rule = f"a level's text has at most {LEVEL_CHARACTERS} characters, and this one has {len(text)}"
+    if len(text) > longest:
+        rule = f"a level's text has at most {longest} characters, and this one has {len(text)}"
         raise LevelError(source, 1, 1, rule)
     for number, line in enumerate(text.split("\n"), 1):
         for column, character in enumerate(line, 1):

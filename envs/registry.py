@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from parenting.envs import options as settings
 from parenting.envs.art import check_text, parse
-from parenting.envs.levels.spec import Level, Setting, WorldSpec
+from parenting.envs.foreign_text import hint
+from parenting.envs.level_text import FILE_CHARACTERS, Written, choose, written
+from parenting.envs.levels.spec import Level, LevelError, Setting, WorldSpec
 from parenting.envs.names import UnknownNameError
 from parenting.envs.people_text import read_name
 
@@ -67,18 +69,39 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
     return parsed
 
 
-def read_level(world: str, text: str, source: str = "level") -> Level:
+def read_level(world: str, text: str, source: str = "level", which: str | None = None) -> Level:
     """A level from a text that a person gives; text and name obey the rules of `envs.people_text`.
 
-    What is stored already is read by `level`, since older versions had no such rules.
+    What surrounds the art is cut, which `Level.said` tells. `which` is the name of one of several levels, or
+    its number. What is stored already is read by `level`, since older versions had no such rules.
 
     Raises:
         UnknownNameError: there is no such world.
+        SeveralLevelsError: there are several levels in the text, and none of them is named.
         LevelError: the text breaks a rule; names `source`, line, column and rule.
     """
-    check_text(text, source)
-    # A text without line end would be taken for a name.
-    return named_by_a_person(level(world, text + "\n", source))
+    glyphs = spec(world).glyphs
+    check_text(text, source, FILE_CHARACTERS)
+    chosen = choose(written(text, glyphs), which, source)
+    return read_written(world, chosen, source)
+
+
+def read_written(world: str, chosen: Written, source: str = "level") -> Level:
+    """A level that was found in a person's text.
+
+    Raises:
+        LevelError: as `read_level`.
+    """
+    try:
+        check_text(chosen.text.lstrip("\n"), source)
+        # A text without line end would be taken for a name.
+        found = level(world, chosen.text + "\n", source)
+        if chosen.comment and found.name == source:
+            found = replace(found, name=chosen.comment)
+        return replace(named_by_a_person(found), said=chosen.said)
+    except LevelError as error:
+        place = chosen.place(error.line, error.column)
+        raise LevelError(source, *place, error.rule + hint([line.text for line in chosen.art])) from None
 
 
 def named_by_a_person(found: Level) -> Level:

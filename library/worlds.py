@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld as World
+from parenting.envs.level_bytes import decode
 from parenting.envs.levels.spec import Level, LevelError, WorldSpec
 from parenting.envs.options import check_names
 from parenting.library.checks import check_device, check_number
@@ -16,7 +18,8 @@ from parenting.library.checks import check_device, check_number
 __all__ = ["AnyLevel", "World", "make", "named", "read_level", "worlds"]
 
 AnyLevel = str | Path | Level | Sequence[Level]
-"""A built-in level's name, a level's text, a file's path, a `Level`, or several levels of one size."""
+"""A built-in level's name, a level's text, a file's path (behind it `:` and the number or name of one of
+several levels), a `Level`, or several levels of one size."""
 
 ARGUMENTS = ("level", "max_episode_steps", "device")
 
@@ -124,19 +127,33 @@ def named(world: str, level: AnyLevel | None) -> tuple[str, str | Level | Sequen
 def read_level(world: str, level: AnyLevel | None) -> str | Level | Sequence[Level] | None:
     """Read a level's file or text; built-in levels are known by their names.
 
+    One of several levels in a file is FILE:NUMBER or FILE:NAME. What is cut around the art is warned of.
+
     Raises:
         TypeError: it is not a level.
         ValueError: a file cannot be read.
     """
+    which = None
     if isinstance(level, str) and "\n" not in level and level not in registry.spec(world).levels:
-        level = Path(level) if os.path.isfile(level) else level  # a name that is not there is told later
+        file, _, part = level.rpartition(":")
+        if os.path.isfile(level):
+            level = Path(level)  # a name that is not there is told later
+        elif file and part and os.path.isfile(file):
+            level, which = Path(file), part
     if not isinstance(level, Path):
         return _checked(world, level)
     try:
-        text = level.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text, said = decode(level.read_bytes())
+    except (OSError, ValueError) as error:
         raise ValueError(f"level: {level} cannot be read as text: {error}.") from None
-    return registry.read_level(world, text, source=str(level))
+    return _warned(registry.read_level(world, text, str(level), which), said)
+
+
+def _warned(level: Level, said: tuple[str, ...] = ()) -> Level:
+    """Warn of what was cut from a level's text."""
+    for sentence in (*said, *level.said):
+        warnings.warn(f"{level.source}: {sentence}.", stacklevel=2)
+    return level
 
 
 def path_hint(world: object) -> str:
@@ -152,7 +169,7 @@ def _checked(world: str, level: object) -> str | Level | Sequence[Level] | None:
     if isinstance(level, Level):
         return registry.named_by_a_person(level)
     if isinstance(level, str) and "\n" in level:
-        return registry.read_level(world, level)
+        return _warned(registry.read_level(world, level))
     if level is None or isinstance(level, str):
         return level
     if isinstance(level, Sequence) and all(isinstance(one, Level) for one in level):

@@ -43,6 +43,7 @@ class Level:
     source: str = field(default="level", compare=False)  # where the text came from, for errors
     line: int = field(default=1, compare=False)  # the text's line that holds the first row
     places: Mapping[str, Cell] = field(default_factory=dict, compare=False)  # line, column of header values
+    said: tuple[str, ...] = field(default=(), compare=False)  # what was cut from a person's text
 
     @property
     def height(self) -> int:

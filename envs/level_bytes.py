@@ -1,0 +1,45 @@
+"""Bytes of a level's file as text: UTF-8, UTF-16 and UTF-32, with byte order mark or without.
+
+Files are opened elsewhere; nothing here does.
+"""
+
+from __future__ import annotations
+
+FILE_BYTES = 2_000_000
+"""Bytes of a file that holds levels, at most."""
+BOMS = (
+    (b"\xef\xbb\xbf", "utf-8"),
+    (b"\xff\xfe\x00\x00", "utf-32-le"),
+    (b"\x00\x00\xfe\xff", "utf-32-be"),
+    (b"\xff\xfe", "utf-16-le"),
+    (b"\xfe\xff", "utf-16-be"),
+)
+"""The byte order mark of each encoding; a longer one stands before one that it begins with."""
+
+
+def decode(blob: bytes) -> tuple[str, tuple[str, ...]]:
+    """Return the text of a file's bytes, and a word on its encoding unless that is UTF-8.
+
+    Raises:
+        ValueError: There are too many, or they are not text in one of the encodings.
+    """
+    if len(blob) > FILE_BYTES:
+        raise ValueError(f"a file of levels has at most {FILE_BYTES} bytes, and this one has more")
+    for bom, encoding in BOMS:
+        if blob.startswith(bom):
+            return _read(blob[len(bom) :], encoding)
+    for zeros, signs, encoding in ((1, 0, "utf-16-le"), (0, 1, "utf-16-be")):
+        # Text in Latin letters and signs has a zero in every second byte, and no other text has.
+        if len(blob) > 1 and not any(blob[zeros::2]) and all(blob[signs::2]):
+            return _read(blob, encoding)
+    return _read(blob, "utf-8")
+
+
+def _read(blob: bytes, encoding: str) -> tuple[str, tuple[str, ...]]:
+    name = "-".join(encoding.upper().split("-")[:2])
+    try:
+        text = blob.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = blob.count(b"\n", 0, error.start) + 1
+        raise ValueError(f"byte {error.start + 1}, on line {line}, is not {name}; save it as UTF-8") from None
+    return text, () if encoding == "utf-8" else (f"the text was read as {name}",)
