@@ -157,7 +157,7 @@ def _apart(one: Written, lines: Sequence[Line]) -> list[Written]:
 
 def _tidied(one: Written, glyphs: str, said: tuple[str, ...]) -> Written:
     """Return a level whose art is cut to what stands within its walls."""
-    replaced: Counter[str] = Counter()
+    replaced: Counter[tuple[str, str]] = Counter()
     art = [_plain(line, glyphs, replaced) for line in one.art]
     indent = _shared([_indentation(line.text) for line in art if line.text.strip()])
     width = max((len(line.text.rstrip(BLANKS)) for line in art), default=0)
