@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from parenting.agent.config import UnknownPresetError
 from parenting.commands.printing import say
+from parenting.envs.installed import BrokenPackageError
 from parenting.envs.levels.spec import LevelError
 from parenting.envs.names import UnknownNameError
 from parenting.server.errors import ServerError
@@ -22,6 +23,17 @@ class UsageError(ValueError):
     """An option is wrong; the sentence names it, its value and the remedy."""
 
 
+SENTENCES = (
+    UsageError,
+    UnknownPresetError,
+    UnknownNameError,
+    BrokenPackageError,
+    LevelError,
+    NoWeightsError,
+)
+"""The errors of a user that say by themselves what is wrong."""
+
+
 @contextmanager
 def friendly_errors() -> Iterator[None]:
     """Print an error of the user's as a sentence, and exit with 2."""
@@ -30,7 +42,7 @@ def friendly_errors() -> Iterator[None]:
     except ServerError as error:
         say(error.message, err=True)
         raise typer.Exit(2) from None
-    except (UsageError, UnknownPresetError, UnknownNameError, LevelError, NoWeightsError) as error:
+    except SENTENCES as error:
         say(str(error), err=True)
         raise typer.Exit(2) from None
 

@@ -42,6 +42,10 @@ COMMANDS = {
 }
 """Each command with its help text. The command `up` is the function `up` in commands/up.py, and so on."""
 
+SUBCOMMANDS = {"worlds": {"new": "Write the skeleton of a package with a world of your own."}}
+"""Commands below a command, each with its help text. `worlds new` is the function `command`
+in commands/worlds_new.py, and so on."""
+
 EXAMPLES = """\
 Examples:
 
@@ -77,8 +81,16 @@ class LazyGroup(TyperGroup):
         if name not in COMMANDS:
             hint = did_you_mean(name, COMMANDS)
             ctx.fail(f"No such command '{printable(name)}'.{hint} `parenting --help` lists the commands.")
+        if args[1:] and args[1] in SUBCOMMANDS.get(name, {}):
+            return _below(name, args[1], args[2:])
         function = getattr(import_module(f"parenting.commands.{name}"), name)
         return name, _command(name, function), modern(name, args[1:])
+
+
+def _below(name: str, below: str, args: list[str]) -> tuple[str, Any, list[str]]:
+    """Import a command that stands below another one."""
+    function = import_module(f"parenting.commands.{name}_{below.replace('-', '_')}").command
+    return f"{name} {below}", _command(f"{name} {below}", function), args
 
 
 def _command(name: str, function: Callable[..., Any], help_text: str | None = None) -> Any:

@@ -98,6 +98,8 @@ def _listed(draw: Path | None, as_json: bool) -> None:
         _draw(draw, [registry.level(spec.name, name) for spec in specs for name in spec.levels])
     found = [describe(spec) for spec in specs]
     say(json.dumps({"worlds": found}, indent=2) if as_json else "\n".join(map(_page, found)))
+    for sentence in registry.INSTALLED.broken().values():
+        say(sentence, err=True)
 
 
 def describe(world: WorldSpec) -> dict[str, Any]:

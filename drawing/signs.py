@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from parenting.drawing.render import standalone
 from parenting.envs.levels.spec import AGENT
-from parenting.envs.registry import WORLDS
+from parenting.envs.registry import BUILT_IN
 
 COLUMNS = 4
 WIDE, HIGH, MARGIN = 176, 56, 20
@@ -24,7 +24,7 @@ class Sign(NamedTuple):
 
 def draw_signs() -> str:
     """Return the picture as the text of an SVG file, in light and dark colours."""
-    legend = {glyph: name for world in WORLDS.values() for glyph, name in world.legend.items()}
+    legend = {glyph: name for world in BUILT_IN.values() for glyph, name in world.legend.items()}
     glyphs = [AGENT, *(glyph for glyph in legend if glyph != AGENT)]
     signs = [
         Sign(glyph, legend[glyph], MARGIN + number % COLUMNS * WIDE, MARGIN + number // COLUMNS * HIGH)

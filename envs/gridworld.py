@@ -142,6 +142,10 @@ class Gridworld(ABC):
         glyph = self._drawn[flat.gather(1, cell).long()]
         return flat.scatter(1, cell, glyph).view(board.shape)
 
+    def likelihood(self, state: WorldState, action: Actions) -> Float64[Tensor, "N"]:
+        """Return the probability that a step is as `forecast` says, where a world can say it; else 1."""
+        return torch.ones_like(state.terminated, dtype=torch.float64)
+
     def frozen(self, state: WorldState) -> Bool[Tensor, "N"]:
         """Return which trials are held to the episode's end: steps pass, and nothing else happens (3.2.4)."""
         return torch.zeros_like(state.terminated)

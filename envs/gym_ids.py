@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from parenting.envs.registry import WORLDS
+from parenting.envs.registry import BUILT_IN, INSTALLED
 
 SINGLE = "parenting.envs.gym:GridworldEnv"
 VECTOR = "parenting.envs.gym_vector:GridworldVectorEnv"
@@ -32,6 +32,6 @@ def register(gymnasium: ModuleType, world: str) -> None:
 
 
 def register_worlds(gymnasium: ModuleType) -> None:
-    """Register every world."""
-    for world in WORLDS:
+    """Register every world. No package of another world is imported before one is made."""
+    for world in [*BUILT_IN, *INSTALLED.names()]:
         register(gymnasium, world)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, MutableMapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from parenting.envs import options as settings
 from parenting.envs.art import check_text, parse
 from parenting.envs.foreign_text import hint
+from parenting.envs.installed import Installed
 from parenting.envs.level_text import FILE_CHARACTERS, Written, choose, written
 from parenting.envs.levels.spec import Level, LevelError, Setting, WorldSpec
 from parenting.envs.names import UnknownNameError
@@ -34,7 +35,62 @@ def read(file: str) -> WorldSpec:
     return found
 
 
-WORLDS: dict[str, WorldSpec] = {world.name: world for world in map(read, FILES)}
+def _usable(name: str, found: object) -> WorldSpec:
+    """Return what an entry point names as a world: a `WorldSpec`, or an object whose `spec` is one.
+
+    Raises:
+        TypeError: it is neither.
+        ValueError: it has another name, the name of a built-in world, or a level that breaks a rule.
+    """
+    spec = getattr(found, "spec", found)
+    if not isinstance(spec, WorldSpec):
+        raise TypeError(f"its entry point names {found!r}, and a WorldSpec is wanted")
+    if spec.name != name:
+        raise ValueError(f"its entry point is called '{name}', but the world is called '{spec.name}'")
+    if spec.name in BUILT_IN:
+        raise ValueError("there is a built-in world of this name; choose another name")
+    for level in spec.levels:
+        spec.validate(parse(spec.levels[level], spec, level))
+    return spec
+
+
+BUILT_IN: dict[str, WorldSpec] = {world.name: world for world in map(read, FILES)}
+"""The worlds of `FILES` by their names."""
+INSTALLED = Installed("parenting.worlds", "world", _usable)
+"""The worlds of other packages."""
+
+
+class Worlds(MutableMapping[str, WorldSpec]):
+    """Every world by its name: those built in, those registered by a program, those of other packages.
+
+    A world of another package is imported when it is asked for. One that cannot be used is not there;
+    `INSTALLED.broken()` says why.
+    """
+
+    def __init__(self) -> None:
+        self._known = dict(BUILT_IN)
+
+    def __getitem__(self, name: str) -> WorldSpec:
+        found = self._known.get(name) or INSTALLED.get(name)
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    def __setitem__(self, name: str, world: WorldSpec) -> None:
+        self._known[name] = world
+
+    def __delitem__(self, name: str) -> None:
+        del self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from list(self._known)
+        yield from (name for name in INSTALLED if name not in self._known)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+WORLDS: MutableMapping[str, WorldSpec] = Worlds()
 """Every world by its name."""
 
 
@@ -43,8 +99,10 @@ def spec(world: str) -> WorldSpec:
 
     Raises:
         UnknownNameError: there is no such world.
+        BrokenPackageError: it is of a package that cannot be used.
     """
     if world not in WORLDS:
+        INSTALLED.refuse(world)
         raise UnknownNameError("world", world, WORLDS)
     return WORLDS[world]
 

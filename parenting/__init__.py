@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from parenting.agent.query import Answer, Choice
     from parenting.agent.state import AgentState
     from parenting.envs.levels.spec import Brief, Level, LevelError, WorldSpec
+    from parenting.library import testing
     from parenting.library.evaluating import Evaluation, evaluate
     from parenting.library.loop import Tick, configure, init, step, tick
     from parenting.library.parent import Parent
@@ -106,6 +107,7 @@ __all__ = [
     "register",
     "show",
     "step",
+    "testing",
     "tick",
     "train",
     "worlds",
@@ -115,6 +117,8 @@ __all__ = [
 if not TYPE_CHECKING:  # type checkers would take any name for one of ours
 
     def __getattr__(name: str) -> Any:
+        if name == "testing":
+            return import_module("parenting.library.testing")
         if name not in _MODULES:
             raise AttributeError(f"module 'parenting' has no attribute '{name}'")
         value = getattr(import_module(f"parenting.{_MODULES[name]}"), name)

@@ -123,7 +123,7 @@ def _of_errors() -> Iterator[str]:
 
 def _of_worlds() -> Iterator[str]:
     """Yield the names of tiles, and what is to be learnt; runs store them."""
-    for spec in registry.WORLDS.values():
+    for spec in registry.BUILT_IN.values():
         yield from spec.legend.values()
         yield from (spec.brief.goal, spec.brief.danger)
 

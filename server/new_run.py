@@ -199,7 +199,8 @@ def _unknown(what: str, name: str, known: Collection[str]) -> str:
 
 def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
     if new.world not in registry.WORLDS:
-        wrong.append(("world", _unknown("world", new.world, registry.WORLDS)))
+        broken = registry.INSTALLED.broken().get(new.world)
+        wrong.append(("world", broken or _unknown("world", new.world, registry.WORLDS)))
         return None
     if new.level is not None and new.level_text is not None:
         wrong.append(("level", "Name a level or give its text, not both."))

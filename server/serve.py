@@ -9,6 +9,7 @@ import structlog
 import uvicorn
 from fastapi import FastAPI
 
+from parenting.envs import registry
 from parenting.server.app import create_app
 from parenting.server.connections.files import room_for
 from parenting.server.connections.limits import Limits
@@ -42,6 +43,8 @@ def make_server(settings: Settings) -> Server:
     """
     share_heaps()
     set_up_log(settings, "web")
+    for broken in registry.INSTALLED.broken().values():
+        log.warning(broken)
     app = create_app(settings)
     if settings.ballast:
         app.state.db.keep_ballast()

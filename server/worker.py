@@ -21,6 +21,7 @@ from types import FrameType
 import structlog
 
 from parenting._process import settle
+from parenting.envs import registry
 from parenting.server import runs, workers
 from parenting.server.db import Database, connect
 from parenting.server.errors import StoreError
@@ -229,6 +230,8 @@ def main(settings: Settings) -> int:
     """
     settle()
     sys.setswitchinterval(SWITCH_SECONDS)
+    for broken in registry.INSTALLED.broken().values():
+        log.warning(broken)
     worker = Worker(connect(settings), settings, BESIDE_SECONDS)
     signal.signal(signal.SIGTERM, worker.stop)
     signal.signal(signal.SIGINT, worker.stop)

@@ -9,9 +9,10 @@ from pkgutil import iter_modules
 
 import pytest
 from fastapi.routing import APIRoute
+from typer.testing import CliRunner
 
 from parenting.agent.config import Config
-from parenting.commands.main import COMMANDS
+from parenting.commands.main import COMMANDS, SUBCOMMANDS, app
 from parenting.envs import registry
 from parenting.server.settings import Settings
 from tests.tree import ROOT, git_files
@@ -88,3 +89,10 @@ def test_every_path_that_a_map_names_is_there(page: str) -> None:
     assert [
         name for text, name in sources if not re.search(rf"^(?:def|class) {name}\b", text, re.MULTILINE)
     ] == []
+
+
+@pytest.mark.parametrize("name", [f"{name} {below}" for name, all in SUBCOMMANDS.items() for below in all])
+def test_every_command_below_another_has_its_line_and_its_example(name: str) -> None:
+    assert f"| `parenting {name}` |" in (ROOT / "docs/commands.md").read_text(encoding="utf-8")
+    shown = CliRunner().invoke(app, [*name.split(), "--help"]).output
+    assert f"parenting {name}" in shown.partition("Example")[2]

@@ -21,6 +21,7 @@ def examine(settings: Settings) -> Iterator[Finding]:
     yield from guarded("versions", machine.versions)
     yield from guarded("limits", partial(machine.limits, settings))
     yield from guarded("weights", machine.shipped_weights)
+    yield from guarded("packages", machine.packages)
     url = make_url(settings.url)
     if url.get_backend_name() == "sqlite":
         yield from _sqlite(settings, url)

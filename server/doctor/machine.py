@@ -8,6 +8,7 @@ import resource
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 
+from parenting.envs import registry
 from parenting.server.doctor.findings import Finding, error, ok, warning
 from parenting.server.environment import warnings
 from parenting.server.errors import SetupError
@@ -86,6 +87,15 @@ def shipped_weights() -> Iterator[Finding]:
         yield error("weights", "; ".join(bad), "Install Parenting again.")
     else:
         yield ok("weights", f"all {len(WEIGHTS)} shipped files are intact")
+
+
+def packages() -> Iterator[Finding]:
+    """Import the worlds of other packages; nothing is said where there are none."""
+    names, broken = registry.INSTALLED.names(), registry.INSTALLED.broken()
+    for said in broken.values():
+        yield warning("packages", said, "parenting worlds lists the worlds that can be used.")
+    if names and not broken:
+        yield ok("packages", f"worlds of other packages: {', '.join(names)}")
 
 
 def _version(name: str) -> str | None:

@@ -1,13 +1,14 @@
-"""Random walks in a world, and the marks of the checks that every world must pass."""
+"""The marks of the checks that every world must pass, and the subjects of these checks."""
 
 from typing import Any
 
 import pytest
-import torch
 
 from parenting.envs import registry
-from parenting.envs.gridworld import Gridworld, WorldState
-from parenting.envs.rng import Keys, keys
+from parenting.envs.gridworld import Gridworld
+from parenting.library.conformance.walks import Subject, begin, roll, same
+
+__all__ = ["CERTAIN", "begin", "certain", "every_level", "every_world", "roll", "same", "subject"]
 
 CERTAIN: dict[str, dict[str, Any]] = {
     "reward-hacking": {"drying": 0.0},
@@ -24,24 +25,5 @@ def certain(name: str, level: str | None = None) -> Gridworld:
     return registry.make(name, level, **CERTAIN.get(name, {}))
 
 
-def begin(world: Gridworld, trials: int, seed: int = 0) -> tuple[WorldState, Keys]:
-    key = keys(seed, trials)
-    return world.reset(key, torch.arange(trials) % len(world.levels)), key
-
-
-def roll(world: Gridworld, trials: int, steps: int, seed: int = 0) -> list[tuple[WorldState, torch.Tensor]]:
-    """Random walks: each state with the action taken in it; the last action is not taken any more."""
-    generator = torch.Generator().manual_seed(seed)
-    state, key = begin(world, trials, seed)
-    passed = []
-    for _ in range(steps + 1):
-        action = torch.randint(4, (trials,), generator=generator)
-        passed.append((state, action))
-        key = key.next()
-        state = world.step(state, action, key)
-    return passed
-
-
-def same(one: WorldState, other: WorldState) -> bool:
-    theirs = other.tensors()
-    return all(torch.equal(tensor, theirs[name]) for name, tensor in one.tensors().items())
+def subject(name: str, level: str | None = None) -> Subject:
+    return Subject(name, level or registry.spec(name).default, CERTAIN.get(name, {}))

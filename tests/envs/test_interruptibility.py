@@ -12,7 +12,7 @@ from parenting.envs.gym import gym_id
 from parenting.envs.levels.spec import LevelError
 from parenting.envs.rng import keys
 from parenting.envs.walk import LETTERS, board_text, states
-from tests.envs.explore import explore
+from parenting.library.conformance.walks import explore
 
 THROUGH, AROUND = "dllllldd", "ddduulllllldd"
 """To the goal over the pink cell, and by way of the button with one bump into the wall."""

@@ -14,7 +14,7 @@ from parenting.envs.levels.spec import Level
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.envs.rng import Stream, keys
 from parenting.envs.walk import LETTERS, board_text, states
-from tests.envs.explore import explore
+from parenting.library.conformance.walks import explore
 
 letters = st.text(LETTERS, max_size=25)
 chances = st.sampled_from([0.0, 0.05, 0.5, 1.0])

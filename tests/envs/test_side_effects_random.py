@@ -12,7 +12,7 @@ from parenting.envs.levels.spec import Cell, Level, LevelError
 from parenting.envs.rng import Keys
 from parenting.envs.side_effects import SideEffects
 from parenting.envs.walk import LETTERS, board_text, states
-from tests.envs.explore import explore
+from parenting.library.conformance.walks import explore
 
 letters = st.text(LETTERS, max_size=40)
 MOVES = {"u": (-1, 0), "d": (1, 0), "l": (0, -1), "r": (0, 1)}

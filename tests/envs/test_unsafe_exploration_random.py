@@ -9,7 +9,7 @@ from parenting.envs.levels.spec import Cell, Level, LevelError
 from parenting.envs.levels.unsafe_exploration import SPEC, validate
 from parenting.envs.unsafe_exploration import UnsafeExploration
 from parenting.envs.walk import LETTERS, board_text, states
-from tests.envs.explore import explore
+from parenting.library.conformance.walks import explore
 
 letters = st.text(LETTERS, max_size=25)
 

@@ -159,7 +159,7 @@ def test_the_settings_of_the_form_are_the_runs(client: httpx2.Client, db: Databa
 
 @pytest.mark.parametrize("option", [one for one in OPTIONS if one.choices], ids=lambda one: one.field)
 def test_each_choice_of_a_setting_is_one_that_a_run_takes(option: Option, tmp_path: Path) -> None:
-    world = next(name for name in reversed(WORLDS) if option.needs in {"", *WORLDS[name].legend})
+    world = next(name for name in reversed(list(WORLDS)) if option.needs in {"", *WORLDS[name].legend})
     empty = plan(read_form({**FORM, "world": world, "level": ""}), tmp_path)
     for value, name in option.choices:
         taken = plan(read_form({**FORM, "world": world, "level": "", option.field: value}), tmp_path)
