@@ -158,6 +158,7 @@ def ask(
     state = state.replace(
         familiarity=familiarity.count(state.familiarity, where, new),
         waiting=state.waiting | asking,
+        info=state.info.replace(pausing=pausing, familiarity=f, logits=view.logits),
     )
     return state, heard, _question(world, config, state, found.pair, asking, query)
 

@@ -145,13 +145,17 @@ def _recorder(world: Gridworld, length: int, trials: int, device: torch.device) 
 
 def no_info(world: WorldState, dtype: torch.dtype) -> TickInfo:
     """The record of a tick in which nothing has happened yet."""
-    nothing = torch.zeros_like(world.terminated)
+    nothing, count = torch.zeros_like(world.terminated), torch.zeros_like(world.step_count)
     number = torch.zeros_like(world.step_count, dtype=dtype)
     return TickInfo(
         before=world,
-        action=torch.zeros_like(world.step_count),
+        action=count,
         moved=nothing,
         trained=nothing,
+        pausing=nothing,
+        familiarity=count,
+        logits=number[:, None].expand(-1, 4),
+        completed=count[:, None].expand(-1, 2),
         loss=number,
         entropy_global=number,
         entropy_local=number,

@@ -102,7 +102,10 @@ def pair(
     recorder = state.recorder
     found = _search(config, recorder, state.maturity, trying)
     if len(found.trial):
-        query = _ask(world, state, found, query)
+        at = _places(state, found)
+        query = _ask(world, state, found, at, query)
+        completed = state.info.completed.index_copy(0, found.trial, recorder.ring.tick[at])
+        state = state.replace(info=state.info.replace(completed=completed))
         recorder.ring.stored[found.trial, EXPLOIT, found.exploit] = False
         recorder.ring.stored[found.trial, EXPLORE, found.explore] = False
     recorder = recorder.replace(asked=_remember(config, recorder.asked, query))
@@ -174,13 +177,23 @@ def _partner(
     return torch.where(newest.values >= 0, newest.indices, -1)
 
 
-def _ask(world: Gridworld, state: AgentState, found: Pair, query: Query) -> Query:
-    """The pair as a query; the exploitative clip is shown on the left by the toss of a coin."""
-    ring, trial = state.recorder.ring, found.trial
+def _places(state: AgentState, found: Pair) -> tuple[Tensor, Tensor, Tensor]:
+    """Where the clips lie, by side; the exploitative one is shown on the left by the toss of a coin.
+
+    They index parts of the ring, [N, 2, C, ...], to [n, 2, ...].
+    """
+    trial = found.trial
     leftward = state.keys.uniform(Stream.PAIR_SIDES)[trial] < 0.5  # [n]
     kinds = torch.where(leftward[:, None], torch.tensor([EXPLOIT, EXPLORE]), torch.tensor([EXPLORE, EXPLOIT]))
     places = torch.stack((found.exploit, found.explore), 1).gather(1, kinds)  # [n, 2], as kinds: by side
-    at = (trial[:, None], kinds, places)  # indexes [N, 2, C, ...] to [n, 2, ...]
+    return trial[:, None], kinds, places
+
+
+def _ask(
+    world: Gridworld, state: AgentState, found: Pair, at: tuple[Tensor, Tensor, Tensor], query: Query
+) -> Query:
+    """The pair as a query."""
+    ring, trial = state.recorder.ring, found.trial
     board, agent, box = ring.board[at], ring.agent[at].long(), ring.box[at].long()
     frames = {
         "board": board,

@@ -111,6 +111,11 @@ class TickInfo(Struct):
     action: Int64[Tensor, "N"]
     moved: Bool[Tensor, "N"]
     trained: Bool[Tensor, "N"]
+    pausing: Bool[Tensor, "N"]  # a draw below p_guid ** f began a pause; where it asks again, none decided
+    # of guidance that is asked
+    familiarity: Int64[Tensor, "N"]  # f of the local state before this question
+    logits: Float[Tensor, "N 4"]  # of the policy there
+    completed: Int64[Tensor, "N 2"]  # of a preference: when each clip was completed, by side
     # Eq. (2) before the last gradient step, and each head's entropy in nats: means over the entries in it
     loss: Float[Tensor, "N"]
     entropy_global: Float[Tensor, "N"]
