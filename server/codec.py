@@ -66,6 +66,12 @@ def decode(
     return query
 
 
+def first_state(world: Gridworld, clips: dict[str, Any]) -> tuple[Tensor, Tensor]:
+    """Return the observation and the agent's cell in the state in which both clips begin."""
+    frame = clips["left"]["frames"][0]
+    return _codes(world.legend, frame["observed"])[None], torch.tensor([frame["agent"]])
+
+
 def _fill(world: Gridworld, query: Query, side: int, clip: dict[str, Any]) -> None:
     query.length[0, side] = clip["length"]
     for place, action in enumerate(clip["actions"]):

@@ -39,7 +39,7 @@ class Growth:
 
     def overhear(self, parent: Parent) -> Parent:
         """Return a parent whose answers this hears, too."""
-        return Overheard(parent, self.lesson.hear)
+        return Overheard(parent, self.lesson)
 
     def row(self, state: AgentState) -> Row:
         """Return the number of cells and of safe ones for a row of metrics, as last looked at."""

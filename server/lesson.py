@@ -5,14 +5,14 @@ Both are read off the policy; nothing of the agent is changed, and no random num
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from parenting.agent.amendment import TickEvent
+from parenting.agent.amendment import Amend, TickEvent
 from parenting.agent.init import network_of
 from parenting.agent.parent import Parent
 from parenting.agent.query import Answer, Query, QueryKind
@@ -39,15 +39,22 @@ class Lesson:
         """Nothing was heard yet."""
         self.network = network_of(world)
         self.asked: Asked | None = None
+        self.corrected: Asked | None = None  # the last answer that was heard as a correction, by X alone
         self._told: tuple[int, int] | None = None  # the answer's tick, and the gradient steps then
 
     def hear(self, state: AgentState, answer: Answer) -> None:
         """Take note of an answer, before the agent hears it. A skip has no lesson."""
-        if not bool(answer.judges[0]):
-            return
+        if bool(answer.judges[0]):
+            self.asked = self._asked(state, answer)
+
+    def correct(self, state: AgentState, answer: Answer) -> None:
+        """Take note of a correction, before X is rebuilt with it. The parent is told nothing of it."""
+        self.corrected = self._asked(state, answer)
+
+    def _asked(self, state: AgentState, answer: Answer) -> Asked:
         seen, agent = answer.query.observation[:, 0, 0], answer.query.agent[:, 0, 0]
         near, (row, column) = local_state(seen, agent), agent[0].tolist()
-        self.asked = Asked(
+        return Asked(
             int(state.keys.tick[0]) + 1,
             QueryKind(int(answer.query.kind[0])).name.lower(),
             (row, column),
@@ -81,18 +88,22 @@ class Lesson:
 class Overheard:
     """A parent whose answers somebody else hears as well, just before the agent does."""
 
-    def __init__(self, parent: Parent, hear: Callable[[AgentState, Answer], None]) -> None:
-        """`hear` is called with the state before the tick, and the answer or silence."""
-        self.parent, self.hear = parent, hear
+    def __init__(self, parent: Parent, lesson: Lesson) -> None:
+        """Let a lesson hear answers and corrections, with the state before the tick."""
+        self.parent, self.lesson = parent, lesson
 
     def events(self, state: AgentState) -> Sequence[TickEvent]:
-        """The parent's events."""
-        return self.parent.events(state)
+        """The parent's events; corrections are overheard."""
+        events = self.parent.events(state)
+        for event in events:
+            if isinstance(event, Amend):
+                self.lesson.correct(state, event.answer)
+        return events
 
     def take(self, state: AgentState) -> Answer:
         """The parent's answer, which is overheard."""
         answer = self.parent.take(state)
-        self.hear(state, answer)
+        self.lesson.hear(state, answer)
         return answer
 
     def post(self, query: Query) -> None:

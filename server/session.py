@@ -36,6 +36,7 @@ from parenting.server.snapshot import (
 )
 from parenting.server.statuses import Waiting
 from parenting.server.tables import Run
+from parenting.server.why import Why
 
 log = structlog.get_logger()
 
@@ -69,6 +70,7 @@ class RunSession:
         self.record_ends = self.parent.record_ends = worker_side.high_water(db, claim.run_id)
         self.growth = Growth(self.world, run, self.evaluation, self.saved.state, self.saved.tally)
         self.lived = Lived(self.world, db, claim, self.saved)
+        self.why = Why(self.world, db, claim, self.saved, self.growth.lesson)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
@@ -125,6 +127,7 @@ class RunSession:
         if reason != self.waiting or (reason is Waiting.STUCK and self.last_tick != self._stuck_at):
             self.waiting, self._stuck_at = reason, self.last_tick
             runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
+        self.why.write()
         self.save_if_due()
 
     def rests_until(self) -> float:
@@ -162,6 +165,7 @@ class RunSession:
         self.saved = Snapshot(state, tally, config)
         self.growth.milestones.see(state, tally)
         self.lived.see(state, tally, events)
+        self.why.see(self.saved, query)
         if self.last_tick <= self.record_ends:
             self._hold_to_the_record(query)
         self._note(answer)
@@ -191,6 +195,7 @@ class RunSession:
         asked = None if stored is None else self.parent.read(stored)
         self.saved = self.saved._replace(state=follow(self.saved.state, asked, query))
         self.lived.forget(self.saved.state)
+        self.why.forget(self.last_tick)
 
     def _note(self, answer: Answer) -> None:
         """Keep what the next row of metrics needs of this tick."""
@@ -218,6 +223,7 @@ class RunSession:
         row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed, **grown}
         optimal = bool(row["optimal"])
         metrics.write_metrics(self.db, self.claim, {self.last_tick: row})
+        self.why.write()
         shown = {"maturity": row["maturity"], "speed": speed, "optimal": optimal}
         shown |= self.growth.news(self.saved.state)
         runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None, **shown)
@@ -261,6 +267,7 @@ class RunSession:
     def save(self) -> None:
         """Write a checkpoint. The next one waits the longer, the longer this one took."""
         self.lived.write()
+        self.why.write()
         began, blob = time.monotonic(), pack(self.saved)
         checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, blob)
         self._saved_tick, self._saved_at = self.last_tick, time.monotonic()

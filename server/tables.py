@@ -27,8 +27,9 @@ from parenting.server.statuses import (
 )
 from parenting.server.table_root import Table, one_of, unique_where
 from parenting.server.triggers import keep_deleted_numbers
+from parenting.server.why_tables import Effect, Reason
 
-__all__ = ["Moves", "Table"]
+__all__ = ["Effect", "Moves", "Reason", "Table"]
 
 KINDS = ("guidance", "preference")
 CHOICES = ("left", "right", "either", "neither")
@@ -157,6 +158,7 @@ class Query(Table):
     """Guidance: answers heard before on the same pair in the same pause; 0 for a first asking."""
     policy_stage: Mapped[int | None]  # which policy asked: the stage T that it was in, and
     policy_steps: Mapped[int | None]  # its gradient steps in that stage; null: asked before these were kept
+    leased: Mapped[datetime | None]  # when it was first shown to somebody; null: never, or not kept then
     leased_until: Mapped[datetime | None]  # by the wall clock, for display
     leased_by: Mapped[str | None]
     lease_epoch: Mapped[str | None]  # by the clock that decides (`server.store.clock`)
@@ -188,6 +190,7 @@ class Answer(Table):
     supersedes: Mapped[int | None] = mapped_column(ForeignKey("answer.id"))
     standing: Mapped[bool] = mapped_column(default=True)
     received: Mapped[datetime]
+    replays: Mapped[int | None]  # how often its parent played the clips again; null: the client did not tell
     applied_tick: Mapped[int | None]
     # the chain of hashes (server.chain)
     salt: Mapped[str | None]

@@ -21,6 +21,7 @@ After = Annotated[
 ClientId = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9._:-]+$")]
 Choice = schemas.Choice
 Place = Annotated[int, Field(ge=0, le=LARGEST_INT), WHOLE]
+Replays = Annotated[int, Field(ge=0, le=10_000), WHOLE]
 
 
 class Strict(BaseModel):
@@ -53,6 +54,9 @@ class AnswerBody(Strict):
     database: DatabaseId | None = Field(None, description="The `database` that came with the question.")
     run: PublicId | None = Field(None, description="The `run_public_id` that came with it.")
     question: PublicId | None = Field(None, description="The `public_id` of the question.")
+    replays: Replays | None = Field(
+        None, description="How often the parent had the clips played again; null: this client does not tell."
+    )
 
 
 class NamedBody(LeaseBody):

@@ -69,7 +69,7 @@ async def change_answer(request: Request, query_id: QueryName, body: AnswerBody,
     A question that has no answer, or another client's, gets 409. Names of another database, run or question
     get 410 (`elsewhere`).
     """
-    said = Said(body.choice, body.client_id, body.parent)
+    said = Said(body.choice, body.client_id, body.parent, body.replays)
     names = Names(body.database, body.run, body.question)
     found = await store(request, partial(supersede_in, db=db, query=query_id, said=said, names=names))
     notify_worker(request)

@@ -44,6 +44,7 @@ class Said:
     choice: str  # left, right, either or neither (Sec. 2.3), or skip
     client_id: str
     parent: str
+    replays: int | None = None  # how often they had the clips played again
 
     @property
     def skips(self) -> bool:

@@ -139,7 +139,7 @@ def _hold_in(
     query = _first_readable(session, offer, {**asks, **mark.bound()})
     if query is not None:
         held = _columns(db, mark, asks["client_id"], seconds)
-        session.execute(_HELD, {"query_id": query.id, **held})
+        session.execute(_HELD, {"query_id": query.id, "leased_at": db.clock(), **held})
         for name, value in held.items():
             set_committed_value(query, name, value)
         db.outlive_crash(session)
@@ -149,7 +149,7 @@ def _hold_in(
 def hold_in(session: Session, db: Database, query_id: int, client_id: str, seconds: float) -> None:
     """Hold one open query for a client, unless another holds it, in a transaction that is already open."""
     mark = db.mark(session)
-    asks = {"query_id": query_id, "client_id": client_id, **mark.bound()}
+    asks = {"query_id": query_id, "client_id": client_id, "leased_at": db.clock(), **mark.bound()}
     session.execute(_HELD_IF_FREE, asks | _columns(db, mark, client_id, seconds))
 
 
@@ -184,7 +184,11 @@ def _first_readable(session: Session, offer: Any, asks: dict[str, Any]) -> Query
 
 # Statements that every question needs are built once.
 _QUERY = Table.metadata.tables["query"]
-_HELD = update(_QUERY).where(_QUERY.c.id == bindparam("query_id"))
+_HELD = (
+    update(_QUERY)
+    .where(_QUERY.c.id == bindparam("query_id"))
+    .values(leased=func.coalesce(_QUERY.c.leased, bindparam("leased_at", type_=_QUERY.c.leased.type)))
+)
 _LEASE = (Query.lease_epoch, Query.lease_begin, Query.lease_end)
 _MINE = and_(Query.leased_by == bindparam("client_id"), holds(*_LEASE))
 _FREE = is_over(*_LEASE)

@@ -47,7 +47,7 @@ export function answer(choice) {
   $("alert").textContent = "";
   performance.mark("answer", { detail: query });
   if (choice !== "skip") recordAnswer();
-  keep({ database, run, question: query, choice, client_id: client, title: name, given: Date.now() });
+  keep({ database, run, question: query, choice, replays: page.player?.replays, client_id: client, title: name, given: Date.now() });
   if (page.ahead) {
     painted(() => flush(report));
     return show(page.ahead);

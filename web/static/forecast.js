@@ -27,5 +27,5 @@ export function forecasts(question) {
   question.addEventListener("contextmenu", (event) => { if (began && sideOf(event.target)) event.preventDefault(); });
   question.addEventListener("focusin", ({ target }) => { if (target.matches(":focus-visible")) show(sideOf(target)); });
   question.addEventListener("focusout", () => show(null));
-  return { replay: null, still: () => show(null), show };
+  return { replay: null, still: () => show(null), show, get replays() { return Object.values(players).reduce((sum, one) => sum + one.replays, 0); } };
 }

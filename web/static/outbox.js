@@ -10,14 +10,14 @@ const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListe
 
 // One attempt: "saved", "refused" (the question has another answer, or was withdrawn), "elsewhere" (it is meant for another
 // database, or the server cannot read it) or "kept" (no connection, or a server in trouble).
-async function send({ database, run, question, choice, client_id }) {
+async function send({ database, run, question, choice, replays, client_id }) {
   if (!question) return ["elsewhere"];
   const late = new AbortController(), timer = setTimeout(() => late.abort(), LATE);
   try {
     const skips = choice === "skip", asked = { client_id, database, run, question };
     const reply = await fetch(`/api/v1/queries/${question}/${skips ? "skip" : "answer"}`, {
       method: "POST", keepalive: true, signal: late.signal, headers: { "content-type": "application/json" },
-      body: JSON.stringify(skips ? asked : { choice, ...asked }),
+      body: JSON.stringify(skips ? asked : { choice, replays, ...asked }),
     });
     if (reply.ok) return ["saved", await reply.json()];
     if (reply.status >= 500 || reply.status === 429) return ["kept", reply.status === 500];

@@ -95,9 +95,11 @@ export function play(question, round = null, step = USUAL) {
       tell();
     });
   };
-  const replay = () => run(0);
+  let replays = 0; // what somebody asked for; the rounds that the clock begins do not count
+  const replay = () => { replays++; run(0); };
+  const controls = { replay, go, still, step: count, get replays() { return replays; } };
   still();
-  if (!bar) return { replay, go, still, step: count };
+  if (!bar) return controls;
   bar.hidden = false;
   for (const button of bar.querySelectorAll("[data-step]")) button.addEventListener("click", () => go(Number(button.dataset.step)));
   for (const part of bar.querySelectorAll("[data-step], output")) part.hidden = steps < 2 && !calm.matches;
@@ -106,5 +108,5 @@ export function play(question, round = null, step = USUAL) {
   }
   bar.querySelector("[data-replay]").addEventListener("click", replay);
   if (calm.matches) go(0); else begin();
-  return { replay, go, still, step: count };
+  return controls;
 }
