@@ -42,7 +42,12 @@ COMMANDS = {
 }
 """Each command with its help text. The command `up` is the function `up` in commands/up.py, and so on."""
 
-SUBCOMMANDS = {"worlds": {"new": "Write the skeleton of a package with a world of your own."}}
+SUBCOMMANDS = {
+    "worlds": {
+        "new": "Write the skeleton of a package with a world of your own.",
+        "import": "Make levels of maps of other collections.",
+    }
+}
 """Commands below a command, each with its help text. `worlds new` is the function `command`
 in commands/worlds_new.py, and so on."""
 

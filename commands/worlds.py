@@ -64,7 +64,7 @@ def worlds(
     """List the worlds and their levels, with the art.
 
     With --random: levels that only moving the box solves, or islands with water in reach, as texts that
-    `parenting run --level` takes.
+    `parenting run --level` takes. `parenting worlds import --help`: levels from other collections.
 
     Example: parenting worlds --random side-effects --size 6x6 --seed 3 > level.txt
     """

@@ -26,7 +26,7 @@ ROWS = {
     "taxi": re.compile(r"\+-+\+|\|[RGYB :|]+\|"),
     "gridworlds": re.compile(r"[ #A-Ztv0-9><^~*]*[#W][ #A-Ztv0-9><^~*]*"),
 }
-"""What a row of each format looks like."""
+"""The pattern of a row of each format."""
 MARKS = {"xsb": "@+", "frozenlake": "S", "cliffwalking": "x", "taxi": "|", "gridworlds": "A"}
 """The signs of which a map of each format has one: where its agent starts, or, of Taxi, its walls."""
 QUOTED = re.compile(r"""[bru]?("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')""")
@@ -113,7 +113,8 @@ def _unquoted(lines: Sequence[str]) -> list[str]:
     found: list[str] = []
     for line in lines:
         parts = [str(ast.literal_eval(one[1])) for one in QUOTED.finditer(line)]
-        found += ["".join(parts)] if all(len(part) == 1 for part in parts) else parts
-        if parts and "]" in QUOTED.sub("", line):
+        by_cell = all(len(part) == 1 for part in parts)
+        found += ["".join(parts)] if by_cell else parts
+        if not by_cell and "]" in QUOTED.sub("", line):
             found.append("")
     return found

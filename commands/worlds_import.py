@@ -1,0 +1,141 @@
+"""`parenting worlds import`: levels of ours from maps of other collections."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import typer
+
+from parenting.commands.errors import UsageError, friendly_errors
+from parenting.commands.level_file import read_text
+from parenting.commands.options import among, folder
+from parenting.commands.printing import say
+from parenting.envs import registry
+from parenting.envs.foreign_levels import carry
+from parenting.envs.foreign_text import FORMATS, ForeignMap, maps
+from parenting.envs.levels.spec import Level, LevelError
+
+
+class Imported(NamedTuple):
+    """A level that was made of a map."""
+
+    level: Level
+    format: str
+    lost: tuple[str, ...]  # what could not be carried over
+    refused: str | None  # the rule of ours that it breaks
+
+
+def command(
+    file: Annotated[str, typer.Argument(metavar="FILE|-", help="A file with maps; - reads standard input.")],
+    form: Annotated[
+        str | None,
+        typer.Option(
+            "--format",
+            parser=among(tuple(FORMATS)),
+            metavar="|".join(FORMATS),
+            help="The maps' format.",
+            show_default="found by its signs",
+        ),
+    ] = None,
+    world: Annotated[
+        str | None, typer.Option(help="The world of art of gridworlds.", show_default="found by its signs")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", parser=folder, help="Write each level to a file in this folder."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+) -> None:
+    """Make levels of maps of other collections, and say what could not be carried over.
+
+    It reads Sokoban's XSB, maps of Gymnasium's FrozenLake, CliffWalking and Taxi, and art of DeepMind's AI
+    safety gridworlds, as text or as lists of strings in Python. The levels go to standard output, as
+    `parenting run --level` takes them.
+
+    Exit codes: 0 every level keeps the rules of its world; 1 one does not, which is said; 2 there is no map.
+
+    Example: parenting worlds import lake.map > lake.txt
+    """
+    with friendly_errors():
+        if world is not None:
+            registry.spec(world)
+        text, _ = read_text("FILE", file)
+        found = _imported(text, file, form, world)
+        if out is not None:
+            _write(out, found)
+    if as_json:
+        say(json.dumps({"levels": [_plain(one) for one in found]}, indent=2))
+    else:
+        say("\n".join(one.level.text for one in found), nl=False)
+        for one in found:
+            for sentence in (*one.lost, *([one.refused] if one.refused else [])):
+                say(f"{one.level.name}: {sentence.removesuffix('.')}.", err=True)
+    if any(one.refused for one in found):
+        raise typer.Exit(1)
+
+
+def _imported(text: str, file: str, form: str | None, world: str | None) -> list[Imported]:
+    """Every map of a text as a level.
+
+    Raises:
+        UsageError: there is no map, or one holds what no world of ours has.
+    """
+    stem = "map" if file == "-" else Path(file).stem or "map"
+    try:
+        found = maps(text, form)
+    except ValueError as error:
+        raise UsageError(f"FILE: {file}: {error}") from None
+    return [_one(one, file, name, world) for one, name in zip(found, _names(found, stem), strict=True)]
+
+
+def _one(one: ForeignMap, file: str, name: str, world: str | None) -> Imported:
+    try:
+        carried = carry(one, world)
+    except ValueError as error:
+        raise UsageError(f"FILE: {file}, line {one.line}: {error}.") from None
+    level = Level(name, carried.world, carried.rows, dict(carried.header), name)
+    try:
+        return Imported(registry.read_level(carried.world, level.text, name), one.format, carried.lost, None)
+    except LevelError as error:
+        row = error.line - len(level.header) - 3
+        where = f"row {row}, column {error.column}" if row > 0 else "its header"
+        refused = f"{carried.world} refuses this level at {where}: {error.rule}; mend it by hand"
+        return Imported(level, one.format, carried.lost, refused)
+
+
+def _names(found: Sequence[ForeignMap], stem: str) -> list[str]:
+    """Names of the levels: their own, or else that of the file with a number where there are several."""
+    plain = [re.sub(r"\s+", " ", one.name)[:60].strip() for one in found]
+    return [name or (stem if len(found) == 1 else f"{stem} {number}") for number, name in enumerate(plain, 1)]
+
+
+def _plain(one: Imported) -> dict[str, Any]:
+    level = one.level
+    return {
+        "world": level.world,
+        "name": level.name,
+        "format": one.format,
+        "rows": list(level.rows),
+        "text": level.text,
+        "lost": list(one.lost),
+        "refused": one.refused,
+    }
+
+
+def _write(out: Path, found: Sequence[Imported]) -> None:
+    """Write each level to a file named after it.
+
+    Raises:
+        UsageError: a file cannot be written.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for number, one in enumerate(found, 1):
+            name = re.sub(r"[^\w-]+", "-", one.level.name).strip("-")
+            (out / f"{number:03}-{name}.txt").write_text(one.level.text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"--out: {out} cannot be written to: {error}.") from None
