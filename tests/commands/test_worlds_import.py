@@ -79,7 +79,7 @@ def test_the_map_of_gymnasium_itself_is_read_as_it_prints() -> None:
     env = gymnasium.make("FrozenLake-v1", map_name="8x8")
     (level,) = levels(str(env.unwrapped.desc))  # of an array of bytes
     assert [row[1:-1].count("W") for row in level["rows"][1:-1]] == [0, 0, 1, 1, 1, 3, 3, 1]
-    taxi = gymnasium.make("Taxi-v3").unwrapped.desc
+    taxi = gymnasium.make("Taxi-v4").unwrapped.desc
     assert levels("\n".join("".join(cell.decode() for cell in row) for row in taxi)) == levels(TAXI)
 
 
