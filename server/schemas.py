@@ -127,6 +127,29 @@ class RunSchema(Schema):
     """alive, silent (none raises this run, nor will one that is alive), or done (the run is over)."""
 
 
+class CurveSchema(Schema):
+    """A curve: places on the axis, and the values there."""
+
+    name: str
+    """The metric."""
+    x: list[float]
+    y: list[float]
+
+
+class CurvesSchema(Schema):
+    """Curves of a run, each with at most as many points as were asked for."""
+
+    by: Literal["tick", "question", "minute"]
+    """The axis: ticks, questions answered so far, or minutes that answering took, breaks left out."""
+    rows: int
+    """The number of rows that they were made of."""
+    last: int | None
+    """The tick of the last of these rows; null: there are none."""
+    thinned: bool
+    """True if a curve has fewer points than there are: of each part its first, least, greatest and last."""
+    curves: list[CurveSchema]
+
+
 class FrameSchema(Schema):
     """One moment of a clip: the true board, the board that the agent saw, and the positions."""
 

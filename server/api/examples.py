@@ -243,6 +243,15 @@ SHOWN = {
     "get_run": Shown(RUN),
     "list_metrics": Shown(_rows(METRIC)),
     "list_episodes": Shown({**_rows(EPISODE), "next": 3}),
+    "list_curves": Shown(
+        {
+            "by": "tick",
+            "rows": 4,
+            "last": 57,
+            "thinned": False,
+            "curves": [{"name": "deaths", "x": [0.0, 1.0, 2.0, 57.0], "y": [0.0, 0.0, 1.0, 1.0]}],
+        }
+    ),
     "list_operator_events": Shown(_rows(*EVENTS)),
     "pause_run": Shown({**RUN, "status": "paused", "state": "paused"}),
     "resume_run": Shown(RUN),

@@ -11,6 +11,7 @@ from parenting.server import tables
 from parenting.server.damage import damage
 from parenting.server.new_run import LARGEST_INT
 from parenting.server.notes import Logged
+from parenting.server.reads.curves import FEWEST, POINTS, Axis
 from parenting.server.schemas import (
     AskedSchema,
     DamagedMetricSchema,
@@ -94,6 +95,23 @@ class MetricPart(Part):
 
     after: Place = Field(-1, description="Only ticks after this one; the `next` of the page before.")
     limit: int = Field(10_000, ge=1, le=10_000, description="At most this many rows.")
+
+
+NAMES = r"^[a-z_]{1,40}(,[a-z_]{1,40}){0,39}$"
+OnAxis = Annotated[float, Field(ge=0, le=LARGEST_INT)]
+"""A place on the axis of a curve."""
+
+
+class CurvePart(Part):
+    """The requested part of a run's curves."""
+
+    names: str = Field(
+        pattern=NAMES, description="Names of metrics, separated by commas.", examples=["deaths,return"]
+    )
+    by: Axis = Field("tick", description="The axis: ticks, questions answered so far, or minutes.")
+    begin: OnAxis | None = Field(None, description="The first place on the axis.")
+    end: OnAxis | None = Field(None, description="The last place on the axis.")
+    points: int = Field(POINTS, ge=FEWEST, le=POINTS, description="At most this many points a curve.")
 
 
 class EventPart(Part):

@@ -8,6 +8,7 @@ from fastapi import Query, Request
 
 from parenting.server.admission import admitted_router
 from parenting.server.api.lists import (
+    CurvePart,
     EventPart,
     MetricPart,
     MetricRows,
@@ -22,8 +23,9 @@ from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.identity import database_id
 from parenting.server.new_run import NewRun, start
 from parenting.server.reads import pagination
+from parenting.server.reads.curves import read_curves
 from parenting.server.reads.schemas import metric_schemas, run_schema, run_schemas
-from parenting.server.schemas import RunSchema
+from parenting.server.schemas import CurveSchema, CurvesSchema, RunSchema
 
 router = admitted_router(tags=["runs"])
 
@@ -61,6 +63,18 @@ def list_metrics(run_id: RunId, db: Db, part: Annotated[MetricPart, Query()]) ->
     """
     page = pagination.metrics_after(db, run_id, part.after, part.limit)
     return MetricRows(rows=metric_schemas(page.rows), next=page.next)
+
+
+@router.get("/runs/{run_id}/curves", summary="Read curves to draw", responses=read_responses(404))
+def list_curves(run_id: RunId, db: Db, part: Annotated[CurvePart, Query()]) -> CurvesSchema:
+    """Read what was measured as curves, each with at most 2,000 points, however long the run has lived.
+
+    Extremes are kept. For all points of a part of the axis, ask for that part.
+    """
+    wanted = list(dict.fromkeys(part.names.split(",")))
+    found = read_curves(db, run_id, wanted, part.by, part.begin, part.end, part.points)
+    curves = [CurveSchema(name=name, x=x, y=y) for name, (x, y) in found.curves.items()]
+    return CurvesSchema(by=part.by, rows=found.rows, last=found.last, thinned=found.thinned, curves=curves)
 
 
 @router.get(

@@ -1,5 +1,6 @@
 // The dashboard: numbers, the table of stages and small charts by Plotly, fed by the run's metrics as they come.
 import "./errors.js";
+import { curvesOf } from "./curves.js";
 import { follow } from "./live.js";
 
 const main = document.getElementById("main"), run = main.dataset.run;
@@ -16,15 +17,15 @@ const SERIES = {
 };
 const CALM = 1000; // ms between two drawings: eight charts cost much, and the parent's page may share the machine
 const COUNTS = new Set(["deaths", "asked", "answers", "size"]);
-const ticks = [], values = {}; // by name, one for each tick
+const LONG = 60_000; // ms after which what was missed is not told row by row
+const namesOf = (id) => SERIES[id].map(([key]) => key);
+const curves = curvesOf(run, [...new Set(Object.keys(SERIES).flatMap(namesOf))]);
 let stages = [];
-let last = -1, queued = false, drawn = -CALM;
-
-for (const name of Object.values(SERIES).flat().map(([key]) => key)) values[name] = [];
+let queued = false, drawn = -CALM, told = -LONG, version = 0;
 
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
-const largest = (id) => Math.max(...SERIES[id].map(([key]) => values[key].at(-1)));
+const largest = (id) => Math.max(...namesOf(id).map((key) => curves.latest(key) ?? 0));
 
 // ---- stages
 
@@ -60,7 +61,7 @@ function layout(id) {
   const axis = { color: colour("quiet"), gridcolor: colour("line"), zeroline: false, fixedrange: false, automargin: true };
   const many = SERIES[id].length > 1, by = id === "stages";
   return {
-    margin: { l: 8, r: 8, t: many ? 26 : 8, b: 8 }, height: 240, autosize: true, hovermode: "x unified", showlegend: many, uirevision: id, datarevision: last, // our arrays grow in place
+    margin: { l: 8, r: 8, t: many ? 26 : 8, b: 8 }, height: 240, autosize: true, hovermode: "x unified", showlegend: many, uirevision: id, datarevision: version, // our arrays grow in place
     paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { family: "system-ui, DejaVu Sans, sans-serif", size: 12, color: colour("quiet") },
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { color: colour("ink") } },
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
@@ -74,7 +75,7 @@ function traces(id) {
   if (id === "stages") return bars();
   const colours = [colour("blue"), colour("agent"), colour("leaf"), colour("unreal")];
   return SERIES[id].map(([key, name], at) => ({
-    type: "scatter", mode: "lines", connectgaps: true, x: ticks, y: values[key], name,
+    type: "scatter", mode: "lines", ...curves.curve(id, key), name,
     line: { color: key === "optimal_return" ? colour("quiet") : colours[at], width: 2, shape: COUNTS.has(id) ? "hv" : "linear", dash: key === "optimal_return" ? "dash" : "solid" },
   }));
 }
@@ -85,7 +86,7 @@ function bars() {
   const [[, policy], [, line]] = SERIES.stages;
   return [
     { type: "bar", x, y: all.map(({ value }) => value), name: policy, width: 0.5, marker: { color: colour("blue") } },
-    { type: "scatter", mode: "lines", x: [0.5, ...x, x.length + 0.5], y: Array(x.length + 2).fill(values.optimal_return.at(-1)), name: line, line: { color: colour("quiet"), width: 2, dash: "dash" } },
+    { type: "scatter", mode: "lines", x: [0.5, ...x, x.length + 0.5], y: Array(x.length + 2).fill(curves.latest("optimal_return")), name: line, line: { color: colour("quiet"), width: 2, dash: "dash" } },
   ];
 }
 
@@ -98,13 +99,25 @@ async function draw() {
   await loadStages();
   for (const figure of figures) {
     const id = figure.dataset.chart, plot = figure.querySelector(".plot");
-    window.Plotly.react(plot, traces(id), layout(id), { displayModeBar: false, responsive: true });
+    await window.Plotly.react(plot, traces(id), layout(id), { displayModeBar: false, responsive: true });
+    if (figure.dataset.zooms || id === "stages") continue;
+    figure.dataset.zooms = "yes";
+    plot.on("plotly_relayout", (change) => zoomed(id, change));
   }
 }
 
+// A part that is looked at closely is drawn with points of its own.
+async function zoomed(id, change) {
+  const { "xaxis.range[0]": begin, "xaxis.range[1]": end, "xaxis.autorange": reset } = change;
+  if (begin === undefined && !reset) return;
+  await curves.zoom(id, namesOf(id), begin, end);
+  redraw();
+}
+
 function redraw() {
-  if (queued || !ticks.length) return;
+  if (queued || curves.after() < 0) return;
   queued = true;
+  version++;
   document.getElementById("charts").hidden = false;
   setTimeout(() => requestAnimationFrame(draw), Math.max(0, drawn + CALM - performance.now()));
 }
@@ -117,14 +130,15 @@ const put = (name, value) => {
 };
 
 function add(rows) {
-  for (const row of rows) {
-    if (row.damaged || row.tick <= last) continue;
-    ticks.push(row.tick);
-    last = row.tick;
-    for (const name in values) values[name].push(row.values[name] ?? null);
-  }
+  told = performance.now();
+  if (curves.add(rows)) load();
   const newest = rows.at(-1)?.values;
   if (newest) for (const name of ["deaths", "return", "optimal_return", "stage_queries"]) put(name, newest[name]);
+  redraw();
+}
+
+async function load() {
+  await curves.load(() => status("offline"));
   redraw();
 }
 
@@ -144,7 +158,12 @@ async function applied(tick) {
 }
 
 const tell = {
-  after: () => last,
+  ready: async () => {
+    if (performance.now() - told < LONG) return;
+    await load();
+    told = performance.now();
+  },
+  after: curves.after,
   metrics: add,
   run(now) {
     status(now.state);

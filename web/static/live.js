@@ -36,7 +36,7 @@ export function poll(id, tell, heard, background = false) {
 }
 
 // Calls tell.run(run) with every change, tell.metrics(rows) for the ticks after tell.after(), and tell.lost() while the
-// server cannot be reached. For pages that only look.
+// server cannot be reached, each time after tell.ready(), if there is one, has settled. For pages that only look.
 export function follow(id, tell) {
   let stream = null, heard = false, turns = 0, release = () => {};
   const on = (event, use) => stream.addEventListener(event, ({ data }) => { heard = true; use(JSON.parse(data)); });
@@ -54,9 +54,11 @@ export function follow(id, tell) {
     release();
   };
   const ask = poll(id, tell, () => heard);
-  const turn = () => {
+  const turn = async () => {
     const now = ++turns;
     close();
+    if (!document.hidden) await tell.ready?.();
+    if (now !== turns) return;
     if (!document.hidden) withStream(open, () => now === turns && !document.hidden);
     ask();
   };
