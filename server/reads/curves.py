@@ -12,6 +12,8 @@ from typing import Any, Literal
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from parenting.server.columns import Damaged
+from parenting.server.damage import sound
 from parenting.server.db import Database
 from parenting.server.runs import find
 from parenting.server.tables import Answer, Metric, Run
@@ -76,8 +78,8 @@ def read_curves(
         for tick, place, values in _within(_placed(session, run, by, begin, end), begin, end):
             rows, last = rows + 1, tick
             for name, (x, y) in held.items():
-                value = values.get(name)
-                if type(value) in (int, float):
+                value = _number(values, name)
+                if value is not None:
                     x.append(place)
                     y.append(value)
                     if len(x) >= HELD:
@@ -125,13 +127,19 @@ def _within(points: Iterator[Point], begin: float | None, end: float | None) -> 
             yield point
 
 
+def _number(values: Values, name: str) -> float | None:
+    """Return a value; None if it is absent, or no number."""
+    value = values.get(name)
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
 def _tick(tick: int, values: Values) -> float | None:
     return float(tick)
 
 
 def _question(tick: int, values: Values) -> float | None:
-    counts = [values.get(name) for name in QUESTIONS]
-    return float(sum(counts)) if all(type(count) is int for count in counts) else None  # type: ignore[arg-type]  # all are int
+    guidance, preference = (_number(values, name) for name in QUESTIONS)
+    return None if guidance is None or preference is None else guidance + preference
 
 
 def _minute(session: Session, run: Run) -> Place:
@@ -139,9 +147,9 @@ def _minute(session: Session, run: Run) -> Place:
     ticks, passed = minutes(session, run)
 
     def place(tick: int, values: Values) -> float | None:
-        seconds = values.get("seconds")
-        if type(seconds) in (int, float):
-            return float(seconds) / 60
+        seconds = _number(values, "seconds")
+        if seconds is not None:
+            return seconds / 60
         before = bisect_right(ticks, tick)
         return passed[before - 1] if before else None
 
@@ -149,7 +157,7 @@ def _minute(session: Session, run: Run) -> Place:
 
 
 def minutes(session: Session, run: Run) -> tuple[list[int], list[float]]:
-    """Return the ticks at which answers were heard, and the minutes since the run was started, breaks left out.
+    """Return the ticks at which answers were heard, and the minutes since the run was started without breaks.
 
     What passes between two answers counts as `BREAK_SECONDS` at most.
     """
@@ -159,13 +167,13 @@ def minutes(session: Session, run: Run) -> tuple[list[int], list[float]]:
         .order_by(Answer.applied_tick)
     )
     ticks, passed, seconds = [0], [0.0], 0.0
-    before = run.created if isinstance(run.created, datetime) else None
+    before: datetime | None = sound(run, "created")
     for tick, received in session.execute(heard):
-        if not isinstance(tick, int) or not isinstance(received, datetime):
+        if any(isinstance(value, Damaged) for value in (tick, received)):
             continue
         gap = 0.0 if before is None else (received - before).total_seconds()
         before = received if before is None else max(before, received)
         seconds += min(max(gap, 0.0), BREAK_SECONDS)
-        ticks.append(tick)
+        ticks.append(tick or 0)
         passed.append(seconds / 60)
     return ticks, passed

@@ -11,7 +11,6 @@ from array import array
 import numpy as np
 from numpy.typing import NDArray
 
-
 KEPT = 4
 """Points that a part keeps at most."""
 
@@ -36,7 +35,8 @@ def _parts(places: Floats, number: int) -> NDArray[np.int64]:
     width = (places[-1] - places[0]) / number
     if not width:
         return np.zeros(len(places), np.int64)
-    return np.minimum((places - places[0]) / width, number - 1).astype(np.int64)
+    parts: NDArray[np.int64] = np.minimum((places - places[0]) / width, number - 1).astype(np.int64)
+    return parts
 
 
 def _chosen(parts: NDArray[np.int64], values: Floats) -> NDArray[np.int64]:

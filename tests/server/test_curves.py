@@ -80,7 +80,12 @@ def test_a_long_life_takes_no_more_memory(db: Database, mine: Claim, monkeypatch
     monkeypatch.setattr(curves, "FIRST", 100)
     longest: list[int] = []
     shorter = curves._shorter
-    monkeypatch.setattr(curves, "_shorter", lambda x, *rest: (longest.append(len(x)), shorter(x, *rest))[1])
+
+    def noted(x: array[float], y: array[float], points: int) -> tuple[array[float], array[float]]:
+        longest.append(len(x))
+        return shorter(x, y, points)
+
+    monkeypatch.setattr(curves, "_shorter", noted)
     store(db, mine.run_id, {tick: {"loss": float((tick * 7919) % 3001)} for tick in range(3000)})
     found = read_curves(db, mine.run_id, ["loss"], points=40)
     assert found.thinned
@@ -108,7 +113,7 @@ def test_by_question(db: Database, mine: Claim) -> None:
 
 
 def test_by_minute(db: Database, mine: Claim) -> None:
-    """The time of the answer before counts, a break at most five minutes; rows of batches say it themselves."""
+    """The time of the answer before counts, a break at most five minutes; rows of batches hold their own."""
     with db.write() as session:
         run = session.get_one(Run, mine.run_id)
         at = run.created
