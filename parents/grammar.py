@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from pydantic import ValidationError
 
+from parenting.envs.installed import BrokenPackageError, Installed
 from parenting.envs.names import did_you_mean
 from parenting.parents.errors import PARTS, Part
 
@@ -18,6 +19,28 @@ PLUS = re.compile(r"(?<![0-9.][eE])\+")
 
 class ParentError(ValueError):
     """A text does not name a parent; the sentence says why, and what would."""
+
+
+NAME = re.compile(r"[a-z][a-z0-9_-]*")
+"""The name of a parent of another package: none of the signs of the grammar."""
+
+
+def _usable(name: str, found: object) -> type[Part]:
+    """Return what an entry point names as a part of a parent.
+
+    Raises:
+        TypeError: it is not a subclass of `Part`.
+        ValueError: its name cannot be written, or is that of a parent of ours.
+    """
+    if not (isinstance(found, type) and issubclass(found, Part)) or isabstract(found):
+        raise TypeError(f"its entry point names {found!r}, and a whole subclass of Part is wanted")
+    if not NAME.fullmatch(name) or name in PARTS:
+        raise ValueError("its name must be of lower-case letters, digits, - and _, and be none of ours")
+    return found
+
+
+INSTALLED = Installed("parenting.parents", "parent", _usable)
+"""The parents of other packages."""
 
 
 class ParentSpec(NamedTuple):
@@ -62,16 +85,32 @@ def read_parent(text: str) -> ParentSpec:
 
 def _part(text: str) -> Part:
     name, colon, rest = text.partition(":")
-    kind = _imported(name) if "." in name else PARTS.get(name)
-    if kind is None:
-        hint = did_you_mean(name, PARTS)
-        raise ParentError(f"There is no parent '{name}'.{hint} The parents are: {', '.join(PARTS)}.")
+    kind = _imported(name) if "." in name else _named(name)
     given = _values(kind, rest.split(",") if colon else [])
     try:
         return kind.model_validate(given)
     except ValidationError as error:
         first = error.errors()[0]
         raise ParentError(f"{name}:{first['loc'][0]}={first['input']}: {first['msg']}.") from None
+
+
+def _named(name: str) -> type[Part]:
+    """Return the parent of a name: one of ours, or one of another package.
+
+    Raises:
+        ParentError: there is none, or its package cannot be used.
+    """
+    kind = PARTS.get(name) or INSTALLED.get(name)
+    if kind is not None:
+        return kind
+    try:
+        INSTALLED.refuse(name)
+    except BrokenPackageError as error:
+        raise ParentError(str(error)) from None
+    known = [*PARTS, *INSTALLED]
+    raise ParentError(
+        f"There is no parent '{name}'.{did_you_mean(name, known)} The parents are: {', '.join(known)}."
+    )
 
 
 def _imported(path: str) -> type[Part]:
@@ -112,5 +151,11 @@ def _values(kind: type[Part], written: list[str]) -> dict[str, str]:
 def _written(part: Part) -> str:
     text = ",".join(f"{name}={value}" for name, value in part.model_dump().items())
     kind = type(part)
-    name = part.name if PARTS.get(part.name) is kind else f"{kind.__module__}.{kind.__name__}"
-    return f"{name}:{text}" if text else name
+    return f"{_name_of(kind)}:{text}" if text else _name_of(kind)
+
+
+def _name_of(kind: type[Part]) -> str:
+    if PARTS.get(kind.name) is kind:
+        return kind.name
+    installed = (name for name in INSTALLED if INSTALLED.get(name) is kind)
+    return next(installed, f"{kind.__module__}.{kind.__name__}")
