@@ -18,7 +18,8 @@ from parenting.server.columns import UNREADABLE, Damaged
 from parenting.server.errors import DamagedRowError
 from parenting.server.public_ids import is_public_id
 from parenting.server.schemas import ClipSchema, LessonSchema
-from parenting.server.tables import Metric, OperatorEvent, Query, Run, Table
+from parenting.server.tables import Effect, Metric, OperatorEvent, Query, Reason, Run, Table
+from parenting.server.why_schemas import GuidanceReason, PolicyThere, PreferenceReason
 
 Row = TypeVar("Row", bound=Table)
 REMEDY = "The rest of the database goes on; a backup of before the damage holds the row."
@@ -33,6 +34,7 @@ class Brief(NamedTuple):
 
 _GLYPHS: TypeAdapter[dict[str, str]] = TypeAdapter(dict[str, str])
 _TICKS: TypeAdapter[dict[str, int] | None] = TypeAdapter(dict[str, int] | None)
+_REASON: TypeAdapter[Any] = TypeAdapter(GuidanceReason | PreferenceReason)
 _NUMBERS: TypeAdapter[Any] = TypeAdapter(dict[str, int | float | None])
 
 
@@ -125,12 +127,22 @@ def _event(event: OperatorEvent) -> None:
     notes.read(event)
 
 
+def _reason(reason: Reason) -> None:
+    _REASON.validate_python(reason.why)
+
+
+def _effect(effect: Effect) -> None:
+    PolicyThere.model_validate(effect.policy)
+
+
 ALWAYS_SET = ("stages", "p_guid", "p_rec", "p_pref", "p_train")
 SHAPES: dict[type[Table], tuple[str, Callable[[Any], None]]] = {
     Run: ("its config, legend, brief, level, milestones or lesson", _run),
     Query: ("query.clips", _query),
     Metric: ("metric.values", _metric),
     OperatorEvent: ("event.payload", _event),
+    Reason: ("reason.why", _reason),
+    Effect: ("effect.policy", _effect),
 }
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from parenting.agent.config import compose
 from parenting.drawing.surroundings import surroundings
 from parenting.envs import registry
+from parenting.server.api.why_example import WHY
 
 WORLD = "unsafe-exploration"
 SPEC = registry.spec(WORLD)
@@ -264,6 +265,7 @@ SHOWN = {
     "list_questions": Shown(_rows(ASKED)),
     "lease_question": Shown(LEASED, {"me": LEASE}),
     "get_question": Shown(ASKED),
+    "get_reason": Shown(WHY),
     "answer_question": Shown(STORED, ANSWERS),
     "change_answer": Shown(CHANGED, {"to right": {"choice": "right", "client_id": "me"}}),
     "withdraw_answer": Shown(WITHDRAWN, {"mine": LEASE}),

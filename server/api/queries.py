@@ -21,10 +21,12 @@ from parenting.server.queue.names import Names
 from parenting.server.reads import pagination
 from parenting.server.reads.names import run_number_in
 from parenting.server.reads.schemas import asked_schema, asked_schemas, leased_schema
+from parenting.server.reads.why import why
 from parenting.server.receipts import StoredSchema
 from parenting.server.runs import find
 from parenting.server.schemas import AskedSchema, LeasedSchema
 from parenting.server.tables import Run
+from parenting.server.why_schemas import WhySchema
 
 router = admitted_router(tags=["questions"])
 
@@ -82,6 +84,17 @@ def _is_worth_it(db: Database, name: int | str, client_id: str, session: Session
 def get_question(query_id: QueryId, db: Db) -> AskedSchema:
     """Read one question, with its answer if one stands. This leases nothing."""
     return asked_schema(db, pagination.asked(db, query_id))
+
+
+@router.get("/queries/{query_id}/why", summary="Read why a question was asked", responses=read_responses(404))
+def get_reason(query_id: QueryId, db: Db) -> WhySchema:
+    """Read the reason for a question, and what its answers changed.
+
+    The reason: for guidance the familiarity of the local state, p_guid ** f and the draw that was below it;
+    for a preference the two recordings and when they were made. The effects: the policy in the asked state,
+    before an answer and 1, 10 and 100 ticks after. What older versions did not keep is null.
+    """
+    return why(db, query_id)
 
 
 @router.post(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from itertools import zip_longest
@@ -20,7 +21,7 @@ from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query, take_answer, take_operator_events
 from parenting.server.runs import claim, report_progress
 from parenting.server.store.sqlite import sqlite_module
-from parenting.server.tables import Identity, Table
+from parenting.server.tables import Effect, Identity, Moves, Reason, Table
 from parenting.server.weights import put as put_weights
 from parenting.server.workers import sign
 from tests.server.conftest import CLIPS
@@ -62,6 +63,13 @@ def two_runs(db: Database) -> None:
         shown = {"milestones": {"goal": 4}, "lesson": lesson}
         report_progress(db, mine, tick=5, versions={"torch": "2"}, maturity=2, speed=1.5, **shown)
         jobs.ask(db, mine.run_id, "walk", {"seed": 0}, "me")
+        there = {"probabilities": [0.25] * 4}
+        recorded = {"kind": "exploitative", "first": 0, "last": 0}
+        why = {"p_pref": 0.5, "draw": 0.1, **there, "clips": {"left": recorded, "right": recorded}}
+        with db.write() as session:
+            session.add(Moves(run_id=mine.run_id, part=0, blob=zlib.compress(bytes(5))))
+            session.add(Reason(run_id=mine.run_id, tick=0, why=why))
+            session.add(Effect(run_id=mine.run_id, tick=1, ticks=0, policy=there))
 
 
 def columns() -> Iterator[Column[Any]]:
