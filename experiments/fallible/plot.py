@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from statistics import fmean
 from typing import TYPE_CHECKING
 
+from parenting.evaluation.statistics import mean_interval
 from parenting.experiments.fallible.report import DEATHS, QUESTIONS, UNTIL, Rows, values
 from parenting.experiments.fallible.settings import (
     AGAINST_MISCONCEPTIONS,
@@ -23,7 +24,6 @@ from parenting.experiments.fallible.settings import (
     Arm,
     noisy,
 )
-from parenting.experiments.reporting.statistics import mean_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,6 +8,7 @@ from statistics import fmean, stdev
 
 from scipy import special
 
+from parenting.evaluation.statistics import TAIL, difference_interval, mean_interval
 from parenting.experiments.fallible.settings import (
     ARMS,
     BOTH,
@@ -32,7 +33,6 @@ from parenting.experiments.reporting.comparison import (
     format_interval,
     mean_sd,
 )
-from parenting.experiments.reporting.statistics import TAIL, difference_interval, mean_interval
 from parenting.experiments.runner.store import Row
 
 Rows = Mapping[str, Sequence[Row]]

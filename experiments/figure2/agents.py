@@ -7,6 +7,7 @@ from math import hypot, log
 from statistics import fmean
 
 from parenting.evaluation.rollouts import EPISODES
+from parenting.evaluation.statistics import difference_interval, mean_interval
 from parenting.experiments.figure2.rows import (
     MANY,
     arms,
@@ -20,7 +21,6 @@ from parenting.experiments.figure2.rows import (
     waterings,
 )
 from parenting.experiments.reporting.comparison import SILENT, Comparison, format_interval, mean_sd
-from parenting.experiments.reporting.statistics import difference_interval, mean_interval
 from parenting.experiments.runner.store import Row
 from parenting.experiments.training.gardens import EPISODE
 

@@ -9,6 +9,7 @@ from statistics import fmean
 from parenting.agent.config import FIELDS
 from parenting.agent.pretraining_mazes import EPISODES as BATCH
 from parenting.evaluation.rollouts import EPISODES
+from parenting.evaluation.statistics import episode_interval
 from parenting.experiments.figure2.agents import NEAR, compare_arms, queries_needed
 from parenting.experiments.figure2.full_coverage import EPSILON
 from parenting.experiments.figure2.plot import draw
@@ -27,7 +28,6 @@ from parenting.experiments.figure2.rows import (
 from parenting.experiments.figure2.settings import Arm, Baselines
 from parenting.experiments.reporting.comparison import SILENT, Comparison, format_interval, mean_sd
 from parenting.experiments.reporting.prose import paragraphs
-from parenting.experiments.reporting.statistics import episode_interval
 from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import Results
 from parenting.experiments.training.gardens import EPISODE, GAMMA

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from statistics import fmean
 
-from parenting.experiments.reporting.statistics import Interval, mean_interval
+from parenting.evaluation.statistics import Interval, mean_interval
 from parenting.experiments.runner.store import Row
 
 MAIN = "more guidance"

@@ -8,13 +8,13 @@ from math import inf
 from statistics import fmean, median
 from typing import NamedTuple
 
-from parenting.experiments.figure3.tasks import BATCH
-from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison, mean_sd
-from parenting.experiments.reporting.statistics import (
+from parenting.evaluation.statistics import (
     auc_interval,
     mann_whitney_auc,
     median_interval,
 )
+from parenting.experiments.figure3.tasks import BATCH
+from parenting.experiments.reporting.comparison import LOST, SILENT, Comparison, mean_sd
 from parenting.experiments.runner.store import Row
 from parenting.experiments.spec import CHUNK
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from statistics import fmean
 from typing import TYPE_CHECKING
 
+from parenting.evaluation.statistics import mean_interval
 from parenting.experiments.panel.report import of, right
 from parenting.experiments.panel.settings import PANELS, RULES
-from parenting.experiments.reporting.statistics import mean_interval
 from parenting.experiments.runner.store import Row
 
 if TYPE_CHECKING:

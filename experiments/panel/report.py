@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from statistics import fmean
 from typing import NamedTuple
 
+from parenting.evaluation.statistics import mean_interval
 from parenting.experiments.panel.settings import (
     ALONE,
     DAWID_SKENE,
@@ -23,7 +24,6 @@ from parenting.experiments.reporting.comparison import (
     compare_mean,
     format_interval,
 )
-from parenting.experiments.reporting.statistics import mean_interval
 from parenting.experiments.runner.store import Row
 
 

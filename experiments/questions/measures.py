@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from statistics import fmean
 
-from parenting.experiments.questions.settings import SHARED
-from parenting.experiments.reporting.comparison import format_interval
-from parenting.experiments.reporting.statistics import (
+from parenting.evaluation.statistics import (
     Interval,
     mean_interval,
     proportion_interval,
 )
+from parenting.experiments.questions.settings import SHARED
+from parenting.experiments.reporting.comparison import format_interval
 from parenting.experiments.runner.store import Row
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from statistics import fmean
 from typing import TYPE_CHECKING
 
+from parenting.evaluation.statistics import mean_interval
 from parenting.experiments.questions.measures import (
     answers,
     deaths,
@@ -28,7 +29,6 @@ from parenting.experiments.questions.settings import (
     WINDOW,
 )
 from parenting.experiments.reporting.plots import COLOUR, GREY, PAPER
-from parenting.experiments.reporting.statistics import mean_interval
 from parenting.experiments.runner.store import Row
 
 if TYPE_CHECKING:

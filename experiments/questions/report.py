@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from parenting.evaluation.statistics import mean_interval
 from parenting.experiments.questions.measures import (
     answers,
     deaths,
@@ -39,7 +40,6 @@ from parenting.experiments.reporting.comparison import (
     mean_sd,
 )
 from parenting.experiments.reporting.prose import paragraphs
-from parenting.experiments.reporting.statistics import mean_interval
 from parenting.experiments.runner.store import Row
 
 

@@ -5,6 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from statistics import fmean
 
+from parenting.evaluation.statistics import (
+    Interval,
+    difference_interval,
+    mean_interval,
+    proportion_interval,
+)
 from parenting.experiments.questions.measures import (
     answers,
     deaths,
@@ -37,12 +43,6 @@ from parenting.experiments.reporting.comparison import (
     format_interval,
     format_percent,
     mean_sd,
-)
-from parenting.experiments.reporting.statistics import (
-    Interval,
-    difference_interval,
-    mean_interval,
-    proportion_interval,
 )
 from parenting.experiments.runner.store import Row
 

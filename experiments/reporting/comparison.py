@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from statistics import fmean, stdev
 from typing import Any, Literal
 
-from parenting.experiments.reporting.statistics import Interval, mean_interval, proportion_interval
+from parenting.evaluation.statistics import Interval, mean_interval, proportion_interval
 
 Reference = Literal["paper", "fit", "check"]
 REFERENCES: tuple[Reference, ...] = ("paper", "fit", "check")

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
-from parenting.experiments.reporting.statistics import proportion_interval
+from parenting.evaluation.statistics import proportion_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

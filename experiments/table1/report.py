@@ -7,6 +7,7 @@ from itertools import pairwise
 from statistics import fmean
 from typing import NamedTuple
 
+from parenting.evaluation.statistics import difference_interval, mean_interval
 from parenting.experiments.reporting.comparison import (
     LOST,
     SILENT,
@@ -17,7 +18,6 @@ from parenting.experiments.reporting.comparison import (
     mean_sd,
     seldom_enough,
 )
-from parenting.experiments.reporting.statistics import difference_interval, mean_interval
 from parenting.experiments.runner.store import Row
 
 SELDOM = "0 or 1"

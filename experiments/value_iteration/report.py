@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from statistics import median
 from typing import NamedTuple
 
+from parenting.evaluation.statistics import proportion_interval
 from parenting.experiments.reporting.comparison import Comparison, format_percent, seldom_enough
 from parenting.experiments.reporting.prose import paragraphs
-from parenting.experiments.reporting.statistics import proportion_interval
 from parenting.experiments.runner.store import Row
 from parenting.experiments.value_iteration.converge import CONFIG, CONVERGING, STAGES
 

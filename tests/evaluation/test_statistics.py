@@ -9,7 +9,7 @@ from subprocess import run
 import numpy as np
 import pytest
 
-from parenting.experiments.reporting.statistics import (
+from parenting.evaluation.statistics import (
     Interval,
     auc_interval,
     difference_interval,
@@ -145,7 +145,7 @@ def test_only_a_bootstrap_loads_scipy_stats() -> None:
     names = "mean_interval, difference_interval, proportion_interval, median_interval, auc_interval"
     code = f"""
 import sys
-from parenting.experiments.reporting.statistics import {names}
+from parenting.evaluation.statistics import {names}
 few, many = [1.0, 2.0, 4.0], [float(n) for n in range(9)]
 alone, shared = [None] * 9, [0, 1, 2] * 3
 found = [mean_interval(many), difference_interval(few, many), proportion_interval(1, 9)]
