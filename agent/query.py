@@ -11,6 +11,7 @@ import torch
 from jaxtyping import Bool, Float64, Int64, UInt8
 from torch import Tensor
 
+from parenting.agent.choice import Choice as Choice
 from parenting.envs.struct import Struct
 
 
@@ -20,20 +21,6 @@ class QueryKind(IntEnum):
     NONE = 0
     GUIDANCE = 1
     PREFERENCE = 2
-
-
-class Choice(IntEnum):
-    """The parent's answer: none yet, one side, *either* (equivalent) or *neither* (both unacceptable).
-
-    *Skip* judges neither side: the parent cannot tell.
-    """
-
-    NONE = 0
-    LEFT = 1
-    RIGHT = 2
-    EITHER = 3
-    NEITHER = 4
-    SKIP = 5
 
 
 class Query(Struct):

@@ -1,4 +1,4 @@
-"""`parenting answer`: the scripted parent as a client of the HTTP API."""
+"""`parenting answer`: a scripted parent as a client of the HTTP API."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from parenting._plural import counted
 from parenting.commands.answering import EXITS, Answering, Ending, Order, Told
 from parenting.commands.client import Client, RefusedError, UnavailableError
 from parenting.commands.errors import UsageError, friendly_errors
+from parenting.commands.parents import chosen_parent
 from parenting.commands.printing import say
 from parenting.commands.progress import bar
 from parenting.envs import registry
@@ -41,6 +42,10 @@ def answer(
     end_episodes: Annotated[
         bool, typer.Option("--end-episodes", help="If no action is acceptable, end the episode.")
     ] = False,
+    parent: Annotated[
+        str,
+        typer.Option(metavar="NAME[:KEY=VALUE,...]", help="The parent; `parenting parents` lists them."),
+    ] = "scripted",
     client_id: Annotated[
         str, typer.Option(help="The name to answer under; two scripts that answer one run need two names.")
     ] = "scripted",
@@ -54,7 +59,7 @@ def answer(
         bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
     ] = False,
 ) -> None:
-    """Answer a run's questions as the scripted parent does (Sec. 3.1.3), over the HTTP API.
+    """Answer a run's questions as the scripted parent does (Sec. 3.1.3), or another, over the HTTP API.
 
     The script knows the rules of the worlds and the question, nothing else. Web and worker may stop and come
     back meanwhile: an answer is sent until the server has confirmed it. The command ends after --limit
@@ -67,11 +72,14 @@ def answer(
     Example: parenting answer --url http://localhost:8765 --run 3 --limit 50
     """
     with friendly_errors(), ExitStack() as stack:
+        spec = chosen_parent(parent)
         client = Client(url)
         stack.callback(client.close)
         found = _first_look(client, run)
         optimal = _until(found["world"], until, limit) == "optimal"
-        order = Order(found["public_id"], client_id, limit, optimal, timeout, end_episodes)
+        order = Order(
+            found["public_id"], client_id, limit, optimal, timeout, end_episodes, before=found["answers"]
+        )
         keep = _receipts(receipts, stack)
         show = stack.enter_context(bar("answers"))
         from parenting._process import (
@@ -85,7 +93,7 @@ def answer(
             keep(receipt)
             show(work.told.answered, limit or found["goal"])
 
-        work = Answering(client, order, Judge(), stored)
+        work = Answering(client, order, Judge(spec, found["seed"]), stored)
         ending = _work(work)
     say(_as_json(run, work.told, ending) if as_json else _said(run, work.told, ending))
     raise typer.Exit(EXITS[ending.kind])
@@ -149,6 +157,8 @@ def _receipts(file: Path | None, stack: ExitStack) -> Callable[[dict[str, Any]],
 def _said(run: int, told: Told, ending: Ending) -> str:
     by_choice = ", ".join(f"{number} {choice}" for choice, number in told.choices.most_common())
     lines = f"Run {run}: answered {told.answered}" + (f" ({by_choice})" if by_choice else "")
+    if told.skipped:
+        lines += f"; skipped {told.skipped}"
     if told.unneeded:
         lines += f"; {told.unneeded} needed no answer any more"
     if told.episodes:
@@ -159,5 +169,5 @@ def _said(run: int, told: Told, ending: Ending) -> str:
 def _as_json(run: int, told: Told, ending: Ending) -> str:
     counts = {choice: told.choices[choice] for choice in ("left", "right", "either", "neither")}
     said = {"run": run, "answered": told.answered, "choices": counts}
-    said |= {"unneeded": told.unneeded, "episodes_ended": told.episodes}
+    said |= {"skipped": told.skipped, "unneeded": told.unneeded, "episodes_ended": told.episodes}
     return json.dumps({**said, "ended": ending.kind, "sentence": ending.sentence})

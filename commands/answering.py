@@ -1,4 +1,4 @@
-"""A script that answers a run over HTTP: it leases, answers, waits, and knows when to end."""
+"""A script that answers a run over HTTP: it leases, answers or skips, waits, and knows when to end."""
 
 from __future__ import annotations
 
@@ -45,6 +45,7 @@ class Order:
     until_optimal: bool = True
     timeout: float = 60.0
     end_episodes: bool = False
+    before: int = 0  # answers that it has given before, which may have tired it
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ class Told:
     choices: Counter[str] = field(default_factory=Counter)
     unneeded: int = 0  # withdrawn or answered by somebody else meanwhile
     episodes: int = 0  # ended
+    skipped: int = 0
 
     @property
     def answered(self) -> int:
@@ -123,14 +125,15 @@ class Answering:
         Raises:
             RefusedError: another database is served there now; nothing was stored.
         """
-        choice = self.judge.choice(question)
-        body = {"choice": choice, "client_id": self.order.client_id, "parent": "scripted"}
+        choice = self.judge.choice(question, self.order.before + self.told.answered + self.told.skipped)
+        verb, said = ("skip", {}) if choice == "skip" else ("answer", {"choice": choice})
+        body = {**said, "client_id": self.order.client_id, "parent": "scripted"}
         body |= {"database": question["database"], "run": question["run_public_id"]}
         body["question"] = question["public_id"]
         self._asked_at = time.monotonic()
         while time.monotonic() - self._asked_at < self.order.timeout:
             try:
-                receipt = self.client.post(f"queries/{question['public_id']}/answer", **body)
+                receipt = self.client.post(f"queries/{question['public_id']}/{verb}", **body)
             except UnavailableError as error:
                 self._why = str(error)
                 time.sleep(SHORTEST)
@@ -140,10 +143,16 @@ class Answering:
                     raise
                 self.told.unneeded += 1
             else:
-                self.told.choices[choice] += 1
-                self.stored(receipt)
+                self._count(choice, receipt)
             self._asked_at = time.monotonic()
             return
+
+    def _count(self, choice: str, receipt: dict[str, Any]) -> None:
+        if choice == "skip":
+            self.told.skipped += 1
+            return
+        self.told.choices[choice] += 1
+        self.stored(receipt)
 
     def _ending(self, asked: bool) -> Ending | None:
         """Return why to end now, or None; without a question, wait a little."""

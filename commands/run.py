@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from parenting.agent.config import FIELDS, PRESETS, Config, UnknownPresetError, compose
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
 from parenting.commands.level_file import LEVEL, chosen_level
+from parenting.commands.parents import chosen_parent
 from parenting.commands.printing import say
 from parenting.commands.run_report import page
 from parenting.envs import registry
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from parenting.experiments.training.counts import OnProgress
     from parenting.experiments.training.counts import Progress as Now
     from parenting.experiments.training.stop_rule import StopRule
-    from parenting.parents.grammar import ParentSpec
 
 
 def run(
@@ -77,7 +77,7 @@ def run(
         goal = _until(world, until)
         config = _mature(config, goal)
         weights = _weights(found, config)
-        spec = _parent(parent)
+        spec = chosen_parent(parent)
     from parenting._process import settle
     from parenting.experiments.runner.processes import WorkersDiedError
     from parenting.experiments.training.chunks import TrainPlan, train_in_chunks
@@ -108,20 +108,6 @@ def _known(world: str, preset: str) -> None:
         raise UsageError(f"WORLD: {error}") from None
     if preset not in PRESETS:
         raise UsageError(f"--preset: {UnknownPresetError(preset)}")
-
-
-def _parent(text: str) -> ParentSpec:
-    """The parent that a text names.
-
-    Raises:
-        UsageError: it names none.
-    """
-    from parenting.parents.grammar import ParentError, read_parent
-
-    try:
-        return read_parent(text)
-    except ParentError as error:
-        raise UsageError(f"--parent: {error}") from None
 
 
 def _config(world: str, preset: str, changes: list[str]) -> Config:

@@ -14,13 +14,14 @@ from parenting.commands.level_file import LEVEL, chosen_level
 from parenting.commands.printing import say
 from parenting.envs import registry
 from parenting.envs.names import did_you_mean
+from parenting.parents.grammar import ParentError, read_script
 from parenting.server import new_run
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.new_run import FORM_FIELDS, read_form
 from parenting.server.notify import Notifier
 from parenting.server.reads.schemas import run_schema
 
-OPTIONS = ("world", "level", "level_text", "preset", "parent", "seed", "goal", "name")
+OPTIONS = ("world", "level", "level_text", "preset", "parent", "script", "seed", "goal", "name")
 """The settings of a run that are arguments or options of their own; `--set` sets the others."""
 
 
@@ -29,7 +30,12 @@ def start(
     level: Annotated[str | None, LEVEL] = None,
     preset: Annotated[str, typer.Option(help="conservative, lax, direct or frugal.")] = "conservative",
     parent: Annotated[
-        str, typer.Option(help="human: people answer on the pages or by the API; scripted: the worker does.")
+        str,
+        typer.Option(
+            metavar="human|NAME[:KEY=VALUE,...]",
+            help="human: people answer on the pages or by the API. Any other, such as scripted or noisy:0.1: "
+            "the worker answers; `parenting parents` lists them.",
+        ),
     ] = "human",
     seed: Annotated[str, typer.Option(help="The same seed and answers give the same run.")] = "0",
     goal: Annotated[
@@ -56,7 +62,7 @@ def start(
     Example: parenting start unsafe-exploration --goal 50 --set guidance_layout=two --set practice=required
     """
     with friendly_errors():
-        given = {"world": world, "preset": preset, "parent": parent, "seed": seed}
+        given = {"world": world, "preset": preset, "seed": seed, **_parent(parent)}
         given |= {key: text for key, text in (("goal", goal), ("name", name)) if text is not None}
         given |= _level(world, level) | _settings(changes or [])
         chosen = settings()
@@ -74,6 +80,20 @@ def start(
         return
     page = "parent" if run.parent == "human" else ""
     say(f"Run {run.id} is started. Its page: /runs/{run.public_id}/{page}".rstrip("/"))
+
+
+def _parent(text: str) -> dict[str, str]:
+    """Return the fields that say who answers.
+
+    Raises:
+        UsageError: the text names no parent that a worker can be.
+    """
+    if text == "human":
+        return {"parent": text}
+    try:
+        return {"parent": "scripted", "script": read_script(text)}
+    except ParentError as error:
+        raise UsageError(f"--parent: {error} Or: human.") from None
 
 
 def _level(world: str, name_or_file: str | None) -> dict[str, str]:
@@ -98,7 +118,8 @@ def _settings(changes: list[str]) -> dict[str, str]:
         if not equals:
             wrong.append(f"--set: '{change}' is not KEY=VALUE. Write it as --set pace=5.")
         elif key in OPTIONS:
-            wrong.append(f"--set: '{key}' has an option of its own: --{key}.")
+            option = "parent" if key == "script" else key
+            wrong.append(f"--set: '{key}' has an option of its own: --{option}.")
         elif key not in known:
             hint = did_you_mean(key, known)
             wrong.append(f"--set: there is no setting '{key}'.{hint} There is: {', '.join(known)}.")

@@ -138,7 +138,7 @@ def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | Fal
             spec = read_parent(parent)
         except ParentError as error:
             raise ValueError(f"parent: {error}") from None
-        return FallibleRule(task.world, task.config, spec)
+        return FallibleRule(task.world, spec, task.config.gamma, task.config.garden_parent)
     known = check_parent(parent)
     if isinstance(known, Parent):
         known.begin(task.world, task.config, trials)

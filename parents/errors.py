@@ -2,34 +2,23 @@
 
 Section 3.1.3 has a parent who never errs. Here are the teachers of B-Pref (Lee et al. 2021, arXiv 2111.03026:
 stochastic, myopic, equal, skip, mistake) and more of their kind, over the exact advantages of Eq. (7).
+The web checks a parent's text by these classes, so none of them needs torch before it is asked.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Literal
 
-import torch
-from jaxtyping import Bool, Float64, Int64
 from pydantic import BaseModel, ConfigDict, Field
-from torch import Tensor
 
-from parenting.agent.query import Choice, Query
-from parenting.envs.fingerprint import fingerprint, together
-from parenting.envs.rng import Keys, Stream
+from parenting.agent.choice import Choice
 
-OTHER = torch.tensor([Choice.NONE, Choice.RIGHT, Choice.LEFT, Choice.EITHER, Choice.NEITHER, Choice.SKIP])
-"""Each choice with its sides exchanged."""
+if TYPE_CHECKING:
+    from jaxtyping import Float64, Int64
+    from torch import Tensor
 
-
-class Asked(NamedTuple):
-    """The knowledge that a parent has of the questions of N trials."""
-
-    query: Query
-    gap: Float64[Tensor, "N"]  # the advantage of the left clip less that of the right one
-    refuses: Bool[Tensor, "N"]  # both moves of guidance are unsafe
-    keys: Keys  # of each trial, at the tick in which it asked
-    answers: Int64[Tensor, "N"]  # that the parent has given before
+    from parenting.parents.asked import Asked
 
 
 class Part(BaseModel, ABC):
@@ -62,8 +51,8 @@ class Wrong(Part):
     """Gives a wrong answer with some chance."""
 
     def change(self, asked: Asked, choice: Int64[Tensor, "N"], place: int) -> Int64[Tensor, "N"]:
-        first, second = _draws(asked.keys, place)
-        return torch.where(first < self.chance(asked), wrong(asked.query, choice, second), choice)
+        first, second = asked.draws(place)
+        return asked.wrong(choice, second).where(first < self.chance(asked), choice)
 
     @abstractmethod
     def chance(self, asked: Asked) -> Float64[Tensor, "N"]:
@@ -77,7 +66,7 @@ class Noisy(Wrong):
     eps: float = Field(0.1, ge=0, le=1, description="Chance of a wrong answer.")
 
     def chance(self, asked: Asked) -> Float64[Tensor, "N"]:
-        return torch.full_like(asked.gap, self.eps)
+        return asked.gap.new_full(asked.gap.shape, self.eps)
 
 
 class Adversarial(Noisy):
@@ -93,8 +82,7 @@ class Misconceived(Noisy):
     name = "misconceived"
 
     def change(self, asked: Asked, choice: Int64[Tensor, "N"], place: int) -> Int64[Tensor, "N"]:
-        same = asked.keys.replace(tick=_pair_word(asked.query))
-        return super().change(asked._replace(keys=same), choice, place)
+        return super().change(asked.by_pair(), choice, place)
 
 
 class Boltzmann(Wrong):
@@ -123,7 +111,7 @@ class Likeness(Wrong):
     )
 
     def chance(self, asked: Asked) -> Float64[Tensor, "N"]:
-        return (self.eps * likeness(asked.query)).clamp_max(0.5)
+        return (self.eps * asked.likeness).clamp_max(0.5)
 
 
 class Tiring(Wrong):
@@ -134,7 +122,7 @@ class Tiring(Wrong):
     half: float = Field(50.0, gt=0, description="Answers after which half of that chance is reached.")
 
     def chance(self, asked: Asked) -> Float64[Tensor, "N"]:
-        rested = torch.pow(torch.tensor(0.5, dtype=torch.float64), asked.answers.double() / self.half)
+        rested: Float64[Tensor, "N"] = 0.5 ** (asked.answers.double() / self.half)
         return self.eps * (1 - rested)
 
 
@@ -160,7 +148,7 @@ class Indifferent(Part):
 
     def change(self, asked: Asked, choice: Int64[Tensor, "N"], place: int) -> Int64[Tensor, "N"]:
         equal = (asked.gap.abs() <= self.gap) & ~asked.refuses & (choice != Choice.NONE)
-        return torch.where(equal, int(Choice.EITHER), choice)
+        return choice.masked_fill(equal, Choice.EITHER)
 
 
 class Aside(Part):
@@ -169,9 +157,9 @@ class Aside(Part):
     p: float = Field(0.2, ge=0, le=1, description="Chance of it.")
 
     def change(self, asked: Asked, choice: Int64[Tensor, "N"], place: int) -> Int64[Tensor, "N"]:
-        first, second = _draws(asked.keys, place)
+        first, second = asked.draws(place)
         now = (first < self.p) & (choice != Choice.NONE)
-        return torch.where(now, self.said(second), choice)
+        return self.said(second).where(now, choice)
 
     @abstractmethod
     def said(self, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
@@ -194,7 +182,7 @@ class Hasty(Aside):
     name = "hasty"
 
     def said(self, draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
-        return torch.where(draw < 0.5, int(Choice.LEFT), int(Choice.RIGHT))
+        return _every(draw, Choice.RIGHT).masked_fill(draw < 0.5, Choice.LEFT)
 
 
 class Skipping(Aside):
@@ -206,40 +194,8 @@ class Skipping(Aside):
         return _every(draw, Choice.SKIP)
 
 
-def wrong(query: Query, choice: Int64[Tensor, "N"], draw: Float64[Tensor, "N"]) -> Int64[Tensor, "N"]:
-    """Return a wrong answer: the worse side, or where neither is worse, a side by a coin.
-
-    The coin names a move rather than a place on the screen, so that a mirrored question gives the same.
-    """
-    lower_left = query.action[:, 0, 0] < query.action[:, 1, 0]
-    coin = torch.where((draw < 0.5) == lower_left, int(Choice.LEFT), int(Choice.RIGHT))
-    sides = (choice == Choice.EITHER) | (choice == Choice.NEITHER)
-    return torch.where(sides, coin, OTHER.to(choice.device)[choice])
-
-
-def _draws(keys: Keys, place: int) -> tuple[Tensor, Tensor]:
-    """Return two draws for this part: whether it errs, and how."""
-    first, second = keys.at(Stream.SLIP, 2 * place + torch.arange(2, device=keys.seed.device)).unbind(1)
-    return first, second
-
-
-def likeness(query: Query) -> Float64[Tensor, "N"]:
-    """Return the likeness of two clips: 1 if they end on diagonal neighbours, 0 if two cells apart."""
-    last = query.length[:, :, None, None].expand(-1, -1, 1, 2)
-    ends = query.agent.gather(2, last).squeeze(2).double()
-    apart = (ends[:, 0] - ends[:, 1]).square().sum(1).sqrt()
-    return ((2 - apart) / (2 - 2**0.5)).clamp_min(0)
-
-
-def _pair_word(query: Query) -> Int64[Tensor, "N"]:
-    """Return a number of the state and the unordered pair of first moves, for guidance and clips alike."""
-    state = query.board[:, 0, 0].flatten(1), query.agent[:, 0, 0], query.box[:, 0, 0]
-    moves = (1 << query.action[:, :, 0]).sum(1)
-    return together(*map(fingerprint, state), moves, query.level)
-
-
 def _every(draw: Float64[Tensor, "N"], choice: Choice) -> Int64[Tensor, "N"]:
-    return torch.full_like(draw, int(choice), dtype=torch.int64)
+    return draw.long().fill_(choice)
 
 
 PARTS = {

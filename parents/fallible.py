@@ -6,12 +6,12 @@ import torch
 from jaxtyping import Int64
 from torch import Tensor
 
-from parenting.agent.config import Config
+from parenting.agent.config import GardenParent
 from parenting.agent.query import Answer, Query, QueryKind
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
-from parenting.parents.errors import Asked
+from parenting.parents.asked import Asked
 from parenting.parents.grammar import ParentSpec
 from parenting.parents.scripted import ScriptedParent, ScriptedRule
 
@@ -23,16 +23,32 @@ class FallibleRule:
     hears the same answers, and so do batches of any size.
     """
 
-    def __init__(self, world: Gridworld, config: Config, spec: ParentSpec) -> None:
+    def __init__(
+        self,
+        world: Gridworld,
+        spec: ParentSpec,
+        gamma: float,
+        inside: GardenParent = "up-down",
+        rule: ScriptedRule | None = None,
+    ) -> None:
         """Compute the exact values of the world, by the discount of this parent.
+
+        Args:
+            world: The world.
+            spec: The parent.
+            gamma: The config's discount; a part may have its own.
+            inside: How the garden's parent walks inside its cycle.
+            rule: A rule of this world by `gamma`, whose values are taken where no part has its own discount.
 
         Raises:
             ValueError: as `ScriptedRule`.
         """
-        gamma = config.gamma
+        own = gamma
         for part in spec.parts:
-            gamma = part.discount(gamma)
-        self.spec, self.rule = spec, ScriptedRule(world, gamma, inside=config.garden_parent)
+            own = part.discount(own)
+        if rule is None or own != gamma:
+            rule = ScriptedRule(world, own, inside=inside)
+        self.spec, self.rule = spec, rule
 
     def answer(self, query: Query, keys: Keys, answers: Int64[Tensor, "N"]) -> Int64[Tensor, "N"]:
         """Return each trial's `Choice`.

@@ -62,15 +62,16 @@ SCRIPTED = ParentSpec((PARTS["scripted"](),))
 """The paper's parent, who never errs (Sec. 3.1.3)."""
 
 
-def read_parent(text: str) -> ParentSpec:
+def read_parent(text: str, *, imports: bool = True) -> ParentSpec:
     """Return the parent that a text names, such as `noisy:0.1` or `boltzmann:beta=5+tiring`.
 
-    A first value without a key belongs to the first parameter of its part.
+    A first value without a key belongs to the first parameter of its part. A server reads with `imports` off:
+    whoever sends it a text would otherwise choose what it imports.
 
     Raises:
         ParentError: there is no such parent or parameter, or a value is out of bounds.
     """
-    parts = tuple(_part(one.strip()) for one in PLUS.split(text))
+    parts = tuple(_part(one.strip(), imports) for one in PLUS.split(text))
     judging = [part for part in parts if part.judges]
     if len(judging) > 1:
         names = " and ".join(part.name for part in judging)
@@ -83,8 +84,19 @@ def read_parent(text: str) -> ParentSpec:
     return ParentSpec(parts)
 
 
-def _part(text: str) -> Part:
+def read_script(text: str) -> str:
+    """Return a parent's text as it is stored: with the value of every parameter.
+
+    Raises:
+        ParentError: as `read_parent`, and for an import path.
+    """
+    return str(read_parent(text, imports=False))
+
+
+def _part(text: str, imports: bool) -> Part:
     name, colon, rest = text.partition(":")
+    if "." in name and not imports:
+        raise ParentError(f"'{name}' is an import path, and a run takes none. {_known()}")
     kind = _imported(name) if "." in name else _named(name)
     given = _values(kind, rest.split(",") if colon else [])
     try:
@@ -107,10 +119,11 @@ def _named(name: str) -> type[Part]:
         INSTALLED.refuse(name)
     except BrokenPackageError as error:
         raise ParentError(str(error)) from None
-    known = [*PARTS, *INSTALLED]
-    raise ParentError(
-        f"There is no parent '{name}'.{did_you_mean(name, known)} The parents are: {', '.join(known)}."
-    )
+    raise ParentError(f"There is no parent '{name}'.{did_you_mean(name, [*PARTS, *INSTALLED])} {_known()}")
+
+
+def _known() -> str:
+    return f"The parents are: {', '.join([*PARTS, *INSTALLED])}."
 
 
 def _imported(path: str) -> type[Part]:

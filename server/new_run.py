@@ -25,6 +25,7 @@ from parenting.envs.art import LEVEL_CHARACTERS
 from parenting.envs.levels.spec import Level, LevelError
 from parenting.envs.names import UnknownNameError, did_you_mean
 from parenting.envs.people_text import LONGEST, plain, read_name
+from parenting.parents.grammar import SCRIPTED, read_script
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.runs import create_run
@@ -40,6 +41,7 @@ FORM_FIELDS = (
     "level",
     "level_text",
     "parent",
+    "script",
     "preset",
     "name",
     "seed",
@@ -86,6 +88,9 @@ PersonsName = Annotated[
     StringConstraints(min_length=1, max_length=LONGEST, pattern=r"^[^\r\n\t]*$"),
     AfterValidator(read_name),
 ]
+Script = Annotated[
+    str, StringConstraints(min_length=1, max_length=200), AfterValidator(plain), AfterValidator(read_script)
+]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_INT), WHOLE]
 Goal = Annotated[int, Field(ge=1, le=1_000_000), WHOLE]
 Pace = Annotated[float, Field(gt=0, le=1000)]
@@ -104,6 +109,10 @@ class NewRun(BaseModel):
         None, description="A level of one's own, as text; instead of `level`."
     )
     parent: Literal["human", "scripted"] = "human"
+    script: Script | None = Field(
+        None,
+        description="The errors of a scripted parent, such as noisy:0.1+tiring; null: it never errs.",
+    )
     preset: Name = Field("conservative", description="conservative, lax, direct or frugal.")
     config: dict[Name, Setting] = Field(
         default_factory=dict, max_length=100, description="Changes to the preset, by field."
@@ -147,6 +156,8 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
         InvalidFieldsError: names every wrong field, with a message each.
     """
     wrong: list[tuple[str, str]] = []
+    if new.script is not None and new.parent == "human":
+        wrong.append(("script", "People answer this run. Errors belong to a run with the parent scripted."))
     level = _level(new, wrong)
     config = _config(new, wrong)
     weights = _weights(new, level, config, folder, wrong)
@@ -155,6 +166,7 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
     spec = registry.spec(new.world)
     return {
         **new.model_dump(include=COLUMNS),
+        "script": _script(new),
         "level": level.name,
         "level_text": level.text,
         "legend": dict(spec.legend),
@@ -191,6 +203,10 @@ def messages(errors: Any, skip: tuple[str, ...] = ()) -> list[tuple[str, str]]:
         message = UNREAD.get(error["type"]) or error["msg"].removeprefix("Value error, ")
         found.setdefault(".".join(path) or "body", message)
     return list(found.items())
+
+
+def _script(new: NewRun) -> str | None:
+    return (new.script or str(SCRIPTED)) if new.parent == "scripted" else None
 
 
 def _unknown(what: str, name: str, known: Collection[str]) -> str:

@@ -76,6 +76,8 @@ class RunSchema(Schema):
     weights: str | None
     """The SHA-256 of the pre-trained weights that the agent began with; null: fresh ones."""
     parent: By
+    script: str | None
+    """The errors of a scripted parent, such as noisy:eps=0.1; scripted: none. Null where people answer."""
     guidance_layout: Literal["one", "two"]
     """The boards on which guidance is asked: one with both moves, or two as in the paper."""
     practice: Literal["offered", "required"]

@@ -13,6 +13,8 @@ from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.agent.query import Answer, Query, QueryKind
 from parenting.evaluation.argmax import evaluation
+from parenting.parents.fallible import FallibleRule
+from parenting.parents.grammar import SCRIPTED, read_parent
 from parenting.parents.scripted import ScriptedRule
 from parenting.server import checkpoints, metrics, runs
 from parenting.server.checkpoint_parts import sweep_parts
@@ -85,7 +87,9 @@ class RunSession:
 
     def _parent(self, config: Config, rule: ScriptedRule, asked: Callable[[], None]) -> QueueParent:
         if self.run.parent == "scripted":
-            return ScriptedQueueParent(self.db, self.claim, self.world, config, asked, rule)
+            spec = read_parent(self.run.script or str(SCRIPTED), imports=False)
+            script = FallibleRule(self.world, spec, config.gamma, config.garden_parent, rule)
+            return ScriptedQueueParent(self.db, self.claim, self.world, config, asked, script)
         return QueueParent(self.db, self.claim, self.world, config, asked)
 
     @property

@@ -81,6 +81,7 @@ class Run(Table):
     preset: Mapped[str]
     seed: Mapped[int] = mapped_column(Big)
     parent: Mapped[str] = mapped_column(OneOf(PARENTS))
+    script: Mapped[str | None]  # the script's errors, as `parents.grammar` reads them; null: people answer
     guidance_layout: Mapped[str] = mapped_column(OneOf(("one", "two")), default="one", server_default="two")
     practice: Mapped[str] = mapped_column(
         OneOf(("offered", "required")), default="offered", server_default="offered"

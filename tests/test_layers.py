@@ -40,7 +40,7 @@ def miniature(tmp_path: Path) -> Path:
     """The layout in empty files, in which everything is allowed that is there."""
     modules = {name for contract in CONTRACTS for name in contract.get("source_modules", [])}
     more = ["agent.learning", "agent.query", "commands.run", "envs.gridworld", "experiments.table1"]
-    more += ["library.training", "parents.scripted"]
+    more += ["library.training", "parents.asked", "parents.errors", "parents.scripted"]
     modules |= {f"parenting.{name}" for name in more}
     for module in modules:
         parts = module.split(".")
@@ -61,6 +61,9 @@ def miniature(tmp_path: Path) -> Path:
         "if TYPE_CHECKING:\n    import parenting.envs.gridworld\ndef load():\n    import torch\n"
     )
     (house / "agent/learning/__init__.py").write_text("import torch\nimport parenting.envs.registry\n")
+    (house / "parents/errors/__init__.py").write_text(
+        "if TYPE_CHECKING:\n    import torch, parenting.parents.asked\n"
+    )
     (house / "parents/scripted/__init__.py").write_text("import parenting.agent.learning\n")
     (house / "experiments/table1/__init__.py").write_text("import parenting.parents.scripted\n")
     (house / "server/app/__init__.py").write_text("import fastapi\n")

@@ -62,7 +62,7 @@ def erring_trials(
 
 
 def _maker(world: Gridworld, config: Config, parent: str, asked: list[BestOfThree] | None) -> MakeParent:
-    rule = FallibleRule(world, config, read_parent(parent))
+    rule = FallibleRule(world, read_parent(parent), config.gamma, config.garden_parent)
 
     def make(scripted: ScriptedParent, _done: object) -> BatchParent:
         erring = FallibleParent(rule, scripted.query)

@@ -105,7 +105,10 @@ def panel_trials(name: str, rates: Sequence[float], rule: str, span: tuple[int, 
 def _parent(
     world: Gridworld, config: Config, rates: Sequence[float], rule: str, scripted: ScriptedParent
 ) -> BatchParent:
-    rules = {rate: FallibleRule(world, config, read_parent(f"noisy:{rate}")) for rate in {*rates}}
+    rules = {
+        rate: FallibleRule(world, read_parent(f"noisy:{rate}"), config.gamma, config.garden_parent)
+        for rate in {*rates}
+    }
     members = [FallibleParent(rules[rate], scripted.query) for rate in rates]
     if rule == ALONE:
         return members[0]

@@ -178,7 +178,7 @@ def parent_of(text: str, world: Gridworld, config: Config) -> MakeParent | None:
     spec = read_parent(text)
     if not spec.errs:
         return None
-    rule = FallibleRule(world, config, spec)
+    rule = FallibleRule(world, spec, config.gamma, config.garden_parent)
     return lambda scripted, _done: FallibleParent(rule, scripted.query)
 
 

@@ -67,6 +67,12 @@ class NamedBody(LeaseBody):
     question: PublicId | None = Field(None, description="The `public_id` of the question.")
 
 
+class SkipBody(NamedBody):
+    """The client that skips, and the names of the question."""
+
+    parent: By = Field("human", description="Who skips, a person or a script; stored with the skip.")
+
+
 class PageErrorBody(Strict):
     """A fault of a script of our pages, as a browser tells it."""
 

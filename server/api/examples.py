@@ -49,6 +49,7 @@ NEW_RUNS = {
         "world": WORLD,
         "level_text": OWN_LEVEL,
         "parent": "scripted",
+        "script": "noisy:0.1",
     },
 }
 RUN: dict[str, Any] = {
@@ -64,6 +65,7 @@ RUN: dict[str, Any] = {
     "seed": 0,
     "weights": None,
     "parent": "human",
+    "script": None,
     "guidance_layout": "one",
     "practice": "offered",
     "words": "plain",
@@ -188,6 +190,7 @@ EXPORTED: dict[str, Any] = {
     "practice": "offered",
     "words": "plain",
     "remarks": True,
+    "script": None,
     "votes": 0,
 }
 

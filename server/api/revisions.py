@@ -7,7 +7,7 @@ from functools import partial
 from fastapi import Request
 
 from parenting.server.admission import admitted_router
-from parenting.server.api.bodies import AnswerBody, NamedBody
+from parenting.server.api.bodies import AnswerBody, NamedBody, SkipBody
 from parenting.server.api.names import QueryName
 from parenting.server.api.responses import write_responses
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
@@ -81,7 +81,7 @@ async def change_answer(request: Request, query_id: QueryName, body: AnswerBody,
     summary="Skip a question",
     responses=write_responses(404, 409, 410),
 )
-async def skip_question(request: Request, query_id: QueryName, body: NamedBody, db: Db) -> SkippedSchema:
+async def skip_question(request: Request, query_id: QueryName, body: SkipBody, db: Db) -> SkippedSchema:
     """Say that this question cannot be told. It counts as no answer, and nothing is learnt from it.
 
     Guidance is set aside: the agent asks about another pair of moves, as long as there is one, and *neither*
@@ -93,7 +93,7 @@ async def skip_question(request: Request, query_id: QueryName, body: NamedBody, 
     A question that was answered, skipped by another client or withdrawn gets 409. Names of another database,
     run or question get 410 (`elsewhere`).
     """
-    said, names = Said(SKIP, body.client_id, "human"), Names(body.database, body.run, body.question)
+    said, names = Said(SKIP, body.client_id, body.parent), Names(body.database, body.run, body.question)
     found = await store(request, partial(skip_in, db=db, query=query_id, said=said, names=names))
     notify_worker(request)
     return SkippedSchema(**vars(found))

@@ -20,6 +20,13 @@ PRESET_OR = (("", "As chosen above"),)
 
 OPTIONS = (
     Option(
+        "script",
+        "The script's errors",
+        "",
+        (),
+        "For a script as the parent, such as noisy:0.1 or boltzmann:2+tiring. Empty: it never errs.",
+    ),
+    Option(
         "pace",
         "Pace",
         "",

@@ -18,13 +18,14 @@ from parenting.agent.events import Event
 from parenting.agent.query import Answer, Query
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
-from parenting.parents.scripted import ScriptedRule
+from parenting.envs.rng import Keys
+from parenting.parents.fallible import FallibleRule
 from parenting.server import tables
 from parenting.server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_name
 from parenting.server.damage import readable, reading, sound
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
-from parenting.server.queue import answers, corrections, worker_side
+from parenting.server.queue import answers, corrections, skips, worker_side
 from parenting.server.queue.repairs import repair
 from parenting.server.runs import Claim
 
@@ -42,6 +43,7 @@ class QueueParent:
         self.db, self.mine, self.world, self.asked = db, mine, world, asked
         self.stages = config.max_clip_length
         self.tick = 0
+        self.keys: Keys | None = None  # before this tick
         self.policy = (1, 0)
         self.answers = self.events_wait = True
         self.corrected: amendment.Applied | None = None  # heard in this tick
@@ -56,7 +58,7 @@ class QueueParent:
 
     def events(self, state: AgentState) -> Sequence[TickEvent]:
         """The operator's events and the correction that apply before the tick that comes."""
-        self.tick = int(state.keys.tick[0]) + 1
+        self.keys, self.tick = state.keys, int(state.keys.tick[0]) + 1
         if not self.events_wait:
             return []
         rows = worker_side.take_operator_events(self.db, self.mine, self.tick)
@@ -145,7 +147,7 @@ class QueueParent:
 
 
 class ScriptedQueueParent(QueueParent):
-    """The scripted parent behind the same rows: it answers each query as soon as it is stored."""
+    """A script behind the same rows: it answers each query as soon as it is stored."""
 
     def __init__(
         self,
@@ -154,14 +156,23 @@ class ScriptedQueueParent(QueueParent):
         world: Gridworld,
         config: Config,
         asked: Callable[[], None],
-        rule: ScriptedRule,
+        rule: FallibleRule,
     ) -> None:
         """A mailbox that is answered by `rule`."""
         super().__init__(db, mine, world, config, asked)
         self.rule = rule
 
     def posted(self, number: int, query: Query) -> None:
-        """Store the script's answer. A replayed tick stores the same again, which changes nothing."""
-        choice = CHOICE_NAMES[int(self.rule.answer(query)[0])]
+        """Store the script's answer or skip. A replayed tick stores the same again, which changes nothing."""
+        choice = CHOICE_NAMES[self._choice(query)]
         with suppress(Conflict):  # the operator has stopped the run meanwhile: the question was withdrawn
-            answers.answer(self.db, number, choice, SCRIPT, SCRIPT)
+            if choice == tables.SKIP:
+                skips.skip(self.db, number, SCRIPT, SCRIPT, final=True)
+            else:
+                answers.answer(self.db, number, choice, SCRIPT, SCRIPT)
+
+    def _choice(self, query: Query) -> int:
+        """Return the answer of the parent in tensors, who counts what it was asked before."""
+        assert self.keys is not None, "a question is asked after the tick began"
+        before = worker_side.asked_before(self.db, self.mine.run_id, self.tick) if self.rule.spec.errs else 0
+        return int(self.rule.answer(query, self.keys.next(), torch.tensor([before]))[0])

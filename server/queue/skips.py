@@ -39,12 +39,19 @@ class Skipped:
 
 
 def skip(
-    db: Database, query: int | str, client_id: str, parent: str = "human", names: Names = UNSTATED
+    db: Database,
+    query: int | str,
+    client_id: str,
+    parent: str = "human",
+    names: Names = UNSTATED,
+    *,
+    final: bool = False,
 ) -> Skipped:
     """Skip a question.
 
     A skip whose reply was lost may be sent again: a question that was put back is withdrawn only if it was
-    leased to this client once more.
+    leased to this client once more. A `final` skip withdraws a preference at once: a script would only
+    skip it again.
 
     Raises:
         ElsewhereError: it is meant for another database, run or question.
@@ -52,10 +59,17 @@ def skip(
         Conflict: it was answered, skipped by somebody else, or withdrawn.
     """
     with db.write() as session:
-        return skip_in(session, db, query, Said(SKIP, client_id, parent), names)
+        return skip_in(session, db, query, Said(SKIP, client_id, parent), names, final)
 
 
-def skip_in(session: Session, db: Database, query: int | str, said: Said, names: Names = UNSTATED) -> Skipped:
+def skip_in(
+    session: Session,
+    db: Database,
+    query: int | str,
+    said: Said,
+    names: Names = UNSTATED,
+    final: bool = False,
+) -> Skipped:
     """Skip a question as `skip` does, in a transaction that is already open."""
     place, asked = find_locked(session, db, query, names)
     if asked.standing is not None:
@@ -64,9 +78,8 @@ def skip_in(session: Session, db: Database, query: int | str, said: Said, names:
         raise Conflict(mark("This question was withdrawn: the run or its episode was ended before that."))
     if asked.put_back and asked.leased_by != said.client_id:
         return Skipped("put_back", **vars(place), number=None)
-    outcome: Outcome = (
-        "set_aside" if asked.kind == "guidance" else "withdrawn" if asked.put_back else "put_back"
-    )
+    ends: Outcome = "withdrawn" if asked.put_back or final else "put_back"
+    outcome: Outcome = "set_aside" if asked.kind == "guidance" else ends
     number, _ = add(session, db, asked, said, standing=outcome != "put_back")
     session.execute(_BECOMES[outcome], {"query_id": place.query})
     announce(session, "web")

@@ -178,6 +178,13 @@ def asked_at(db: Database, run_id: int, tick: int) -> Query | None:
         return session.scalars(select(Query).where(Query.run_id == run_id, Query.tick == tick)).one_or_none()
 
 
+def asked_before(db: Database, run_id: int, tick: int) -> int:
+    """Return the number of questions that were asked before a tick."""
+    with db.read() as session:
+        asked = select(func.count()).where(Query.run_id == run_id, Query.tick < tick)
+        return session.execute(asked).scalar_one()
+
+
 def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
     """Return the answer to be heard at this tick, or None: guidance first, then the oldest query's.
 

@@ -59,6 +59,21 @@ def test_a_limit(db: Database, raising: None, tmp_path: Path) -> None:
     assert {row.client_id for row in rows} == {"scripted"}
 
 
+def test_a_parent_who_errs_and_skips(db: Database, raising: None) -> None:
+    run = begin(db)
+    found = json.loads(answer("--limit", "6", "--parent", "adversarial+skipping:0.5", "--json").stdout)
+    rows = [row.answer for row in every(db, run)]
+    assert found["skipped"] == sum(row.choice == "skip" for row in rows) > 0
+    assert found["answered"] == sum(row.choice != "skip" for row in rows) == 6
+    assert {row.parent for row in rows} == {"scripted"}
+
+
+def test_a_parent_that_is_none() -> None:
+    said = answer("--parent", "nosy")
+    assert said.exit_code == 2
+    assert "--parent: There is no parent 'nosy'. Did you mean 'noisy'?" in said.stderr
+
+
 def test_optimal(db: Database, raising: None) -> None:
     run = begin(db)
     found = json.loads(answer("--json").stdout)

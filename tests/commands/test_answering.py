@@ -33,7 +33,7 @@ Stored = Callable[[dict[str, Any]], object]
 class Never(Judge):
     """A parent to whom no move is acceptable."""
 
-    def choice(self, question: dict[str, Any]) -> str:
+    def choice(self, question: dict[str, Any], before: int = 0) -> str:
         return "neither" if question["kind"] == "guidance" else "either"
 
 
@@ -94,7 +94,7 @@ def test_what_somebody_else_has_answered_is_let_go(db: Database, web: httpx2.Cli
     first, second = asked(db, run, 1, 2, kind="preference")
 
     class Slow(Never):
-        def choice(self, question: dict[str, Any]) -> str:
+        def choice(self, question: dict[str, Any], before: int = 0) -> str:
             if question["id"] == first:
                 answers.answer(db, first, "left", "somebody", "human")
             return super().choice(question)
@@ -120,7 +120,7 @@ def test_an_answer_is_not_given_to_another_database_that_comes_to_the_address(
     with TestClient(create_app(settings, other), base_url="http://localhost") as at_other:
 
         class Moves(Never):
-            def choice(self, question: dict[str, Any]) -> str:
+            def choice(self, question: dict[str, Any], before: int = 0) -> str:
                 work.client.http = at_other
                 return super().choice(question)
 

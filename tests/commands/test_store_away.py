@@ -30,7 +30,7 @@ COMMANDS_OF_THE_STORE = {
     "doctor": [],
     "start": ["unsafe-exploration"],
 }
-OTHERS = {"run", "experiment", "pretrain", "worlds", "answer", "restore"}
+OTHERS = {"run", "experiment", "parents", "pretrain", "worlds", "answer", "restore"}
 """Commands that open no store, or that bring one back. A worker waits for a store that is away."""
 MAKERS = ("up", "migrate")
 """Commands that make a database where there is none."""

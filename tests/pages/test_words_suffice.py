@@ -49,7 +49,7 @@ class Listener(Judge):
         self.session = page.context.new_cdp_session(page)
         self.answers: list[dict[str, str]] = []
 
-    def choice(self, question: dict[str, Any]) -> str:
+    def choice(self, question: dict[str, Any], before: int = 0) -> str:
         told = {"api": read_sentences(question["sentences"]), **self._heard(question)}
         said = {name: board.choice(question["kind"]) for name, board in told.items()}
         if question["kind"] == "guidance":

@@ -15,7 +15,8 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
 from parenting.experiments.training.batch import train_agents
 from parenting.experiments.training.stop_rule import StopRule
-from parenting.parents.errors import OTHER, PARTS, Asked, Wrong
+from parenting.parents.asked import OTHER, Asked
+from parenting.parents.errors import PARTS, Wrong
 from parenting.parents.fallible import FallibleParent, FallibleRule
 from parenting.parents.grammar import ParentError, read_parent
 
@@ -46,7 +47,7 @@ def question(world: Gridworld, left: int, right: int, trials: int = N) -> Query:
 
 
 def said(text: str, asked: Query, tick: int = 1, answers: int = 0) -> torch.Tensor:
-    rule = FallibleRule(WORLD, CONFIG, read_parent(text))
+    rule = FallibleRule(WORLD, read_parent(text), CONFIG.gamma, CONFIG.garden_parent)
     now = keys(5, len(asked.kind))
     return rule.answer(asked, now.replace(tick=now.tick + tick), torch.full_like(asked.kind, answers))
 
@@ -71,7 +72,7 @@ def test_errors_come_at_their_rate(sided: Query, text: str) -> None:
 
 
 def test_a_boltzmann_parent_errs_as_its_softmax_says(sided: Query) -> None:
-    rule = FallibleRule(WORLD, CONFIG, read_parent("boltzmann:0.5"))
+    rule = FallibleRule(WORLD, read_parent("boltzmann:0.5"), CONFIG.gamma, CONFIG.garden_parent)
     gap = float(rule.rule.values.advantage_gap(sided)[0])
     left = int((said("boltzmann:0.5", sided) == Choice.LEFT).sum())
     assert binomtest(left, N, float(torch.tensor(0.5 * gap).sigmoid())).pvalue > 0.001
@@ -114,7 +115,7 @@ def test_every_parent_answers_in_every_world(name: str) -> None:
         rules = registry.make(world, None)
         config = compose("lax", registry.defaults(world), {}, strict=True)
         asked = question(rules, UP, DOWN, trials=3)
-        rule = FallibleRule(rules, config, read_parent(name))
+        rule = FallibleRule(rules, read_parent(name), config.gamma, config.garden_parent)
         choice = rule.answer(asked, keys(1, 3), torch.zeros(3, dtype=torch.int64))
         assert bool((choice != Choice.NONE).all())
         nothing = asked.replace(kind=torch.zeros_like(asked.kind))
@@ -159,7 +160,7 @@ def test_likeness_is_how_near_the_clips_end_to_each_other(
 
 def test_a_batch_hears_a_parent_who_errs() -> None:
     """The same answers as its rule gives for the same questions and ticks."""
-    rule = FallibleRule(WORLD, CONFIG, read_parent("noisy:0.3"))
+    rule = FallibleRule(WORLD, read_parent("noisy:0.3"), CONFIG.gamma, CONFIG.garden_parent)
     heard = list[torch.Tensor]()
 
     class Listening(FallibleParent):

@@ -42,6 +42,7 @@ def test_a_row_tells_all_about_an_answer(db: Database, run_id: int) -> None:
         "level": "island",
         "kind": "preference",
         "maturity": 2,
+        "script": None,
         "votes": 0,
         "tick": 0,
         "applied_tick": 1,

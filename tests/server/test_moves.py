@@ -22,7 +22,7 @@ pytestmark = pytest.mark.only("sqlite", "the moves are bytes to every store")
 
 
 def live(life: RunSession, ticks: int) -> list[list[Any]]:
-    """What is true after each step: where the agent stands, and the box, by tick."""
+    """The truth after each step: where the agent stands, and the box, by tick."""
     seen = []
     for _ in range(ticks):
         life.tick(watch(life.db, [life.claim.run_id])[life.claim.run_id])
