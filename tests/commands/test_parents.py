@@ -20,10 +20,7 @@ def listed(*arguments: str) -> str:
 def test_each_parent_stands_there_with_its_parameters() -> None:
     lines = listed().splitlines()
     assert [line.partition(":")[0] for line in lines if not line.startswith(" ")] == [*PARTS]
-    assert (
-        "noisy: Wrong at a fixed rate, whatever is asked: slips, drawn again for every question (B-Pref: mistake)."
-        in lines
-    )
+    assert "hasty: Answers now and then before looking: left or right by a coin." in lines
     assert "    side=left  left or right." in lines
 
 
