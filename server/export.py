@@ -83,8 +83,8 @@ def _row(db: Database, database: str, run: Run, answered: Answered) -> dict[str,
         "practice": sound(run, "practice"),  # required: people practised before their first question
         "words": sound(run, "words"),  # guide: lengths of safe ways were told
         "remarks": sound(run, "remarks"),  # the page told of hasty and contradictory answers
-        "script": sound(run, "script"),  # the errors of a scripted parent; null: people answer
         "votes": sound(query, "votes"),  # heard before on the same pair: above 0, it was asked again
+        "script": sound(run, "script"),  # the errors of a scripted parent; null: people answer
     }
     return row if found is None else {**row, "damaged": found}
 

@@ -190,8 +190,8 @@ EXPORTED: dict[str, Any] = {
     "practice": "offered",
     "words": "plain",
     "remarks": True,
-    "script": None,
     "votes": 0,
+    "script": None,
 }
 
 WALK: dict[str, Any] = {
