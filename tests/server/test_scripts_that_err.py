@@ -41,7 +41,8 @@ def stored(db: Database, run: int) -> list[tuple[int, str]]:
     """The same of a run in the database."""
     with db.read() as session:
         rows = select(Query.tick, Answer.choice).join(Answer, Answer.query_id == Query.id)
-        return [tuple(row) for row in session.execute(rows.where(Query.run_id == run).order_by(Query.tick))]
+        found = session.execute(rows.where(Query.run_id == run).order_by(Query.tick))
+        return [(tick, choice) for tick, choice in found]
 
 
 def taken_up(db: Database, run: int) -> RunSession:
