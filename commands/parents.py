@@ -19,11 +19,13 @@ def parents(
 ) -> None:
     """List the parents who answer by a rule: the paper's (Sec. 3.1.3), who never errs, and those who err.
 
-    `--parent` of run, start and answer takes them: a name with its parameters, several joined by +.
+    `--parent` of run, start and answer takes them: a name with its parameters, several joined by +. Parents of
+    installed packages stand at the end.
 
     Example: parenting parents, then parenting run side-effects --parent boltzmann:beta=2+tiring
     """
-    found = {**PARTS, **{name: INSTALLED[name] for name in INSTALLED}}
+    installed = {name: part for name in INSTALLED if (part := INSTALLED.get(name)) is not None}
+    found = {**PARTS, **installed}
     if as_json:
         say(json.dumps([_plain(name, part) for name, part in found.items()], indent=2))
         return
