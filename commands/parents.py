@@ -19,7 +19,7 @@ def parents(
 ) -> None:
     """List the parents who answer by a rule: the paper's (Sec. 3.1.3), who never errs, and those who err.
 
-    `--parent` of run, start and answer takes them: a name with its parameters, several joined by +. Parents of
+    `--parent` of run, start and answer takes them: a name with its parameters, several joined by +. Those of
     installed packages stand at the end.
 
     Example: parenting parents, then parenting run side-effects --parent boltzmann:beta=2+tiring
