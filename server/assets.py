@@ -28,7 +28,7 @@ SHEETS = {
     "page.css": EVERY_PAGE,
     "parent.css": (*EVERY_PAGE, "board.css", "parent.css"),
     "history.css": (*EVERY_PAGE, "board.css", "parent.css", "forms.css", "history.css"),
-    "dashboard.css": (*EVERY_PAGE, "forms.css", "dashboard.css"),
+    "dashboard.css": (*EVERY_PAGE, "board.css", "forms.css", "dashboard.css", "seen.css"),
     "start.css": (*EVERY_PAGE, "forms.css", "start.css"),
     "end.css": (
         *EVERY_PAGE,

@@ -12,6 +12,7 @@ from typing import Any
 from sqlalchemy import CheckConstraint, ForeignKey, Index, UniqueConstraint, event, text
 from sqlalchemy.orm import Mapped, mapped_column
 
+from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.columns import Big, OneOf, name_places
 from parenting.server.moves_table import Moves
 from parenting.server.public_ids import public_id
@@ -29,7 +30,7 @@ from parenting.server.table_root import Table, one_of, unique_where
 from parenting.server.triggers import keep_deleted_numbers
 from parenting.server.why_tables import Effect, Reason
 
-__all__ = ["Effect", "Moves", "Reason", "Table"]
+__all__ = ["BoardSnapshot", "BoardStates", "Effect", "Moves", "Reason", "Table"]
 
 KINDS = ("guidance", "preference")
 CHOICES = ("left", "right", "either", "neither")

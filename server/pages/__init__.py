@@ -6,6 +6,7 @@ from parenting.server.pages.carried import router as carried
 from parenting.server.pages.controls import router as controls
 from parenting.server.pages.dashboard import router as dashboard
 from parenting.server.pages.docs import router as docs
+from parenting.server.pages.episodes import router as episodes
 from parenting.server.pages.grid import router as grid
 from parenting.server.pages.growth import router as growth
 from parenting.server.pages.history import router as history
@@ -27,6 +28,7 @@ router.include_router(revisions)
 router.include_router(practice)
 router.include_router(walk)
 router.include_router(growth)
+router.include_router(episodes)
 router.include_router(grid)
 router.include_router(skips)
 router.include_router(dashboard)

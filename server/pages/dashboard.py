@@ -16,6 +16,7 @@ from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
+from parenting.server.pages.board import board_panel
 from parenting.server.pages.labels import MetricLabels, describe_start, metric_labels
 from parenting.server.pages.operator_log import PROBABILITIES, LogEntry, log_entries, probabilities
 from parenting.server.pages.render import format_number, moved, page
@@ -128,8 +129,7 @@ def dashboard_page(
     state, focus = run_schema(db, run_id).state, next(iter(errors), None)
     context = DashboardPage(run, parent_title(run), state, describe_start(run), errors, focus)
     parts = {**vars(context), **vars(_numbers(db, run)), **vars(_operator(db, run, typed))}
-    response = page("dashboard.html", 422 if errors else 200, **parts)
-    return response
+    return page("dashboard.html", 422 if errors else 200, board=board_panel(run), **parts)
 
 
 def _numbers(db: Database, run: Run) -> Numbers:

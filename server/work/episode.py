@@ -37,6 +37,7 @@ def episode(db: Database, run_id: int, payload: EpisodePayload) -> dict[str, Any
         "last": found.last,
         "pauses": found.pauses,
         "steps": found.steps,
+        "over": found.end is not None,
         "clip": clip_of(world, played),
         "end": end_of(world, played) if not cut else "time",
         "unsafe": played.unsafe,

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.only("sqlite", "the moves are bytes to every store")
 
 
 def live(life: RunSession, ticks: int) -> list[list[Any]]:
-    """The truth after each step: where the agent stands, and the box, by tick."""
+    """Return the truth after each tick: the place of the agent, the board, and if it moved."""
     seen = []
     for _ in range(ticks):
         life.tick(watch(life.db, [life.claim.run_id])[life.claim.run_id])

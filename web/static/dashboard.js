@@ -1,4 +1,5 @@
 // The dashboard: numbers, the table of stages and small charts by Plotly, fed by the run's metrics as they come.
+import { seen } from "./board_panel.js";
 import "./errors.js";
 import { curvesOf } from "./curves.js";
 import { follow } from "./live.js";
@@ -178,6 +179,7 @@ const tell = {
     put("optimal", now.optimal ? "optimal" : "learning");
     for (const button of document.querySelectorAll("[data-more]")) button.value = now.goal + Number(button.dataset.more);
     applied(now.tick);
+    seen();
   },
   lost: () => status("offline"),
 };

@@ -1,0 +1,158 @@
+// The board of the dashboard: what the agent would do in every cell and what is known of it, at any stored tick of its life.
+// All of it was stored by the worker; nothing of a policy is computed here.
+import { cells } from "./board_cell.js";
+import { boardOf } from "./board_data.js";
+import { paintArrows, paintShares } from "./board_paint.js";
+import { pickers } from "./board_rests.js";
+
+const $ = (id) => document.getElementById(id);
+const panel = $("seen"), slider = $("seen-slider"), form = panel.querySelector(".seen-choices");
+const { run } = document.getElementById("main").dataset;
+const data = boardOf(run), { known } = data;
+const WAYS = ["up", "down", "left", "right"], COUNTS = ["visits", "deaths", "entries"];
+const NAMES = Object.fromEntries([...panel.querySelectorAll("[data-number]")].map(({ dataset, previousElementSibling }) => [dataset.number, previousElementSibling.textContent]));
+const CALM = 1000; // ms between two looks for new snapshots
+let shown = null, sums = null, index = new Map(); // the snapshot, its counts by cell, the states of this rest by cell
+let newest = true, wanted = null, busy = false, looked = -CALM, timer = 0;
+
+const percent = (share) => share > 0 && share < 0.005 ? "under 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
+const number = (value) => Number.isInteger(value) ? value.toLocaleString("en") : String(Number(value.toPrecision(3)));
+const put = (id, words) => { if ($(id).textContent !== words) $(id).textContent = words; };
+const key = (row, column) => `${row} ${column}`;
+
+// ---- what is known of a cell
+
+function valueOf(name, place, state) {
+  if (COUNTS.includes(name)) return sums[name].get(place) ?? 0;
+  return state === undefined ? null : shown[name]?.[state] ?? null;
+}
+
+function tell([row, column]) {
+  const place = key(row, column), state = index.get(place), tile = pick.tile(row, column), numbers = {};
+  const where = `Row ${row + 1}, column ${column + 1}: ${tile}.`;
+  if (!shown || state === undefined) return { tile: tile && `${tile}. The agent never decides here.`, numbers, spoken: `${where} The agent never decides here.` };
+  const policy = shown.policy(state);
+  WAYS.forEach((way, at) => { numbers[way] = policy ? percent(policy[at]) : "not stored"; });
+  for (const name of ["familiarity", "ask", ...COUNTS]) {
+    const value = valueOf(name, place, state);
+    if (value !== null) numbers[name] = name === "ask" ? percent(value) : number(value);
+  }
+  const said = Object.entries(numbers).map(([name, text]) => `${NAMES[name]} ${text}`);
+  return { tile, numbers, spoken: `${where} ${said.join(", ")}.` };
+}
+
+// ---- what is painted
+
+// Counts grow without end, so they are shaded by their logarithm.
+function shade(name) {
+  const places = [...index].map(([place, state]) => [place.split(" ").map(Number), valueOf(name, place, state) ?? 0]);
+  const most = Math.max(0, ...places.map(([, value]) => value)), scale = COUNTS.includes(name) ? Math.log1p : (value) => value;
+  paintShares($("seen-layer"), places.map(([place]) => place), places.map(([, value]) => most ? scale(value) / scale(most) : 0));
+  return `Shade: ${NAMES[name]}, up to ${name === "ask" ? percent(most) : number(most)}${COUNTS.includes(name) ? ", by its logarithm" : ""}.`;
+}
+
+function paint() {
+  if (!shown) return;
+  const { layer, arrows } = form.elements, name = layer.value;
+  const states = arrows.checked ? [...index.values()].filter((state) => state < shown.states) : [];
+  paintArrows($("seen-arrows"), states.map((state) => known.cells[state]), states.map((state) => shown.policy(state)));
+  panel.dataset.layer = name;
+  $("seen-layer").replaceChildren();
+  const words = name ? shade(name) : "";
+  put("seen-legend", `${arrows.checked ? "Arrows: the longer and darker, the likelier." : ""} ${words}`.trim());
+  showCell();
+}
+
+function sumUp() {
+  sums = Object.fromEntries(COUNTS.map((name) => [name, new Map()]));
+  for (const name of COUNTS) {
+    shown[name]?.forEach((value, state) => {
+      const [row, column] = known.cells[state], place = key(row, column);
+      if (value) sums[name].set(place, (sums[name].get(place) ?? 0) + value);
+    });
+  }
+}
+
+function turned() {
+  index = new Map();
+  known.cells.forEach(([row, column, rest], state) => { if (rest === pick.rest) index.set(key(row, column), state); });
+  paint();
+}
+
+// ---- which snapshot
+
+function say({ tick, maturity, answers }) {
+  const words = `Tick ${number(tick)}, stage ${maturity}, ${number(answers)} answer${answers === 1 ? "" : "s"}`;
+  put("seen-at", words + (newest ? " · the newest" : ""));
+  slider.setAttribute("aria-valuetext", words);
+}
+
+// The policies pi_1 to pi_T of this snapshot; the one that acts is chosen until another one is.
+function offerStages(maturity) {
+  const select = form.elements.stage, before = Number(select.value) || null;
+  if (select.options.length === maturity) return;
+  const follows = before === null || before === select.options.length;
+  select.replaceChildren(...Array.from({ length: maturity }, (_, at) => new Option(`π${at + 1}${at + 1 === maturity ? ", which acts" : ""}`, at + 1)));
+  select.value = follows ? maturity : Math.min(before, maturity);
+}
+
+// Show a snapshot: the last one asked for wins, and meanwhile nothing is asked twice.
+async function show(place) {
+  wanted = place;
+  if (busy) return;
+  busy = true;
+  try {
+    while (wanted !== null) {
+      const one = known.snapshots[wanted];
+      wanted = null;
+      offerStages(one.maturity);
+      say(one);
+      shown = await data.at(one.tick, Number(form.elements.stage.value));
+      if (shown.states > known.cells.length) await data.news();
+      sumUp();
+      turned();
+    }
+  } catch ({ message }) { put("seen-at", message); } finally { busy = false; }
+}
+
+function go(place) {
+  const last = known.snapshots.length - 1, to = Math.max(0, Math.min(last, place));
+  newest = to === last;
+  $("seen-newest").setAttribute("aria-pressed", newest);
+  slider.value = to;
+  show(to);
+}
+
+// Ask for new snapshots, at most once in a while; the newest is shown unless the researcher has moved the slider.
+export function seen() {
+  if (timer) return;
+  timer = setTimeout(look, Math.max(0, looked + CALM - performance.now()));
+}
+
+async function look() {
+  looked = performance.now();
+  const had = known.snapshots.length;
+  try { await data.news(); } catch { return; } finally { timer = 0; } // the next event asks again
+  if (known.snapshots.length === had) return;
+  if (!had) begin();
+  slider.max = known.snapshots.length - 1;
+  pick.offer();
+  if (newest) go(known.snapshots.length - 1);
+}
+
+function begin() {
+  for (const control of panel.querySelectorAll(".seen-time *, .seen-choices *")) control.disabled = false;
+}
+
+const pick = pickers(run, known, turned);
+const showCell = cells(tell);
+slider.addEventListener("input", () => go(Number(slider.value)));
+for (const button of panel.querySelectorAll("[data-time]")) button.addEventListener("click", () => go(Number(slider.value) + Number(button.dataset.time)));
+$("seen-newest").addEventListener("click", () => go(known.snapshots.length - 1));
+form.addEventListener("change", ({ target }) => (target.name === "stage" ? go(Number(slider.value)) : paint()));
+form.addEventListener("submit", (event) => event.preventDefault());
+for (const button of panel.querySelectorAll("[data-job]")) {
+  button.hidden = false;
+  button.addEventListener("click", () => import("./episodes.js").then(({ open }) => open(button.dataset.job)));
+}
+seen();

@@ -1,0 +1,118 @@
+// Episodes: any of the agent's life, shown again from its moves, and one that the present policy plays by itself. A worker
+// makes the moves; the server draws them. Nothing here is loaded before somebody asks for it.
+import { play } from "./play.js";
+
+const TEXTS = {
+  ready: "A worker makes its moves again.",
+  no_worker: "No worker is running. The episode is shown once one is started (parenting worker).",
+  gone: "The server does not answer. Try again.",
+  none: "No episode of its life is stored yet.",
+};
+const TITLES = { episode: "Episodes of its life", walk: "An episode of the present policy" };
+const POLL = 100, SLOW = 500, SOON = 20; // ms between two looks: at first, and after so many looks
+const STEP = 520, WHOLE = 15000, QUICKEST = 160; // ms of a step; a long episode is quicker, so that it ends in time
+const { run } = document.getElementById("main").dataset;
+let dialog = null, player = null, turn = 0;
+
+function made() {
+  if (dialog) return dialog;
+  const sheet = Object.assign(document.createElement("link"), { rel: "stylesheet", href: document.getElementById("seen").dataset.sheet });
+  document.head.append(sheet);
+  dialog = document.createElement("dialog");
+  dialog.className = "watch";
+  dialog.setAttribute("aria-labelledby", "episode-title");
+  dialog.innerHTML = `<h1 id="episode-title"></h1>
+<form class="which"><button type="button" class="small" data-by="-1" aria-label="The episode before">‹</button>
+<label>Episode <input name="number" inputmode="numeric" autocomplete="off" size="5"></label> <span class="quiet" data-of></span>
+<button type="button" class="small" data-by="1" aria-label="The episode after">›</button> <button class="small">Show</button></form>
+<p class="quiet state" role="status"></p><div class="shown"></div>
+<div class="beside"><button type="button" data-again>Another one</button><button type="button" class="primary" data-close>Close</button></div>`;
+  document.body.append(dialog);
+  dialog.querySelector("[data-close]").addEventListener("click", () => dialog.close());
+  dialog.querySelector("[data-again]").addEventListener("click", () => show("walk", { seed: Math.floor(Math.random() * 2 ** 31) }));
+  dialog.addEventListener("close", still);
+  const form = dialog.querySelector(".which");
+  form.addEventListener("submit", (event) => { event.preventDefault(); number(Number(form.elements.number.value)); });
+  for (const button of form.querySelectorAll("[data-by]")) button.addEventListener("click", () => number(Number(form.elements.number.value) + Number(button.dataset.by)));
+  return dialog;
+}
+
+function still() {
+  turn++;
+  player?.still();
+  player = null;
+}
+
+function say(words) {
+  const line = dialog.querySelector(".state");
+  if (line.textContent !== words) line.textContent = words;
+}
+
+async function reply(path, options) {
+  const found = await fetch(path, options).catch(() => { throw new Error(TEXTS.gone); });
+  if (!found.ok) throw new Error((await found.json().catch(() => null))?.error?.message ?? TEXTS.gone);
+  return found;
+}
+
+// Up to `limit` episodes from that of a number backwards, or from the newest.
+async function found(limit, wanted = null) {
+  const page = await reply(`/api/v1/runs/${run}/episodes?limit=${limit}${wanted ? `&before=${wanted + 1}` : ""}`);
+  return (await page.json()).rows;
+}
+
+async function number(wanted) {
+  still();
+  const mine = turn;
+  try {
+    const newest = await found(2);
+    if (mine !== turn) return;
+    if (!newest.length) return say(TEXTS.none);
+    const last = newest[0].number, at = Math.max(1, Math.min(last, wanted));
+    const [one] = Number.isInteger(wanted) ? await found(1, at) : [newest.at(-1)];
+    if (mine !== turn) return;
+    dialog.querySelector("[name=number]").value = one.number;
+    dialog.querySelector("[data-of]").textContent = `of ${last}`;
+    await show("episode", { tick: one.first });
+  } catch ({ message }) { if (mine === turn) say(message); }
+}
+
+async function done(job, mine) {
+  for (let looks = 0; job.state === "waiting" || job.state === "working"; looks++) {
+    if (mine !== turn) return null;
+    say(job.worker === "silent" ? TEXTS.no_worker : TEXTS.ready);
+    await new Promise((rest) => { setTimeout(rest, looks < SOON ? POLL : SLOW); });
+    job = await (await reply(`/api/v1/jobs/${job.id}`)).json();
+  }
+  if (job.state === "failed") throw new Error(job.reason);
+  return job;
+}
+
+async function show(which, payload) {
+  still();
+  const mine = turn, shown = dialog.querySelector(".shown"), body = JSON.stringify({ client_id: "dashboard", kind: which, payload });
+  say(TEXTS.ready);
+  try {
+    const asked = await reply(`/api/v1/runs/${run}/jobs`, { method: "POST", headers: { "content-type": "application/json" }, body });
+    const job = await done(await asked.json(), mine);
+    if (!job) return;
+    const part = await (await reply(`/runs/${run}/${which === "walk" ? "walk" : "episodes"}/${job.id}/board`)).text();
+    if (mine !== turn) return;
+    shown.innerHTML = part;
+    const view = shown.firstElementChild, steps = job.result.clip.length;
+    say(view.dataset.spoken);
+    view.querySelector(".told").hidden = true;
+    view.classList.add("played");
+    if (steps) player = play(view.querySelector(".walked"), null, Math.max(QUICKEST, Math.min(STEP, WHOLE / steps)));
+  } catch ({ message }) { if (mine === turn) say(message); }
+}
+
+// Open the dialog on the last episode of the life that has ended, or on one of the present policy.
+export function open(which) {
+  made().querySelector("h1").textContent = TITLES[which];
+  dialog.querySelector(".which").hidden = which !== "episode";
+  dialog.querySelector("[data-again]").hidden = which !== "walk";
+  dialog.querySelector(".shown").replaceChildren();
+  dialog.showModal();
+  if (which === "episode") number(NaN);
+  else show("walk", { seed: Math.floor(Math.random() * 2 ** 31) });
+}
