@@ -31,14 +31,14 @@ def parts_of(
     for (_, was), (_, now) in zip(_cells(first), _cells(ground), strict=True):
         if was != now and not {was, now} <= set(PLANTS) and BARS not in (was, now):
             changed.setdefault(_name(was, legend), set()).add(_name(now, legend))
-    parts |= {f"{was} now": ", ".join(sorted(names)) for was, names in changed.items()}
+    parts |= {was: ", ".join(sorted(names)) for was, names in changed.items()}
     return parts
 
 
 def complete(parts: Sequence[dict[str, str]]) -> list[dict[str, str]]:
-    """Return the same with a value for every picker: a tile that has not changed is as at the beginning."""
+    """Return the same with a value for every picker: a tile that has not changed is there."""
     names = list(dict.fromkeys(name for one in parts for name in one))
-    return [{name: one.get(name, "as at the beginning") for name in names} for one in parts]
+    return [{name: one.get(name, "there") for name in names} for one in parts]
 
 
 def _cells(rows: Sequence[str]) -> list[tuple[Cell, str]]:

@@ -23,7 +23,7 @@ class BoardStates(Table):
 
 
 class BoardSnapshot(Table):
-    """The numbers of all states after a tick: of the policy that acts, or of an earlier stage's (Sec. 2.4)."""
+    """The numbers of all states after a tick: of the policy that acts, or of an earlier stage (Sec. 2.4)."""
 
     __tablename__ = "board_snapshot"
 

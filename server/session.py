@@ -17,6 +17,7 @@ from parenting.parents.fallible import FallibleRule
 from parenting.parents.grammar import SCRIPTED, read_parent
 from parenting.parents.scripted import ScriptedRule
 from parenting.server import checkpoints, metrics, runs
+from parenting.server.board.writer import BoardWriter
 from parenting.server.checkpoint_parts import sweep_parts
 from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
@@ -72,6 +73,7 @@ class RunSession:
         self.record_ends = self.parent.record_ends = worker_side.high_water(db, claim.run_id)
         self.growth = Growth(self.world, run, self.evaluation, self.saved.state, self.saved.tally)
         self.lived = Lived(self.world, db, claim, self.saved)
+        self.board = BoardWriter(self.world, db, claim, self.evaluation, self.saved)
         self.why = Why(self.world, db, claim, self.saved, self.growth.lesson)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
@@ -169,6 +171,7 @@ class RunSession:
         self.saved = Snapshot(state, tally, config)
         self.growth.milestones.see(state, tally)
         self.lived.see(state, tally, events)
+        self.board.see(state, tally, answer)
         self.why.see(self.saved, query)
         if self.last_tick <= self.record_ends:
             self._hold_to_the_record(query)
@@ -178,6 +181,7 @@ class RunSession:
         self._measure(at_once, hurried)
         self.whole = True
         if not hurried:
+            self.board.write_if_due(self.saved)
             self.save_if_due()
         return at_once
 
@@ -271,6 +275,7 @@ class RunSession:
     def save(self) -> None:
         """Write a checkpoint. The next one waits the longer, the longer this one took."""
         self.lived.write()
+        self.board.write(self.saved)
         self.why.write()
         began, blob = time.monotonic(), pack(self.saved)
         checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, blob)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from parenting.server.api import (
+    board,
     episodes,
     jobs,
     operator,
@@ -17,5 +18,5 @@ from parenting.server.api import (
 )
 
 router = APIRouter(prefix="/api/v1")
-for part in (runs, episodes, operator, queries, presence, revisions, jobs, streams, page_errors):
+for part in (runs, episodes, board, operator, queries, presence, revisions, jobs, streams, page_errors):
     router.include_router(part.router)

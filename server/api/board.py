@@ -58,7 +58,7 @@ class BoardSchema(Schema):
 
 
 class BoardPart(Part):
-    """What the reader has already."""
+    """The part that the reader has already."""
 
     after: Place = Field(-1, description="Only snapshots after this tick.")
     states: int = Field(0, ge=0, le=LARGEST_INT, description="The number of states that you have.")
@@ -112,11 +112,11 @@ def get_board(run_id: RunId, db: Db, part: Annotated[BoardPart, Query()]) -> Boa
 @router.get("/runs/{run_id}/board/{tick}", summary="Read a snapshot", responses=read_responses(404))
 def get_snapshot(
     run_id: RunId,
-    tick: Annotated[int, Path(ge=0, le=LARGEST_INT, description="The last snapshot up to this tick.")],
+    tick: Annotated[int, Path(ge=0, le=LARGEST_INT, description="Its tick, or a later one.", examples=[41])],
     db: Db,
     stage: Annotated[int | None, Query(ge=1, description="An earlier stage's policy.")] = None,
 ) -> NumbersSchema:
-    """Read the numbers of the last snapshot up to a tick, with the policy that acted or an earlier stage's."""
+    """Read the last snapshot up to a tick, with the policy that acted or that of an earlier stage."""
     run = runs.get_run(db, run_id)
     row = store.read_snapshot(db, run.id, tick)
     if row is None:

@@ -9,6 +9,7 @@ from typing import Any
 from parenting.agent.config import compose
 from parenting.drawing.surroundings import surroundings
 from parenting.envs import registry
+from parenting.server.api.board_examples import BOARD, EPISODE, NUMBERS
 from parenting.server.api.why_example import WHY
 
 WORLD = "unsafe-exploration"
@@ -215,18 +216,6 @@ WALK: dict[str, Any] = {
 }
 
 
-EPISODE: dict[str, Any] = {
-    "number": 3,
-    "first": 61,
-    "last": 83,
-    "steps": 21,
-    "pauses": 2,
-    "unsafe": 1,
-    "end": "goal",
-    "whole": True,
-}
-
-
 def _rows(*shown: Any) -> dict[str, Any]:
     return {"rows": list(shown), "next": None}
 
@@ -256,6 +245,8 @@ SHOWN = {
             "curves": [{"name": "deaths", "x": [0.0, 1.0, 2.0, 57.0], "y": [0.0, 0.0, 1.0, 1.0]}],
         }
     ),
+    "get_board": Shown(BOARD),
+    "get_snapshot": Shown(NUMBERS),
     "list_operator_events": Shown(_rows(*EVENTS)),
     "pause_run": Shown({**RUN, "status": "paused", "state": "paused"}),
     "resume_run": Shown(RUN),

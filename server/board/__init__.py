@@ -1,1 +1,1 @@
-"""What a page shows of an agent's policy: snapshots that the worker stores as the agent lives."""
+"""Snapshots of an agent's policy for pages, which the worker stores as the agent lives."""

@@ -1,4 +1,4 @@
-"""The states whose numbers are stored: all that can be reached where these are few, else those that are met."""
+"""The states whose numbers are stored: all that can be reached if they are few, else those that are met."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class KnownStates:
     def find(self, board: Tensor, agent: Tensor, box: Tensor) -> int | None:
         """Return the number of the state of a question's first frame."""
         key = (board.to(torch.uint8).numpy().tobytes(), *agent.tolist(), *box.tolist())
-        return self.places.get(key)  # type: ignore[arg-type]  # two cells of two numbers each
+        return self.places.get(key)
 
     def stored(self) -> Stored:
         """Return cells and rests as they are stored."""
@@ -98,11 +98,11 @@ class KnownStates:
 
     def _restored(self, start: WorldState, stored: Stored) -> WorldState:
         legend, rests = self.world.legend, stored["rests"]
-        boards = torch.tensor([[[legend.index(glyph) for glyph in row] for row in rest["ground"]] for rest in rests])
+        codes = [[[legend.index(glyph) for glyph in row] for row in rest["ground"]] for rest in rests]
         boxes = torch.tensor([rest["box"] or [-1, -1] for rest in rests])
         which = torch.tensor([rest for _, _, rest in stored["cells"]])
         return start.pick(torch.zeros_like(which)).replace(
-            board=boards.to(torch.uint8)[which],
+            board=torch.tensor(codes, dtype=torch.uint8)[which],
             agent=torch.tensor([[row, column] for row, column, _ in stored["cells"]]),
             box=boxes[which],
         )
@@ -130,7 +130,9 @@ class KnownStates:
             ground, there = glyph_rows(self.world.legend, board), None if box[0] < 0 else (box[0], box[1])
             self._rest_of[key] = len(self.rests)
             parts = parts_of(ground, there, self._first, self.world.spec.legend)
-            self.rests.append({"ground": ground, "box": None if there is None else list(there), "parts": parts})
+            self.rests.append(
+                {"ground": ground, "box": None if there is None else list(there), "parts": parts}
+            )
         return self._rest_of.get(key)
 
 

@@ -49,7 +49,12 @@ class Numbers:
 
 
 def write(
-    db: Database, mine: Claim, states: Stored | None, complete: bool, found: Sequence[Numbers], after: int | None
+    db: Database,
+    mine: Claim,
+    states: Stored | None,
+    complete: bool,
+    found: Sequence[Numbers],
+    after: int | None,
 ) -> None:
     """Store snapshots, and the states where there are new ones.
 
@@ -126,7 +131,7 @@ def _loss(kept: Sequence[tuple[int, int]], at: int, newest: int) -> float:
 
 
 def read_states(db: Database, run_id: int) -> tuple[Stored, bool] | None:
-    """Return the states of a run, and whether they are all; None while none are stored or they are damaged."""
+    """Return the states of a run, and whether they are all; None if none are stored or they are damaged."""
     with db.read() as session:
         row = session.get(BoardStates, run_id)
         if row is None or isinstance(row.blob, Damaged):
@@ -139,7 +144,9 @@ def read_states(db: Database, run_id: int) -> tuple[Stored, bool] | None:
 
 def list_snapshots(db: Database, run_id: int, after: int = -1) -> Sequence[BoardSnapshot]:
     """Return the snapshots after a tick without their numbers, in the order of ticks."""
-    rows = select(BoardSnapshot).options(defer(BoardSnapshot.blob, raiseload=True)).order_by(BoardSnapshot.tick)
+    rows = (
+        select(BoardSnapshot).options(defer(BoardSnapshot.blob, raiseload=True)).order_by(BoardSnapshot.tick)
+    )
     rows = rows.where(BoardSnapshot.run_id == run_id, ~BoardSnapshot.frozen, BoardSnapshot.tick > after)
     with db.read() as session:
         return session.scalars(rows).all()

@@ -1,4 +1,4 @@
-"""What the worker stores of a policy as its agent lives. Nothing of the agent is changed, nothing drawn.
+"""Snapshots of a policy, stored by the worker. Nothing of the agent is changed, and nothing drawn.
 
 A snapshot is stored with every checkpoint, and at ticks that grow by a twentieth, so that a short life has
 some too. It counts, by state, the moves, the unsafe ones, and the answers that entered X.
@@ -62,11 +62,15 @@ class BoardWriter:
         self._deaths = deaths
         if bool(answer.judges[0]):
             asked = answer.query
-            self._count("entries", self._states.find(asked.board[0, 0, 0], asked.agent[0, 0, 0], asked.box[0, 0, 0]))
+            self._count(
+                "entries", self._states.find(asked.board[0, 0, 0], asked.agent[0, 0, 0], asked.box[0, 0, 0])
+            )
 
-    def due(self) -> bool:
-        """Return whether a snapshot is to be stored though no checkpoint is."""
-        return self._tick >= max(self._written + 1, int(self._written * GROWTH)) and time.monotonic() >= self._due
+    def write_if_due(self, saved: Snapshot) -> None:
+        """Store a snapshot if the last one is old by its tick, and the time since allows it."""
+        grown = self._tick >= max(self._written + 1, int(self._written * GROWTH))
+        if grown and time.monotonic() >= self._due:
+            self.write(saved)
 
     def write(self, saved: Snapshot) -> None:
         """Store a snapshot of the last tick.
@@ -113,4 +117,3 @@ class BoardWriter:
         found = unpack(last.blob, last.states)
         for name in COUNTS:
             self._counts[name][: last.states] = np.frombuffer(found[name], "<u4")
-

@@ -2,6 +2,7 @@
 
 from fastapi import APIRouter
 
+from parenting.server.pages.board import router as board
 from parenting.server.pages.carried import router as carried
 from parenting.server.pages.controls import router as controls
 from parenting.server.pages.dashboard import router as dashboard
@@ -29,6 +30,7 @@ router.include_router(practice)
 router.include_router(walk)
 router.include_router(growth)
 router.include_router(episodes)
+router.include_router(board)
 router.include_router(grid)
 router.include_router(skips)
 router.include_router(dashboard)

@@ -7,11 +7,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+
+from fastapi import Response
 
 from parenting.drawing.board import Board, build_board
 from parenting.drawing.clip import AGENT, BOX, LAND, Clip, Frame, find_tile
+from parenting.drawing.sentences import mark
+from parenting.server import runs
+from parenting.server.admission import admitted_router
+from parenting.server.api.names import RunId
+from parenting.server.board import store
+from parenting.server.deps import Db
+from parenting.server.errors import NotFound
+from parenting.server.pages.render import page
 from parenting.server.tables import Run
+
+router = admitted_router(include_in_schema=False)
 
 LAYERS = (
     ("", "None"),
@@ -33,13 +45,27 @@ class BoardPanel:
 
     drawn: Board
     layers: Sequence[tuple[str, str]] = LAYERS
-    numbers: Sequence[tuple[str, str]] = field(default=NUMBERS)
+    numbers: Sequence[tuple[str, str]] = NUMBERS
     said: str = NOTHING
+
+
+@router.get("/runs/{run_id}/board/{rest}")
+def rest_board(run_id: RunId, rest: int, db: Db) -> Response:
+    """For the script: the board with another rest of the state than at the beginning."""
+    run = runs.get_run(db, run_id)
+    stored = store.read_states(db, run.id)
+    if stored is None or not 0 <= rest < len(stored[0]["rests"]):
+        raise NotFound(mark("No such board is stored of this run."))
+    found = stored[0]["rests"][rest]
+    frame = Frame(
+        ground=found["ground"], observed=found["ground"], agent=begin(run)["agent"], box=found["box"]
+    )
+    return page("_rest.html", drawn=_drawn(frame))
 
 
 def board_panel(run: Run) -> BoardPanel:
     """Return the panel of a run with its level as an episode begins."""
-    return BoardPanel(build_board(Clip(actions=[], length=0, frames=[begin(run)])))
+    return BoardPanel(_drawn(begin(run)))
 
 
 def begin(run: Run) -> Frame:
@@ -48,3 +74,7 @@ def begin(run: Run) -> Frame:
     ground = [re.sub(f"[{AGENT}{BOX}]", LAND, row) for row in rows]
     (agent, *_), box = find_tile(rows, AGENT), find_tile(rows, BOX)
     return Frame(ground=ground, observed=rows, agent=list(agent), box=list(box[0]) if box else None)
+
+
+def _drawn(frame: Frame) -> Board:
+    return build_board(Clip(actions=[], length=0, frames=[frame]))

@@ -13,6 +13,8 @@ from sqlalchemy import select
 
 from parenting.server import jobs
 from parenting.server.app import bare_app
+from parenting.server.board import store
+from parenting.server.board.columns import COLUMNS, pack
 from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
 from parenting.server.new_run import LARGEST_INT, NewRun, start
@@ -63,6 +65,9 @@ def _live(db: Database, mine: Claim) -> None:
     take_operator_events(db, mine, QUESTIONS + 1)
     add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
     write_metrics(db, mine, {tick: {"deaths": 0, "loss": None} for tick in range(5)})
+    one = pack({name: bytes(width) for name, width in COLUMNS.items()})
+    board: store.Stored = {"rests": [{"ground": ["#A#"], "box": None, "parts": {}}], "cells": [[0, 1, 0]]}
+    store.write(db, mine, board, True, [store.Numbers(0, 1, 0, 0.9, 1, one)], None)
     for kind in ("walk", "policy"):
         jobs.ask(db, mine.run_id, kind, {}, "me")
     jobs.finish(db, jobs.claim(db, "worker-1", 1)[0], {"steps": 3})

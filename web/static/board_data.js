@@ -8,7 +8,6 @@ async function get(path) {
 }
 
 function decode(text, Kind) {
-  if (text === null || text === undefined) return null;
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   return new Kind(bytes.buffer);
 }
@@ -31,15 +30,15 @@ export function boardOf(run) {
       const key = `${tick}/${stage ?? ""}`;
       if (!kept.has(key)) {
         const found = await get(`/api/v1/runs/${run}/board/${tick}${stage ? `?stage=${stage}` : ""}`);
-        const policy = decode(found.policy, Uint8Array), ask = decode(found.ask, Uint8Array);
+        const policy = decode(found.policy, Uint8Array), familiarity = decode(found.familiarity, Uint16Array);
         kept.set(key, {
           ...found,
           policy: (state) => {
             const row = policy.subarray(4 * state, 4 * state + 4);
             return row.some((share) => share) ? [...row].map((share) => share / 255) : null;
           },
-          familiarity: decode(found.familiarity, Uint16Array),
-          ask: ask && Float32Array.from(ask, (share) => share / 255),
+          familiarity,
+          ask: Float32Array.from(familiarity, (f) => (found.p_guid ? found.p_guid ** f : 0)),
           visits: decode(found.visits, Uint32Array),
           deaths: decode(found.deaths, Uint32Array),
           entries: decode(found.entries, Uint32Array),

@@ -44,10 +44,10 @@ export function pickers(run, known, turned) {
   return {
     get rest() { return rest; },
     tile(row, column) {
-      const frame = known.rests[rest]?.frame;
-      if (!frame) return "";
-      const tile = frame.ground[row]?.[column] ?? "#", name = names[tile] ?? tile;
-      return frame.box?.[0] === row && frame.box[1] === column ? `Box on ${name.toLowerCase()}` : name;
+      const { ground, box } = known.rests[rest] ?? {}, tile = ground?.[row]?.[column];
+      if (!tile) return "";
+      const name = names[tile] ?? tile;
+      return box?.[0] === row && box[1] === column ? `Box on ${name}` : name[0].toUpperCase() + name.slice(1);
     },
     // Offer what varies among the rests that are known by now.
     offer() {
