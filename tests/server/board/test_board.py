@@ -40,7 +40,7 @@ def live(life: RunSession, ticks: int) -> int:
 
 
 def numbers(client: httpx2.Client, run: int, tick: int, **asked: int) -> dict[str, Any]:
-    found = client.get(f"/api/v1/runs/{run}/board/{tick}", params=asked).json()
+    found: dict[str, Any] = client.get(f"/api/v1/runs/{run}/board/{tick}", params=asked).json()
     return found | {name: np.frombuffer(base64.b64decode(found[name]), kind) for name, kind in WIDTHS.items()}
 
 
