@@ -29,6 +29,7 @@ SHEETS = {
     "parent.css": (*EVERY_PAGE, "board.css", "parent.css"),
     "history.css": (*EVERY_PAGE, "board.css", "parent.css", "forms.css", "history.css"),
     "dashboard.css": (*EVERY_PAGE, "board.css", "forms.css", "dashboard.css", "seen.css"),
+    "comparison.css": (*EVERY_PAGE, "forms.css", "dashboard.css", "comparison.css"),
     "start.css": (*EVERY_PAGE, "forms.css", "start.css"),
     "end.css": (
         *EVERY_PAGE,
@@ -42,7 +43,7 @@ SHEETS = {
     "walk.css": ("walk.css", "growth.css"),
 }
 """The sheets of each page. That of the API's description stands alone, after one of another package."""
-SCRIPTS = ("parent.js", "practice.js", "history.js", "dashboard.js", "start.js", "docs.js")
+SCRIPTS = ("parent.js", "practice.js", "history.js", "dashboard.js", "comparison.js", "start.js", "docs.js")
 PICTURES = ("icon.svg", "query.svg", "question.svg")
 MEDIA = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 SMALLER: dict[str, Callable[[str], str]] = {"css": rcssmin.cssmin, "js": rjsmin.jsmin}

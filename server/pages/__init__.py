@@ -4,6 +4,7 @@ from fastapi import APIRouter
 
 from parenting.server.pages.board import router as board
 from parenting.server.pages.carried import router as carried
+from parenting.server.pages.comparison import router as comparison
 from parenting.server.pages.controls import router as controls
 from parenting.server.pages.dashboard import router as dashboard
 from parenting.server.pages.docs import router as docs
@@ -34,6 +35,7 @@ router.include_router(board)
 router.include_router(grid)
 router.include_router(skips)
 router.include_router(dashboard)
+router.include_router(comparison)
 router.include_router(controls)
 router.include_router(history)
 router.include_router(docs)

@@ -12,7 +12,7 @@ const chosen = ({ x, y }, wanted) => {
   return found;
 };
 
-async function fetched(run, names, part = {}) {
+async function fetched(run, names, part) {
   const query = new URLSearchParams({ names: names.join(), ...part });
   const reply = await fetch(`/api/v1/runs/${run}/curves?${query}`).catch(() => null);
   if (!reply?.ok) return null;
@@ -20,7 +20,8 @@ async function fetched(run, names, part = {}) {
   return { ...found, curves: Object.fromEntries(curves.map(({ name, x, y }) => [name, { x, y }])) };
 }
 
-export function curvesOf(run, names) {
+// The curves of some metrics; `how` may hold another axis (`by`) and another number of points.
+export function curvesOf(run, names, how = {}) {
   let whole = Object.fromEntries(names.map((name) => [name, { x: [], y: [] }]));
   let last = -1, fresh = 0, thinned = false;
   const parts = {}; // what is looked at closely, by chart
@@ -29,7 +30,7 @@ export function curvesOf(run, names) {
   async function load(failed) {
     fresh = 0;
     let found;
-    while (!(found = await fetched(run, names))) {
+    while (!(found = await fetched(run, names, how))) {
       failed();
       await new Promise((resolve) => setTimeout(resolve, AGAIN));
     }
@@ -60,14 +61,16 @@ export function curvesOf(run, names) {
     if (begin === undefined || !thinned) return;
     const part = { begin: Math.max(0, begin), end: Math.max(0, end) };
     const wanted = parts[chart] = { ...part, curves: null };
-    const found = await fetched(run, ofChart, part);
-    if (parts[chart] === wanted && found?.last != null) Object.assign(wanted, { curves: found.curves, end: Math.min(part.end, found.last) });
+    const found = await fetched(run, ofChart, { ...how, ...part });
+    if (parts[chart] !== wanted || !found?.rows) return;
+    const ends = Object.values(found.curves).map(({ x }) => x.at(-1) ?? begin);
+    Object.assign(wanted, { curves: found.curves, end: Math.max(...ends) });
   }
 
   // Returns a curve for a chart; one that was never measured has a place without a value, so that its legend stands.
   function curve(chart, name) {
     const part = parts[chart];
-    if (!whole[name].x.length) return { x: [last], y: [null] };
+    if (!whole[name].x.length) return { x: [null], y: [null] };
     if (!part?.curves) return whole[name];
     return joined([chosen(whole[name], (tick) => tick < part.begin), part.curves[name], chosen(whole[name], (tick) => tick > part.end)]);
   }

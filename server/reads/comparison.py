@@ -1,0 +1,141 @@
+"""Runs beside each other: groups of runs with the same settings, what differs between them, final numbers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from sqlalchemy import select
+
+from parenting.server.damage import damage
+from parenting.server.db import Database
+from parenting.server.reads.metrics import latest_metrics
+from parenting.server.statuses import OVER
+from parenting.server.tables import Run
+
+NUMBERS = ("deaths", "guidance", "preference", "return")
+"""Metrics whose last values are compared, besides the ticks and whether the policy is optimal."""
+SHORT = 12
+"""Digits of a hash that are shown."""
+Settings = Mapping[str, Any]
+
+
+class Mean(NamedTuple):
+    """A mean over runs, with its 95 % interval where the runs determine one."""
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A run with its last numbers."""
+
+    run: Run
+    numbers: Mapping[str, float]  # those that it has
+
+    @property
+    def over(self) -> bool:
+        """Return whether these numbers are final."""
+        return self.run.status in OVER
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs with the same settings."""
+
+    letter: str
+    settings: Settings
+    runs: list[Compared] = field(default_factory=list)
+
+    @property
+    def seeds(self) -> str:
+        """Return the seeds, as "0-4, 9"."""
+        return ranges([one.run.seed for one in self.runs])
+
+    def mean(self, name: str) -> Mean | None:
+        """Return the mean of a number over the runs that have it (`evaluation.statistics.mean_interval`)."""
+        from parenting.evaluation.statistics import mean_interval  # loads scipy, which no other page needs
+
+        values = [one.numbers[name] for one in self.runs if name in one.numbers]
+        if not values:
+            return None
+        interval = mean_interval(values)
+        return Mean(sum(values) / len(values), *(interval or (None, None)))
+
+    def optimal(self) -> Mean:
+        """Return the proportion of runs with an optimal policy (`evaluation.statistics.proportion_interval`)."""
+        from parenting.evaluation.statistics import proportion_interval
+
+        hits = sum(one.run.optimal for one in self.runs)
+        return Mean(hits / len(self.runs), *proportion_interval(hits, len(self.runs)))
+
+
+def found_runs(db: Database, numbers: Sequence[int]) -> tuple[list[Run], list[int], list[int]]:
+    """Return the runs of these numbers, in this order; the numbers that there are not; those of damaged runs."""
+    with db.read() as session:
+        there = {run.id: run for run in session.scalars(select(Run).where(Run.id.in_(numbers)))}
+    damaged = [number for number in numbers if number in there and damage(there[number]) is not None]
+    sound = [there[number] for number in numbers if number in there and number not in damaged]
+    return sound, [number for number in numbers if number not in there], damaged
+
+
+def grouped(db: Database, runs: Sequence[Run]) -> list[Group]:
+    """Return the groups of runs with the same settings, in the order of their first runs."""
+    latest = latest_metrics(db, [run.id for run in runs])
+    groups: dict[str, Group] = {}
+    for run in runs:
+        known = settings(run)
+        key = json.dumps(known, sort_keys=True)
+        group = groups.setdefault(key, Group(letter(len(groups)), known))
+        values = latest[run.id].values if run.id in latest else {}
+        numbers = {name: values[name] for name in NUMBERS if isinstance(values.get(name), int | float)}
+        group.runs.append(Compared(run, {**numbers, "ticks": run.tick}))
+    return list(groups.values())
+
+
+def settings(run: Run) -> dict[str, Any]:
+    """Return all that a run was started with but its seed and its name."""
+    return {
+        "world": run.world,
+        "level": run.level,
+        "level's text": run.level_text,
+        "parent": run.parent,
+        "weights": run.weights and run.weights[:SHORT],
+        **run.config,
+    }
+
+
+def differences(groups: Sequence[Group]) -> list[tuple[str, list[Any]]]:
+    """Return the settings that are not the same in all groups, each with its value in every group.
+
+    The text of a level is left out where its name tells the levels apart.
+    """
+    names = dict.fromkeys(name for group in groups for name in group.settings)
+    rows = [(name, [group.settings.get(name) for group in groups]) for name in names]
+    found = [(name, values) for name, values in rows if any(value != values[0] for value in values)]
+    if len({group.settings["level's text"] for group in groups}) == len(
+        {(group.settings["world"], group.settings["level"]) for group in groups}
+    ):
+        found = [(name, values) for name, values in found if name != "level's text"]
+    return found
+
+
+def ranges(numbers: Sequence[int]) -> str:
+    """Return numbers in their order, runs of them as ranges: "1-3, 7"."""
+    parts: list[list[int]] = []
+    for number in sorted(set(numbers)):
+        if parts and number == parts[-1][1] + 1:
+            parts[-1][1] = number
+        else:
+            parts.append([number, number])
+    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in parts)
+
+
+def letter(place: int) -> str:
+    """Return the name of a group: A, B, ... Z, AA, AB, ..."""
+    rest, last = divmod(place, 26)
+    return (letter(rest - 1) if rest else "") + chr(ord("A") + last)
