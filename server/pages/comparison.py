@@ -45,6 +45,7 @@ CHARTS = (
     ("rows", "Dataset X", "Distinct rows."),
 )
 """Metric, name and one sentence of each chart, drawn by web/static/comparison.js."""
+OF_MANY_WORLDS = MetricLabels("Unsafe moves", "Return", "", "", has_optimum=True)
 METRICS = frozenset(metric for metric, _, _ in CHARTS)
 
 RunsText = Annotated[list[str] | None, Query()]
@@ -131,10 +132,8 @@ def choose(db: Database, text: str, wanted: Mapping[str, str]) -> Choice:
         what = str(absent[0]) if len(absent) == 1 else f"of these numbers: {ranges(absent)}"
         return Choice(text, error=f"There is no run {what}.", status=404)
     fields = {run.id: _fields(run) for run in found}
-    filters = [
-        Filter(name, sorted({fields[run.id][name] for run in found}), wanted.get(name, ""))
-        for name in FILTERS
-    ]
+    values = {name: sorted({field[name] for field in fields.values()}) for name in FILTERS}
+    filters = [Filter(name, values[name], wanted.get(name, "")) for name in FILTERS]
     left = [run for run in found if all(one.chosen in ("", fields[run.id][one.name]) for one in filters)]
     short = ranges(numbers).replace(" ", "") if numbers == sorted(numbers) else ",".join(map(str, numbers))
     return Choice(short, found, left, filters, damaged=damaged)
@@ -175,9 +174,7 @@ def _content(db: Database, choice: Choice, by: Any) -> ComparisonPage:
     groups = grouped(db, choice.left)
     chosen = [(one.name, one.chosen) for one in choice.filters if one.chosen]
     labels = {metric_labels(run.legend) for run in choice.left}
-    names = (
-        labels.pop() if len(labels) == 1 else MetricLabels("Unsafe moves", "Return", "", "", has_optimum=True)
-    )
+    names = labels.pop() if len(labels) == 1 else OF_MANY_WORLDS
     return ComparisonPage(
         choice=choice,
         by=by,

@@ -67,7 +67,7 @@ class Group:
         return Mean(sum(values) / len(values), *(interval or (None, None)))
 
     def optimal(self) -> Mean:
-        """Return the proportion of runs with an optimal policy (`evaluation.statistics.proportion_interval`)."""
+        """Return the proportion of optimal policies (`evaluation.statistics.proportion_interval`)."""
         from parenting.evaluation.statistics import proportion_interval
 
         hits = sum(one.run.optimal for one in self.runs)
@@ -75,7 +75,7 @@ class Group:
 
 
 def found_runs(db: Database, numbers: Sequence[int]) -> tuple[list[Run], list[int], list[int]]:
-    """Return the runs of these numbers, in this order; the numbers that there are not; those of damaged runs."""
+    """Return the runs of these numbers, in this order; numbers of no run; those of damaged runs."""
     with db.read() as session:
         there = {run.id: run for run in session.scalars(select(Run).where(Run.id.in_(numbers)))}
     damaged = [number for number in numbers if number in there and damage(there[number]) is not None]
@@ -103,7 +103,7 @@ def settings(run: Run) -> dict[str, Any]:
         "world": run.world,
         "level": run.level,
         "level's text": run.level_text,
-        "parent": run.parent,
+        "parent": run.script or run.parent,
         "weights": run.weights and run.weights[:SHORT],
         **run.config,
     }
