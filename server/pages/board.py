@@ -34,8 +34,7 @@ LAYERS = (
     ("entries", "Entries of X"),
 )
 """The layers of which one is shaded, by the names of the API."""
-NUMBERS = (("up", "Up"), ("down", "Down"), ("left", "Left"), ("right", "Right"), *LAYERS[1:])
-"""The numbers of a cell."""
+WAYS = (("up", "Up"), ("down", "Down"), ("left", "Left"), ("right", "Right"))
 NOTHING = "Nothing is stored yet: a worker stores what is seen here as the agent lives."
 
 
@@ -44,8 +43,8 @@ class BoardPanel:
     """The content of web/templates/_board.html."""
 
     drawn: Board
-    layers: Sequence[tuple[str, str]] = LAYERS
-    numbers: Sequence[tuple[str, str]] = NUMBERS
+    layers: Sequence[tuple[str, str]]
+    numbers: Sequence[tuple[str, str]]
     said: str = NOTHING
 
 
@@ -63,9 +62,10 @@ def rest_board(run_id: RunId, rest: int, db: Db) -> Response:
     return page("_rest.html", drawn=_drawn(frame))
 
 
-def board_panel(run: Run) -> BoardPanel:
-    """Return the panel of a run with its level as an episode begins."""
-    return BoardPanel(_drawn(begin(run)))
+def board_panel(run: Run, harm: str) -> BoardPanel:
+    """Return the panel of a run with its level as an episode begins; `harm` names its unsafe moves."""
+    layers = [(name, harm if name == "deaths" else text) for name, text in LAYERS]
+    return BoardPanel(_drawn(begin(run)), layers, [*WAYS, *layers[1:]])
 
 
 def begin(run: Run) -> Frame:

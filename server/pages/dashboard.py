@@ -128,8 +128,10 @@ def dashboard_page(
     run = runs.get_run(db, run_id)
     state, focus = run_schema(db, run_id).state, next(iter(errors), None)
     context = DashboardPage(run, parent_title(run), state, describe_start(run), errors, focus)
-    parts = {**vars(context), **vars(_numbers(db, run)), **vars(_operator(db, run, typed))}
-    return page("dashboard.html", 422 if errors else 200, board=board_panel(run), **parts)
+    numbers = _numbers(db, run)
+    parts = {**vars(context), **vars(numbers), **vars(_operator(db, run, typed))}
+    board = board_panel(run, numbers.names.harm)
+    return page("dashboard.html", 422 if errors else 200, board=board, **parts)
 
 
 def _numbers(db: Database, run: Run) -> Numbers:

@@ -1,0 +1,123 @@
+"""The board of the dashboard: arrows, layers, a cell's numbers, time, the rest of the state, and episodes."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from parenting.drawing.policy import policy_arrows
+from parenting.server.board import store
+from parenting.server.board.columns import unpack
+from parenting.server.db import Database
+from parenting.server.new_run import NewRun, start
+from parenting.server.queue.worker_side import watch
+from parenting.server.runs import claim, report_progress
+from parenting.server.session import RunSession
+from parenting.server.work.jobs import Jobs
+from tests.pages.browser_tabs import BrowserTabs
+from tests.pages.test_access import light_and_dark
+
+
+@pytest.fixture
+def life(db: Database) -> RunSession:
+    new = NewRun(world="side-effects", parent="scripted", seed=3, config={"pretrain": False})
+    run = start(db, new)
+    (mine,) = claim(db, "test")
+    return RunSession(db, mine, run, lambda: None)
+
+
+def live(life: RunSession, ticks: int) -> None:
+    number = life.claim.run_id
+    for _ in range(ticks):
+        life.tick(watch(life.db, [number])[number])
+    life.save()
+    report_progress(life.db, life.claim, tick=life.last_tick)
+
+
+def drawn(page: Page) -> set[str]:
+    """The arrows on the board."""
+    paths = page.locator("#seen-arrows path").evaluate_all("all => all.map(path => path.getAttribute('d'))")
+    return set(re.findall("M[^z]*z", "".join(paths)))
+
+
+def stored(life: RunSession, tick: int, rest: int) -> set[str]:
+    """The arrows of a stored policy as they are drawn elsewhere."""
+    row, states = (
+        store.read_snapshot(life.db, life.claim.run_id, tick),
+        store.read_states(life.db, life.claim.run_id),
+    )
+    assert row is not None
+    assert states is not None
+    policy = unpack(row.blob, row.states)["policy"]
+    rows = {
+        (r, c): [share / 255 for share in policy[4 * at : 4 * at + 4]]
+        for at, (r, c, of) in enumerate(states[0]["cells"])
+        if of == rest
+    }
+    arrows = policy_arrows(rows)
+    return set(re.findall("M[^z]*z", arrows.likely + arrows.less))
+
+
+def test_the_board_shows_the_stored_policy_and_follows_it(tabs: BrowserTabs, life: RunSession) -> None:
+    live(life, 12)
+    page = tabs.open("/runs/1")
+    now = page.locator("#seen-at")
+    expect(now).to_contain_text("Tick 12, stage 1")
+    assert drawn(page) == stored(life, 12, 0) != set()
+    live(life, 6)
+    expect(now).to_contain_text("Tick 18")
+    assert drawn(page) == stored(life, 18, 0)
+    slider = page.get_by_role("slider", name="Time")
+    slider.press("Home")
+    expect(now).to_contain_text("Tick 1,")
+    live(life, 3)
+    expect(slider).to_have_attribute("max", str(len(store.list_snapshots(life.db, 1)) - 1))
+    expect(now).to_contain_text("Tick 1,")
+    page.get_by_role("button", name="Newest").click()
+    expect(now).to_contain_text("Tick 21")
+    before = drawn(page)
+    page.get_by_label("Box").select_option(index=1)
+    expect(page.locator("#seen-over .board:first-child .box")).to_have_attribute(
+        "transform", re.compile("translate")
+    )
+    assert drawn(page) == stored(life, 21, 1) != before
+
+
+def test_a_cell_is_told_by_keys_and_by_pointer_for_everybody(tabs: BrowserTabs, life: RunSession) -> None:
+    live(life, 20)
+    page = tabs.open("/runs/1", viewport={"width": 390, "height": 844})
+    expect(page.locator("#seen-at")).to_contain_text("Tick 20")
+    page.get_by_label("Visits").check()
+    expect(page.locator("#seen-legend")).to_contain_text(re.compile(r"Shade: Visits, up to \d+"))
+    expect(page.locator("#seen-layer path").first).to_be_attached()
+    board = page.get_by_role("application", name="Board: arrow keys go from cell to cell")
+    board.focus()
+    page.keyboard.press("Control+Home")
+    for key in ("ArrowRight", "ArrowUp", "ArrowDown"):
+        page.keyboard.press(key)
+    said = page.locator("#seen-said")
+    expect(said).to_have_text(re.compile(r"Row 3, column 3: .*(Up \d+\s%, Down|never decides)"))
+    box = board.bounding_box()
+    assert box is not None
+    page.get_by_label("Arrows of the policy").uncheck()
+    expect(page.locator("#seen-arrows path")).to_have_count(0)
+    board.click(position={"x": box["width"] / 2, "y": box["height"] / 2})
+    expect(said).not_to_have_text(re.compile("Row 3, column 3"))
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert light_and_dark(page) == []
+
+
+def test_episodes_are_shown_again_once_there_is_a_worker(tabs: BrowserTabs, life: RunSession) -> None:
+    live(life, 30)
+    page = tabs.open("/runs/1")
+    page.get_by_role("button", name="Episodes of its life").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog.locator(".state")).to_contain_text("No worker is running")
+    some = Jobs(life.db, 5.0, lambda: None)
+    some.begin("late")
+    some.close(60)
+    expect(dialog.locator(".walked .board")).to_be_visible()
+    expect(dialog.get_by_label("Episode", exact=True)).to_have_value(re.compile(r"\d+"))
+    expect(dialog).to_contain_text(re.compile(r"Episode \d+, from tick \d+ to \d+"))
