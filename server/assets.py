@@ -31,6 +31,7 @@ SHEETS = {
     "dashboard.css": (*EVERY_PAGE, "board.css", "forms.css", "dashboard.css", "seen.css"),
     "comparison.css": (*EVERY_PAGE, "forms.css", "dashboard.css", "comparison.css"),
     "start.css": (*EVERY_PAGE, "forms.css", "start.css"),
+    "settings.css": (*EVERY_PAGE, "forms.css", "settings.css"),
     "end.css": (
         *EVERY_PAGE,
         "forms.css",

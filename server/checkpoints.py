@@ -6,21 +6,25 @@ A large one is written in parts (`server.checkpoint_parts`), and exists once its
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import delete, select
+from sqlalchemy import ColumnElement, delete, func, or_, select
 from sqlalchemy.orm import Session
 
 from parenting.server import checkpoint_parts
 from parenting.server.checkpoint_parts import join_parts, sweep_parts, write_parts
 from parenting.server.damage import sound
 from parenting.server.db import Database
-from parenting.server.runs import Claim, held
-from parenting.server.tables import Checkpoint
+from parenting.server.runs import CLAIM_SECONDS, Claim, held
+from parenting.server.statuses import RunStatus
+from parenting.server.store.clock import is_over
+from parenting.server.tables import Checkpoint, CheckpointPart, Run
 
 KEPT = 2
-"""Checkpoints kept of a run: the last, and one before it in case the last is damaged."""
+"""Checkpoints kept of a run: the last, and one before it in case the last is damaged. Of a run that was
+stopped or has finished the last alone is kept (`thin`); one that has failed keeps both, since it may have
+failed for what is in the last."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,54 @@ def _store(db: Database, mine: Claim, row: Checkpoint) -> None:
         )
         kept = session.scalars(newest).all()
         session.execute(delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.id.not_in(kept)))
+
+
+def ended_with_more(db: Database, seconds: float = CLAIM_SECONDS, but: Collection[int] = ()) -> int | None:
+    """Return a run that was stopped or has finished, has several checkpoints, and is held by no worker.
+
+    `but` names runs to leave alone.
+    """
+    several = select(Checkpoint.run_id).join(Run, Run.id == Checkpoint.run_id).where(*_ended(seconds))
+    several = several.where(Run.id.not_in(but)).group_by(Checkpoint.run_id).having(func.count() > 1).limit(1)
+    with db.read() as session:
+        return session.scalar(several, db.mark(session).bound())
+
+
+def thin(db: Database, run_id: int, seconds: float = CLAIM_SECONDS) -> bool:
+    """Delete a piece of what is older than the last checkpoint of such a run; return whether there was one.
+
+    Its parts go first, one by one, so that whoever goes on finds the rest. Where the last checkpoint is seen
+    to be damaged, the ones before it are kept.
+    """
+    with db.write(durable=False) as session:
+        mine = select(Run.id).where(Run.id == run_id, *_ended(seconds)).with_for_update()
+        if session.scalar(mine, db.mark(session).bound()) is None:
+            return False
+        rows = select(Checkpoint.id, Checkpoint.parcel).where(Checkpoint.run_id == run_id)
+        found = session.execute(rows.order_by(Checkpoint.id.desc())).all()
+        if len(found) < 2 or not _whole(session, found[0].id):
+            return False
+        oldest = found[-1]
+        part = session.scalar(
+            select(CheckpointPart.id).where(CheckpointPart.parcel == oldest.parcel).limit(1)
+        )
+        if part is None:
+            session.execute(delete(Checkpoint).where(Checkpoint.id == oldest.id))
+        else:
+            session.execute(delete(CheckpointPart).where(CheckpointPart.id == part))
+        return True
+
+
+def _ended(seconds: float) -> tuple[ColumnElement[bool], ...]:
+    silent = is_over(Run.claim_epoch, Run.claim_mark, Run.claim_mark + seconds)
+    ended = Run.status.in_((RunStatus.STOPPED, RunStatus.FINISHED))
+    return ended, Run.deleting.is_(None), or_(Run.worker.is_(None), silent)
+
+
+def _whole(session: Session, checkpoint_id: int) -> bool:
+    """Return whether a checkpoint of one piece has the bytes that were written; one of parts is trusted."""
+    row = session.get_one(Checkpoint, checkpoint_id)
+    return row.parcel is not None or _stored(session, row).intact
 
 
 def load_checkpoints(db: Database, run_id: int) -> Sequence[StoredCheckpoint]:

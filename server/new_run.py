@@ -28,7 +28,7 @@ from parenting.envs.people_text import LONGEST, plain, read_name
 from parenting.parents.grammar import SCRIPTED, read_script
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
-from parenting.server.runs import create_run
+from parenting.server.identity import unused_number
 from parenting.server.tables import Run
 from parenting.server.weights import put as put_weights
 from parenting.server.whole import WHOLE, whole
@@ -146,7 +146,12 @@ def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
     """
     columns = plan(new, folder)
     file: Path | None = columns.pop("weights")
-    return create_run(db, **columns, weights=put_weights(db, file) if file else None)
+    columns["weights"] = put_weights(db, file) if file else None
+    with db.write() as session:
+        run = Run(id=unused_number(session, Run), created=db.clock(), **columns)
+        session.add(run)
+        session.flush()
+        return run
 
 
 def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Verbs on runs: the operator's (create, pause, stop) and the worker's (claim, report_progress, finish).
+"""Verbs on runs: the operator's (pause, resume, stop) and the worker's (claim, report_progress, finish).
 
 Exactly one worker raises a run: `claim` increments the run's fencing token, and every later write of a worker
 checks the token inside its own transaction (`held`). A worker that slept past its claim therefore cannot
@@ -19,7 +19,6 @@ from parenting.server.damage import readable, sound
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.failures import fail_if_damaged, note_failure, resume_in
-from parenting.server.identity import unused_number
 from parenting.server.queue.queries import withdraw_in
 from parenting.server.statuses import LIVING, OVER, RESUMABLE, RunStatus
 from parenting.server.store.clock import is_over
@@ -39,25 +38,13 @@ class Claim:
     fencing_token: int
 
 
-_LOCKED = select(Run.id).where(Run.id == bindparam("run_id")).with_for_update()
+_LOCKED = select(Run.id).where(Run.id == bindparam("run_id"), Run.deleting.is_(None)).with_for_update()
 _MINE = (
     select(Run.status)
     .where(Run.id == bindparam("run_id"), Run.worker == bindparam("worker"))
     .where(Run.fencing_token == bindparam("fencing_token"))
     .with_for_update()
 )
-
-
-def create_run(db: Database, **fields: Any) -> Run:
-    """Add a run.
-
-    The fields are those of `tables.Run`; `server.new_run` checks and fills them in from a form.
-    """
-    with db.write() as session:
-        run = Run(id=unused_number(session, Run), created=db.clock(), **fields)
-        session.add(run)
-        session.flush()
-        return run
 
 
 def list_runs(db: Database, limit: int = 200) -> Sequence[Run]:
@@ -106,7 +93,7 @@ def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None 
                 mark("This run is {now}; it cannot become {status}."), now=run.status, status=status
             )
         if run.status != status:
-            _become(session, run, status, reason)
+            become(session, run, status, reason)
         return run
 
 
@@ -233,7 +220,7 @@ def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str
     with db.write() as session:
         run = held(session, mine)
         if sound(run, "status") not in OVER:
-            _become(session, run, status, reason)
+            become(session, run, status, reason)
             run.error = error
             if status is RunStatus.FAILED:
                 note_failure(session, db, run, reason)
@@ -241,23 +228,23 @@ def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str
 
 
 def find(session: Session, run_id: int) -> Run:
-    """Return one run, in a transaction that is already open; raises NotFound."""
-    run = session.get(Run, run_id)
-    if run is None:
-        raise NotFound(mark("There is no run {run}."), run=run_id)
-    return run
+    """Return one run, in an open transaction; raises NotFound, also where it is being deleted."""
+    return _kept(session.get(Run, run_id), run_id)
 
 
 def hold(session: Session, run_id: int) -> Run:
-    """Return one run, its row locked until the transaction ends (SQLite locks the whole file anyway)."""
-    run = session.get(Run, run_id, with_for_update=True)
-    if run is None:
+    """Return what `find` does, locked until the transaction ends (SQLite locks the whole file anyway)."""
+    return _kept(session.get(Run, run_id, with_for_update=True), run_id)
+
+
+def _kept(run: Run | None, run_id: int) -> Run:
+    if run is None or sound(run, "deleting") is not None:
         raise NotFound(mark("There is no run {run}."), run=run_id)
     return run
 
 
 def lock(session: Session, run_id: int) -> None:
-    """Lock a run without reading it."""
+    """Lock a run without reading it; raises NotFound, also where it is being deleted."""
     if session.execute(_LOCKED, {"run_id": run_id}).scalar() is None:
         raise NotFound(mark("There is no run {run}."), run=run_id)
 
@@ -276,8 +263,15 @@ def living(session: Session, run_id: int) -> Run:
 
 
 def held(session: Session, mine: Claim) -> Run:
-    """Return the run of a claim, locked, if the claim still holds. Every write of a worker begins here."""
-    run = hold(session, mine.run_id)
+    """Return the run of a claim, locked, if the claim still holds. Every write of a worker begins here.
+
+    Raises:
+        LostClaimError: another worker trains this run now, or it was deleted.
+    """
+    try:
+        run = hold(session, mine.run_id)
+    except NotFound:
+        raise LostClaimError(f"Run {mine.run_id} was deleted.") from None
     worker, token = sound(run, "worker"), sound(run, "fencing_token")
     if (worker, token) != (mine.worker, mine.fencing_token):
         raise LostClaimError(
@@ -293,7 +287,8 @@ def held_status(session: Session, mine: Claim) -> RunStatus:
     return held(session, mine).status if status is None else status
 
 
-def _become(session: Session, run: Run, status: RunStatus, reason: str | None) -> None:
+def become(session: Session, run: Run, status: RunStatus, reason: str | None) -> None:
+    """Give a run that is locked another status; the end of one withdraws its open queries."""
     run.status, run.reason = status, reason
     if status in OVER:
         run.waiting = None

@@ -67,6 +67,14 @@ class RunSchema(Schema):
     """The UUID of the database that it is in."""
     created: datetime
     name: str | None
+    description: str | None
+    """What its researchers keep with it: at most 2000 characters."""
+    tags: list[str]
+    """Words by which its researchers find it."""
+    archived: datetime | None
+    """Since when the list on the first page leaves it out; null: it does not."""
+    deleting: datetime | None
+    """When its deletion was confirmed: it is not there but in lists; null: nobody deletes it."""
     world: str
     level: str
     preset: str
@@ -86,6 +94,10 @@ class RunSchema(Schema):
     """guide: a question in words also tells how long a safe way is, which gives its answer away."""
     remarks: bool
     """True if the page tells the parent of hasty and contradictory answers."""
+    finish: str
+    """What ends it: optimal (its argmax policy is), goal:N (it has heard N answers), stages:T (stage T is
+    over), or never.
+    """
     status: RunStatus
     reason: str | None
     """The reason why it is over, in a sentence."""

@@ -19,7 +19,7 @@ from fastapi.sse import ServerSentEvent
 
 from parenting.server.admission import Admission
 from parenting.server.db import Database
-from parenting.server.errors import ServerError, StoreError, TooManyStreamsError
+from parenting.server.errors import NotFound, ServerError, StoreError, TooManyStreamsError
 from parenting.server.notify import Notifier
 from parenting.server.queue.leases import waiting
 from parenting.server.queue.presence import held
@@ -49,6 +49,7 @@ class Subscription:
     leases: list[dict[str, str]] = field(default_factory=list)
     changed: asyncio.Event = field(default_factory=asyncio.Event)
     task: asyncio.Task[None] | None = None
+    gone: bool = False  # the run was deleted
 
 
 class Streams:
@@ -91,7 +92,7 @@ class Streams:
             asked: Any = ...
             leases: Any = []
             ready = 0.0
-            while not self.closed:
+            while not self.closed and not subscription.gone:
                 changed = subscription.changed
                 if subscription.run and subscription.question != asked:
                     asked = subscription.question
@@ -166,6 +167,10 @@ class Streams:
             ends_in: float | None = None
             try:
                 now, ends_in = await self.admission.read(look)
+            except NotFound:
+                subscription.gone = True  # its streams end, and whoever opens one again gets 404
+                _tell(subscription)
+                return
             except ServerError:  # busy: the next look will tell
                 now = subscription.run, subscription.question, subscription.leases
             if now != (subscription.run, subscription.question, subscription.leases):

@@ -1,4 +1,4 @@
-"""The tables: identity, runs, queries, answers, events, metrics, checkpoints, moves, workers, jobs, weights.
+"""The tables: runs, queries, answers, events, metrics, checkpoints, moves, workers, jobs, and others.
 
 The database enforces the invariants: one query for each run and tick, one standing answer for each query,
 known words only. Times are UTC. JSON is readable by eye; `Query.clips` describes the shape of a clip.
@@ -27,10 +27,12 @@ from parenting.server.statuses import (
     Waiting,
 )
 from parenting.server.table_root import Table, one_of, unique_where
+from parenting.server.tombstone_table import Tombstone
 from parenting.server.triggers import keep_deleted_numbers
 from parenting.server.why_tables import Effect, Reason
+from parenting.server.worker_table import Worker
 
-__all__ = ["BoardSnapshot", "BoardStates", "Effect", "Moves", "Reason", "Table"]
+__all__ = ["BoardSnapshot", "BoardStates", "Effect", "Moves", "Reason", "Table", "Tombstone", "Worker"]
 
 KINDS = ("guidance", "preference")
 CHOICES = ("left", "right", "either", "neither")
@@ -73,6 +75,10 @@ class Run(Table):
     public_id: Mapped[str] = _public_id()
     created: Mapped[datetime]
     name: Mapped[str | None]
+    description: Mapped[str | None]
+    tags: Mapped[str] = mapped_column(default="", server_default=text("''"))  # ",pilot,group a,"
+    archived: Mapped[datetime | None]  # since when the list leaves it out
+    deleting: Mapped[datetime | None]  # when its deletion was confirmed (`server.deletion`)
     world: Mapped[str]
     level: Mapped[str]
     level_text: Mapped[str]  # the level's file as it was at the start, header included
@@ -89,6 +95,7 @@ class Run(Table):
     )
     words: Mapped[str] = mapped_column(OneOf(("plain", "guide")), default="plain", server_default="plain")
     remarks: Mapped[bool] = mapped_column(default=True, server_default=text("false"))  # on hasty answers
+    finish: Mapped[str] = mapped_column(default="never", server_default=text("'never'"))  # `server.finishes`
     # where it is
     status: Mapped[RunStatus] = mapped_column(default=RunStatus.ACTIVE)
     reason: Mapped[str | None]
@@ -179,6 +186,7 @@ class Answer(Table):
         unique_where("uq_answer_standing", "standing", "query_id"),
         unique_where("uq_answer_first", "supersedes IS NULL", "query_id", "client_id"),
         Index(None, "query_id"),
+        Index(None, "supersedes"),  # without it, deleting an answer searches all of them
         Index(None, "run_id", "applied_tick", unique=True),  # at most one answer is heard in a tick
     )
 
@@ -223,18 +231,6 @@ class Metric(Table):
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
     tick: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     values: Mapped[dict[str, Any]]
-
-
-class Worker(Table):
-    """A worker process that is alive; it deletes its row when it ends in order."""
-
-    __tablename__ = "worker"
-
-    name: Mapped[str] = mapped_column(primary_key=True)
-    started: Mapped[datetime]
-    heartbeat: Mapped[datetime]  # by the wall clock, for display
-    epoch: Mapped[str | None]  # by the clock that decides (`server.store.clock`)
-    mark: Mapped[float | None]
 
 
 class Checkpoint(Table):

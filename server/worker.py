@@ -31,6 +31,7 @@ from parenting.server.queue import worker_side
 from parenting.server.queue.worker_side import Watch
 from parenting.server.settings import Settings
 from parenting.server.store.relay import Relay
+from parenting.server.work.chores import Chores
 from parenting.server.work.held import AT_NEWS, NOW, HeldRuns
 from parenting.server.work.jobs import Jobs
 from parenting.server.work.patience import Patience
@@ -70,6 +71,7 @@ class Worker:
         self.told = threading.Event()
         self.patience, self.turns = Patience(), Turns(self.notifier.wake, beside_after)
         self.jobs = Jobs(db, settings.claim_seconds, self.notifier.wake)
+        self.chores = Chores(db, settings.claim_seconds)
         self.held = HeldRuns(db, self.patience, self.web_notifier.notify)
         self.claims, self.sessions = self.held.claims, self.held.sessions
         self._found: dict[int, Watch] = {}
@@ -116,6 +118,7 @@ class Worker:
         ticked = self._round()
         self._sign(at_once=self.patience.doubts)
         self._claim()
+        self.chores.go_on()
         if not ticked:
             self.notifier.wait(self._soonest)
 
@@ -195,6 +198,7 @@ class Worker:
             return  # nobody has committed anything
         self._found, self._committed = found, True
         self.jobs.news()
+        self.chores.news()
         for run_id, seen in found.items():
             if self._seen.get(run_id) != seen:
                 self._seen[run_id], self._due[run_id] = seen, NOW

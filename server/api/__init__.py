@@ -8,6 +8,7 @@ from parenting.server.api import (
     board,
     episodes,
     jobs,
+    keeping,
     operator,
     page_errors,
     presence,
@@ -18,5 +19,6 @@ from parenting.server.api import (
 )
 
 router = APIRouter(prefix="/api/v1")
-for part in (runs, episodes, board, operator, queries, presence, revisions, jobs, streams, page_errors):
+PARTS = (runs, keeping, episodes, board, operator, queries, presence, revisions, jobs, streams, page_errors)
+for part in PARTS:
     router.include_router(part.router)

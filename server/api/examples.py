@@ -10,6 +10,7 @@ from parenting.agent.config import compose
 from parenting.drawing.surroundings import surroundings
 from parenting.envs import registry
 from parenting.server.api.board_examples import BOARD, EPISODE, NUMBERS
+from parenting.server.api.kept_examples import kept
 from parenting.server.api.why_example import WHY
 
 WORLD = "unsafe-exploration"
@@ -59,6 +60,10 @@ RUN: dict[str, Any] = {
     "database": DATABASE,
     "created": NOON,
     "name": "first",
+    "description": None,
+    "tags": ["pilot"],
+    "archived": None,
+    "deleting": None,
     "world": WORLD,
     "level": LEVEL.name,
     "preset": "conservative",
@@ -71,6 +76,7 @@ RUN: dict[str, Any] = {
     "practice": "offered",
     "words": "plain",
     "remarks": True,
+    "finish": "never",
     "status": "active",
     "reason": None,
     "tick": 5,
@@ -279,5 +285,6 @@ SHOWN = {
     "follow_run": Shown(STREAM),
     "export_run": Shown(json.dumps(EXPORTED) + "\n"),
     "download_policy": Shown("the bytes of a file of safetensors"),
+    **{name: Shown(*shown) for name, shown in kept(RUN).items()},
 }
 """By operationId."""

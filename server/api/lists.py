@@ -9,9 +9,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from parenting.server import tables
 from parenting.server.damage import damage
-from parenting.server.new_run import LARGEST_INT
+from parenting.server.keeping import Tag
+from parenting.server.new_run import LARGEST_INT, Name
 from parenting.server.notes import Logged
 from parenting.server.reads.curves import FEWEST, POINTS, Axis
+from parenting.server.reads.listing import Order
 from parenting.server.schemas import (
     AskedSchema,
     DamagedMetricSchema,
@@ -75,9 +77,14 @@ class RunPart(Part):
     """The requested part of the runs."""
 
     before: Annotated[int, Field(ge=1, le=LARGEST_INT)] | None = Field(
-        None, description="Only runs with smaller ids; the `next` of the page before."
+        None, description="Only runs behind this one: with smaller ids. The `next` of the page before."
     )
     limit: int = Field(50, ge=1, le=200, description="At most this many rows.")
+    q: str = Field("", max_length=200, description="Only runs with each of these words, or of this number.")
+    tag: Tag | None = Field(None, description="Only runs with this tag.")
+    world: Name | None = Field(None, description="Only runs in this world.")
+    archived: bool | None = Field(None, description="Only archived ones, or only others.")
+    sort: Order = Field(Order.NEWEST, description="Their order; with another one `before` goes by it.")
 
 
 class AskedPart(Part):

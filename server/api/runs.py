@@ -24,6 +24,7 @@ from parenting.server.identity import database_id
 from parenting.server.new_run import NewRun, start
 from parenting.server.reads import pagination
 from parenting.server.reads.curves import read_curves
+from parenting.server.reads.listing import Wanted, find_runs
 from parenting.server.reads.schemas import metric_schemas, run_schema, run_schemas
 from parenting.server.schemas import CurveSchema, CurvesSchema, RunSchema
 
@@ -32,8 +33,12 @@ router = admitted_router(tags=["runs"])
 
 @router.get("/runs", summary="List the runs", responses=read_responses())
 def list_runs(db: Db, part: Annotated[RunPart, Query()]) -> RunRows:
-    """List all runs, newest first. Send the `next` of a page as `before` to get the following page."""
-    page = pagination.runs_before(db, part.before, part.limit)
+    """List the runs, newest first. Send the `next` of a page as `before` to get the following page.
+
+    Runs are searched by words, tag and world; archived ones are listed unless they are left out.
+    """
+    wanted = Wanted(part.q, part.tag, part.world, part.archived, part.sort)
+    page = find_runs(db, wanted, part.before, part.limit)
     return RunRows(rows=run_schemas(db, page.rows), next=page.next, database=database_id(db))
 
 

@@ -16,6 +16,7 @@ from parenting.server.pages.parent import router as parent
 from parenting.server.pages.practice import router as practice
 from parenting.server.pages.render import error_page
 from parenting.server.pages.revisions import router as revisions
+from parenting.server.pages.settings import router as settings
 from parenting.server.pages.skips import router as skips
 from parenting.server.pages.start import router as start
 from parenting.server.pages.walk import router as walk
@@ -38,4 +39,5 @@ router.include_router(dashboard)
 router.include_router(comparison)
 router.include_router(controls)
 router.include_router(history)
+router.include_router(settings)
 router.include_router(docs)

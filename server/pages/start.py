@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
-from fastapi import Depends, Query, Request, Response
+from fastapi import Depends, Request, Response
 
 from parenting.envs.levels.spec import WorldSpec
 from parenting.envs.registry import WORLDS
@@ -16,16 +16,9 @@ from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.new_run import LARGEST_INT, plan, read_form, start
-from parenting.server.pages.labels import metric_labels
 from parenting.server.pages.options import OPTIONS, Option
 from parenting.server.pages.render import page, redirect
-from parenting.server.pages.texts import run_title
-from parenting.server.reads.metrics import latest_metrics
-from parenting.server.reads.pagination import runs_before
-from parenting.server.reads.schemas import run_schemas
-from parenting.server.schemas import DamagedSchema
-from parenting.server.statuses import STATE_LABELS, RunState
-from parenting.server.tables import Metric, Run
+from parenting.server.pages.run_list import Find, FindRuns, run_list
 
 router = admitted_router(include_in_schema=False)
 
@@ -36,11 +29,6 @@ PRESET_WORDS = {
     "direct": "never asks before a move; learns from clips alone",
 }
 """The meaning of each preset for the parent, in a line; the form begins with the first."""
-
-PAGE = 20
-"""Runs on a page."""
-
-Before = Annotated[int | None, Query(ge=1, le=LARGEST_INT)]
 
 NUMBER_ERRORS = {
     "seed": f"A seed is a whole number from 0 to {LARGEST_INT}.",
@@ -61,25 +49,11 @@ EMPTY_FORM = {
 """The form before anything was typed."""
 
 
-class RunRow(NamedTuple):
-    """A run in the list."""
-
-    run: Run
-    title: str
-    state: str
-    harm: str  # what `deaths` are called
-    deaths: float | int | None
-    damaged: str | None = None  # what of the run cannot be read; all else but its number is empty then
-
-
 @dataclass(frozen=True)
 class StartPage:
-    """The content of web/templates/start.html."""
+    """The content of web/templates/start.html beside the list."""
 
-    runs: Sequence[RunRow]  # one page of them
     fresh: bool  # a new installation: nothing was started or typed yet
-    older: int | None  # the id before which the next page begins; None on the last one
-    before: int | None  # the same of this page; None on the first one
     form: Mapping[str, str]  # the text of every field
     errors: Mapping[str, str]  # a sentence for each wrong field
     more_open: bool  # whether one of the settings below the fold was set or is wrong
@@ -88,7 +62,6 @@ class StartPage:
     worlds: Collection[WorldSpec] = tuple(WORLDS.values())
     options: Sequence[Option] = OPTIONS
     presets: Mapping[str, str] = field(default_factory=lambda: PRESET_WORDS)
-    state_labels: Mapping[RunState, str] = field(default_factory=lambda: STATE_LABELS)
 
 
 async def text_fields(request: Request) -> dict[str, str]:
@@ -100,9 +73,9 @@ FormFields = Annotated[dict[str, str], Depends(text_fields)]
 
 
 @router.get("/")
-def index(db: Db, before: Before = None) -> Response:
-    """The list of runs and an empty form. `before` is a run's id: those that were started before it."""
-    return _page(db, EMPTY_FORM, {}, before)
+def index(db: Db, find: FindRuns) -> Response:
+    """The list of runs and an empty form. `before` is a run's id: those that come behind it in the list."""
+    return _page(db, EMPTY_FORM, {}, find)
 
 
 @router.post("/runs")
@@ -132,35 +105,16 @@ def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
 
 
 def _page(
-    db: Database, form: Mapping[str, str], errors: Mapping[str, str], before: int | None = None
+    db: Database, form: Mapping[str, str], errors: Mapping[str, str], find: Find | None = None
 ) -> Response:
-    listed = runs_before(db, before, PAGE)
+    listed = run_list(db, find or Find())
+    untouched = not (listed.runs or listed.archived or listed.find.narrows or listed.find.before or errors)
     context = StartPage(
-        runs=_rows(db, listed.rows),
-        fresh=not listed.rows and before is None and not errors,
-        older=listed.next,
-        before=before,
+        fresh=untouched,
         form=form,
         errors=errors,
         more_open=any(form[option.field] or option.field in errors for option in OPTIONS),
         focus=next((field for field in EMPTY_FORM if field in errors), None),
         other_errors=[message for field, message in errors.items() if field not in EMPTY_FORM],
     )
-    return page("start.html", 422 if errors else 200, **vars(context))
-
-
-def _rows(db: Database, listed: Sequence[Run]) -> list[RunRow]:
-    """Return the rows of the list."""
-    latest = latest_metrics(db, [run.id for run in listed])
-    return [
-        RunRow(run, f"Run {run.id}", RunState.OVER, "", None, schema.damaged)
-        if isinstance(schema, DamagedSchema)
-        else RunRow(
-            run, run_title(run), schema.state, metric_labels(run.legend).harm, _deaths(latest, run.id)
-        )
-        for run, schema in zip(listed, run_schemas(db, listed), strict=True)
-    ]
-
-
-def _deaths(latest: Mapping[int, Metric], run_id: int) -> float | int | None:
-    return latest[run_id].values.get("deaths") if run_id in latest else None
+    return page("start.html", 422 if errors else 200, **vars(context), **vars(listed))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sqlalchemy import Row, bindparam, select
+from sqlalchemy import Row, and_, bindparam, select
 from sqlalchemy.orm import Session
 
 from parenting.drawing.sentences import mark
@@ -56,9 +56,10 @@ def find_place(session: Session, query: int | str, names: Names = UNSTATED) -> P
     if row is None:
         raise DamagedRowError(UNREADABLE)
     stated(row.database)
-    if _differs(row, names) or (row.query is None and isinstance(query, str)):
+    missing = row.query is None or row.run_public_id is None
+    if _differs(row, names) or (missing and isinstance(query, str)):
         raise ElsewhereError
-    if row.query is None:
+    if missing:
         raise NotFound(mark("There is no question {question}."), question=query)
     return Place(**row._mapping)
 
@@ -70,7 +71,8 @@ def _differs(row: Row[str, int, int, str, str], names: Names) -> bool:
     return any(name is not None and name != here for name, here in zip(stated, found, strict=True))
 
 
-# Statements that every answer needs are built once. They join the only row of `Identity`.
+# Statements that every answer needs are built once. They join the only row of `Identity`, and no run that is
+# being deleted: what is answered there would go with it.
 _PLACE = select(
     Identity.uuid.label("database"),
     Query.id.label("query"),
@@ -78,7 +80,6 @@ _PLACE = select(
     Run.public_id.label("run_public_id"),
     Query.public_id.label("query_public_id"),
 ).select_from(Identity)
-_BY_NUMBER = _PLACE.outerjoin(Query, Query.id == bindparam("query")).outerjoin(Run, Run.id == Query.run_id)
-_BY_PUBLIC_ID = _PLACE.outerjoin(Query, Query.public_id == bindparam("query")).outerjoin(
-    Run, Run.id == Query.run_id
-)
+_ITS_RUN = and_(Run.id == Query.run_id, Run.deleting.is_(None))
+_BY_NUMBER = _PLACE.outerjoin(Query, Query.id == bindparam("query")).outerjoin(Run, _ITS_RUN)
+_BY_PUBLIC_ID = _PLACE.outerjoin(Query, Query.public_id == bindparam("query")).outerjoin(Run, _ITS_RUN)

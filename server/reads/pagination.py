@@ -19,7 +19,7 @@ from parenting.server.errors import NotFound
 from parenting.server.reads.metrics import list_metrics
 from parenting.server.runs import find
 from parenting.server.statuses import QueryStatus
-from parenting.server.tables import Answer, Metric, OperatorEvent, Query, Run
+from parenting.server.tables import Answer, Metric, OperatorEvent, Query
 
 Row = TypeVar("Row")
 
@@ -40,15 +40,6 @@ class Asked:
     answer: Answer | None
 
 
-def runs_before(db: Database, before: int | None, limit: int) -> Page[Run]:
-    """Return the runs with smaller ids than `before`, newest first; None begins with the newest."""
-    rows = select(Run).order_by(Run.id.desc()).limit(limit + 1)
-    if before is not None:
-        rows = rows.where(Run.id < before)
-    with db.read() as session:
-        return _cut(session.scalars(rows).all(), limit, lambda run: run.id)
-
-
 def asked_after(
     db: Database, run_id: int, tick: int, limit: int, status: QueryStatus | None = None
 ) -> Page[Asked]:
@@ -62,7 +53,7 @@ def asked_after(
         rows = rows.where(Query.status == status)
     with db.read() as session:
         find(session, run_id)
-        page = _cut(session.scalars(rows.limit(limit + 1)).all(), limit, lambda query: query.tick)
+        page = cut(session.scalars(rows.limit(limit + 1)).all(), limit, lambda query: query.tick)
         answers = _standing(session, [query.id for query in page.rows])
         return Page([Asked(query, answers.get(query.id)) for query in page.rows], page.next)
 
@@ -90,7 +81,7 @@ def operator_events_after(db: Database, run_id: int, event_id: int, limit: int) 
     rows = select(event).where(event.run_id == run_id, event.id > event_id).order_by(event.id)
     with db.read() as session:
         find(session, run_id)
-        return _cut(session.scalars(rows.limit(limit + 1)).all(), limit, lambda event: event.id)
+        return cut(session.scalars(rows.limit(limit + 1)).all(), limit, lambda event: event.id)
 
 
 def metrics_after(db: Database, run_id: int, tick: int, limit: int) -> Page[Metric]:
@@ -99,10 +90,10 @@ def metrics_after(db: Database, run_id: int, tick: int, limit: int) -> Page[Metr
     Raises:
         NotFound: there is no such run.
     """
-    return _cut(list_metrics(db, run_id, tick, limit + 1), limit, lambda metric: metric.tick)
+    return cut(list_metrics(db, run_id, tick, limit + 1), limit, lambda metric: metric.tick)
 
 
-def _cut(rows: Sequence[Row], limit: int, place: Callable[[Row], int]) -> Page[Row]:
+def cut(rows: Sequence[Row], limit: int, place: Callable[[Row], int]) -> Page[Row]:
     """Return a page of `limit` rows; one row more than that says that another page follows.
 
     A row whose place is damaged gives no cursor: the one before it does. SQLite sorts such rows last.

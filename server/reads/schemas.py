@@ -16,6 +16,7 @@ from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import damage, readable, reading, sound
 from parenting.server.db import Database
 from parenting.server.identity import database_id_in, stated
+from parenting.server.keeping import split_tags
 from parenting.server.queue.queries import Open, open_by_run, open_in
 from parenting.server.reads.pagination import Asked
 from parenting.server.runs import find
@@ -187,12 +188,13 @@ def _answer_schema(answer: Answer) -> AnswerSchema:
 
 
 def _run_schema(run: Run, opened: Open, worker: Sign, database: str) -> RunSchema:
-    made = ("open", "worker", "resting", "state", "database")
+    made = ("open", "worker", "resting", "state", "database", "tags")
     own = {name: getattr(run, name) for name in RunSchema.model_fields if name not in made}
     shown = OpenSchema(guidance=opened.guidance, preference=opened.preference)
     resting = run.status not in OVER and run.goal is not None and run.standing >= run.goal
     state = _run_state(run, opened, resting, worker)
-    return RunSchema(**own, open=shown, worker=worker, resting=resting, state=state, database=database)
+    own |= {"tags": split_tags(run.tags), "database": database}
+    return RunSchema(**own, open=shown, worker=worker, resting=resting, state=state)
 
 
 def _run_state(run: Run, opened: Open, resting: bool, worker: Sign) -> RunState:

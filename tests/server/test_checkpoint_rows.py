@@ -9,14 +9,15 @@ from sqlalchemy import event, select, text, update
 
 from parenting.server import checkpoint_parts
 from parenting.server.checkpoint_parts import sweep_parts
-from parenting.server.checkpoints import load_checkpoints, save_checkpoint
+from parenting.server.checkpoints import ended_with_more, load_checkpoints, save_checkpoint, thin
 from parenting.server.db import Database
 from parenting.server.errors import LostClaimError
 from parenting.server.metrics import write_metrics
 from parenting.server.migrate import downgrade, upgrade
-from parenting.server.runs import Claim, claim, get_run
+from parenting.server.runs import Claim, claim, finish, get_run, let_go
 from parenting.server.session import CHECKPOINT_SPEED, RunSession
 from parenting.server.snapshot import pack
+from parenting.server.statuses import RunStatus
 from parenting.server.store.patience import patience
 from parenting.server.tables import Checkpoint, CheckpointPart, Run
 from tests.server.conftest import Clock
@@ -236,3 +237,34 @@ def test_large_checkpoints_are_seldom_but_bound_what_is_repeated(
     session.save()
     assert session._save_every == pytest.approx(every)
     assert 0 < size < 2 * CHECKPOINT_SPEED, "checkpoints of the built-in levels come every two seconds"
+
+
+def test_a_run_that_ended_keeps_its_last_checkpoint(db: Database, mine: Claim, part_bytes: int) -> None:
+    """Parts of the one before go first, one by one; while a worker has the run, nothing goes."""
+    for tick in (1, 2):
+        save_checkpoint(db, mine, tick, bytes(3 * part_bytes))
+    finish(db, mine, RunStatus.FINISHED, "for the test")
+    assert ended_with_more(db) is None
+    assert not thin(db, mine.run_id)
+    let_go(db, [mine])
+    assert ended_with_more(db) == mine.run_id
+    assert [thin(db, mine.run_id) for _ in range(5)] == [True] * 4 + [False]
+    (last,) = load_checkpoints(db, mine.run_id)
+    assert (last.tick, last.intact, ended_with_more(db)) == (2, True, None)
+    assert len(parts(db)) == 3
+
+
+def test_a_failed_run_keeps_both_and_a_damaged_last_checkpoint_is_not_relied_on(
+    db: Database, mine: Claim
+) -> None:
+    for tick in (1, 2):
+        save_checkpoint(db, mine, tick, b"state %d" % tick)
+    finish(db, mine, RunStatus.FAILED, "for the test")
+    let_go(db, [mine])
+    assert (ended_with_more(db), thin(db, mine.run_id)) == (None, False)
+    with db.write() as session:
+        session.execute(update(Run).values(status=RunStatus.STOPPED))
+        session.execute(update(Checkpoint).where(Checkpoint.tick == 2).values(blob=b"damaged"))
+    assert (ended_with_more(db), thin(db, mine.run_id)) == (mine.run_id, False)
+    assert ended_with_more(db, but=[mine.run_id]) is None
+    assert [kept.tick for kept in load_checkpoints(db, mine.run_id)] == [2, 1]

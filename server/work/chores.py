@@ -1,0 +1,65 @@
+"""What a worker tidies up beside its runs: rows of deleted runs, and older checkpoints of ended ones.
+
+A chore is done in pieces, each a short transaction, between the rounds of the worker's loop. Several workers
+may do the same one: a piece that is gone already is passed over.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+
+import structlog
+
+from parenting.server import checkpoints, deletion
+from parenting.server.checkpoint_parts import LONGEST_REST, REST
+from parenting.server.db import Database
+
+log = structlog.get_logger()
+
+LOOK_SECONDS = 0.5
+"""Seconds between two looks for a chore, at the least."""
+
+
+class Chores:
+    """The chores of a worker: one at a time."""
+
+    def __init__(self, db: Database, seconds: float) -> None:
+        """Nothing is to be done yet; `seconds` is how long a run's claim holds without a sign of life."""
+        self.db, self.seconds = db, seconds
+        self._deleted: int | None = None
+        self._thinned: int | None = None
+        self._done: int | None = None
+        self._kept: set[int] = set()
+        self._news, self._due = True, -math.inf
+
+    def news(self) -> None:
+        """Take note that somebody has committed something: there may be a chore."""
+        self._news = True
+
+    def go_on(self) -> None:
+        """Do a piece of what is to be done, if there is anything and it is time."""
+        began = time.monotonic()
+        if began < self._due:
+            return
+        if self._deleted is None and self._thinned is None:
+            self._look()
+        if self._deleted is not None:
+            if deletion.piece(self.db, self._deleted):
+                log.info("run deleted", run=self._deleted)
+                self._deleted = None
+        elif self._thinned is not None and not checkpoints.thin(self.db, self._thinned, self.seconds):
+            self._done, self._thinned = self._thinned, None
+        busy = self._deleted is not None or self._thinned is not None
+        rest = min(LONGEST_REST, REST * (time.monotonic() - began))
+        self._due = time.monotonic() + (rest if busy else LOOK_SECONDS if self._news else self.seconds / 2)
+        self._news = False
+
+    def _look(self) -> None:
+        self._deleted = next(iter(deletion.under_way(self.db)), None)
+        if self._deleted is not None:
+            return
+        self._thinned = checkpoints.ended_with_more(self.db, self.seconds, self._kept)
+        if self._thinned is not None and self._thinned == self._done:  # its last one is damaged, so both stay
+            self._kept.add(self._thinned)
+            self._thinned = None
