@@ -40,13 +40,14 @@ def init(
         config: The hyperparameters.
         keys: The random streams of N trials at tick 0, as `envs.rng.keys` makes them; weights are drawn from
             them.
-        weights: Pre-trained weights with which all trials begin instead, where `config.pretrain` is set.
+        weights: Weights with which all trials begin instead: those of an earlier policy, or pre-trained ones
+            where `config.pretrain` is set.
 
     Returns:
         The state of N agents.
 
     Raises:
-        ValueError: the config has pre-training on and no weights came, or the other way round.
+        ValueError: the config has pre-training on and no weights came, or they are of another size.
     """
     trials, device = len(keys.seed), keys.seed.device
 
@@ -87,9 +88,8 @@ def _rehearsal(network: Network, config: Config, keys: Keys) -> Rehearsal:
 
 def _start(network: Network, config: Config, keys: Keys, weights: Tensor | None) -> Float[Tensor, "N P"]:
     dtype = getattr(torch, config.dtype)
-    if config.pretrain != (weights is not None):
-        wanted = "needs pre-trained weights" if config.pretrain else "takes no pre-trained weights"
-        raise ValueError(f"A run with pretrain = {config.pretrain} {wanted}.")
+    if config.pretrain and weights is None:
+        raise ValueError("A run with pretrain = True needs pre-trained weights.")
     if weights is None:
         return network.init_params(keys, dtype)
     if weights.shape != (network.size,):

@@ -14,6 +14,7 @@ import typer
 from pydantic import ValidationError
 
 from parenting.agent.config import FIELDS, PRESETS, Config, UnknownPresetError, compose
+from parenting.commands.beginnings import FromAnswers, FromPolicy, begins_with
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
 from parenting.commands.level_file import LEVEL, chosen_level
 from parenting.commands.parents import chosen_parent
@@ -22,9 +23,11 @@ from parenting.commands.run_report import page
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
 from parenting.envs.names import UnknownNameError, did_you_mean
+from parenting.weights.origin import Origin
 from parenting.weights.store import Wanted, find
 
 if TYPE_CHECKING:
+    from parenting.agent.beginning import Beginning
     from parenting.experiments.training.chunks import TrainPlan
     from parenting.experiments.training.counts import OnProgress
     from parenting.experiments.training.counts import Progress as Now
@@ -60,6 +63,8 @@ def run(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Number of processes.", show_default="one a core")
     ] = None,
+    from_policy: FromPolicy = None,
+    from_answers: FromAnswers = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
     ] = False,
@@ -76,8 +81,10 @@ def run(
         config = _config(world, preset, changes or [])
         goal = _until(world, until)
         config = _mature(config, goal)
-        weights = _weights(found, config)
         spec = chosen_parent(parent)
+        origin = begins_with(from_policy, from_answers)
+        _fits(origin, found, config)
+        weights = None if origin.policy is not None else _weights(found, config)
     from parenting._process import settle
     from parenting.experiments.runner.processes import WorkersDiedError
     from parenting.experiments.training.chunks import TrainPlan, train_in_chunks
@@ -85,6 +92,8 @@ def run(
 
     settle()
     plan = TrainPlan(world, found.text, config, seed, trials, goal, max_ticks, weights, str(spec))
+    if origin.about is not None:
+        plan = plan._replace(beginning=_beginning(origin, found, config), origin=origin.about)
     began = time.monotonic()
     try:
         with exit_on_interrupt(), _bar(plan) as progress:
@@ -94,6 +103,23 @@ def run(
         raise typer.Exit(1) from None
     results = summarise(plan, found.name, outcomes, time.monotonic() - began)
     say(json.dumps(results) if as_json else page(results))
+
+
+def _fits(origin: Origin, level: Level, config: Config) -> None:
+    """Check what the trials begin with against their world and config.
+
+    Raises:
+        UsageError: it does not fit; the sentence names the field.
+    """
+    if wrong := origin.misfits(level, config):
+        raise UsageError("\n".join(f"{field}: {said}" for field, said in wrong))
+
+
+def _beginning(origin: Origin, level: Level, config: Config) -> Beginning:
+    from parenting.agent.init import world_of
+    from parenting.server.beginnings import beginning
+
+    return beginning(origin, world_of(level.world, level, config), config)
 
 
 def _known(world: str, preset: str) -> None:

@@ -28,6 +28,8 @@ def page(results: dict[str, Any]) -> str:
     ]
     if "parent" in results:
         lines.append(_line("parent", results["parent"]))
+    for part, one in results.get("origin", {}).items():
+        lines.append(_line(f"from {part}", f"{one['file']} ({one['sha256'][:12]})"))
     if "waterings" not in results["evaluation"]:
         lines.append(_line("optimal", f"{sum(row['optimal'] for row in results['trials'])} of {number}"))
     lines += [_line(name, _spread(results["mean"][name], results["sd"][name])) for name in COUNTS]
@@ -40,7 +42,7 @@ def page(results: dict[str, Any]) -> str:
 
 
 def _line(name: str, said: str) -> str:
-    return f"  {name:<12}{said}"
+    return f"  {name:<12}{said}" if len(name) < 12 else f"  {name} {said}"
 
 
 def _spread(mean: float | None, sd: float | None) -> str:

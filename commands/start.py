@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from parenting.agent.config import FIELDS, Config, v1_names
+from parenting.commands.beginnings import FromAnswers, FromPolicy, begins_with
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, friendly_errors, settings
 from parenting.commands.level_file import LEVEL, chosen_level
@@ -48,6 +49,8 @@ def start(
             "--set", metavar="KEY=VALUE", help="Another setting or a hyperparameter; may be repeated."
         ),
     ] = None,
+    from_policy: FromPolicy = None,
+    from_answers: FromAnswers = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the run as JSON, as in the API, and nothing else.")
     ] = False,
@@ -55,9 +58,10 @@ def start(
     """Start a run in the database; a worker raises it (`parenting up` or `parenting worker`).
 
     `--set` takes the settings that the form of the first page has (pace, guidance_layout, practice) and every
-    hyperparameter.
+    hyperparameter. `--from-policy` begins with the weights of a policy, `--from-answers` with X of earlier
+    answers; the run keeps their hashes and the run that they are of.
 
-    Exit codes: 0 started; 2 a setting is wrong, or there is no database yet.
+    Exit codes: 0 started; 2 a setting is wrong, a file does not fit, or there is no database yet.
 
     Example: parenting start unsafe-exploration --goal 50 --set guidance_layout=two --set practice=required
     """
@@ -65,10 +69,10 @@ def start(
         given = {"world": world, "preset": preset, "seed": seed, **_parent(parent)}
         given |= {key: text for key, text in (("goal", goal), ("name", name)) if text is not None}
         given |= _level(world, level) | _settings(changes or [])
-        chosen = settings()
+        chosen, origin = settings(), begins_with(from_policy, from_answers)
         with database() as db:
             try:
-                run = new_run.start(db, read_form(given), chosen.weights)
+                run = new_run.start(db, read_form(given), chosen.weights, origin)
             except InvalidFieldsError as error:
                 raise UsageError(
                     "\n".join(_said(field, given, rule) for field, rule in error.fields)

@@ -27,7 +27,7 @@ from parenting.server.notes import AGENT_KINDS
 from parenting.server.queue import leases
 from parenting.server.reads import answers
 from parenting.server.settings import Settings
-from parenting.server.snapshot import Snapshot, initial_snapshot, initial_weights, unpack
+from parenting.server.snapshot import Snapshot, first_snapshot, initial_weights, unpack
 from parenting.server.statuses import QueryStatus
 from parenting.server.tables import SKIP, Answer, Query, Run
 
@@ -57,7 +57,7 @@ def begin(db: Database, settings: Settings, task: Task, rule: StopRule, seed: in
         goal=rule.number if rule.kind == "queries" else None,
     )
     try:
-        return new_run.start(db, new, settings.weights).id
+        return new_run.start(db, new, settings.weights, task.origin).id
     except InvalidFieldsError as error:
         raise ValueError(str(error)) from None
 
@@ -138,7 +138,7 @@ def _snapshot(db: Database, run: Run, task: Task, seed: int) -> Snapshot:
     weights = initial_weights(db, run, task.world)
     saved = next((one for one in checkpoints.load_checkpoints(db, run.id) if one.intact), None)
     if saved is None:
-        return initial_snapshot(task.world, task.config, seed, weights)
+        return first_snapshot(db, run, task.world, task.config, weights)
     return unpack(task.world, task.config, saved.blob, weights)
 
 

@@ -143,8 +143,8 @@ class Policy:
             "trial": self.trial,
             "seed": self.seed,
         }
-        source = {"source": self.about["source"]} if "source" in self.about else {}
-        write_policy(Path(path), self.parameters, {**about, **source})
+        known = {name: self.about[name] for name in ("source", "origin") if name in self.about}
+        write_policy(Path(path), self.parameters, {**about, **known})
         return Path(path)
 
     def seed_actions(self, seed: int) -> None:

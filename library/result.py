@@ -43,6 +43,7 @@ class TrainResult:
             and `right` (moves), `row` and `column` (where the clips begin), `choice`.
         events: One record for each act of an operator: `tick`, `kind`, and of a changed probability `name`
             and `value`.
+        origin: The earlier policy and answers that it began with, each with its hash; empty without any.
     """
 
     world: World
@@ -53,6 +54,7 @@ class TrainResult:
     trials: list[Record]
     answers: list[Record]
     events: list[Record] = field(default_factory=list)
+    origin: Record = field(default_factory=dict)
 
     def mean(self) -> dict[str, float | None]:
         """Return the means over trials.
@@ -140,16 +142,18 @@ def collect(
     """Collect the batches of a run, one after the other."""
     trials: list[Record] = []
     policies: list[Policy] = []
+    origin = dict(task.origin.about or {})
+    about = {"origin": origin} if origin else {}
     for trained in parts:
         outcomes = examine(task.world, task.config, trained)
         last = outcomes.counts.maturity - 1
         final = trained.policies[last, torch.arange(len(last))]
         for row, parameters in enumerate(final):
             number, stage = len(trials), int(last[row]) + 1
-            own: dict[str, Any] = {"stage": stage, "trial": number, "seed": seed}
+            own: dict[str, Any] = {"stage": stage, "trial": number, "seed": seed, "about": about}
             policies.append(Policy(task.world, task.config, parameters, **own))
             trials.append(_record(task.world, outcomes, row, number))
-    return TrainResult(task.world, task.config, seed, until, policies, trials, answers, [*events])
+    return TrainResult(task.world, task.config, seed, until, policies, trials, answers, [*events], origin)
 
 
 def _record(world: World, outcomes: Outcomes, row: int, number: int) -> Record:

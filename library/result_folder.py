@@ -50,6 +50,7 @@ class Fields(NamedTuple):
     trials: list[Record]
     answers: list[Record]
     events: list[Record]
+    origin: Record
 
 
 def write(folder: Path, result: Fields, mean: Mapping[str, float | None], overwrite: bool) -> Path:
@@ -103,6 +104,7 @@ def _fill(folder: Path, result: Fields, mean: Mapping[str, float | None]) -> Non
         "seed": result.seed,
         "until": result.until,
         "mean": dict(mean),
+        **({"origin": result.origin} if result.origin else {}),
         "columns": {name: _types(getattr(result, name)) for name in TABLES},
     }
     (folder / ABOUT).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
@@ -121,7 +123,8 @@ def _read(folder: Path, about: dict[str, Any]) -> Fields:
         Policy(world, config, one, stage=row["stage"], trial=row["trial"], seed=about["seed"])
         for one, row in zip(parameters, tables["trials"], strict=True)
     ]
-    return Fields(world, config, about["seed"], about["until"], policies, **tables)
+    origin = about.get("origin", {})
+    return Fields(world, config, about["seed"], about["until"], policies, **tables, origin=origin)
 
 
 def _types(records: Sequence[Record]) -> dict[str, str]:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 from torch import Tensor
 
+from parenting.agent.beginning import Beginning
 from parenting.agent.config import FIELDS, Config, compose, merge
 from parenting.agent.init import world_of
 from parenting.envs import registry
@@ -17,6 +18,8 @@ from parenting.envs.names import did_you_mean
 from parenting.envs.options import SUPERVISION
 from parenting.experiments.training.stop_rule import StopRule, read_stop_rule
 from parenting.library.worlds import AnyLevel, World, named, path_hint
+from parenting.server.beginnings import beginning
+from parenting.weights.origin import NO_ORIGIN, Origin
 from parenting.weights.store import Wanted, find, load
 
 
@@ -26,10 +29,20 @@ class Task(NamedTuple):
     world: World
     config: Config
     weights: Tensor | None
+    origin: Origin = NO_ORIGIN  # the files that it begins with
+
+    @property
+    def beginning(self) -> Beginning:
+        """The weights and answers of an earlier agent that these begin with."""
+        return beginning(self.origin, self.world, self.config)
 
 
 def prepare(
-    world: str | World | Level, level: AnyLevel | None, preset: str | Config, changes: Mapping[str, object]
+    world: str | World | Level,
+    level: AnyLevel | None,
+    preset: str | Config,
+    changes: Mapping[str, object],
+    origin: Origin = NO_ORIGIN,
 ) -> Task:
     """Compose a task: the preset, over it the world's own defaults, over it the changes.
 
@@ -37,11 +50,12 @@ def prepare(
 
     Raises:
         TypeError: a change is not a hyperparameter; the message names the nearest.
-        ValueError: a world, level, preset or hyperparameter is wrong; the message names it.
+        ValueError: a world, level, preset or hyperparameter is wrong, or does not fit what the training
+            begins with; the message names it.
     """
     changes = _new_names(changes)
     if isinstance(world, Level):
-        return prepare(registry.make(world.world, world), level, preset, changes)
+        return prepare(registry.make(world.world, world), level, preset, changes, origin)
     if isinstance(world, str):
         name, found = named(world, level)
         config = compose_config(registry.spec(name), preset, changes)
@@ -55,7 +69,10 @@ def prepare(
         config = compose_config(world.spec, preset, {**_settings(world), **changes})
     if config.gamma == 1 and not made.spec.ends_at_goal:
         raise ValueError(f"gamma: it must be below 1 in {made.name}, where rewards never end; try gamma=0.9.")
-    return Task(made, config, _weights(made) if config.pretrain else None)
+    if wrong := origin.misfits(made.levels[0], config):
+        raise ValueError("\n".join(f"{field}: {said}" for field, said in wrong))
+    drawn = origin.policy is not None or not config.pretrain
+    return Task(made, config, None if drawn else _weights(made), origin)
 
 
 def compose_config(world: WorldSpec, preset: str | Config, changes: Mapping[str, object]) -> Config:

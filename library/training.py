@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import torch
@@ -20,9 +21,11 @@ from parenting.experiments.training.counts import Progress as BatchProgress
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.library.answer_log import AnswerLog
 from parenting.library.batch_parent import LoggedParent, WholeBatch
+from parenting.library.beginnings import origin_of
 from parenting.library.checks import check_callback, check_number, check_parent, check_progress
 from parenting.library.parent import EndedError, Parent
 from parenting.library.person import Person, TerminalParent
+from parenting.library.policy import Policy
 from parenting.library.progress import Progress, bar
 from parenting.library.result import TrainResult, collect
 from parenting.library.scripted import ScriptedParent
@@ -48,6 +51,8 @@ def train(
     callback: Callback | None = None,
     progress: bool | None = None,
     max_ticks: int = 20_000,
+    from_policy: str | Path | Policy | None = None,
+    from_answers: str | Path | None = None,
     **changes: Any,
 ) -> TrainResult:
     """Train agents by PARENTING (Sec. 2): they ask, a parent answers, and no reward is read.
@@ -65,6 +70,8 @@ def train(
         callback: Called with a `Progress` after each tick; training ends early where it returns False.
         progress: Show a progress bar; None shows one on a terminal.
         max_ticks: Ticks after which a trial is left unfinished.
+        from_policy: Begin with the weights of a `Policy` or its file, not with fresh or pre-trained ones.
+        from_answers: Begin with X of the answers of an export (`parenting export`) that stand.
         **changes: Hyperparameters that differ from the preset, by their names in `Config`.
 
     Returns:
@@ -83,7 +90,7 @@ def train(
         >>> result
         <TrainResult unsafe-exploration, level island: 3 trials, 3 finished, 0 unsafe steps>
     """
-    task = prepare(world, level, preset, changes)
+    task = prepare(world, level, preset, changes, origin_of(from_policy, from_answers))
     rule = stop_rule(task.world, until)
     check_number("trials", trials, 1, 1_000_000)
     check_number("seed", seed, 0, 2**53 - 1)
@@ -163,7 +170,10 @@ def _logged(
 
 def _trainer(task: Task, rule: StopRule, seed: int, chunk: range, parent: MakeParent) -> BatchTrainer:
     mine = keys(seed, chunk.stop, task.world.device).pick(torch.arange(chunk.start, chunk.stop))
-    return BatchTrainer(task.world, task.config, mine, rule, weights=task.weights, parent=parent)
+    begun = task.beginning
+    return BatchTrainer(
+        task.world, task.config, mine, rule, weights=task.weights, beginning=begun, parent=parent
+    )
 
 
 def _run(

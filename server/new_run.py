@@ -31,7 +31,9 @@ from parenting.server.errors import InvalidFieldsError
 from parenting.server.identity import unused_number
 from parenting.server.tables import Run
 from parenting.server.weights import put as put_weights
+from parenting.server.weights import put_bytes
 from parenting.server.whole import WHOLE, whole
+from parenting.weights.origin import NO_ORIGIN, Origin
 from parenting.weights.store import NoWeightsError, Wanted, find
 
 LARGEST_INT = 2**53 - 1
@@ -136,16 +138,18 @@ class NewRun(BaseModel):
     )
 
 
-def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
-    """Check a new run against worlds and hyperparameters, and add it, with its pre-trained weights.
+def start(db: Database, new: NewRun, folder: Path | None = None, origin: Origin = NO_ORIGIN) -> Run:
+    """Check a new run against worlds and hyperparameters, and add it, with all that it begins with.
 
     `folder` holds weights of one's own; those of the built-in levels are shipped.
 
     Raises:
         InvalidFieldsError: names every wrong field, with a message each.
     """
-    columns = plan(new, folder)
+    columns = plan(new, folder, origin)
     file: Path | None = columns.pop("weights")
+    for name, blob in origin.blobs:
+        put_bytes(db, name, blob)
     columns["weights"] = put_weights(db, file) if file else None
     with db.write() as session:
         run = Run(id=unused_number(session, Run), created=db.clock(), **columns)
@@ -154,7 +158,7 @@ def start(db: Database, new: NewRun, folder: Path | None = None) -> Run:
         return run
 
 
-def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
+def plan(new: NewRun, folder: Path | None = None, origin: Origin = NO_ORIGIN) -> dict[str, Any]:
     """The columns of a new run; under `weights` the file of its pre-trained weights, or None.
 
     Raises:
@@ -165,7 +169,9 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
         wrong.append(("script", "People answer this run. Errors belong to a run with the parent scripted."))
     level = _level(new, wrong)
     config = _config(new, wrong)
-    weights = _weights(new, level, config, folder, wrong)
+    weights = None if origin.policy is not None else _weights(new, level, config, folder, wrong)
+    if level is not None and config is not None:
+        wrong += origin.misfits(level, config)
     if wrong or level is None or config is None:
         raise InvalidFieldsError(wrong)
     spec = registry.spec(new.world)
@@ -178,6 +184,7 @@ def plan(new: NewRun, folder: Path | None = None) -> dict[str, Any]:
         "brief": {"goal": spec.brief.goal, "danger": spec.brief.danger},
         "config": config.model_dump(mode="json"),
         "weights": weights,
+        "origin": origin.about,
     }
 
 

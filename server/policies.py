@@ -77,6 +77,7 @@ def _policy(db: Database, run: Run, archive: TensorArchive, sha256: str) -> Poli
         "stage": count["maturity"],
         "trial": 0,
         "seed": run.seed,
+        **({} if run.origin is None else {"origin": run.origin}),
         "source": {
             "database": database_id(db),
             "run": run.public_id,

@@ -17,7 +17,7 @@ from parenting.envs.rng import keys
 from parenting.server.checkpoints import StoredCheckpoint, load_checkpoints
 from parenting.server.db import Database
 from parenting.server.notes import CheckpointDamaged, notes
-from parenting.server.snapshot import DamagedCheckpointError, Snapshot, Written, initial_snapshot, read
+from parenting.server.snapshot import DamagedCheckpointError, Snapshot, Written, first_snapshot, read
 from parenting.server.tables import Run
 
 CHANGED_BYTES = "its bytes are not those that were written"
@@ -64,7 +64,7 @@ def recall(db: Database, run: Run, world: Gridworld, config: Config, weights: Te
         except DamagedCheckpointError as error:
             note = CheckpointDamaged(sha256=kept.sha256, reason=error.message)
             passed.append(Passed(kept.tick, note, noted=False))
-    return Recalled(initial_snapshot(world, config, run.seed, weights), None, None, 0, passed)
+    return Recalled(first_snapshot(db, run, world, config, weights), None, None, 0, passed)
 
 
 def _read(

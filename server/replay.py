@@ -18,6 +18,7 @@ from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.replay import ReplayMismatchError, ReplayParent
+from parenting.server.begun import inherited
 from parenting.server.codec import kind_name
 from parenting.server.counters import count
 from parenting.server.db import Database
@@ -31,7 +32,7 @@ from parenting.server.snapshot import (
     DivergedError,
     Snapshot,
     changed,
-    initial_snapshot,
+    first_snapshot,
     initial_weights,
     versions,
 )
@@ -83,7 +84,8 @@ def relive(db: Database, run_id: int, progress: Progress = silent) -> Relived:
     until = comparable_until(db, run)
     last = kept.tick if until is None else min(until, kept.tick)
     rows = StoredRecord(db, run_id, world, config.max_clip_length)
-    lived, parent, parted = initial_snapshot(world, config, run.seed, weights), ReplayParent(rows), None
+    rows.inherited = inherited(db, run, world, config)
+    lived, parent, parted = first_snapshot(db, run, world, config, weights), ReplayParent(rows), None
     try:
         for tick in range(1, last + 1):
             lived = _beat(world, lived, parent)

@@ -83,6 +83,8 @@ class RunSchema(Schema):
     seed: int
     weights: str | None
     """The SHA-256 of the pre-trained weights that the agent began with; null: fresh ones."""
+    origin: dict[str, Any] | None
+    """The earlier policy, answers or run that it began with, each with its hash and public id; null: none."""
     parent: By
     script: str | None
     """The errors of a scripted parent, such as noisy:eps=0.1; scripted: none. Null where people answer."""

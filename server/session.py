@@ -17,6 +17,7 @@ from parenting.parents.fallible import FallibleRule
 from parenting.parents.grammar import SCRIPTED, read_parent
 from parenting.parents.scripted import ScriptedRule
 from parenting.server import checkpoints, metrics, runs
+from parenting.server.begun import inherited
 from parenting.server.board.writer import BoardWriter
 from parenting.server.checkpoint_parts import sweep_parts
 from parenting.server.codec import encode, kind_name
@@ -70,6 +71,7 @@ class RunSession:
         self.parent = self._parent(config, rule, asked)
         self._recalled = recall(db, run, self.world, config, initial_weights(db, run, self.world))
         self.saved = self._recalled.saved
+        self.parent.inherited = inherited(db, run, self.world, config)
         self.record_ends = self.parent.record_ends = worker_side.high_water(db, claim.run_id)
         self.growth = Growth(self.world, run, self.evaluation, self.saved.state, self.saved.tally)
         self.lived = Lived(self.world, db, claim, self.saved)
@@ -81,9 +83,7 @@ class RunSession:
         self._news, self._learnt = False, NOTHING_LEARNT
         self._save_every, self._look_cost = CHECKPOINT_SECONDS, 0.0
         self.whole, self._told, self._told_at = True, False, 0.0
-        self._stuck_at = (
-            -1
-        )  # the tick that was reported as stuck: who ends episodes must see the next one too
+        self._stuck_at = -1  # reported as stuck: who ends episodes must see the next one too
         sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
         self.parent.follow_until = take_up(db, claim, run, self._recalled, self.record_ends)
 

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import io
 import platform
+from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import torch
 from torch import Tensor
 
 from parenting.agent import parenting
+from parenting.agent.beginning import inherit
 from parenting.agent.config import Config
+from parenting.agent.query import Answer
 from parenting.agent.state import AgentState, Confirmation, current_names
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
 from parenting.envs.struct import Struct
 from parenting.server import weights
+from parenting.server.begun import earlier_weights, inherited
 from parenting.server.counters import Counters, no_counts
 from parenting.server.db import Database
 from parenting.server.errors import ServerError
@@ -74,19 +78,37 @@ def changed(before: dict[str, Any] | None, after: dict[str, Any]) -> bool:
 
 
 def initial_weights(db: Database, run: Run, world: Gridworld) -> Tensor | None:
-    """Return the pre-trained weights that a run began with; None if it drew random ones (Sec. 3.1.4).
+    """Return the weights that a run began with, earlier or pre-trained ones; None if it drew random ones.
 
     Raises:
         NotFound: they are not in the database, or are damaged.
     """
     if run.weights is None:
-        return None
+        return earlier_weights(db, run)
     return load(weights.get(db, run.weights), Wanted(world.spec, world.height, world.width))
 
 
-def initial_snapshot(world: Gridworld, config: Config, seed: int, weights: Tensor | None = None) -> Snapshot:
-    """Return a run at tick 0."""
-    return Snapshot(parenting.init(world, config, keys(seed, 1), weights), no_counts(), config)
+def first_snapshot(
+    db: Database, run: Run, world: Gridworld, config: Config, weights: Tensor | None
+) -> Snapshot:
+    """Return a stored run at tick 0, with the answers that it began with.
+
+    Raises:
+        NotFound: these are not in the database, or are damaged.
+    """
+    return initial_snapshot(world, config, run.seed, weights, inherited(db, run, world, config))
+
+
+def initial_snapshot(
+    world: Gridworld,
+    config: Config,
+    seed: int,
+    weights: Tensor | None = None,
+    answers: Sequence[Answer] = (),
+) -> Snapshot:
+    """Return a run at tick 0, with the weights and the answers that it begins with."""
+    state = inherit(config, parenting.init(world, config, keys(seed, 1), weights), answers)
+    return Snapshot(state, no_counts(), config)
 
 
 def pack(saved: Snapshot) -> bytes:

@@ -122,6 +122,7 @@ class Run(Table):
     versions: Mapped[dict[str, Any] | None]  # torch build and threads: other ones give other bits
     error: Mapped[str | None]
     weights: Mapped[str | None]  # the sha256 of the pre-trained weights (`Weights`); none: fresh ones
+    origin: Mapped[dict[str, Any] | None]  # an earlier policy, answers or run that it began with (`origin`)
 
     @property
     def standing(self) -> int:
@@ -130,7 +131,7 @@ class Run(Table):
 
 
 class Weights(Table):
-    """Pre-trained weights that runs begin with (Sec. 3.1.4), so that a worker needs no file."""
+    """Weights (Sec. 3.1.4), policies and answers that runs begin with, so that a worker needs no file."""
 
     __tablename__ = "weights"
 
@@ -163,8 +164,7 @@ class Query(Table):
     status: Mapped[QueryStatus] = mapped_column(default=QueryStatus.OPEN)
     put_back: Mapped[bool] = mapped_column(default=False, server_default=text("false"))  # skipped once
     posted: Mapped[datetime]
-    votes: Mapped[int] = mapped_column(default=0, server_default=text("0"))
-    """Guidance: answers heard before on the same pair in the same pause; 0 for a first asking."""
+    votes: Mapped[int] = mapped_column(default=0, server_default=text("0"))  # heard on this pair and pause
     policy_stage: Mapped[int | None]  # which policy asked: the stage T that it was in, and
     policy_steps: Mapped[int | None]  # its gradient steps in that stage; null: asked before these were kept
     leased: Mapped[datetime | None]  # when it was first shown to somebody; null: never, or not kept then

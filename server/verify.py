@@ -19,13 +19,14 @@ from parenting.agent.events import Change, Mature
 from parenting.agent.init import world_of
 from parenting.agent.state import AgentState
 from parenting.parents.replay import ReplayParent
+from parenting.server.begun import inherited
 from parenting.server.chain import Checked, check
 from parenting.server.db import Database
 from parenting.server.reads.record import StoredRecord, UnreadableRecordError
 from parenting.server.recall import recall
 from parenting.server.replay import Progress, Relived, comparable_until, equal, relive, silent
 from parenting.server.runs import get_run
-from parenting.server.snapshot import DivergedError, Snapshot, initial_snapshot, initial_weights
+from parenting.server.snapshot import DivergedError, Snapshot, first_snapshot, initial_weights
 
 EXACT = "Bits are not comparable there; the answers, their order and X are exact on every machine."
 PADDED = {"s0": "states", "local_state": "states", "digest": "states"}
@@ -64,8 +65,9 @@ def verify(db: Database, run_id: int, progress: Progress = silent) -> Verified:
     recalled = recall(db, run, world, config, weights)
     if recalled.sha256 is None:
         return Verified(run_id, chain, None, None, None, None)
-    begun = initial_snapshot(world, config, run.seed, weights)
+    begun = first_snapshot(db, run, world, config, weights)
     record = StoredRecord(db, run_id, world, config.max_clip_length)
+    record.inherited = inherited(db, run, world, config)
     x = _x(begun, recalled.saved, recalled.tick, ReplayParent(record))
     try:
         until = comparable_until(db, run)

@@ -1,4 +1,4 @@
-"""Pre-trained weights in the database, where a run's worker finds them on any machine."""
+"""Weights and answers that runs begin with, in the database, where a worker finds them on any machine."""
 
 from __future__ import annotations
 
@@ -12,16 +12,20 @@ from parenting.weights.store import digest
 
 def put(db: Database, file: Path) -> str:
     """Store a file of weights, once, and return its SHA-256."""
-    blob = file.read_bytes()
+    return put_bytes(db, file.name, file.read_bytes())
+
+
+def put_bytes(db: Database, name: str, blob: bytes) -> str:
+    """Store what a run begins with under its SHA-256, once, and return that."""
     sha256 = digest(blob)
     with db.write() as session:
         if session.get(Weights, sha256) is None:
-            session.add(Weights(sha256=sha256, name=file.name, blob=blob, created=db.clock()))
+            session.add(Weights(sha256=sha256, name=name, blob=blob, created=db.clock()))
     return sha256
 
 
-def get(db: Database, sha256: str) -> bytes:
-    """Return the bytes of stored weights.
+def get(db: Database, sha256: str, what: str = "pre-trained weights") -> bytes:
+    """Return the bytes of stored weights, or of something else that runs begin with.
 
     Raises:
         NotFound: no weights have this hash, or they have changed.
@@ -30,5 +34,5 @@ def get(db: Database, sha256: str) -> bytes:
         row = session.get(Weights, sha256)
         blob = None if row is None else row.blob
     if blob is None or digest(blob) != sha256:
-        raise NotFound(f"The pre-trained weights {sha256} are not in the database, or are damaged.")
+        raise NotFound(f"The {what} {sha256} are not in the database, or are damaged.")
     return blob

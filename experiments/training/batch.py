@@ -11,6 +11,7 @@ from torch import Tensor
 from torch.nn.functional import one_hot
 
 from parenting.agent import parenting
+from parenting.agent.beginning import FRESH, Beginning, inherit
 from parenting.agent.config import Config
 from parenting.agent.parent import BatchParent
 from parenting.agent.query import Answer, QueryKind
@@ -50,6 +51,7 @@ class BatchTrainer:
         until: StopRule,
         *,
         weights: Tensor | None = None,
+        beginning: Beginning = FRESH,
         parent: MakeParent | None = None,
         note_optimal: bool = False,
     ) -> None:
@@ -58,7 +60,8 @@ class BatchTrainer:
         self.world, self.config, self.until = world, config, until
         self.notes_optimal = note_optimal or until.kind == "optimal"
         self.evaluation = evaluation(world, rule.values, config.gamma)
-        self.state = parenting.init(world, config, keys, weights)
+        own = weights if beginning.weights is None else beginning.weights
+        self.state = inherit(config, parenting.init(world, config, keys, own), beginning.answers)
         trials, live = len(keys.seed), self.state.learner.params
         self.trial = torch.arange(trials)
         stages = config.max_clip_length
@@ -191,6 +194,7 @@ def train_agents(
     max_ticks: int,
     progress: OnProgress | None = None,
     weights: Tensor | None = None,
+    beginning: Beginning = FRESH,
     parent: MakeParent | None = None,
     note_optimal: bool = False,
 ) -> TrainResult:
@@ -204,10 +208,18 @@ def train_agents(
         max_ticks: Ticks after which a trial is left unfinished.
         progress: Called after each tick.
         weights: The pre-trained weights, where the config asks for them (Sec. 3.1.4).
+        beginning: The weights and answers of an earlier agent, if trials begin with some.
         parent: Makes the batch's parent; None takes the scripted one (Sec. 3.1.3).
         note_optimal: Note when each policy is first optimal, also where that does not end its trial.
     """
     trainer = BatchTrainer(
-        world, config, keys, until, weights=weights, parent=parent, note_optimal=note_optimal
+        world,
+        config,
+        keys,
+        until,
+        weights=weights,
+        beginning=beginning,
+        parent=parent,
+        note_optimal=note_optimal,
     )
     return trainer.run(max_ticks, progress)

@@ -6,16 +6,17 @@ sums: a batch of another size may add in another order (docs/architecture.md, "B
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 
 from parenting._process import settle
+from parenting.agent.beginning import FRESH, Beginning
 from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.envs.rng import keys
@@ -46,6 +47,8 @@ class TrainPlan(NamedTuple):
     weights: bytes | None = None  # the file of pre-trained weights (Sec. 3.1.4)
     parent: str = "scripted"  # by the grammar of `parents.grammar`
     note_optimal: bool = False  # when each policy is first optimal, also where that does not end its trial
+    beginning: Beginning = FRESH  # the weights and answers of an earlier agent
+    origin: Mapping[str, Any] | None = None  # the files that these are of
 
 
 def chunks(trials: int) -> list[range]:
@@ -93,6 +96,7 @@ def train_chunk(plan: TrainPlan, chunk: range, progress: OnProgress | None = Non
         max_ticks=plan.max_ticks,
         progress=progress,
         weights=weights,
+        beginning=plan.beginning,
         parent=parent_of(plan.parent, world, plan.config),
         note_optimal=plan.note_optimal,
     )

@@ -40,6 +40,7 @@ def summarise(plan: TrainPlan, level: str, outcomes: Outcomes, seconds: float) -
         "config": plan.config.model_dump(mode="json"),
         **({} if plan.parent == "scripted" else {"parent": plan.parent}),
         "weights": None if plan.weights is None else digest(plan.weights),
+        **({} if plan.origin is None else {"origin": dict(plan.origin)}),
         "trials": _rows(outcomes, report),
         "unfinished": int((~counts.finished).sum()),
         "stuck": int(counts.stuck.sum()),

@@ -70,6 +70,7 @@ RUN: dict[str, Any] = {
     "config": compose("conservative", registry.defaults(WORLD), {}, strict=True).model_dump(mode="json"),
     "seed": 0,
     "weights": None,
+    "origin": None,
     "parent": "human",
     "script": None,
     "guidance_layout": "one",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from parenting._plural import counted
 from parenting.agent.config import Config
 from parenting.server.tables import Run
 
@@ -51,11 +52,23 @@ def describe_start(run: Run) -> str:
 
 
 def _start_sentences(run: Run, config: Config) -> Iterator[str]:
-    if run.weights is None:
+    earlier = run.origin or {}
+    if "policy" in earlier:
+        yield f"It began with the policy {_file(earlier['policy'])}."
+    elif run.weights is None:
         yield "It began with fresh weights."
     else:
         yield f"It began pre-trained on mazes (weights {run.weights[:SHORT]})."
+    if "answers" in earlier:
+        answers = earlier["answers"]
+        yield f"Its X began with {counted(answers['answers'], 'answer')} of {_file(answers)}."
     if SUPERVISOR in run.legend:
         yield SUPERVISED[config.supervised]
     if PLANT in run.legend:
         yield INSIDE[config.garden_parent]
+
+
+def _file(part: Mapping[str, Any]) -> str:
+    """Name a file that a run began with, its hash, and the run that it is of."""
+    source = "" if part.get("run") is None else f", of run {part['run']}"
+    return f"{part['file']} ({part['sha256'][:SHORT]}{source})"

@@ -47,6 +47,7 @@ class QueueParent:
         self.policy = (1, 0)
         self.answers = self.events_wait = True
         self.corrected: amendment.Applied | None = None  # heard in this tick
+        self.inherited: Sequence[Answer] = ()  # of an earlier run: corrections keep them in X
         self.record_ends = -1  # the last tick of the record: up to it, recorded questions stand
         self.follow_until = -1  # the last tick whose record another machine has written
 
@@ -75,7 +76,7 @@ class QueueParent:
         return Correction(
             self._answer(found.answer, found.query),
             self._answer(found.replaced, found.query),
-            [self._answer(taken.answer, taken.query) for taken in found.standing],
+            [*self.inherited, *(self._answer(taken.answer, taken.query) for taken in found.standing)],
             found.query.tick,
         )
 

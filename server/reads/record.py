@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import torch
 from pydantic import TypeAdapter
@@ -35,6 +35,7 @@ class StoredRecord:
     def __init__(self, db: Database, run_id: int, world: Gridworld, stages: int) -> None:
         self.db, self.run_id, self.world, self.stages = db, run_id, world, stages
         self.answers = self.events = 0  # given back so far
+        self.inherited: Sequence[Answer] = ()  # of an earlier run: corrections keep them in X
         self.nothing = queries.empty(1, stages, world.height, world.width)
         self._window = range(0)
         self._asked: dict[int, tables.Query] = {}
@@ -91,7 +92,7 @@ class StoredRecord:
         return Correction(
             self._answer(answer, query),
             self._answer(replaced, query),
-            [self._answer(taken.answer, taken.query) for taken in standing],
+            [*self.inherited, *(self._answer(taken.answer, taken.query) for taken in standing)],
             query.tick,
         )
 

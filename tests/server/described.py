@@ -11,10 +11,13 @@ from schemathesis.schemas import BaseSchema
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 from sqlalchemy import select
 
-from parenting.server import jobs
+from parenting.agent.config import Config
+from parenting.agent.init import world_of
+from parenting.server import jobs, snapshot
 from parenting.server.app import bare_app
 from parenting.server.board import store
 from parenting.server.board.columns import COLUMNS, pack
+from parenting.server.checkpoints import save_checkpoint
 from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
 from parenting.server.new_run import LARGEST_INT, NewRun, start
@@ -22,7 +25,7 @@ from parenting.server.operator_events import add_operator_event
 from parenting.server.public_ids import is_public_id
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query, take_answer, take_operator_events
-from parenting.server.runs import Claim, claim, finish, set_status
+from parenting.server.runs import Claim, claim, finish, get_run, set_status
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Job, Query, Run
 from parenting.server.workers import sign
@@ -64,6 +67,7 @@ def _live(db: Database, mine: Claim) -> None:
     add_operator_event(db, mine.run_id, "change", {"kind": "change", "name": "p_rec", "value": 0.5})
     take_operator_events(db, mine, QUESTIONS + 1)
     add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
+    _save(db, mine)
     write_metrics(db, mine, {tick: {"deaths": 0, "loss": None} for tick in range(5)})
     one = pack({name: bytes(width) for name, width in COLUMNS.items()})
     board: store.Stored = {"rests": [{"ground": ["#A#"], "box": None, "parts": {}}], "cells": [[0, 1, 0]]}
@@ -71,6 +75,14 @@ def _live(db: Database, mine: Claim) -> None:
     for kind in ("walk", "policy"):
         jobs.ask(db, mine.run_id, kind, {}, "me")
     jobs.finish(db, jobs.claim(db, "worker-1", 1)[0], {"steps": 3})
+
+
+def _save(db: Database, mine: Claim) -> None:
+    """Save a checkpoint of tick 0, so that there is a policy to download."""
+    run = get_run(db, mine.run_id)
+    config = Config.model_validate(run.config)
+    begun = snapshot.initial_snapshot(world_of(run.world, run.level_text, config), config, run.seed)
+    save_checkpoint(db, mine, 0, snapshot.pack(begun))
 
 
 def reply_to(case: Case[Any], app: FastAPI) -> int:
