@@ -140,7 +140,7 @@ def _cells(rows: Sequence[str], signs: str) -> list[Cell]:
 
 
 def _inside(rows: Sequence[str]) -> set[Cell]:
-    """Return the cells that the player's walls enclose: floor beyond them is no floor."""
+    """Return the cells that the player's walls enclose: floor beyond them is wall."""
     fringe = _cells(rows, "@+")
     found = set(fringe)
     while fringe:

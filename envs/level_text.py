@@ -87,7 +87,6 @@ def written(text: str, glyphs: str) -> list[Written]:
         Line(number, line, tuple(range(1, len(line) + 1)))
         for number, line in enumerate(ENDS.split(text.removeprefix("\ufeff")), 1)
     ]
-    said = ("the code fences around the art were left out",) if _has_fence(lines, glyphs) else ()
     found: list[Written] = []
     now = Written()
     for kind, several in groupby(lines, lambda line: _kind(line, glyphs)):
@@ -103,6 +102,7 @@ def written(text: str, glyphs: str) -> list[Written]:
             now = replace(now, art=[*now.art, *block])
     if now.art or now.header or not found:
         found += _apart(now, lines)
+    said = _around(lines, found, glyphs)
     return [_tidied(one, glyphs, said) for one in found]
 
 
@@ -139,8 +139,13 @@ def _is_fence(line: Line, glyphs: str) -> bool:
     return line.text.strip()[:1] not in glyphs and FENCE.fullmatch(line.text) is not None
 
 
-def _has_fence(lines: Sequence[Line], glyphs: str) -> bool:
-    return any(_is_fence(line, glyphs) for line in lines if line.text)
+def _around(lines: Sequence[Line], found: Sequence[Written], glyphs: str) -> tuple[str, ...]:
+    """Say what stands around the art and is left out: fences, and rows of blanks."""
+    within = {line.number for one in found for line in one.art}
+    kinds = [_kind(line, glyphs) for line in lines if line.text and line.number not in within]
+    rows = kinds.count("blank")
+    said = ["the code fences around the art were left out"] if "fence" in kinds else []
+    return (*said, *([f"{_count(rows, 'blank row')} around the art {_were(rows)} cut"] if rows else []))
 
 
 def _apart(one: Written, lines: Sequence[Line]) -> list[Written]:

@@ -101,6 +101,17 @@ def compared(browser: Browser, url: str) -> Page:
     return page
 
 
+def painted(browser: Browser, url: str) -> Page:
+    """The editor of levels with a level whose goal is out of reach."""
+    page = browser.new_page(reduced_motion="reduce")
+    page.goto(f"{url}/levels")
+    page.locator("#begin").select_option("island-bottleneck")
+    page.locator("#brushes label", has_text="water").click()
+    page.locator("[data-at='3 3']").click()
+    page.wait_for_selector("#beside:not([hidden])")
+    return page
+
+
 def main(folder: Path) -> None:
     """All pictures into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -121,6 +132,7 @@ def main(folder: Path) -> None:
         parent.keyboard.press("Escape")
         shoot(practised(browser, url), "practice", folder)
         shoot(compared(browser, url), "preference", folder)
+        shoot(painted(browser, url), "levels", folder, TALL)
         page = browser.new_page(reduced_motion="reduce")
         page.goto(f"{url}/runs/{garden}")
         page.wait_for_selector("main[data-state=resting]", timeout=600_000)

@@ -9,6 +9,7 @@ from parenting.server.api import (
     episodes,
     jobs,
     keeping,
+    levels,
     operator,
     page_errors,
     presence,
@@ -19,6 +20,6 @@ from parenting.server.api import (
 )
 
 router = APIRouter(prefix="/api/v1")
-PARTS = (runs, keeping, episodes, board, operator, queries, presence, revisions, jobs, streams, page_errors)
+PARTS = (runs, keeping, episodes, board, operator, queries, presence, revisions, jobs, levels, streams, page_errors)
 for part in PARTS:
     router.include_router(part.router)

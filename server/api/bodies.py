@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from fastapi import Query
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
+from parenting.envs.people_text import plain
 from parenting.server import schemas
 from parenting.server.api.names import DatabaseId, PublicId
 from parenting.server.job_kinds import EpisodePayload, PolicyPayload, WalkPayload
-from parenting.server.new_run import LARGEST_INT, Goal, Pace
+from parenting.server.level_check import TEXT_CHARACTERS
+from parenting.server.new_run import LARGEST_INT, Goal, Name, Pace
 from parenting.server.schemas import By
 from parenting.server.whole import WHOLE
 
@@ -71,6 +73,16 @@ class SkipBody(NamedBody):
     """The client that skips, and the names of the question."""
 
     parent: By = Field("human", description="Who skips, a person or a script; stored with the skip.")
+
+
+class LevelBody(Strict):
+    """A text with a level of one's own."""
+
+    world: Name
+    text: Annotated[str, StringConstraints(max_length=TEXT_CHARACTERS), AfterValidator(plain)] = Field(
+        description="A level's text, or several levels' texts."
+    )
+    which: Name | None = Field(None, description="The name or number of one of several levels.")
 
 
 class PageErrorBody(Strict):

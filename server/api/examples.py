@@ -12,6 +12,7 @@ from parenting.envs import registry
 from parenting.server.api.board_examples import BOARD, EPISODE, NUMBERS
 from parenting.server.api.kept_examples import kept
 from parenting.server.api.why_example import WHY
+from parenting.server.level_check import check
 
 WORLD = "unsafe-exploration"
 SPEC = registry.spec(WORLD)
@@ -23,6 +24,8 @@ NOON = "2026-11-22T12:00:00Z"
 DATABASE, RUN_ID = "7c9e6679-7425-40de-944b-e07fc1f90ae7", "5J3mBbAH58CpQ3Y8RNJpUK"
 QUESTION_ID = "8kZ4cVxtw1Rr5Qh2mPzDvN"
 OWN_LEVEL = "WWWWW\nWA GW\nWWWWW"
+CHECKED_TEXT = {"world": WORLD, "text": OWN_LEVEL.replace("G", " ")}
+CHECKED = check(**CHECKED_TEXT).model_dump()
 
 
 def _frame(row: int, column: int) -> dict[str, Any]:
@@ -236,6 +239,7 @@ class Shown:
 
 
 SHOWN = {
+    "check_level": Shown(CHECKED, {"a level": CHECKED_TEXT}),
     "healthz": Shown({"status": "ok"}),
     "readyz": Shown({"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}),
     "list_runs": Shown({**_rows(RUN), "database": DATABASE}),

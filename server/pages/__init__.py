@@ -12,6 +12,7 @@ from parenting.server.pages.episodes import router as episodes
 from parenting.server.pages.grid import router as grid
 from parenting.server.pages.growth import router as growth
 from parenting.server.pages.history import router as history
+from parenting.server.pages.levels import router as levels
 from parenting.server.pages.parent import router as parent
 from parenting.server.pages.practice import router as practice
 from parenting.server.pages.render import error_page
@@ -25,6 +26,7 @@ __all__ = ["error_page", "router"]
 
 router = APIRouter(include_in_schema=False)
 router.include_router(start)
+router.include_router(levels)
 router.include_router(carried)
 router.include_router(parent)
 router.include_router(revisions)

@@ -92,6 +92,11 @@ def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> 
     return redirect(f"/runs/{run.public_id}/parent" if run.parent == "human" else f"/runs/{run.public_id}")
 
 
+def filled_form(db: Database, form: Mapping[str, str]) -> Response:
+    """Return the page with a form that is filled in as far as it is known."""
+    return _page(db, {**EMPTY_FORM, **form}, {}, filled=True)
+
+
 def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
     """Return an error for each wrong field: wrong by itself, or in the world that the others name."""
     errors: dict[str, str] = {}
@@ -105,12 +110,16 @@ def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
 
 
 def _page(
-    db: Database, form: Mapping[str, str], errors: Mapping[str, str], find: Find | None = None
+    db: Database,
+    form: Mapping[str, str],
+    errors: Mapping[str, str],
+    find: Find | None = None,
+    filled: bool = False,
 ) -> Response:
     listed = run_list(db, find or Find())
     untouched = not (listed.runs or listed.archived or listed.find.narrows or listed.find.before or errors)
     context = StartPage(
-        fresh=untouched,
+        fresh=untouched and not filled,
         form=form,
         errors=errors,
         more_open=any(form[option.field] or option.field in errors for option in OPTIONS),

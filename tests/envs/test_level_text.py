@@ -43,7 +43,7 @@ DISGUISED = {
     "soft": (POND.replace("WW", "W\u00adW"), "1 soft hyphen was left out"),
     "fenced": (f"```\n{POND}```\n", "the code fences around the art were left out"),
     "fenced with a language": (f"~~~~ text\n{POND}~~~~", "the code fences around the art were left out"),
-    "blank lines": (f"   \n{POND}\n  \t\n", None),
+    "blank lines": (f"   \n{POND}\n  \t\n", "2 blank rows around the art were cut"),
     "old Mac": (POND.replace("\n", "\r"), None),
     "Windows": (f"\ufeff{POND}".replace("\n", "\r\n"), None),
 }

@@ -25,6 +25,7 @@ SCREENS: dict[str, ViewportSize] = {
 SIZES: tuple[ViewportSize, ...] = (*SCREENS.values(), {"width": 320, "height": 568})
 PATHS = (
     "/",
+    "/levels",
     "/practice",
     "/practice?at=1&choice=left",
     "/practice?at=4",

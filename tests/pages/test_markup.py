@@ -18,6 +18,7 @@ from tests.pages import island_fixtures as fixtures
 
 PATHS = (
     "/",
+    "/levels",
     "/practice?at=1&choice=left",
     "/practice?at=6",
     "/runs/1",

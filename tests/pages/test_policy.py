@@ -17,7 +17,7 @@ window.violations = [];
 document.addEventListener("securitypolicyviolation", event =>
   window.violations.push(`${event.violatedDirective} ${event.blockedURI} ${event.sourceFile}`));
 """
-PAGES = ("/", "/practice", "/runs/1", "/runs/1/history", "/runs/1/parent", "/docs", "/runs/99")
+PAGES = ("/", "/levels", "/practice", "/runs/1", "/runs/1/history", "/runs/1/parent", "/docs", "/runs/99")
 
 
 @pytest.mark.parametrize("path", [*PAGES, "/healthz", "/static/site.css", "/api/v1/runs"])

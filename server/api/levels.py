@@ -1,0 +1,20 @@
+"""The route that checks a level of one's own; nothing is stored."""
+
+from __future__ import annotations
+
+from parenting.server.admission import admitted_router
+from parenting.server.api.bodies import LevelBody
+from parenting.server.api.responses import write_responses
+from parenting.server.level_check import CheckedLevelSchema, check
+
+router = admitted_router(tags=["runs"])
+
+
+@router.post("/levels/check", summary="Check a level of one's own", responses=write_responses())
+def check_level(body: LevelBody) -> CheckedLevelSchema:
+    """Read a level's text as people have it, and name the first rule of its world that it breaks.
+
+    The sentences are those of the command line. A level that is wrong is no wrong request: the reply is 200,
+    and `error` names line, column and rule. Of several levels in a text `which` chooses one.
+    """
+    return check(body.world, body.text, body.which)
