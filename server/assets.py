@@ -45,7 +45,16 @@ SHEETS = {
     "walk.css": ("walk.css", "growth.css"),
 }
 """The sheets of each page. That of the API's description stands alone, after one of another package."""
-SCRIPTS = ("parent.js", "practice.js", "history.js", "dashboard.js", "comparison.js", "start.js", "docs.js", "levels.js")
+SCRIPTS = (
+    "parent.js",
+    "practice.js",
+    "history.js",
+    "dashboard.js",
+    "comparison.js",
+    "start.js",
+    "docs.js",
+    "levels.js",
+)
 PICTURES = ("icon.svg", "query.svg", "question.svg")
 MEDIA = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 SMALLER: dict[str, Callable[[str], str]] = {"css": rcssmin.cssmin, "js": rjsmin.jsmin}

@@ -20,6 +20,19 @@ from parenting.server.api import (
 )
 
 router = APIRouter(prefix="/api/v1")
-PARTS = (runs, keeping, episodes, board, operator, queries, presence, revisions, jobs, levels, streams, page_errors)
+PARTS = (
+    runs,
+    keeping,
+    episodes,
+    board,
+    operator,
+    queries,
+    presence,
+    revisions,
+    jobs,
+    levels,
+    streams,
+    page_errors,
+)
 for part in PARTS:
     router.include_router(part.router)

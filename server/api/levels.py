@@ -14,7 +14,7 @@ router = admitted_router(tags=["runs"])
 def check_level(body: LevelBody) -> CheckedLevelSchema:
     """Read a level's text as people have it, and name the first rule of its world that it breaks.
 
-    The sentences are those of the command line. A level that is wrong is no wrong request: the reply is 200,
-    and `error` names line, column and rule. Of several levels in a text `which` chooses one.
+    The sentences are those of the command line. The reply to a level that is wrong is 200, too:
+    `error` names line, column and rule. Of several levels in a text `which` chooses one.
     """
     return check(body.world, body.text, body.which)
