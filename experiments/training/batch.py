@@ -19,6 +19,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
 from parenting.evaluation.argmax import Evaluation, evaluation
 from parenting.experiments.training.counts import Counts, OnProgress, Progress, no_counts
+from parenting.experiments.training.history import History, Table
 from parenting.experiments.training.stop_rule import StopRule
 from parenting.parents.fallible import FallibleParent, FallibleRule
 from parenting.parents.grammar import read_parent
@@ -38,6 +39,7 @@ class TrainResult(NamedTuple):
     counts: Counts
     policies: Float[Tensor, "M N P"]  # pi_1 .. pi_T, each trial's at its own end; zeros beyond
     evaluation: Evaluation
+    history: Table | None = None  # where it was kept
 
 
 class BatchTrainer:
@@ -54,6 +56,7 @@ class BatchTrainer:
         beginning: Beginning = FRESH,
         parent: MakeParent | None = None,
         note_optimal: bool = False,
+        history: bool = False,
     ) -> None:
         """Begin one trial for each of `keys`, with the options of `train_agents`."""
         rule = ScriptedRule(world, config.gamma, inside=config.garden_parent)
@@ -63,9 +66,10 @@ class BatchTrainer:
         own = weights if beginning.weights is None else beginning.weights
         self.state = inherit(config, parenting.init(world, config, keys, own), beginning.answers)
         trials, live = len(keys.seed), self.state.learner.params
-        self.trial = torch.arange(trials)
+        self.trial, self.ticks = torch.arange(trials), 0
         stages = config.max_clip_length
         self.counts, self.result = no_counts(trials, stages), no_counts(trials, stages)
+        self.history = History(trials, self.evaluation) if history else None
         self.policies = live.new_zeros(config.max_clip_length, *live.shape)
         scripted = ScriptedParent(rule, parenting.no_query(world, config, self.state))
         self.parent = scripted if parent is None else parent(scripted, self.done)
@@ -81,6 +85,9 @@ class BatchTrainer:
             self.world, self.config, self.state, self.parent
         )
         self._count(answer, stage)
+        self.ticks += 1
+        if self.history is not None:
+            self.history.note(self.ticks, self.trial, self.state, self.counts)
         self._finish(self.state.info.trained | owed | (self.counts.ticks == 1))
 
     def _count(self, answer: Answer, stage: Int64[Tensor, "N"]) -> None:
@@ -146,6 +153,8 @@ class BatchTrainer:
 
     def save(self, which: Bool[Tensor, "N"]) -> None:
         """Write the tallies and the policies of some trials into the results."""
+        if self.history is not None:
+            self.history.end(which, self.trial, self.state, self.counts)
         optimal = self.counts.finished if self.until.kind == "optimal" else self._optimal(which)
         place, ours = self.trial[which], self.counts.replace(optimal=optimal).pick(which).tensors()
         self.result = self.result.map(lambda name, tensor, _axis: tensor.index_put((place,), ours[name]))
@@ -169,7 +178,8 @@ class BatchTrainer:
             if bool(self.counts.done.all()):
                 break
         self.save(~self.counts.done)
-        return TrainResult(self.result, self.policies, self.evaluation)
+        kept = None if self.history is None else self.history.table
+        return TrainResult(self.result, self.policies, self.evaluation, kept)
 
 
 def parent_of(text: str, world: Gridworld, config: Config) -> MakeParent | None:
@@ -197,6 +207,7 @@ def train_agents(
     beginning: Beginning = FRESH,
     parent: MakeParent | None = None,
     note_optimal: bool = False,
+    history: bool = False,
 ) -> TrainResult:
     """Train one agent for each of `keys` until it is finished.
 
@@ -211,6 +222,7 @@ def train_agents(
         beginning: The weights and answers of an earlier agent, if trials begin with some.
         parent: Makes the batch's parent; None takes the scripted one (Sec. 3.1.3).
         note_optimal: Note when each policy is first optimal, also where that does not end its trial.
+        history: Keep numbers of each trial after some of its ticks.
     """
     trainer = BatchTrainer(
         world,
@@ -221,5 +233,6 @@ def train_agents(
         beginning=beginning,
         parent=parent,
         note_optimal=note_optimal,
+        history=history,
     )
     return trainer.run(max_ticks, progress)

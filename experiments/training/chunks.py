@@ -49,6 +49,7 @@ class TrainPlan(NamedTuple):
     note_optimal: bool = False  # when each policy is first optimal, also where that does not end its trial
     beginning: Beginning = FRESH  # the weights and answers of an earlier agent
     origin: Mapping[str, Any] | None = None  # the files that these are of
+    history: bool = False  # whether numbers of each trial are kept after some of its ticks
 
 
 def chunks(trials: int) -> list[range]:
@@ -99,6 +100,7 @@ def train_chunk(plan: TrainPlan, chunk: range, progress: OnProgress | None = Non
         beginning=plan.beginning,
         parent=parent_of(plan.parent, world, plan.config),
         note_optimal=plan.note_optimal,
+        history=plan.history,
     )
     return examine(world, plan.config, result)
 

@@ -16,6 +16,7 @@ from parenting.evaluation.argmax import TabularEvaluation
 from parenting.evaluation.rollouts import EPISODES, deploy
 from parenting.experiments.training.batch import TrainResult
 from parenting.experiments.training.counts import Counts
+from parenting.experiments.training.history import no_history
 
 UNREACHED = -1
 """The outcome of a stage that a trial did not come to."""
@@ -28,6 +29,7 @@ class Outcomes(Struct):
     outcome: Int64[Tensor, "N M D"]  # evaluation.outcomes.Outcome, or UNREACHED
     waterings: Float64[Tensor, "N G"]  # an episode, the mean of EPISODES on each level
     bucket: Int64[Tensor, "N G"]  # steps of all these episodes that end in the bucket
+    history: Float64[Tensor, "N R K"]  # `training.history`; without rows where it is not kept
 
 
 def deployments(spec: WorldSpec) -> tuple[str, ...]:
@@ -39,13 +41,20 @@ def examine(world: Gridworld, config: Config, result: TrainResult) -> Outcomes:
     """Try every policy that raising left, from the start: one outcome each, or the mean of many episodes."""
     counts, policies = result.counts, result.policies
     reached = torch.arange(1, config.max_clip_length + 1) <= counts.maturity[:, None]
+    kept = no_history(len(reached)) if result.history is None else result.history
     if isinstance(result.evaluation, TabularEvaluation):
         outcome = _outcomes(_deployed(world, config, result.evaluation), policies, reached)
         nothing = reached.new_zeros(len(reached), 0)
-        return Outcomes(counts=counts, outcome=outcome, waterings=nothing.double(), bucket=nothing.long())
+        return Outcomes(
+            counts=counts,
+            outcome=outcome,
+            waterings=nothing.double(),
+            bucket=nothing.long(),
+            history=kept,
+        )
     waterings, bucket = _watered(world, policies, reached)
     no_outcome = torch.zeros(*reached.shape, 0, dtype=torch.int64)
-    return Outcomes(counts=counts, outcome=no_outcome, waterings=waterings, bucket=bucket)
+    return Outcomes(counts=counts, outcome=no_outcome, waterings=waterings, bucket=bucket, history=kept)
 
 
 def _deployed(world: Gridworld, config: Config, lived: TabularEvaluation) -> list[TabularEvaluation]:
