@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 from parenting.envs.people_text import plain
 from parenting.server import schemas
 from parenting.server.api.names import DatabaseId, PublicId
-from parenting.server.job_kinds import EpisodePayload, PolicyPayload, WalkPayload
+from parenting.server.job_kinds import EpisodePayload, PolicyPayload, StatePayload, WalkPayload
 from parenting.server.level_check import TEXT_CHARACTERS
 from parenting.server.new_run import LARGEST_INT, Goal, Name, Pace
 from parenting.server.schemas import By
@@ -137,5 +137,12 @@ class EpisodeBody(LeaseBody):
     payload: EpisodePayload = EpisodePayload()
 
 
-JobBody = Annotated[WalkBody | PolicyBody | EpisodeBody, Field(discriminator="kind")]
+class StateBody(LeaseBody):
+    """The policy in one state."""
+
+    kind: Literal["state"]
+    payload: StatePayload = StatePayload()
+
+
+JobBody = Annotated[WalkBody | PolicyBody | EpisodeBody | StateBody, Field(discriminator="kind")]
 """A job for any worker, and the client that asks for it: one body for each of `job_kinds.KINDS`."""

@@ -9,12 +9,13 @@ from parenting.server.db import Database
 from parenting.server.job_kinds import KINDS
 from parenting.server.jobs import JobClaim
 from parenting.server.work.episode import episode
+from parenting.server.work.one_state import one_state
 from parenting.server.work.walk import policy, walk
 
 Doer = Callable[[Database, int, Any], dict[str, Any]]
 """It reads the run of this id and returns a result; it writes nothing."""
 
-DOERS: Mapping[str, Doer] = {"walk": walk, "policy": policy, "episode": episode}
+DOERS: Mapping[str, Doer] = {"walk": walk, "policy": policy, "episode": episode, "state": one_state}
 """The function that does each kind of job."""
 
 

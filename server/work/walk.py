@@ -24,7 +24,7 @@ from parenting.server.db import Database
 from parenting.server.job_kinds import WalkPayload
 from parenting.server.recall import recall
 from parenting.server.runs import get_run
-from parenting.server.snapshot import initial_weights
+from parenting.server.snapshot import Snapshot, initial_weights
 
 WALK_SEED = 2**54
 """Walks draw from seeds from here on, and runs from seeds below 2**53: no draw of a life is used."""
@@ -40,6 +40,7 @@ class Present(NamedTuple):
     world: Gridworld
     parameters: Float[Tensor, "1 P"]
     facts: dict[str, int]  # tick, stage, and the answers that it has heard
+    saved: Snapshot
 
 
 def present(db: Database, run_id: int) -> Present:
@@ -58,12 +59,12 @@ def present(db: Database, run_id: int) -> Present:
         "maturity": int(saved.state.maturity[0]),
         "answers": int(saved.tally.kinds.sum()),
     }
-    return Present(world, saved.state.learner.params, facts)
+    return Present(world, saved.state.learner.params, facts, saved)
 
 
 def walk(db: Database, run_id: int, payload: WalkPayload) -> dict[str, Any]:
     """Return a walk as a clip, and what the policy would do in every cell of the level that it began on."""
-    world, parameters, facts = present(db, run_id)
+    world, parameters, facts, _ = present(db, run_id)
     episode = play(world, parameters, keys(WALK_SEED + payload.seed, 1), most_steps(world))
     return {
         **facts,
@@ -76,7 +77,7 @@ def walk(db: Database, run_id: int, payload: WalkPayload) -> dict[str, Any]:
 
 def policy(db: Database, run_id: int, _payload: object) -> dict[str, Any]:
     """Return what the present policy would do in every cell of its level."""
-    world, parameters, facts = present(db, run_id)
+    world, parameters, facts, _ = present(db, run_id)
     start = world.beginnings().pick(torch.tensor([0]))
     return {**facts, "start": _frame(world, start), "cells": _cells(world, parameters, start)}
 
