@@ -30,6 +30,7 @@ SHEETS = {
     "history.css": (*EVERY_PAGE, "board.css", "parent.css", "forms.css", "history.css"),
     "dashboard.css": (*EVERY_PAGE, "board.css", "forms.css", "dashboard.css", "seen.css"),
     "comparison.css": (*EVERY_PAGE, "forms.css", "dashboard.css", "comparison.css"),
+    "why.css": (*EVERY_PAGE, "board.css", "parent.css", "forms.css", "history.css", "why.css"),
     "start.css": (*EVERY_PAGE, "forms.css", "start.css"),
     "settings.css": (*EVERY_PAGE, "forms.css", "settings.css"),
     "levels.css": (*EVERY_PAGE, "board.css", "forms.css", "levels.css"),

@@ -21,6 +21,7 @@ from parenting.server.pages.settings import router as settings
 from parenting.server.pages.skips import router as skips
 from parenting.server.pages.start import router as start
 from parenting.server.pages.walk import router as walk
+from parenting.server.pages.why import router as why
 
 __all__ = ["error_page", "router"]
 
@@ -42,4 +43,5 @@ router.include_router(comparison)
 router.include_router(controls)
 router.include_router(history)
 router.include_router(settings)
+router.include_router(why)
 router.include_router(docs)

@@ -128,11 +128,11 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
         return DamagedEntry(answer.number, error.message)
     return Entry(
         answer.number,
-        _said(answer.choice, shown),
+        said(answer.choice, shown),
         ("left", "right") if answer.choice == "either" else (answer.choice,),
         _fallen(answer, query),
         answer.standing and answer.parent == "human" and answer.client_id == mine,
-        _who(answer.parent, answer.client_id, mine),
+        who(answer.parent, answer.client_id, mine),
         f"{answer.received:%Y-%m-%d %H:%M:%S}",
         query.tick,
         answer.applied_tick,
@@ -141,7 +141,7 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
     )
 
 
-def _said(choice: str, shown: QuestionView) -> str:
+def said(choice: str, shown: QuestionView) -> str:
     """Say what a choice means; a move of one board has its letter."""
     sides = {move.side for move in shown.candidates} if shown.one_board else set()
     if choice in sides:
@@ -158,7 +158,8 @@ def _fallen(answer: tables.Answer, query: tables.Query) -> str:
     return tr("taken back") if back else tr("corrected later")
 
 
-def _who(parent: str, client_id: str, mine: str) -> str:
+def who(parent: str, client_id: str, mine: str) -> str:
+    """Say who answered, to the client `mine`."""
     if parent == "scripted":
         return tr("a script")
     if client_id == mine:

@@ -6,7 +6,6 @@ from sqlalchemy import select
 
 from parenting.server.damage import readable
 from parenting.server.db import Database
-from parenting.server.errors import NotFound
 from parenting.server.queue.answers import get_query
 from parenting.server.queue.presence import holder
 from parenting.server.runs import get_run
@@ -59,18 +58,11 @@ def why(db: Database, query_id: int) -> WhySchema:
     )
 
 
-def last_question(db: Database, run_id: int) -> Query:
-    """Return the question of a run that was asked last.
-
-    Raises:
-        NotFound: it has asked nothing yet.
-    """
+def last_question(db: Database, run_id: int) -> Query | None:
+    """Return the question of a run that was asked last; None if it has asked nothing yet."""
+    rows = select(Query).where(Query.run_id == run_id).order_by(Query.tick.desc()).limit(1)
     with db.read() as session:
-        rows = select(Query).where(Query.run_id == run_id).order_by(Query.tick.desc()).limit(1)
-        query = session.scalars(rows).first()
-    if query is None:
-        raise NotFound("This agent has not asked anything yet.")
-    return query
+        return session.scalars(rows).first()
 
 
 def neighbours(db: Database, query: Query) -> tuple[str | None, str | None]:

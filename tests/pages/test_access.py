@@ -12,7 +12,10 @@ from playwright.sync_api import Page, ViewportSize, expect
 from parenting.server import operator_events, runs
 from parenting.server.db import Database
 from parenting.server.queue import answers
+from parenting.server.queue.worker_side import take_answer
+from parenting.server.runs import Claim
 from parenting.server.statuses import RunStatus
+from parenting.server.tables import Effect, Reason
 from tests.pages import island_fixtures as fixtures
 from tests.pages.axe import violated
 from tests.pages.browser_tabs import BrowserTabs
@@ -33,6 +36,7 @@ PATHS = (
     "/runs/1",
     "/runs/1/end",
     "/runs/1/history",
+    "/runs/1/why?query=3",
     "/runs/1/parent?query=1",
     "/runs/1/parent?query=2",
     "/runs/2",
@@ -59,6 +63,7 @@ def lives(db: Database) -> None:
     fixtures.ask(db, mine, 42, "preference", fixtures.preference("down left left left", "right down down"))
     told = fixtures.ask(db, mine, 43, "preference", fixtures.preference("left left", "down"))
     answers.answer(db, told, "left", "me", "human")
+    explain(db, mine, 43)
     guided = fixtures.ask(db, mine, 44, "guidance", fixtures.guidance("left", "up", start=(1, 2)))
     answers.answer(db, guided, "neither", "me", "human")
     _, other = fixtures.start_run(db, level="island-bottleneck")
@@ -72,6 +77,17 @@ def lives(db: Database) -> None:
     )
     _, fourth = fixtures.start_run(db)
     runs.finish(db, fourth, RunStatus.FAILED, "The agent could not go on.")
+
+
+def explain(db: Database, mine: Claim, tick: int) -> None:
+    """The answer of a preference is heard, with all that is kept of why it was asked and what changed."""
+    take_answer(db, mine, tick + 1)
+    there = {"probabilities": [0.1, 0.2, 0.3, 0.4]}
+    clips = {side: {"kind": "exploratory", "first": 3, "last": 4} for side in ("left", "right")}
+    with db.write() as session:
+        why = {"p_pref": 0.3, "draw": 0.2, "clips": clips, **there}
+        session.add(Reason(run_id=mine.run_id, tick=tick, why=why))
+        session.add(Effect(run_id=mine.run_id, tick=tick + 1, ticks=0, policy=there))
 
 
 def violations(page: Page, **options: Any) -> list[str]:
@@ -99,7 +115,7 @@ def everywhere(page: Page) -> list[str]:
 
 @pytest.mark.parametrize("part", [0, 1])
 def test_axe_finds_nothing(tabs: BrowserTabs, lives: None, part: int) -> None:
-    """It takes long because axe looks at sixteen pages on three screens in both schemes."""
+    """It takes long because axe looks at seventeen pages on three screens in both schemes."""
     tabs.expected = ("404", "422")
     page = tabs.open("/")
     for path in PATHS[part::2]:

@@ -70,7 +70,12 @@ def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(
     expect(page.get_by_role("heading", name="This run is not here.")).to_be_visible()
     names = form(db, number, run=runs.get_run(db, 1).public_id)
     assert sent.value.url.endswith(f"/api/v1/queries/{names['question']}/answer")
-    body = {"choice": "right", "client_id": page.locator("#main").get_attribute("data-client"), **names}
+    body = {
+        "choice": "right",
+        "replays": 0,
+        "client_id": page.locator("#main").get_attribute("data-client"),
+        **names,
+    }
     assert json.loads(sent.value.post_data or "") == body
     assert body.items() <= kept(page)[0].items()
     said = f"Your answer to “{parent_title(runs.get_run(db, 1))}” of "

@@ -31,7 +31,14 @@ from tests.server.damaging import (
 DAMAGES = length(all_at_once(), each_alone())
 EVERYBODYS = ("/", "/api/v1/runs", "/healthz")
 LISTS = ("queries", "metrics", "operator-events")
-PAGES = ("/runs/{}", "/runs/{}/history", "/runs/{}/parent", "/api/v1/runs/{}", "/runs/{}/stages")
+PAGES = (
+    "/runs/{}",
+    "/runs/{}/history",
+    "/runs/{}/why",
+    "/runs/{}/parent",
+    "/api/v1/runs/{}",
+    "/runs/{}/stages",
+)
 
 
 @pytest.fixture(scope="module")

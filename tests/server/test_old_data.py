@@ -39,7 +39,7 @@ WRITTEN_WITH = ("AVX2", "AVX512")
 NAMES = ["database", "run_public_id", "query_public_id", "guidance_layout", "practice", "words", "remarks"]
 NAMES += ["votes", "script"]
 """The keys that later versions add to a row of the export."""
-PAGES = ("/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/api/v1/runs/{}/queries")
+PAGES = ("/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/runs/{}/why", "/api/v1/runs/{}/queries")
 
 
 @pytest.fixture
@@ -115,7 +115,7 @@ def test_its_export_has_the_old_bytes_and_the_names(db: Database, settings: Sett
 
 @pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize(
-    "path", ["/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/api/v1/runs/{}/queries"]
+    "path", ["/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/runs/{}/why", "/api/v1/runs/{}/queries"]
 )
 def test_its_pages_open(db: Database, settings: Settings, path: str, run: int) -> None:
     with TestClient(create_app(settings, db), base_url="http://localhost") as client:
