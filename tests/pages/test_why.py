@@ -16,6 +16,7 @@ from parenting.server.runs import Claim, get_run
 from parenting.server.tables import Answer, Effect, Query, Reason
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs, given, until
+from tests.pages.parent_page import shown
 
 CHANCES = [0.1, 0.2, 0.3, 0.4]
 GUIDANCE: dict[str, Any] = {
@@ -134,9 +135,9 @@ def test_the_dashboard_and_the_history_lead_there(db: Database, client: httpx2.C
 def test_how_often_the_clips_were_played_again_comes_with_the_answer(
     tabs: BrowserTabs, db: Database, mine: Claim
 ) -> None:
-    fixtures.ask(db, mine, 9, "preference", fixtures.preference("left left", "down"))
+    query = fixtures.ask(db, mine, 9, "preference", fixtures.preference("left left", "down"))
     page = tabs.open("/runs/1/parent")
-    expect(page.locator("#question [data-replay]")).to_be_visible()
+    shown(page, query)
     page.keyboard.press("Space")
     page.locator("#question [data-replay]").click()
     page.keyboard.press("e")
