@@ -174,6 +174,6 @@ def world_of(name: str, level: str | Level | Sequence[Level] | None, config: Con
         UnknownNameError, LevelError, ValueError: as `envs.registry.make`.
     """
     options: dict[str, Any] = {}
-    if "supervised" in registry.spec(name).options:
+    if "supervised" in registry.spec(name, level).options:
         options["supervised"] = config.supervised
     return registry.make(name, level, time_limit=config.max_episode_steps, **options)

@@ -50,7 +50,7 @@ def animate_query(
     Raises:
         UnknownWorldError: `spec` is missing and no world of this name is registered.
     """
-    spec = spec or registry.spec(level.world)
+    spec = spec or registry.spec(level.world, level)
     view = query_view(clips, kind, stage, spec.legend, level.rows)
     place = layout(view)
     steps = max(side.board.steps for side in view.sides)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 Cell = tuple[int, int]
 """Row and column."""
@@ -31,6 +31,7 @@ class Clip(TypedDict):
     actions: list[str]
     length: int
     frames: list[Frame]
+    chance: NotRequired[float]  # of guidance: the probability of the outcome shown, the likeliest
 
 
 def transitions(clip: Clip) -> list[tuple[Frame, Frame]]:

@@ -21,7 +21,7 @@ def draw_level(level: Level, spec: WorldSpec | None = None) -> str:
     Raises:
         UnknownWorldError: `spec` is missing and no world of this name is registered.
     """
-    spec = spec or registry.spec(level.world)
+    spec = spec or registry.spec(level.world, level)
     return standalone(
         "level.svg", board=level_board(level), legend=spec.legend, title=f"{spec.title}: {level.name}"
     )

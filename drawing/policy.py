@@ -35,7 +35,7 @@ def draw_policy(
         UnknownWorldError: `spec` is missing and no world of this name is registered.
         ValueError: a cell has not four probabilities.
     """
-    spec = spec or registry.spec(level.world)
+    spec = spec or registry.spec(level.world, level)
     arrows = policy_arrows(probabilities)
     return standalone(
         "policy.svg",

@@ -58,7 +58,7 @@ def draw_query(
     Raises:
         UnknownWorldError: `spec` is missing and no world of this name is registered.
     """
-    spec = spec or registry.spec(level.world)
+    spec = spec or registry.spec(level.world, level)
     view = query_view(clips, kind, stage, spec.legend, level.rows)
     return standalone("query.svg", legend=spec.legend, view=view, place=layout(view))
 

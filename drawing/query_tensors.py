@@ -43,15 +43,22 @@ class QueryTensors(Protocol):
         """Row and column of the box, -1 where there is none, [N, 2, T + 1, 2]."""
 
 
-def read_clips(query: QueryTensors, glyphs: str, trial: int = 0) -> dict[str, Clip]:
+def read_clips(
+    query: QueryTensors, glyphs: str, trial: int = 0, chances: tuple[float, float] | None = None
+) -> dict[str, Clip]:
     """Return the clips of one trial's query by side.
 
     Args:
         query: The query of `parenting.agent`; it must ask something in this trial.
         glyphs: The world's glyphs in the order of their codes (`WorldSpec.glyphs`).
         trial: The row of the batch.
+        chances: The probability of the outcome on each side, where these are forecasts left to chance.
     """
-    return {name: _clip(query, glyphs, trial, side) for side, name in enumerate(SIDES)}
+    clips = {name: _clip(query, glyphs, trial, side) for side, name in enumerate(SIDES)}
+    if chances is not None:
+        for name, chance in zip(SIDES, chances, strict=True):
+            clips[name]["chance"] = chance
+    return clips
 
 
 def _clip(query: QueryTensors, glyphs: str, trial: int, side: int) -> Clip:

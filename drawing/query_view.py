@@ -119,8 +119,16 @@ def _side(
     start: Cell | None,
 ) -> SideView:
     board = build_board(clip, stage, bars, start)
-    captions = clip_captions(clip, board, legend, longest)
+    captions = (*clip_captions(clip, board, legend, longest), *_likely(clip))
     return SideView(name, letter, action_text(clip["actions"]), captions, board)
+
+
+def _likely(clip: Clip) -> tuple[Caption, ...]:
+    """Return how probable a forecast is, where it is left to chance."""
+    if clip.get("chance", 1.0) >= 1:
+        return ()
+    percent = f"{100 * clip['chance']:.0f}"
+    return (Caption(tr("This is the likeliest outcome, with {percent} %.", percent=percent)),)
 
 
 def _chance_note(clips: Iterable[Clip]) -> str:

@@ -41,7 +41,7 @@ class WorldState(Struct):
 class Gridworld(ABC):
     """The rules of one world on K levels of one size. Immutable: a function of its arguments, with tables."""
 
-    spec: ClassVar[WorldSpec]
+    spec: WorldSpec
     walls: ClassVar[str] = WALL  # the glyphs that stop the agent
     ends: ClassVar[str] = "G"  # the glyphs that end an episode when the agent enters them
     hides: ClassVar[str] = ""  # the glyphs under which the agent is not drawn
@@ -126,6 +126,17 @@ class Gridworld(ABC):
     def enter(self, before: WorldState, after: WorldState) -> WorldState:
         """Apply the effect of the cell that the agent stands on: some end the episode."""
         return after.replace(terminated=before.terminated | self._ends[self.tile(after.board, after.agent)])
+
+    branches: int = 1
+    """The most outcomes of a step that a parent's model knows of; where it is 1, the forecast alone."""
+
+    def branch(self, state: WorldState, action: Actions, number: int) -> WorldState:
+        """The outcome of a number below `branches`; the forecast, where there is no other."""
+        return self.forecast(state, action)
+
+    def branch_chance(self, state: WorldState, action: Actions) -> Float64[Tensor, "N B"]:
+        """The probability of each outcome."""
+        return torch.ones_like(state.terminated, dtype=torch.float64)[:, None]
 
     def chance(self, before: WorldState, after: WorldState, keys: Keys) -> WorldState:
         """Apply the random events of a step."""

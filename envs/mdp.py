@@ -31,6 +31,25 @@ class Model(Struct):
     forbidden: Bool[Tensor, "S 4"]
     terminal: Bool[Tensor, "S"]
     goal: Bool[Tensor, "S"]  # over, and not by harm alone: on a goal, or where some safe step led
+    branch_state: Int64[Tensor, "S 4 B"]  # every outcome, where a world tells its chance; else B = 0
+    branch_chance: Float64[Tensor, "S 4 B"]  # and its probability; then `reward` is their mean
+
+    @property
+    def chancy(self) -> bool:
+        """Return whether the world tells what is left to chance in a step."""
+        return self.branch_state.shape[-1] > 0
+
+    def mean(self, v: Float64[Tensor, "S"]) -> Float64[Tensor, "S 4"]:
+        """Return the mean of v over the states that each action leads to."""
+        if not self.chancy:
+            return v[self.next_state]
+        return torch.where(self.branch_chance > 0, self.branch_chance * v[self.branch_state], 0.0).sum(-1)
+
+    def any_of(self, to: Bool[Tensor, "S"]) -> Bool[Tensor, "S 4"]:
+        """Return which actions may lead to some of these states."""
+        if not self.chancy:
+            return to[self.next_state]
+        return (to[self.branch_state] & (self.branch_chance > 0)).any(-1)
 
     def find(self, board: Tensor, agent: Tensor, box: Tensor, level: Tensor) -> Int64[Tensor, "..."]:
         """The states of given boards, for any leading axes.
@@ -69,12 +88,12 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
         )
     found, steps = [edge], []
     while len(edge.step_count):
-        arrived, step = _expand(world, edge)
+        arrived, words, step = _expand(world, edge)
         steps.append(step)
-        fresh = _new(step["word"], known)
+        fresh = _new(words, known)
         edge = arrived.pick(fresh)
         found.append(edge)
-        known = torch.cat((known, step["word"][fresh]))
+        known = torch.cat((known, words[fresh]))
         if len(known) > most:
             raise ValueError(
                 f"This world has more than {most} states, too many for the scripted parent to list; "
@@ -83,26 +102,44 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
     return _model(world, WorldState.joined(found), known, steps)
 
 
-def _expand(world: Gridworld, edge: WorldState) -> tuple[WorldState, dict[str, Tensor]]:
-    """Step every action from each state: the next states and their rewards, in the order (state, action)."""
+def _expand(world: Gridworld, edge: WorldState) -> tuple[WorldState, Tensor, dict[str, Tensor]]:
+    """Step every action from each state, in the order (state, action).
+
+    Return the next states, one word for each, and what is to be known of each step. Where the world tells its
+    chance, the next states are all outcomes.
+    """
     number = torch.arange(len(edge.step_count), device=edge.step_count.device)
     before = edge.pick(number.repeat_interleave(4))
     action = torch.arange(4, device=number.device).repeat(len(number))
-    after = world.forecast(before, action)
-    after = after.replace(step_count=torch.zeros_like(after.step_count))
+    after = _uncounted(world.forecast(before, action))
     said = {
         "word": _word(after),
         "reward": world.reward(before, action, after),
         "unsafe": world.unsafe(before, action, after),
         "forbidden": world.forbidden(before, action, after),
     }
-    return after, said
+    if world.branches == 1:
+        return after, said["word"], said
+    outcomes = [_uncounted(world.branch(before, action, place)) for place in range(world.branches)]
+    worth = torch.stack([world.reward(before, action, one) for one in outcomes], -1)
+    said["chance"] = world.branch_chance(before, action)
+    said["reward"] = (said["chance"] * worth).sum(-1)
+    said["branch"] = torch.stack([_word(one) for one in outcomes], -1)
+    return WorldState.joined(outcomes), said["branch"].T.flatten(), said
+
+
+def _uncounted(states: WorldState) -> WorldState:
+    return states.replace(step_count=torch.zeros_like(states.step_count))
 
 
 def _model(world: Gridworld, found: WorldState, known: Tensor, steps: list[dict[str, Tensor]]) -> Model:
     ordered = known.sort()
-    said = {name: torch.cat([step[name] for step in steps]).view(-1, 4) for name in steps[0]}
+    said = {name: _by_state([step[name] for step in steps]) for name in steps[0]}
     next_state = ordered.indices[torch.searchsorted(ordered.values, said["word"])]
+    if "branch" in said:
+        branches = ordered.indices[torch.searchsorted(ordered.values, said["branch"])], said["chance"]
+    else:
+        branches = next_state.new_zeros(*next_state.shape, 0), said["reward"].new_zeros(*next_state.shape, 0)
     on_goal = world.lookup("G")[world.tile(found.board, found.agent)]
     return Model(
         states=found,
@@ -114,7 +151,15 @@ def _model(world: Gridworld, found: WorldState, known: Tensor, steps: list[dict[
         forbidden=said["forbidden"],
         terminal=found.terminated,
         goal=found.terminated & (on_goal | _entered_safely(found.terminated, next_state, said["unsafe"])),
+        branch_state=branches[0],
+        branch_chance=branches[1],
     )
+
+
+def _by_state(rows: list[Tensor]) -> Tensor:
+    """Rows of steps as [S, 4], or as [S, 4, B] of their outcomes."""
+    joined = torch.cat(rows)
+    return joined.view(-1, 4, *joined.shape[1:])
 
 
 def _entered_safely(terminal: Tensor, next_state: Tensor, unsafe: Tensor) -> Bool[Tensor, "S"]:

@@ -15,6 +15,7 @@ from parenting.envs.level_text import FILE_CHARACTERS, Written, choose, written
 from parenting.envs.levels.spec import Level, LevelError, Setting, WorldSpec
 from parenting.envs.names import UnknownNameError
 from parenting.envs.people_text import read_name
+from parenting.envs.tables import text as tables
 
 if TYPE_CHECKING:
     from parenting.envs.gridworld import Gridworld
@@ -94,17 +95,45 @@ WORLDS: MutableMapping[str, WorldSpec] = Worlds()
 """Every world by its name."""
 
 
-def spec(world: str) -> WorldSpec:
+def spec(world: str, of: str | Level | Sequence[Level] | None = None) -> WorldSpec:
     """The world of a name.
+
+    Args:
+        world: The name.
+        of: A level's text, or levels; one that holds a table says by itself what its world is.
 
     Raises:
         UnknownNameError: there is no such world.
         BrokenPackageError: it is of a package that cannot be used.
+        LevelError: the level's table is not sound.
     """
+    if of is not None and world not in BUILT_IN:
+        packed = _packed(of)
+        if packed is not None:
+            return _of_table(world, packed)
     if world not in WORLDS:
         INSTALLED.refuse(world)
         raise UnknownNameError("world", world, WORLDS)
     return WORLDS[world]
+
+
+def knows(world: str, text: str | None = None) -> bool:
+    """Return whether there is a world of this name, or a level's text says by itself what its world is."""
+    return world in WORLDS or (text is not None and tables.told_in(text) is not None)
+
+
+def _packed(of: str | Level | Sequence[Level]) -> str | None:
+    if isinstance(of, str):
+        return tables.told_in(of)
+    first = of if isinstance(of, Level) else next(iter(of), None)
+    return None if first is None else first.header.get(tables.KEY)
+
+
+def _of_table(world: str, packed: str) -> WorldSpec:
+    try:
+        return tables.spec_of(world, packed)
+    except ValueError as error:
+        raise LevelError("level", 1, 1, str(error).rstrip(".")) from None
 
 
 def level(world: str, name_or_text: str | None = None, source: str = "level") -> Level:
@@ -116,7 +145,7 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
         UnknownNameError: there is no such world or level.
         LevelError: the text breaks a rule; names `source`, line, column and rule.
     """
-    found = spec(world)
+    found = spec(world, name_or_text)
     chosen = found.default if name_or_text is None else name_or_text
     if "\n" not in chosen:
         if chosen not in found.levels:
@@ -138,7 +167,7 @@ def read_level(world: str, text: str, source: str = "level", which: str | None =
         SeveralLevelsError: there are several levels in the text, and none of them is named.
         LevelError: the text breaks a rule; names `source`, line, column and rule.
     """
-    glyphs = spec(world).glyphs
+    glyphs = spec(world, text).glyphs
     check_text(text, source, FILE_CHARACTERS)
     chosen = choose(written(text, glyphs), which, source)
     return read_written(world, chosen, source)
@@ -199,7 +228,7 @@ def make(
         LevelError: a text breaks a rule.
         ValueError: no levels, levels of different sizes or of another world, or a time limit below 1.
     """
-    found = spec(world)
+    found = spec(world, levels)
     settings.check_names(found, options)
     own = {**found.options, **settings.read(options)}
     if levels is None or isinstance(levels, str):

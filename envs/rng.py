@@ -41,6 +41,7 @@ class Stream(IntEnum):
     SUPERVISED = 23  # [] : this episode is supervised if u < 0.5, where that is left to chance
     MAZE = 24  # random mazes and levels
     START = 25  # the cell of bare soil floor(n u) of n, where an experiment lets episodes begin anywhere
+    TABLE = 26  # [] : which outcome of a move comes, in a world that is a table
     # parents who err (ours)
     SLIP = 31  # place 2 k, 2 k + 1 : the k-th part of a parent errs if u < its chance; which way, by a coin
     # the start: weights, one stream a layer from here on

@@ -15,10 +15,12 @@ from parenting.agent.init import network_of
 from parenting.envs.gridworld import Gridworld, local_state
 from parenting.envs.mdp import Model
 from parenting.evaluation import rollouts
-from parenting.evaluation.outcomes import UNREACHABLE, distance_to_goal, follow, outcome
+from parenting.evaluation.outcomes import UNREACHABLE, Outcome, distance_to_goal, follow, outcome
 from parenting.parents.garden_values import GardenValues
 from parenting.parents.values import TabularValues, Values
 
+SAME = 1e-6
+"""Values of actions within this are the same."""
 MEAN_EPISODES = 16
 """Episodes of the garden's mean that a dashboard draws. Even these cost a quarter of a second."""
 REFRESH_SECONDS = 3.0
@@ -48,6 +50,8 @@ def evaluation(world: Gridworld, values: Values, gamma: float) -> Evaluation:
     match values:
         case GardenValues():
             return GardenEvaluation(world, values)
+        case TabularValues() if values.model.chancy:
+            return ChanceEvaluation(world, values, gamma)
         case TabularValues():
             return TabularEvaluation(world, values.model, gamma)
     raise TypeError(f"There is no evaluation of a world whose values are {type(values).__name__}.")
@@ -143,6 +147,60 @@ class TabularEvaluation:
             total += self.gamma**t * float(self.model.reward[at, action])
             at = self.model.next_state[at, action]
         return total
+
+
+class ChanceEvaluation(TabularEvaluation):
+    """The argmax policy where the steps of a listed world are left to chance, by their probabilities."""
+
+    def __init__(self, world: Gridworld, values: TabularValues, gamma: float) -> None:
+        """Prepare the optimal actions of all states, too."""
+        super().__init__(world, values.model, gamma)
+        self.values = values
+        q, v = values.table.q, values.table.v
+        self.good = (q >= v[:, None] - SAME) | values.model.terminal[:, None]
+
+    def optimal(self, parameters: Float[Tensor, "N P"]) -> Bool[Tensor, "N"]:
+        """Return whether the argmax policy takes an optimal action wherever chance may lead it."""
+        found = [self._optimal(one) for one in self._every_action(parameters)]
+        return torch.tensor(found, dtype=torch.bool, device=parameters.device)
+
+    def _optimal(self, action: Int64[Tensor, "S"]) -> bool:
+        every = torch.arange(len(action), device=action.device)
+        met = torch.isin(every, self.starts)
+        while True:
+            may = self.model.branch_chance[every, action] > 0
+            to = self.model.branch_state[every, action]
+            grown = met.clone()
+            grown[to[(met & ~self.model.terminal)[:, None] & may]] = True
+            if bool((grown == met).all()):
+                return bool(self.good[every, action][met].all())
+            met = grown
+
+    def _every_action(self, parameters: Float[Tensor, "N P"]) -> Int64[Tensor, "N S"]:
+        every = torch.arange(len(self.local_state), device=parameters.device)
+        return self.argmax(parameters, every.expand(len(parameters), -1))
+
+    def outcomes(self, parameters: Float[Tensor, "N P"]) -> Int64[Tensor, "N"]:
+        """The `Outcome` of each likeliest walk; optimal only where the policy is, whatever chance does."""
+        walked = super().outcomes(parameters).clamp_min(int(Outcome.DETOUR))
+        return torch.where(self.optimal(parameters), int(Outcome.OPTIMAL), walked)
+
+    def returns(self, parameters: Float[Tensor, "N P"], level: int = 0) -> Float64[Tensor, "N"]:
+        """The expected discounted return of an episode on one level, cut off at the time limit."""
+        return torch.stack([self._expected(action, level) for action in self._every_action(parameters)])
+
+    def _expected(self, action: Int64[Tensor, "S"], level: int) -> Float64[Tensor, ""]:
+        every, model = torch.arange(len(action), device=action.device), self.model
+        chance, to = model.branch_chance[every, action], model.branch_state[every, action]
+        reward = model.reward[every, action].masked_fill(model.terminal, 0.0)
+        v = torch.zeros_like(reward)
+        for _ in range(self.world.time_limit):
+            v = (reward + self.gamma * (chance * v[to]).sum(-1)).masked_fill(model.terminal, 0.0)
+        return v[self.starts[level]]
+
+    def best(self, level: int = 0) -> float:
+        """The value of the level's start, over an infinite horizon."""
+        return float(self.values.table.v[self.starts[level]])
 
 
 class ArgmaxPolicy:

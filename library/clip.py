@@ -19,6 +19,8 @@ class Clip:
         observed: The same as the agent saw it, which differs where it is deluded (Sec. 3.2.2).
         cells: Where the agent is in each frame: row and column, counted from 0.
         tiles: The glyph of the ground under the agent in each frame.
+        chance: The probability of what is shown, where guidance shows the likeliest outcome of a move; else
+            1.
     """
 
     actions: tuple[str, ...]
@@ -26,6 +28,7 @@ class Clip:
     observed: tuple[tuple[str, ...], ...]
     cells: tuple[tuple[int, int], ...]
     tiles: tuple[str, ...]
+    chance: float = 1.0
 
     def __str__(self) -> str:
         return " ".join(self.actions)
@@ -41,6 +44,7 @@ def plain_clip(clip: drawing.Clip) -> Clip:
         observed=tuple(tuple(moment["observed"]) for moment in moments),
         cells=cells,
         tiles=tuple(moment["ground"][y][x] for moment, (y, x) in zip(moments, cells, strict=True)),
+        chance=clip.get("chance", 1.0),
     )
 
 

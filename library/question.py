@@ -10,7 +10,9 @@ import torch
 
 from parenting._plural import counted
 from parenting.agent import query as queries
+from parenting.agent.forecast_chance import forecast_chances
 from parenting.agent.query import Choice, QueryKind
+from parenting.drawing import clip as drawing
 from parenting.drawing.query import draw_query
 from parenting.drawing.query_tensors import read_clips
 from parenting.library.clip import Clip, plain_clip
@@ -111,7 +113,7 @@ class Question:
     def drawing(self) -> Drawing:
         """Draw both clips; `show` does."""
         query = self.query
-        clips = read_clips(query, query.world.legend)
+        clips = _clips(query)
         level = query.world.levels[int(query.level[0])]
         picture = draw_query(clips, level, self.kind, self.stage, query.world.spec)
         return Drawing([picture], both_clips(self.kind, self.left, self.right, self.votes))
@@ -126,7 +128,7 @@ class Question:
 def question(query: Query, row: int, trial: int | None = None) -> Question:
     """Return the question in one row of a query."""
     one = query.row(row)
-    clips = read_clips(one, one.world.legend)
+    clips = _clips(one)
     return Question(
         kind=QueryKind(int(one.kind[0])).name.lower(),
         left=plain_clip(clips["left"]),
@@ -136,6 +138,11 @@ def question(query: Query, row: int, trial: int | None = None) -> Question:
         query=one,
         votes=int(one.votes[0]),
     )
+
+
+def _clips(query: Query) -> dict[str, drawing.Clip]:
+    """Return the clips of one trial's query, with the chances of a forecast."""
+    return read_clips(query, query.world.legend, chances=forecast_chances(query.world, query))
 
 
 def choice_of(said: Any, who: str) -> Choice:

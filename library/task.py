@@ -16,8 +16,9 @@ from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
 from parenting.envs.names import did_you_mean
 from parenting.envs.options import SUPERVISION
+from parenting.envs.tables.world import TableWorld
 from parenting.experiments.training.stop_rule import StopRule, read_stop_rule
-from parenting.library.worlds import AnyLevel, World, named, path_hint
+from parenting.library.worlds import AnyLevel, World, named, of_table, path_hint
 from parenting.server.beginnings import beginning
 from parenting.weights.origin import NO_ORIGIN, Origin
 from parenting.weights.store import Wanted, find, load
@@ -38,7 +39,7 @@ class Task(NamedTuple):
 
 
 def prepare(
-    world: str | World | Level,
+    world: str | World | Level | TableWorld,
     level: AnyLevel | None,
     preset: str | Config,
     changes: Mapping[str, object],
@@ -54,11 +55,13 @@ def prepare(
             begins with; the message names it.
     """
     changes = _new_names(changes)
+    if isinstance(world, TableWorld):
+        world = of_table(world, level)
     if isinstance(world, Level):
         return prepare(registry.make(world.world, world), level, preset, changes, origin)
     if isinstance(world, str):
         name, found = named(world, level)
-        config = compose_config(registry.spec(name), preset, changes)
+        config = compose_config(registry.spec(name, found), preset, changes)
         made = world_of(name, found, config)
     elif not isinstance(world, World):
         raise TypeError(f"world: {world!r} is not the name of a world, a World or a text.{path_hint(world)}")

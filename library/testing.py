@@ -7,6 +7,7 @@ from typing import Any
 
 from parenting.envs import registry
 from parenting.envs.levels.spec import WorldSpec
+from parenting.envs.tables.world import TableWorld
 from parenting.library.conformance import record, seen, steps
 from parenting.library.conformance.walks import ConformanceError, Subject
 from parenting.library.worlds import World, register
@@ -42,7 +43,9 @@ LIVES, STEPS = 8, 30
 """Random lives that are lived twice, and their steps."""
 
 
-def check_world(world: str | WorldSpec | World, *, certain: Mapping[str, Any] | None = None) -> None:
+def check_world(
+    world: str | WorldSpec | World | TableWorld, *, certain: Mapping[str, Any] | None = None
+) -> None:
     """Check that a world has what every world has, so that agents can be raised in it.
 
     Its record, its built-in levels and what spoils them; that the plain search finds what steps reach; that
@@ -50,7 +53,8 @@ def check_world(world: str | WorldSpec | World, *, certain: Mapping[str, Any] | 
     alone, draw by key, read no step count, and stay at their end.
 
     Args:
-        world: A world's name, its `WorldSpec`, which is registered if it is not yet, or a world made of it.
+        world: A world's name, its `WorldSpec`, which is registered if it is not yet, a `TableWorld`,
+            or a world made of one.
         certain: The options that leave nothing to chance, such as `{"drying": 0.0}`, for a world whose steps
             are left to chance and whose `likelihood` does not say so.
 

@@ -18,7 +18,8 @@ def both_clips(kind: str, left: Clip, right: Clip, votes: int = 0) -> str:
     """
     parts = [f"{kind}: {ASKS[kind]}", *([TO_BE_SURE] if votes else [])]
     for name, clip in (("left", left), ("right", right)):
-        parts += [f"{name}: {clip}", frames(clip)]
+        likely = f" (the likeliest outcome, {clip.chance:.0%})" if clip.chance < 1 else ""
+        parts += [f"{name}: {clip}{likely}", frames(clip)]
     return "\n".join(parts)
 
 

@@ -14,6 +14,7 @@ from parenting.agent.parent import BatchParent
 from parenting.agent.parent import Parent as AnyParent
 from parenting.envs.levels.spec import Level
 from parenting.envs.rng import keys
+from parenting.envs.tables.world import TableWorld
 from parenting.experiments.training import batch
 from parenting.experiments.training.batch import BatchTrainer, MakeParent
 from parenting.experiments.training.chunks import chunks
@@ -40,7 +41,7 @@ Callback = Callable[[Progress], bool | None]
 
 
 def train(
-    world: str | World | Level,
+    world: str | World | Level | TableWorld,
     *,
     level: AnyLevel | None = None,
     preset: str | Config = "conservative",
@@ -58,7 +59,8 @@ def train(
     """Train agents by PARENTING (Sec. 2): they ask, a parent answers, and no reward is read.
 
     Args:
-        world: A world's name, a `World`, a level's text whose header names its world, or a `Level`.
+        world: A world's name, a `World`, a level's text whose header names its world, a
+            `Level`, or a `TableWorld`.
         level: A built-in level's name, a level's text, a file's path, or a `Level`; None takes the default.
         preset: A name in `PRESETS` ("conservative", "lax", "direct": Table 1; "frugal": ours), or a `Config`.
         parent: "scripted" (Sec. 3.1.3), a parent who errs such as "noisy:0.1" (docs/commands.md, "Parents who

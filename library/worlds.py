@@ -13,6 +13,7 @@ from parenting.envs.gridworld import Gridworld as World
 from parenting.envs.level_bytes import decode
 from parenting.envs.levels.spec import Level, LevelError, WorldSpec
 from parenting.envs.options import check_names
+from parenting.envs.tables.world import TableWorld
 from parenting.library.checks import check_device, check_number
 
 __all__ = ["AnyLevel", "World", "make", "named", "read_level", "worlds"]
@@ -39,7 +40,7 @@ def worlds() -> dict[str, tuple[str, ...]]:
 
 
 def make(
-    world: str,
+    world: str | TableWorld,
     level: AnyLevel | None = None,
     *,
     max_episode_steps: int | None = None,
@@ -49,7 +50,7 @@ def make(
     """Make a world (Sec. 3.2): its rules in tensors, all trials at once.
 
     Args:
-        world: A world's name, or a level's text whose header names its world.
+        world: A world's name, a level's text whose header names its world, or a `TableWorld`.
         level: A built-in level's name, a level's text, the path of a file, a `Level`, or several levels of
             one size; None takes the world's default level.
         max_episode_steps: Steps after which an episode is cut off; None takes the world's default.
@@ -73,8 +74,10 @@ def make(
         >>> world.height, world.width
         (6, 8)
     """
+    if isinstance(world, TableWorld):
+        world = of_table(world, level)
     name, found = named(world, level)
-    _check_options(registry.spec(name), options)
+    _check_options(registry.spec(name, found), options)
     if max_episode_steps is not None:
         check_number("max_episode_steps", max_episode_steps, 1, 10**9)
     if device is not None:
@@ -108,6 +111,17 @@ def register(spec: WorldSpec) -> None:
         except LevelError:
             del registry.WORLDS[spec.name]
             raise
+
+
+def of_table(world: TableWorld, level: object) -> str:
+    """Return the text of a table's level, which says all of its world.
+
+    Raises:
+        ValueError: A level is given beside it.
+    """
+    if level is not None:
+        raise ValueError("level: a TableWorld has its level already. Leave level out.")
+    return world.level.text
 
 
 def named(world: str, level: AnyLevel | None) -> tuple[str, str | Level | Sequence[Level] | None]:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from parenting.agent.query import Answer, Choice
     from parenting.agent.state import AgentState
     from parenting.envs.levels.spec import Brief, Level, LevelError, WorldSpec
+    from parenting.envs.tables.world import TableWorld
     from parenting.library import testing
     from parenting.library.evaluating import Evaluation, evaluate
     from parenting.library.loop import Tick, configure, init, step, tick
@@ -54,6 +55,7 @@ _MODULES = {
     "ReplayError": "library.replay",
     "ReplayParent": "library.replay",
     "ScriptedParent": "library.scripted",
+    "TableWorld": "envs.tables.world",
     "Tick": "library.loop",
     "TrainResult": "library.result",
     "World": "library.worlds",
@@ -94,6 +96,7 @@ __all__ = [
     "ReplayError",
     "ReplayParent",
     "ScriptedParent",
+    "TableWorld",
     "Tick",
     "TrainResult",
     "World",

@@ -33,9 +33,9 @@ def optimal(model: Model, gamma: float) -> ValueTable:
     """
     lost = _goal_unreachable(model)
     v = torch.zeros_like(model.reward[:, 0])
-    if gamma == 1 and bool(model.goal.any()):
+    if gamma == 1 and bool(model.goal.any()) and not model.chancy:
         v.fill_(-torch.inf)  # so that only ways which come to an end count
-    gives_up = lost[model.next_state]
+    gives_up = model.any_of(lost) & ~model.any_of(~lost)
     return _iterate(model, gamma, v, lost, lambda q: q.masked_fill(gives_up, -torch.inf).max(1).values)
 
 
@@ -63,7 +63,7 @@ def _goal_unreachable(model: Model) -> Bool[Tensor, "S"]:
 def _can_reach(model: Model, to: Bool[Tensor, "S"], by: Bool[Tensor, "S 4"]) -> Bool[Tensor, "S"]:
     """From where some of the moves `by` lead to some of these states."""
     while True:
-        grown = to | (~model.terminal & (by & to[model.next_state]).any(1))
+        grown = to | (~model.terminal & (by & model.any_of(to)).any(1))
         if bool((grown == to).all()):
             return to
         to = grown
@@ -75,10 +75,10 @@ def _iterate(
     """The fixed point of v = backup(r + gamma v'), which is 0 at an end and HOPELESS where all is lost."""
     v = torch.where(lost, HOPELESS, torch.where(model.terminal, 0.0, v))
     for _ in range(MAX_SWEEPS):
-        q = model.reward + gamma * v[model.next_state]
+        q = model.reward + gamma * model.mean(v)
         better = torch.where(lost, HOPELESS, torch.where(model.terminal, 0.0, backup(q)))
         if bool(((better == v) | ((better - v).abs() <= TOLERANCE * better.abs().clamp_min(1.0))).all()):
-            return ValueTable(gamma, better, model.reward + gamma * better[model.next_state])
+            return ValueTable(gamma, better, model.reward + gamma * model.mean(better))
         v = better
     raise ArithmeticError(
         f"Values did not converge within {MAX_SWEEPS} sweeps at gamma = {gamma}; use a smaller gamma."

@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from parenting.agent import query as queries
+from parenting.agent.forecast_chance import forecast_chances
 from parenting.agent.query import Choice, Query, QueryKind
 from parenting.drawing.query_tensors import ACTIONS, SIDES, read_clips
 from parenting.envs.gridworld import Gridworld
@@ -34,7 +35,7 @@ def encode(world: Gridworld, query: Query) -> dict[str, Any]:
     """
     if int(query.level[0]) != 0:
         raise ValueError(f"level: {int(query.level[0])} cannot be stored; a stored run has one level, 0.")
-    return dict(read_clips(query, world.legend))
+    return dict(read_clips(query, world.legend, chances=forecast_chances(world, query)))
 
 
 def kind_name(query: Query) -> str | None:

@@ -168,13 +168,13 @@ def plan(new: NewRun, folder: Path | None = None, origin: Origin = NO_ORIGIN) ->
     if new.script is not None and new.parent == "human":
         wrong.append(("script", "People answer this run. Errors belong to a run with the parent scripted."))
     level = _level(new, wrong)
-    config = _config(new, wrong)
+    config = _config(new, level, wrong)
     weights = None if origin.policy is not None else _weights(new, level, config, folder, wrong)
     if level is not None and config is not None:
         wrong += origin.misfits(level, config)
     if wrong or level is None or config is None:
         raise InvalidFieldsError(wrong)
-    spec = registry.spec(new.world)
+    spec = registry.spec(new.world, level)
     return {
         **new.model_dump(include=COLUMNS),
         "script": _script(new),
@@ -226,7 +226,7 @@ def _unknown(what: str, name: str, known: Collection[str]) -> str:
 
 
 def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
-    if new.world not in registry.WORLDS:
+    if not registry.knows(new.world, new.level_text):
         broken = registry.INSTALLED.broken().get(new.world)
         wrong.append(("world", broken or _unknown("world", new.world, registry.WORLDS)))
         return None
@@ -239,14 +239,20 @@ def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
             return registry.level(new.world, new.level)
         return registry.read_level(new.world, new.level_text.replace("\r\n", "\n"))
     except UnknownNameError:
-        known = registry.spec(new.world).levels
+        known = registry.spec(new.world, new.level_text).levels
         wrong.append((field, _unknown(f"level of {new.world}", str(new.level), known)))
     except LevelError as error:
         wrong.append((field, str(error)))
     return None
 
 
-def _config(new: NewRun, wrong: list[tuple[str, str]]) -> Config | None:
+def _defaults(new: NewRun, level: Level | None) -> Mapping[str, object]:
+    if level is not None:
+        return registry.spec(new.world, level).defaults
+    return registry.defaults(new.world) if new.world in registry.WORLDS else {}
+
+
+def _config(new: NewRun, level: Level | None, wrong: list[tuple[str, str]]) -> Config | None:
     """The preset, over it what the world sets, over it what this run sets (docs/paper.md, "Settings").
 
     A script answers at once, so its agent waits for each of its answers.
@@ -254,7 +260,7 @@ def _config(new: NewRun, wrong: list[tuple[str, str]]) -> Config | None:
     if new.preset not in PRESETS:
         wrong.append(("preset", _unknown("preset", new.preset, PRESETS)))
         return None
-    world = registry.defaults(new.world) if new.world in registry.WORLDS else {}
+    world = _defaults(new, level)
     waits = {"max_open_preferences": 0} if new.parent == "scripted" else {}
     changes = waits | {name: whole(value) for name, value in new.config.items()}
     try:
@@ -272,7 +278,7 @@ def _weights(
     if level is None or config is None or not config.pretrain:
         return None
     try:
-        return find(Wanted(registry.spec(new.world), level.height, level.width), folder)
+        return find(Wanted(registry.spec(new.world, level), level.height, level.width), folder)
     except NoWeightsError as error:
         wrong.append(("config.pretrain", str(error)))
         return None

@@ -97,7 +97,7 @@ def _policy(db: Database, run: Run, archive: TensorArchive, sha256: str) -> Poli
 
 def _options(run: Run, config: Config) -> dict[str, Any]:
     """Return the options of the world that differ by the config, as `agent.init.world_of` sets them."""
-    known = registry.spec(run.world).options
+    known = registry.spec(run.world, run.level_text).options
     return {"supervised": SUPERVISION[config.supervised]} if "supervised" in known else {}
 
 

@@ -184,6 +184,7 @@ class ClipSchema(Schema):
     actions: list[Literal["up", "down", "left", "right"]]
     length: int
     frames: list[FrameSchema]
+    chance: float | None = None  # of guidance: the probability of the outcome shown, the likeliest
 
 
 class PolicySchema(Schema):

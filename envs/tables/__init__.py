@@ -1,0 +1,1 @@
+"""Worlds given by tables of transition probabilities, as Gymnasium's toy text gives them."""
