@@ -30,6 +30,7 @@ COMMANDS = {
     "answer": "Answer a run as a scripted parent, over the HTTP API.",
     "runs": "List the runs, and who waits for whom.",
     "resume": "Let a paused or failed run go on.",
+    "rollback": "Go on from an earlier tick of a run, as a new run.",
     "export": "Write the answers of a run as JSON lines.",
     "policy": "Write the present policy of a run to a file.",
     "replay": "Replay a stored run and compare it bit for bit.",

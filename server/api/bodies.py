@@ -12,7 +12,7 @@ from parenting.server import schemas
 from parenting.server.api.names import DatabaseId, PublicId
 from parenting.server.job_kinds import EpisodePayload, PolicyPayload, StatePayload, WalkPayload
 from parenting.server.level_check import TEXT_CHARACTERS
-from parenting.server.new_run import LARGEST_INT, Goal, Name, Pace
+from parenting.server.new_run import LARGEST_INT, Goal, Name, Pace, PersonsName
 from parenting.server.schemas import By
 from parenting.server.whole import WHOLE
 
@@ -108,6 +108,13 @@ class GoalBody(Strict):
     """The goal of a run."""
 
     goal: Goal | None = Field(description="Number of answers after which the run rests; null: none.")
+
+
+class RollBackBody(Strict):
+    """The tick that a run is rolled back to, and the name of the new run."""
+
+    tick: Place = Field(description="The last tick that both runs have in common.")
+    name: PersonsName | None = Field(None, description="null: the name of the run, and the tick.")
 
 
 class PaceBody(Strict):

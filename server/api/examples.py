@@ -265,6 +265,7 @@ SHOWN = {
     "mature_run": Shown(RUN),
     "end_episode": Shown(RUN),
     "change_run": Shown(RUN, {"ask less": {"name": "p_guid", "value": 0.5}}),
+    "roll_back_run": Shown(RUN, {"to tick 40": {"tick": 40}}),
     "set_goal": Shown(RUN, {"fifty": {"goal": 50}, "never": {"goal": None}}),
     "set_pace": Shown({**RUN, "pace": 2.5}, {"to watch": {"pace": 2.5}, "free": {"pace": None}}),
     "list_questions": Shown(_rows(ASKED)),

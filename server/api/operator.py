@@ -7,12 +7,13 @@ from fastapi import Request
 from parenting.agent.events import Change, EndEpisode, Event, Mature
 from parenting.server import runs
 from parenting.server.admission import admitted_router
-from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody
+from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody, RollBackBody
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import write_responses
 from parenting.server.deps import Db, notify_worker
 from parenting.server.operator_events import add_operator_event
 from parenting.server.reads.schemas import run_schema
+from parenting.server.rollback import roll_back
 from parenting.server.schemas import RunSchema
 from parenting.server.statuses import RunStatus
 
@@ -77,6 +78,20 @@ def change_run(request: Request, run_id: RunId, body: ChangeBody, db: Db) -> Run
     `config` keeps the value that the run was started with; the change is listed among the operator events.
     """
     return _happen(request, db, run_id, Change(name=body.name, value=body.value))
+
+
+@router.post(
+    "/runs/{run_id}/roll-back", summary="Roll a run back", status_code=201, responses=write_responses(404)
+)
+def roll_back_run(request: Request, run_id: RunId, body: RollBackBody, db: Db) -> RunSchema:
+    """Start a new run from a tick of this one: its record up to that tick is copied, and this run stays.
+
+    A worker lives the copied ticks again, bit for bit, and goes on from there. Questions whose answers the
+    agent had not heard by then are asked again. `origin` of the new run names this one.
+    """
+    new = roll_back(db, run_id, body.tick, body.name)
+    notify_worker(request)
+    return run_schema(db, new.id)
 
 
 def _become(request: Request, db: Db, run_id: int, status: RunStatus, reason: str | None = None) -> RunSchema:

@@ -20,6 +20,7 @@ from parenting.server.pages.revisions import router as revisions
 from parenting.server.pages.settings import router as settings
 from parenting.server.pages.skips import router as skips
 from parenting.server.pages.start import router as start
+from parenting.server.pages.take import router as take
 from parenting.server.pages.walk import router as walk
 from parenting.server.pages.why import router as why
 
@@ -41,6 +42,7 @@ router.include_router(skips)
 router.include_router(dashboard)
 router.include_router(comparison)
 router.include_router(controls)
+router.include_router(take)
 router.include_router(history)
 router.include_router(settings)
 router.include_router(why)

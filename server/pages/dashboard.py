@@ -99,6 +99,7 @@ class OperatorForms:
     fields: Mapping[str, str]  # the text of every field
     events: Sequence[LogEntry]  # the last ones that the operator caused
     earlier: int  # how many came before these
+    typed: Mapping[str, str] = field(default_factory=dict)  # in a form that was wrong
     probabilities: Mapping[str, str] = field(default_factory=lambda: PROBABILITIES)
     paces: Sequence[int] = PACES
 
@@ -161,7 +162,7 @@ def _operator(db: Database, run: Run, typed: Mapping[str, str]) -> OperatorForms
         "pace": format_number(run.pace),
     }
     fields = {**known, **{name: text for name, text in typed.items() if name in known}}
-    return OperatorForms(fields, log_entries(events)[:EVENTS], max(0, len(events) - EVENTS))
+    return OperatorForms(fields, log_entries(events)[:EVENTS], max(0, len(events) - EVENTS), typed)
 
 
 def _named(chart: str, name: str, text: str, names: MetricLabels) -> tuple[str, str]:

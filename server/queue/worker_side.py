@@ -3,9 +3,10 @@
 Each verb is one transaction.
 
 **Crash and replay.** A worker that lost its memory resumes from a checkpoint and lives some ticks a second
-time. Let the *high-water tick* be the largest tick of any posted query, applied answer or applied event. At
-or below it, `take_answer` and `take_operator_events` return exactly what was recorded for that tick, and
-`post_query` inserts nothing. So ticks replay exactly and nothing is asked twice.
+time. Let the *high-water tick* be the largest tick of any posted query, applied answer or applied event, or
+of the record that was copied from another run (`server.rollback`). At or below it, `take_answer` and
+`take_operator_events` return exactly what was recorded for that tick, and `post_query` inserts nothing. So
+ticks replay exactly and nothing is asked twice.
 
 Within a tick the order is: events, answer, step, query. An event applied at a tick therefore leaves that tick
 open to an answer, whereas an answer or a query closes it to both.
@@ -24,6 +25,7 @@ from parenting.server.columns import Damaged
 from parenting.server.db import Database
 from parenting.server.identity import unused_number
 from parenting.server.notes import AGENT_KINDS
+from parenting.server.origins import rolled_back_to
 from parenting.server.queue.queries import guidance_first, withdraw_guidance_in
 from parenting.server.queue.taken import Taken, heard_before, recorded_at
 from parenting.server.runs import Claim, held, held_status
@@ -58,6 +60,7 @@ _HIGH = select(
     select(func.max(OperatorEvent.applied_tick))
     .where(OperatorEvent.run_id == _RUN, OperatorEvent.kind.in_(AGENT_KINDS))
     .scalar_subquery(),
+    select(Run.origin).where(Run.id == _RUN).scalar_subquery(),
 )
 _PENDING = (
     select(Answer, Query)
@@ -239,8 +242,9 @@ def take_operator_events(db: Database, mine: Claim, tick: int) -> Sequence[Opera
 
 
 def _high(session: Session, run_id: int) -> tuple[int, int, int]:
-    ticks = session.execute(_HIGH, {"run_id": run_id}).one()
-    return tuple(-1 if tick is None else tick for tick in ticks)  # type: ignore[return-value]
+    *found, origin = session.execute(_HIGH, {"run_id": run_id}).one()
+    query, answer, event = (-1 if tick is None else tick for tick in found)
+    return max(query, rolled_back_to(origin)), answer, event
 
 
 def closed(session: Session, run_id: int, tick: int) -> bool:

@@ -83,7 +83,7 @@ def by_api(db: Database, client: httpx2.Client) -> None:
 def by_page(db: Database, client: httpx2.Client) -> None:
     shown = client.get(f"/runs/{RUN}").text
     assert REASON in shown
-    assert "Resume this run" in shown
+    assert "Retry this run" in shown
     assert client.post(f"/runs/{RUN}/status", data={"status": "active"}).status_code == 200
 
 

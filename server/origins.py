@@ -1,0 +1,17 @@
+"""The parts of `Run.origin`: an earlier policy, earlier answers, and the run whose record was copied."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from parenting.server.columns import Damaged
+
+ROLLED_BACK = "rolled_back"
+"""The part that names the run whose record was copied, and the last tick of the copy."""
+
+
+def rolled_back_to(origin: dict[str, Any] | Damaged | None) -> int:
+    """Return the tick up to which a run's record was copied from another run; -1 if it was not."""
+    if origin is None or isinstance(origin, Damaged) or ROLLED_BACK not in origin:
+        return -1
+    return int(origin[ROLLED_BACK]["tick"])
