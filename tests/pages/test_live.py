@@ -48,7 +48,7 @@ def test_the_table_of_stages_grows_as_it_is_drawn(tabs: BrowserTabs, db: Databas
 def test_an_event_gets_its_tick_on_the_page(tabs: BrowserTabs, db: Database) -> None:
     _, mine = fixtures.start_run(db, config={"stages": 2})
     page = tabs.open("/runs/1")
-    page.get_by_label("p_guid").fill("0.5")
+    page.get_by_label("p_guid", exact=True).fill("0.5")
     page.get_by_role("button", name="Change").click()
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 before the next tick")
     worker_side.take_operator_events(db, mine, 8)

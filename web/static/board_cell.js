@@ -5,8 +5,9 @@ const CELL = 20, CALM = 150; // units of a cell; ms until a screen reader is tol
 const $ = (id) => document.getElementById(id);
 const keys = $("seen-keys"), cursor = $("seen-cursor"), over = $("seen-over");
 
-// `tell([row, column])` returns what is known of a cell: { tile, numbers: { name: text }, spoken }.
-export function cells(tell) {
+// `tell([row, column])` returns what is known of a cell: { tile, numbers: { name: text }, spoken }, and whether it is `open`:
+// a worker may be asked for it by `ask([row, column])`. Returns what shows the cell again, and tells it again if asked to.
+export function cells(tell, ask) {
   let at = null, pointed = null, timer = 0; // where the cursor rests, and where the pointer is
   const view = () => over.querySelector(".painted").viewBox.baseVal;
   const bounds = () => {
@@ -20,7 +21,8 @@ export function cells(tell) {
     if (!cell) return;
     cursor.setAttribute("x", cell[1] * CELL);
     cursor.setAttribute("y", cell[0] * CELL);
-    const { tile, numbers } = tell(cell);
+    const { tile, numbers, open } = tell(cell);
+    $("seen-ask").classList.toggle("absent", !open || !!pointed && pointed.join() !== at?.join());
     $("seen-where").textContent = `Row ${cell[0] + 1}, column ${cell[1] + 1}`;
     $("seen-tile").textContent = tile;
     for (const field of $("seen-numbers").querySelectorAll("dd")) field.textContent = numbers[field.dataset.number] ?? "–";
@@ -61,5 +63,6 @@ export function cells(tell) {
     else return;
     event.preventDefault();
   });
-  return show;
+  $("seen-ask").addEventListener("click", () => { if (at) ask(at); });
+  return (aloud = false) => { show(); if (aloud) say(); };
 }

@@ -13,13 +13,14 @@ function decode(text, Kind) {
 }
 
 export function boardOf(run) {
-  const kept = new Map(), known = { rests: [], cells: [], snapshots: [] };
+  const kept = new Map(), known = { rests: [], cells: [], snapshots: [], complete: true };
   return {
     known,
     // Ask for what is new: states are only ever added. Resolves to whether a snapshot was.
     async news() {
       const last = known.snapshots.at(-1)?.tick ?? -1;
       const found = await get(`/api/v1/runs/${run}/board?after=${last}&states=${known.cells.length}&rests=${known.rests.length}`);
+      known.complete = found.complete;
       known.rests.push(...found.rests);
       known.cells.push(...found.cells);
       known.snapshots.push(...found.snapshots.filter(({ tick }) => tick > last));

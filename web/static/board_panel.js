@@ -4,6 +4,7 @@ import { cells } from "./board_cell.js";
 import { boardOf } from "./board_data.js";
 import { paintArrows, paintShares } from "./board_paint.js";
 import { pickers } from "./board_rests.js";
+import { job } from "./worker_job.js";
 
 const $ = (id) => document.getElementById(id);
 const panel = $("seen"), slider = $("seen-slider"), form = panel.querySelector(".seen-choices");
@@ -17,6 +18,9 @@ let newest = true, wanted = null, busy = false, looked = -CALM, timer = 0;
 
 const percent = (share) => share > 0 && share < 0.005 ? "under 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
 const number = (value) => Number.isInteger(value) ? value.toLocaleString("en") : String(Number(value.toPrecision(3)));
+const listed = (numbers) => Object.entries(numbers).map(([name, text]) => `${NAMES[name]} ${text}`).join(", ");
+const computed = new Map(); // what a worker has computed of states that are not stored
+const computedKey = (row, column) => `${row} ${column} ${pick.rest} ${form.elements.stage.value} ${shown?.tick}`;
 const put = (id, words) => { if ($(id).textContent !== words) $(id).textContent = words; };
 const key = (row, column) => `${row} ${column}`;
 
@@ -29,16 +33,33 @@ function valueOf(name, place, state) {
 
 function tell([row, column]) {
   const place = key(row, column), state = index.get(place), tile = pick.tile(row, column), numbers = {};
-  const where = `Row ${row + 1}, column ${column + 1}: ${tile}.`;
-  if (!shown || state === undefined) return { tile: tile && `${tile}. The agent never decides here.`, numbers, spoken: `${where} The agent never decides here.` };
-  const policy = shown.policy(state);
-  WAYS.forEach((way, at) => { numbers[way] = policy ? percent(policy[at]) : "not stored"; });
+  const where = `Row ${row + 1}, column ${column + 1}: ${tile}.`, told = computed.get(computedKey(row, column));
+  if (told) return { tile: `${tile}. ${told.said}`, numbers: told.numbers, spoken: `${where} ${told.said} ${listed(told.numbers)}`, open: false };
+  const policy = shown && state !== undefined ? shown.policy(state) : null;
+  if (!policy) {
+    const never = known.complete || pick.wall(row, column), said = never ? "The agent never decides here." : "Nothing is stored of it.";
+    return { tile: tile && `${tile}. ${said}`, numbers, spoken: `${where} ${said}`, open: !!shown && !never && newest };
+  }
+  WAYS.forEach((way, at) => { numbers[way] = percent(policy[at]); });
   for (const name of ["familiarity", "ask", ...COUNTS]) {
     const value = valueOf(name, place, state);
     if (value !== null) numbers[name] = name === "ask" ? percent(value) : number(value);
   }
-  const said = Object.entries(numbers).map(([name, text]) => `${NAMES[name]} ${text}`);
-  return { tile, numbers, spoken: `${where} ${said.join(", ")}.` };
+  return { tile, numbers, spoken: `${where} ${listed(numbers)}` };
+}
+
+// A state that is not stored, as it is with the present policy: a worker computes it.
+async function ask([row, column]) {
+  const mine = computedKey(row, column), stage = Number(form.elements.stage.value);
+  const wait = (said) => { computed.set(mine, { said, numbers: {} }); showCell(); };
+  wait("A worker computes it.");
+  try {
+    const waits = (worker) => wait(worker === "silent" ? "No worker is running; it is computed once one is started (parenting worker)." : "A worker computes it.");
+    const { result } = await job(run, "state", { row, column, rest: pick.rest, stage }, waits, () => true);
+    const numbers = Object.fromEntries(WAYS.map((way, at) => [way, percent(result.probabilities[at])]));
+    computed.set(mine, { said: `Computed for tick ${number(result.tick)}.`, numbers: { ...numbers, familiarity: number(result.familiarity), ask: percent(result.ask) } });
+  } catch ({ message }) { computed.set(mine, { said: message, numbers: {} }); }
+  showCell(true);
 }
 
 // ---- what is painted
@@ -145,7 +166,7 @@ function begin() {
 }
 
 const pick = pickers(run, known, turned);
-const showCell = cells(tell);
+const showCell = cells(tell, ask);
 slider.addEventListener("input", () => go(Number(slider.value)));
 for (const button of panel.querySelectorAll("[data-time]")) button.addEventListener("click", () => go(Number(slider.value) + Number(button.dataset.time)));
 $("seen-newest").addEventListener("click", () => go(known.snapshots.length - 1));

@@ -43,6 +43,7 @@ export function pickers(run, known, turned) {
 
   return {
     get rest() { return rest; },
+    wall: (row, column) => known.rests[rest]?.ground[row]?.[column] === "#",
     tile(row, column) {
       const { ground, box } = known.rests[rest] ?? {}, tile = ground?.[row]?.[column];
       if (!tile) return "";

@@ -1,15 +1,14 @@
 // Episodes: any of the agent's life, shown again from its moves, and one that the present policy plays by itself. A worker
 // makes the moves; the server draws them. Nothing here is loaded before somebody asks for it.
 import { play } from "./play.js";
+import { job, reply } from "./worker_job.js";
 
 const TEXTS = {
   ready: "A worker makes its moves again.",
   no_worker: "No worker is running. The episode is shown once one is started (parenting worker).",
-  gone: "The server does not answer. Try again.",
   none: "No episode of its life is stored yet.",
 };
-const TITLES = { episode: "Episodes of its life", walk: "An episode of the present policy" };
-const POLL = 100, SLOW = 500, SOON = 20; // ms between two looks: at first, and after so many looks
+const TITLES = { episode: "Episodes of its life", walk: "The present policy plays" };
 const STEP = 520, WHOLE = 15000, QUICKEST = 160; // ms of a step; a long episode is quicker, so that it ends in time
 const { run } = document.getElementById("main").dataset;
 let dialog = null, player = null, turn = 0;
@@ -48,12 +47,6 @@ function say(words) {
   if (line.textContent !== words) line.textContent = words;
 }
 
-async function reply(path, options) {
-  const found = await fetch(path, options).catch(() => { throw new Error(TEXTS.gone); });
-  if (!found.ok) throw new Error((await found.json().catch(() => null))?.error?.message ?? TEXTS.gone);
-  return found;
-}
-
 // Up to `limit` episodes from that of a number backwards, or from the newest.
 async function found(limit, wanted = null) {
   const page = await reply(`/api/v1/runs/${run}/episodes?limit=${limit}${wanted ? `&before=${wanted + 1}` : ""}`);
@@ -76,29 +69,17 @@ async function number(wanted) {
   } catch ({ message }) { if (mine === turn) say(message); }
 }
 
-async function done(job, mine) {
-  for (let looks = 0; job.state === "waiting" || job.state === "working"; looks++) {
-    if (mine !== turn) return null;
-    say(job.worker === "silent" ? TEXTS.no_worker : TEXTS.ready);
-    await new Promise((rest) => { setTimeout(rest, looks < SOON ? POLL : SLOW); });
-    job = await (await reply(`/api/v1/jobs/${job.id}`)).json();
-  }
-  if (job.state === "failed") throw new Error(job.reason);
-  return job;
-}
-
 async function show(which, payload) {
   still();
-  const mine = turn, shown = dialog.querySelector(".shown"), body = JSON.stringify({ client_id: "dashboard", kind: which, payload });
+  const mine = turn, shown = dialog.querySelector(".shown");
   say(TEXTS.ready);
   try {
-    const asked = await reply(`/api/v1/runs/${run}/jobs`, { method: "POST", headers: { "content-type": "application/json" }, body });
-    const job = await done(await asked.json(), mine);
-    if (!job) return;
-    const part = await (await reply(`/runs/${run}/${which === "walk" ? "walk" : "episodes"}/${job.id}/board`)).text();
+    const done = await job(run, which, payload, (worker) => say(worker === "silent" ? TEXTS.no_worker : TEXTS.ready), () => mine === turn);
+    if (!done) return;
+    const part = await (await reply(`/runs/${run}/${which === "walk" ? "walk" : "episodes"}/${done.id}/board`)).text();
     if (mine !== turn) return;
     shown.innerHTML = part;
-    const view = shown.firstElementChild, steps = job.result.clip.length;
+    const view = shown.firstElementChild, steps = done.result.clip.length;
     say(view.dataset.spoken);
     view.querySelector(".told").hidden = true;
     view.classList.add("played");
