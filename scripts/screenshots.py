@@ -138,6 +138,7 @@ def main(folder: Path) -> None:
         page.wait_for_selector("main[data-state=resting]", timeout=600_000)
         last = page.locator("#now-stage_queries")
         until(lambda: last.inner_text() == str(GARDEN["mature_every"]), 60, "the last answer was not counted")
+        page.wait_for_selector("#seen-arrows path", state="attached")
         shoot(page, "dashboard", folder, TALL)
         page = parent.context.new_page()  # of the browser that has answered
         for name, address in (("history", "/runs/2/history"), ("runs", "/"), ("docs", "/docs")):

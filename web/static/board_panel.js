@@ -20,7 +20,7 @@ const percent = (share) => share > 0 && share < 0.005 ? "under 1\u00a0%" : `${Ma
 const number = (value) => Number.isInteger(value) ? value.toLocaleString("en") : String(Number(value.toPrecision(3)));
 const listed = (numbers) => Object.entries(numbers).map(([name, text]) => `${NAMES[name]} ${text}`).join(", ");
 const computed = new Map(); // what a worker has computed of states that are not stored
-const computedKey = (row, column) => `${row} ${column} ${pick.rest} ${form.elements.stage.value} ${shown?.tick}`;
+const computedKey = (row, column) => `${row} ${column} ${pick.rest} ${form.elements.stage.value}`;
 const put = (id, words) => { if ($(id).textContent !== words) $(id).textContent = words; };
 const key = (row, column) => `${row} ${column}`;
 
@@ -33,10 +33,10 @@ function valueOf(name, place, state) {
 
 function tell([row, column]) {
   const place = key(row, column), state = index.get(place), tile = pick.tile(row, column), numbers = {};
-  const where = `Row ${row + 1}, column ${column + 1}: ${tile}.`, told = computed.get(computedKey(row, column));
-  if (told) return { tile: `${tile}. ${told.said}`, numbers: told.numbers, spoken: `${where} ${told.said} ${listed(told.numbers)}`, open: false };
-  const policy = shown && state !== undefined ? shown.policy(state) : null;
+  const where = `Row ${row + 1}, column ${column + 1}: ${tile}.`, policy = shown && state !== undefined ? shown.policy(state) : null;
   if (!policy) {
+    const told = newest && computed.get(computedKey(row, column));
+    if (told) return { tile: `${tile}. ${told.said}`, numbers: told.numbers, spoken: `${where} ${told.said} ${listed(told.numbers)}`, open: !told.going };
     const never = known.complete || pick.wall(row, column), said = never ? "The agent never decides here." : "Nothing is stored of it.";
     return { tile: tile && `${tile}. ${said}`, numbers, spoken: `${where} ${said}`, open: !!shown && !never && newest };
   }
@@ -51,7 +51,7 @@ function tell([row, column]) {
 // A state that is not stored, as it is with the present policy: a worker computes it.
 async function ask([row, column]) {
   const mine = computedKey(row, column), stage = Number(form.elements.stage.value);
-  const wait = (said) => { computed.set(mine, { said, numbers: {} }); showCell(); };
+  const wait = (said) => { computed.set(mine, { said, numbers: {}, going: true }); showCell(); };
   wait("A worker computes it.");
   try {
     const waits = (worker) => wait(worker === "silent" ? "No worker is running; it is computed once one is started (parenting worker)." : "A worker computes it.");
@@ -66,7 +66,8 @@ async function ask([row, column]) {
 
 // Counts grow without end, so they are shaded by their logarithm.
 function shade(name) {
-  const places = [...index].map(([place, state]) => [place.split(" ").map(Number), valueOf(name, place, state) ?? 0]);
+  const values = COUNTS.includes(name) ? [...sums[name]] : [...index].map(([place, state]) => [place, valueOf(name, place, state) ?? 0]);
+  const places = values.map(([place, value]) => [place.split(" ").map(Number), value]);
   const most = Math.max(0, ...places.map(([, value]) => value)), scale = COUNTS.includes(name) ? Math.log1p : (value) => value;
   paintShares($("seen-layer"), places.map(([place]) => place), places.map(([, value]) => most ? scale(value) / scale(most) : 0));
   return `Shade: ${NAMES[name]}, up to ${name === "ask" ? percent(most) : number(most)}${COUNTS.includes(name) ? ", by its logarithm" : ""}.`;
