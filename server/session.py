@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
@@ -107,7 +106,7 @@ class RunSession:
             return True
         if seen.corrections:
             return True
-        if idle(seen):
+        if seen.idle:
             return False
         if seen.events:
             return True
@@ -134,13 +133,14 @@ class RunSession:
             self.waiting, self._stuck_at = reason, self.last_tick
             runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
         self.why.write()
+        self.board.go_on(self.saved)
         self.save_if_due()
 
     def rests_until(self) -> float:
         """Return when a run that waits has to report again though nothing has happened; `inf` for never."""
-        due = math.inf
+        due = self.board.next_portion()
         if self.unsaved:
-            due = self._saved_at + self._save_every
+            due = min(due, self._saved_at + self._save_every)
         return min(due, self._measured_at + self._look_every) if self._news else due
 
     def delay(self, pace: float | None) -> float:
@@ -181,7 +181,7 @@ class RunSession:
         self._measure(at_once, hurried)
         self.whole = True
         if not hurried:
-            self.board.write_if_due(self.saved)
+            self.board.go_on(self.saved)
             self.save_if_due()
         return at_once
 
@@ -272,10 +272,13 @@ class RunSession:
         if self.unsaved and time.monotonic() - self._saved_at >= self._save_every:
             self.save()
 
-    def save(self) -> None:
-        """Write a checkpoint. The next one waits the longer, the longer this one took."""
+    def save(self, last: bool = False) -> None:
+        """Write a checkpoint, and with the `last` one of a life for now a whole snapshot (`board.write`).
+
+        The next one waits the longer, the longer this one took.
+        """
         self.lived.write()
-        self.board.write(self.saved)
+        self.board.write(self.saved, last)
         self.why.write()
         began, blob = time.monotonic(), pack(self.saved)
         checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, blob)
@@ -288,13 +291,3 @@ class RunSession:
                 f"checkpoints of {len(blob) / 1e6:.0f} MB: one every {wanted:.0f} s", run=self.claim.run_id
             )
         self._save_every = wanted
-
-
-def goal_reached(seen: Watch) -> bool:
-    """Return whether the goal of answers is reached; the worker then looks before each tick."""
-    return seen.goal is not None and seen.answered >= seen.goal
-
-
-def idle(seen: Watch) -> bool:
-    """Return whether the agent rests: the goal is reached, and every answer is heard."""
-    return goal_reached(seen) and not seen.answers

@@ -22,8 +22,8 @@ MOST_STATES = 5_000
 """States whose numbers are stored, at the most."""
 MOST_GLYPHS = 1_000_000
 """Cells of all boards of the rests together, at the most."""
-AT_ONCE = 512
-"""States whose probabilities are computed at once."""
+GLYPHS_AT_ONCE = 8_000
+"""Cells of the boards of a batch. It takes some milliseconds, and twenty where boards are largest."""
 
 Key = tuple[bytes, int, int, int, int]
 """A board, the agent's cell and the box's."""
@@ -49,6 +49,7 @@ class KnownStates:
         self._rest_of: dict[tuple[bytes, int, int], int] = {}
         self._seen: list[UInt8[Tensor, "S H W"]] = []
         self._local: list[UInt8[Tensor, "S 4"]] = []
+        self._at_once = max(1, GLYPHS_AT_ONCE // (world.height * world.width))
         self._most_rests = max(1, MOST_GLYPHS // (world.height * world.width))
         start = world.beginnings().pick(torch.tensor([0]))
         self._first = glyph_rows(world.legend, start.board[0])
@@ -83,18 +84,20 @@ class KnownStates:
         local = torch.cat(self._local)
         return counts[local_state_index(local, len(self.world.legend))]
 
-    def policy(self, parameters: Float[Tensor, "1 P"]) -> bytes:
-        """Return pi(a|s) of each state, in 255ths."""
+    def policy(self, parameters: Float[Tensor, "1 P"], begin: int, end: int) -> bytes:
+        """Return pi(a|s) in 255ths for a batch of states from `begin` on, none of them from `end` on.
+
+        Batches begin at the same states whenever this is called on from 0, so that the bits are the same.
+        """
+        if len(self._seen) > 1:
+            self._seen, self._local = [torch.cat(self._seen)], [torch.cat(self._local)]
+        some = slice(begin, min(end, begin + self._at_once))
+        seen, local = self._seen[0][some].unsqueeze(0), self._local[0][some].unsqueeze(0)
         network = network_of(self.world)
-        seen, local, parts = torch.cat(self._seen), torch.cat(self._local), []
-        self._seen, self._local = [seen], [local]
         with torch.no_grad():
-            layers = network.unpack(parameters)
-            for begin in range(0, len(seen), AT_ONCE):
-                some = slice(begin, begin + AT_ONCE)
-                heads = network.heads(layers, seen[some].unsqueeze(0), local[some].unsqueeze(0))
-                parts.append(heads.logits[0].double().softmax(-1))
-        return (torch.cat(parts) * SHARE).round().to(torch.uint8).numpy().tobytes()
+            heads = network.heads(network.unpack(parameters), seen, local)
+        chances = heads.logits[0].double().softmax(-1)
+        return (chances * SHARE).round().to(torch.uint8).numpy().tobytes()
 
     def _restored(self, start: WorldState, stored: Stored) -> WorldState:
         legend, rests = self.world.legend, stored["rests"]

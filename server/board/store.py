@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypedDict
 
-from sqlalchemy import delete, select
+from sqlalchemy import ColumnElement, and_, delete, func, or_, select
 from sqlalchemy.orm import Session, defer
 
 from parenting.server.board_tables import BoardSnapshot, BoardStates
@@ -26,6 +26,8 @@ MOST_BYTES = 2_000_000
 MOST_SNAPSHOTS = 240
 LATEST = 8
 """The last snapshots, which are never dropped."""
+COUNTS_ALONE, COUNTS_KEPT = 0, 2
+"""The stage of rows with counts alone, for who takes the run up; so many are kept, as checkpoints are."""
 
 
 class Stored(TypedDict):
@@ -87,7 +89,12 @@ def write(
 
 def _replace(session: Session, run_id: int, one: Numbers) -> None:
     mine = BoardSnapshot.run_id == run_id, BoardSnapshot.stage == one.stage
-    at = BoardSnapshot.frozen if one.frozen else BoardSnapshot.tick == one.tick
+    at: ColumnElement[bool] = BoardSnapshot.tick == one.tick
+    if one.frozen:
+        older = select(BoardSnapshot.tick).where(*mine, BoardSnapshot.frozen, BoardSnapshot.tick != one.tick)
+        newest = older.order_by(BoardSnapshot.tick.desc()).limit(COUNTS_KEPT - 1)
+        kept = session.scalars(newest).all() if one.stage == COUNTS_ALONE else ()
+        at = and_(BoardSnapshot.frozen, BoardSnapshot.tick.not_in(kept))
     session.execute(delete(BoardSnapshot).where(*mine, at))
     session.add(BoardSnapshot(run_id=run_id, size=len(one.blob), **vars(one)))
 
@@ -99,7 +106,8 @@ def _thin(session: Session, run_id: int) -> None:
         .order_by(BoardSnapshot.tick)
     ).all()
     size = select(BoardSnapshot.size).where(BoardSnapshot.run_id == run_id, BoardSnapshot.frozen)
-    beside = sum(session.scalars(size))
+    states = select(func.length(BoardStates.blob)).where(BoardStates.run_id == run_id)
+    beside = sum(session.scalars(size)) + (session.scalar(states) or 0)
     dropped = to_drop([(row.tick, row.size) for row in rows], MOST_BYTES - beside)
     if dropped:
         mine = BoardSnapshot.run_id == run_id, BoardSnapshot.tick.in_(dropped), ~BoardSnapshot.frozen
@@ -158,6 +166,14 @@ def read_snapshot(db: Database, run_id: int, tick: int) -> BoardSnapshot | None:
     newest = rows.where(~BoardSnapshot.frozen).order_by(BoardSnapshot.tick.desc()).limit(1)
     with db.read() as session:
         return session.scalars(newest).first()
+
+
+def read_counts(db: Database, run_id: int, tick: int) -> BoardSnapshot | None:
+    """Return the last row with counts up to a tick: a snapshot, or counts alone."""
+    rows = select(BoardSnapshot).where(BoardSnapshot.run_id == run_id, BoardSnapshot.tick <= tick)
+    counted = or_(~BoardSnapshot.frozen, BoardSnapshot.stage == COUNTS_ALONE)
+    with db.read() as session:
+        return session.scalars(rows.where(counted).order_by(BoardSnapshot.tick.desc()).limit(1)).first()
 
 
 def read_frozen(db: Database, run_id: int, stage: int) -> BoardSnapshot | None:

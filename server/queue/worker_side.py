@@ -51,6 +51,16 @@ class Watch:
     events: int  # not yet applied
     corrections: int = 0  # of answers that were heard, themselves not yet heard
 
+    @property
+    def goal_reached(self) -> bool:
+        """Return whether the goal of answers is reached; the worker then looks before each tick."""
+        return self.goal is not None and self.answered >= self.goal
+
+    @property
+    def idle(self) -> bool:
+        """Return whether the agent rests: the goal is reached, and every answer is heard."""
+        return self.goal_reached and not self.answers
+
 
 # Statements that every tick needs are built once.
 _RUN: BindParameter[int] = bindparam("run_id")

@@ -14,7 +14,7 @@ from parenting.server.db import Database
 from parenting.server.errors import LostClaimError, StoreError
 from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
-from parenting.server.session import RunSession, goal_reached
+from parenting.server.session import RunSession
 from parenting.server.statuses import OVER, RunStatus
 from parenting.server.work.patience import Patience, back_off
 
@@ -80,14 +80,14 @@ class HeldRuns:
             return session.rests_until()
         if (delay := session.delay(seen.pace)) > 0:
             return time.monotonic() + delay
-        go_on = session.tick(seen) and seen.pace is None and not goal_reached(seen)
+        go_on = session.tick(seen) and seen.pace is None and not seen.goal_reached
         until = time.monotonic() + SLICE_SECONDS
         while go_on and time.monotonic() < until and not session.finished():
             go_on = session.tick()
         return self._finish(session) if session.finished() else NOW
 
     def _finish(self, session: RunSession) -> float:
-        session.save()
+        session.save(last=True)
         runs.finish(self.db, session.claim, RunStatus.FINISHED, "Its argmax policy is optimal.")
         self.drop(session.claim.run_id)
         return NOW
@@ -105,7 +105,7 @@ class HeldRuns:
         """
         session = self.sessions.get(run_id)
         if session is not None and session.unsaved:
-            session.save()
+            session.save(last=True)
         runs.let_go(self.db, [self.claims[run_id]])
         self.drop(run_id)
         return AT_NEWS

@@ -14,7 +14,7 @@ from parenting.server.queue import worker_side
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease, lease_ahead, may_lease
 from parenting.server.runs import Claim, claim, get_run, set_goal, set_pace, set_status
-from parenting.server.session import RunSession, idle
+from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
@@ -65,11 +65,11 @@ def test_it_rests_once_every_answer_is_heard(db: Database, mine: Claim) -> None:
     query = worker_side.post_query(db, mine, 1, "guidance", 1, CLIPS)
     set_goal(db, mine.run_id, 1)
     answer(db, query, "left", "me", "human")
-    assert not idle(worker_side.watch(db, [mine.run_id])[mine.run_id])
+    assert not worker_side.watch(db, [mine.run_id])[mine.run_id].idle
     worker_side.take_answer(db, mine, 2)
-    assert idle(worker_side.watch(db, [mine.run_id])[mine.run_id])
+    assert worker_side.watch(db, [mine.run_id])[mine.run_id].idle
     set_goal(db, mine.run_id, None)
-    assert not idle(worker_side.watch(db, [mine.run_id])[mine.run_id])
+    assert not worker_side.watch(db, [mine.run_id])[mine.run_id].idle
 
 
 def test_a_script_stops_at_its_goal_to_the_question(db: Database, settings: Settings) -> None:

@@ -1,0 +1,119 @@
+"""Snapshots of policies that take long: computed a portion at a time, out of the way of a life."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from sqlalchemy import delete, update
+
+from parenting.server.board import states as known_states
+from parenting.server.board import store, sweep, writer
+from parenting.server.board.columns import unpack
+from parenting.server.board.store import COUNTS_ALONE
+from parenting.server.board_tables import BoardSnapshot, BoardStates
+from parenting.server.db import Database
+from parenting.server.queue.worker_side import watch
+from parenting.server.session import RunSession
+from tests.server.board.test_board import begin, live
+
+pytestmark = pytest.mark.only("sqlite", "the rows are bytes to every store")
+
+
+def small_portions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a portion be one batch of one state, as on the largest boards."""
+    for module in (known_states, sweep):
+        monkeypatch.setattr(module, "GLYPHS_AT_ONCE", 1)
+
+
+def ticks(db: Database, life: RunSession) -> list[int]:
+    return [row.tick for row in store.list_snapshots(db, life.claim.run_id)]
+
+
+def test_a_snapshot_is_of_the_tick_at_which_it_was_begun(
+    db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small_portions(monkeypatch)
+    life = begin(db, "unsafe-exploration")
+    live(life, 1)
+    assert life.board.busy
+    parameters = life.saved.state.learner.params.clone()
+    states = len(life.board._states.cells)
+    while life.board.busy:
+        assert ticks(db, life) == []
+        live(life, 1)
+    assert life.last_tick >= states
+    assert not life.saved.state.learner.params.equal(parameters)
+    assert ticks(db, life) == [1]
+    row = store.read_snapshot(db, life.claim.run_id, 1)
+    assert row is not None
+    whole = b"".join(life.board._states.policy(parameters, at, states) for at in range(states))
+    assert unpack(row.blob, row.states)["policy"] == whole
+
+
+def test_a_checkpoint_amid_a_snapshot_has_its_counts(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    small_portions(monkeypatch)
+    life = begin(db, "unsafe-exploration")
+    moves = live(life, 4)
+    for _ in range(3):
+        moves += live(life, 2)
+        life.save()
+    assert life.board.busy
+    assert ticks(db, life) == []
+    live(life, 1)
+    again = RunSession(db, life.claim, life.run, lambda: None)
+    assert again.last_tick == 10
+    assert again.board._counts["visits"].sum() == moves
+    alone = BoardSnapshot.stage == COUNTS_ALONE
+    with db.read() as session:
+        assert session.query(BoardSnapshot).where(alone).count() == store.COUNTS_KEPT
+
+
+def test_an_agent_that_waits_goes_on_with_its_snapshot_and_ends_with_a_whole_one(
+    db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small_portions(monkeypatch)
+    life = begin(db, "unsafe-exploration")
+    seen = watch(db, [life.claim.run_id])[life.claim.run_id]
+    assert life.board.next_portion() == math.inf
+    life.report_waiting(seen)
+    assert life.board.busy
+    assert life.rests_until() < math.inf
+    while life.board.busy:
+        life.report_waiting(seen)
+    assert ticks(db, life) == [0]
+    assert life.rests_until() == math.inf
+    monkeypatch.setattr(writer, "LAST_SECONDS", math.inf)
+    live(life, 3)
+    life.save(last=True)
+    assert ticks(db, life) == [0, 3]
+
+
+def test_a_life_of_before_snapshots_has_one_as_soon_as_it_is_taken_up(db: Database) -> None:
+    life = begin(db, "unsafe-exploration")
+    live(life, 12)
+    life.save()
+    with db.write() as session:
+        session.execute(delete(BoardSnapshot))
+        session.execute(delete(BoardStates))
+    again = RunSession(db, life.claim, life.run, lambda: None)
+    again.report_waiting(watch(db, [again.claim.run_id])[again.claim.run_id])
+    assert ticks(db, again) == [12]
+
+
+@pytest.mark.parametrize("table", [BoardSnapshot, BoardStates])
+def test_damaged_numbers_end_no_life(db: Database, table: type[BoardSnapshot | BoardStates]) -> None:
+    life = begin(db, "reward-hacking")
+    live(life, 12)
+    life.save()
+    with db.write() as session:
+        session.execute(update(table).values(blob=b"not compressed"))
+    again = RunSession(db, life.claim, life.run, lambda: None)
+    moves = live(again, 3)
+    again.save()
+    row = store.read_snapshot(db, life.claim.run_id, 15)
+    stored = store.read_states(db, life.claim.run_id)
+    assert row is not None
+    assert stored is not None
+    visits = memoryview(unpack(row.blob, row.states)["visits"]).cast("I")
+    assert (sum(visits), row.states) == (moves, len(stored[0]["cells"]))
