@@ -10,12 +10,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from datetime import datetime
+from itertools import islice
 from typing import Any
 
 from parenting.server.damage import damage, sound
 from parenting.server.db import Database
 from parenting.server.identity import database_id
-from parenting.server.reads.answers import Answered, every, number_of
+from parenting.server.reads.answers import BATCH, Answered, every, number_of
+from parenting.server.reads.why import Kept, kept
 from parenting.server.runs import stored_run
 from parenting.server.tables import Run
 
@@ -29,6 +31,10 @@ MU = {
 """Eq. (1); *neither* and *skip* train nothing."""
 
 
+REASON = ("pausing", "familiarity", "p_guid", "chance", "p_pref", "draw", "probabilities", "clips")
+"""The keys of a reason, for both kinds of questions; null where they are of the other kind."""
+
+
 def rows(db: Database, run_id: int) -> Iterator[dict[str, Any]]:
     """Return the answers of a run up to now, oldest first, read in batches.
 
@@ -38,7 +44,28 @@ def rows(db: Database, run_id: int) -> Iterator[dict[str, Any]]:
         NotFound: the run does not exist; raised here, not at the first row.
     """
     run, database = stored_run(db, run_id), database_id(db)
-    return (_row(db, database, run, answered) for answered in every(db, run_id))
+    return _rows(db, database, run)
+
+
+def _rows(db: Database, database: str, run: Run) -> Iterator[dict[str, Any]]:
+    answers = every(db, run.id)
+    while batch := list(islice(answers, BATCH)):
+        asked = [tick for one in batch if (tick := sound(one.query, "tick")) is not None]
+        heard = [tick for one in batch if (tick := sound(one.answer, "applied_tick")) is not None]
+        known = kept(db, run.id, asked, heard)
+        for answered in batch:
+            yield _row(db, database, run, answered) | _why(answered, known)
+
+
+def _why(answered: Answered, known: Kept) -> dict[str, Any]:
+    """Return the columns of `server.reads.why`: null where nothing was kept."""
+    reason = known.reasons.get(sound(answered.query, "tick"))
+    return {
+        "leased": _time(sound(answered.query, "leased")),  # when its question was first leased
+        "replays": sound(answered.answer, "replays"),  # how often its parent had the clips played again
+        "reason": None if reason is None else {name: reason.get(name) for name in REASON},
+        "effects": known.effects_of(sound(answered.answer, "applied_tick")),
+    }
 
 
 def lines(db: Database, run_id: int) -> Iterator[str]:

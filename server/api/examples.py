@@ -11,6 +11,7 @@ from parenting.drawing.surroundings import surroundings
 from parenting.envs import registry
 from parenting.server.api.board_examples import BOARD, EPISODE, NUMBERS
 from parenting.server.api.kept_examples import kept
+from parenting.server.api.why_example import EXPORTED as EXPORTED_WHY
 from parenting.server.api.why_example import WHY
 from parenting.server.level_check import check
 
@@ -203,6 +204,7 @@ EXPORTED: dict[str, Any] = {
     "remarks": True,
     "votes": 0,
     "script": None,
+    **EXPORTED_WHY,
 }
 
 WALK: dict[str, Any] = {

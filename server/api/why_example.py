@@ -1,9 +1,29 @@
-"""The example of a reason for the API's description."""
+"""The examples of reasons and effects for the API's description."""
 
 from __future__ import annotations
 
 from typing import Any
 
+EXPORTED: dict[str, Any] = {
+    "leased": "2026-11-22T12:00:01.000000Z",
+    "replays": 1,
+    "reason": {
+        "pausing": True,
+        "familiarity": 2,
+        "p_guid": 0.5,
+        "chance": 0.25,
+        "p_pref": None,
+        "draw": 0.113,
+        "probabilities": [0.31, 0.22, 0.19, 0.28],
+        "clips": None,
+    },
+    "effects": {
+        "before": [0.31, 0.22, 0.19, 0.28],
+        "after_1": [0.33, 0.21, 0.19, 0.27],
+        "after_10": [0.52, 0.11, 0.16, 0.21],
+        "after_100": None,
+    },
+}
 WHY: dict[str, Any] = {
     "public_id": "8kZ4cVxtw1Rr5Qh2mPzDvN",
     "run_public_id": "5J3mBbAH58CpQ3Y8RNJpUK",

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
 from sqlalchemy import select
 
-from parenting.server.damage import readable
+from parenting.server.damage import damage, readable
 from parenting.server.db import Database
 from parenting.server.queue.answers import get_query
 from parenting.server.queue.presence import holder
 from parenting.server.runs import get_run
-from parenting.server.schemas import PolicySchema
+from parenting.server.schemas import Chances, PolicySchema
 from parenting.server.tables import SKIP, Answer, Effect, Query, Reason
 from parenting.server.why_schemas import (
     EffectSchema,
@@ -55,6 +58,32 @@ def why(db: Database, query_id: int) -> WhySchema:
         if stored is None or query.kind != "preference"
         else PreferenceReason.model_validate(stored),
         answers=[_given(readable(answer), known) for answer in given],
+    )
+
+
+class Kept(NamedTuple):
+    """The reasons of some questions by tick, and the effects of some answers by tick and ticks since."""
+
+    reasons: dict[int, dict[str, Any]]
+    effects: dict[tuple[int, int], Chances]
+
+    def effects_of(self, heard: int | None) -> dict[str, Chances | None] | None:
+        """Return the policy before an answer and after it; None where nothing of it was kept."""
+        found = {} if heard is None else {n: self.effects.get((heard, n)) for n in TICKS}
+        if not any(found.values()):
+            return None
+        return {"before" if n == 0 else f"after_{n}": there for n, there in found.items()}
+
+
+def kept(db: Database, run_id: int, asked: Sequence[int], heard: Sequence[int]) -> Kept:
+    """Return what is kept of a run's questions and answers of these ticks; a damaged row counts as absent."""
+    with db.read() as session:
+        reasons = session.scalars(select(Reason).where(Reason.run_id == run_id, Reason.tick.in_(asked))).all()
+        effects = session.scalars(select(Effect).where(Effect.run_id == run_id, Effect.tick.in_(heard))).all()
+    there = {row: PolicyThere.model_validate(row.policy) for row in effects if damage(row) is None}
+    return Kept(
+        {row.tick: row.why for row in reasons if damage(row) is None},
+        {(row.tick, row.ticks): policy.probabilities for row, policy in there.items()},
     )
 
 

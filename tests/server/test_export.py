@@ -62,6 +62,10 @@ def test_a_row_tells_all_about_an_answer(db: Database, run_id: int) -> None:
         "practice": "offered",
         "words": "plain",
         "remarks": True,
+        "leased": None,
+        "replays": None,
+        "reason": None,
+        "effects": None,
     }
 
 
@@ -98,3 +102,24 @@ def test_a_line_a_row_with_the_same_keys(db: Database, run_id: int) -> None:
 def test_unknown_run_is_refused_before_the_first_row(db: Database) -> None:
     with pytest.raises(NotFound):
         lines(db, 9)
+
+
+def test_a_row_tells_why_it_was_asked_and_what_changed(db: Database, run_id: int) -> None:
+    """Each answer has its own effects, and a damaged reason leaves the row as it is."""
+    there = [0.1, 0.2, 0.3, 0.4]
+    recording = {"kind": "exploitative", "first": 1, "last": 2}
+    why = {
+        "p_pref": 0.3,
+        "draw": 0.2,
+        "probabilities": there,
+        "clips": {"left": recording, "right": recording},
+    }
+    with db.write() as session:
+        session.add(tables.Reason(run_id=run_id, tick=0, why=why))
+        session.add(tables.Reason(run_id=run_id, tick=2, why={**why, "draw": "low"}))
+        session.add(tables.Effect(run_id=run_id, tick=1, ticks=10, policy={"probabilities": there}))
+    first, second, *_ = rows(db, run_id)
+    guidance = dict.fromkeys(("pausing", "familiarity", "p_guid", "chance"))
+    assert first["reason"] == guidance | why
+    assert first["effects"] == {"before": None, "after_1": None, "after_10": tuple(there), "after_100": None}
+    assert (second["reason"], second["effects"], second.get("damaged")) == (None, None, None)

@@ -37,7 +37,7 @@ RUNS = (1, 2, 3)
 WRITTEN_WITH = ("AVX2", "AVX512")
 """Instructions of torch with the same bits as those that wrote the sample."""
 NAMES = ["database", "run_public_id", "query_public_id", "guidance_layout", "practice", "words", "remarks"]
-NAMES += ["votes", "script"]
+NAMES += ["votes", "script", "leased", "replays", "reason", "effects"]
 """The keys that later versions add to a row of the export."""
 PAGES = ("/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/runs/{}/why", "/api/v1/runs/{}/queries")
 
