@@ -22,7 +22,7 @@ from parenting.server.new_run import FORM_FIELDS, read_form
 from parenting.server.notify import Notifier
 from parenting.server.reads.schemas import run_schema
 
-OPTIONS = ("world", "level", "level_text", "preset", "parent", "script", "seed", "goal", "name")
+OPTIONS = ("world", "level", "level_text", "preset", "parent", "script", "seed", "goal", "finish", "name")
 """The settings of a run that are arguments or options of their own; `--set` sets the others."""
 
 
@@ -41,6 +41,14 @@ def start(
     seed: Annotated[str, typer.Option(help="The same seed and answers give the same run.")] = "0",
     goal: Annotated[
         str | None, typer.Option(help="Answers after which the run rests.", show_default="none")
+    ] = None,
+    finish: Annotated[
+        str | None,
+        typer.Option(
+            metavar="optimal|goal:N|stages:T|never",
+            help="What ends the run: its policy is optimal, N answers are heard, stage T is over.",
+            show_default="optimal with a script, else never",
+        ),
     ] = None,
     name: Annotated[str | None, typer.Option(help="A name for the lists.", show_default="none")] = None,
     changes: Annotated[
@@ -67,7 +75,11 @@ def start(
     """
     with friendly_errors():
         given = {"world": world, "preset": preset, "seed": seed, **_parent(parent)}
-        given |= {key: text for key, text in (("goal", goal), ("name", name)) if text is not None}
+        given |= {
+            key: text
+            for key, text in (("goal", goal), ("finish", finish), ("name", name))
+            if text is not None
+        }
         given |= _level(world, level) | _settings(changes or [])
         chosen, origin = settings(), begins_with(from_policy, from_answers)
         with database() as db:

@@ -34,13 +34,13 @@ from parenting.server.languages import SHIPPED, LanguageMiddleware, Languages
 from parenting.server.log_limit import LogLimit
 from parenting.server.meters import Meters
 from parenting.server.migrate import require_current
-from parenting.server.new_run import messages
 from parenting.server.notify import Notifier
 from parenting.server.requests import RequestMiddleware
 from parenting.server.security import SecurityMiddleware
 from parenting.server.settings import Settings
 from parenting.server.static import OthersFiles, OurFiles
 from parenting.server.streams import Streams
+from parenting.server.wrong_fields import messages
 
 LARGEST_BODY = 64 * 1024
 SMALL_BODY = 1024

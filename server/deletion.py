@@ -37,7 +37,7 @@ REASON = "It is being deleted."
 
 
 class Held(NamedTuple):
-    """What a run holds, in numbers."""
+    """The holdings of a run, in numbers."""
 
     answers: int
     questions: int
@@ -48,7 +48,7 @@ class Held(NamedTuple):
 
 
 def holds(db: Database, run_id: int) -> Held:
-    """Return what a run holds, for whoever thinks of deleting it.
+    """Return the holdings of a run, for whoever thinks of deleting it.
 
     Raises:
         NotFound: there is no such run.

@@ -28,11 +28,13 @@ from parenting.envs.people_text import LONGEST, plain, read_name
 from parenting.parents.grammar import SCRIPTED, read_script
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
+from parenting.server.finishes import PATTERN, never_met, usual
 from parenting.server.identity import unused_number
 from parenting.server.tables import Run
 from parenting.server.weights import put as put_weights
 from parenting.server.weights import put_bytes
 from parenting.server.whole import WHOLE, whole
+from parenting.server.wrong_fields import messages
 from parenting.weights.origin import NO_ORIGIN, Origin
 from parenting.weights.store import NoWeightsError, Wanted, find
 
@@ -44,6 +46,7 @@ FORM_FIELDS = (
     "level_text",
     "parent",
     "script",
+    "finish",
     "preset",
     "name",
     "seed",
@@ -70,15 +73,6 @@ COLUMNS = {
 """The fields that are columns of the run as they are."""
 AS_JSON = ("seed", "goal", "pace", "remarks")
 """Fields of the form whose text is a number or a truth value."""
-UNREAD = {
-    "json_invalid": "This is not JSON.",
-    "union_tag_invalid": "It is of none of the kinds that there are.",
-    "union_tag_not_found": "Name its kind.",
-    "model_attributes_type": "Send a JSON object, with the header Content-Type: application/json.",
-}
-"""The message for a body that cannot be read, by Pydantic's type of error."""
-
-
 Name = Annotated[
     str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\r\n\t]*$"), AfterValidator(plain)
 ]
@@ -93,6 +87,7 @@ PersonsName = Annotated[
 Script = Annotated[
     str, StringConstraints(min_length=1, max_length=200), AfterValidator(plain), AfterValidator(read_script)
 ]
+End = Annotated[str, StringConstraints(pattern=PATTERN)]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_INT), WHOLE]
 Goal = Annotated[int, Field(ge=1, le=1_000_000), WHOLE]
 Pace = Annotated[float, Field(gt=0, le=1000)]
@@ -122,6 +117,11 @@ class NewRun(BaseModel):
     seed: Seed = 0
     name: PersonsName | None = None
     goal: Goal | None = Field(None, description="Answered questions after which the run rests; null: never.")
+    finish: End | None = Field(
+        None,
+        description="What ends the run: optimal (its argmax policy is), goal:N (it has heard N answers), "
+        "stages:T (stage T is over) or never; null: optimal where the parent is scripted, else never.",
+    )
     pace: Pace | None = Field(None, description="Ticks a second at most; null: as fast as it can.")
     guidance_layout: Literal["one", "two"] = Field(
         "one", description="Guidance on one board with both moves, or on two boards as in the paper."
@@ -171,13 +171,14 @@ def plan(new: NewRun, folder: Path | None = None, origin: Origin = NO_ORIGIN) ->
     config = _config(new, level, wrong)
     weights = None if origin.policy is not None else _weights(new, level, config, folder, wrong)
     if level is not None and config is not None:
-        wrong += origin.misfits(level, config)
+        wrong += [*origin.misfits(level, config), *never_met(new.finish, new.world, config)]
     if wrong or level is None or config is None:
         raise InvalidFieldsError(wrong)
     spec = registry.spec(new.world, level)
     return {
         **new.model_dump(include=COLUMNS),
         "script": _script(new),
+        "finish": new.finish or usual(new.parent),
         "level": level.name,
         "level_text": level.text,
         "legend": dict(spec.legend),
@@ -203,18 +204,6 @@ def read_form(form: Mapping[str, str]) -> NewRun:
         return NewRun.model_validate(fields)
     except ValidationError as error:
         raise InvalidFieldsError(messages(error.errors())) from None
-
-
-def messages(errors: Any, skip: tuple[str, ...] = ()) -> list[tuple[str, str]]:
-    """Pydantic's errors as (field, message), without what was sent: nothing of a request is echoed."""
-    found: dict[str, str] = {}
-    for error in errors:
-        path = [str(part) for part in error["loc"] if part not in skip and error["type"] != "json_invalid"]
-        if path[:1] == ["config"]:
-            path = path[:2]  # the rest names the branch of the union that was tried
-        message = UNREAD.get(error["type"]) or error["msg"].removeprefix("Value error, ")
-        found.setdefault(".".join(path) or "body", message)
-    return list(found.items())
 
 
 def _script(new: NewRun) -> str | None:

@@ -23,6 +23,7 @@ from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
 from parenting.server.damage import readable
 from parenting.server.db import Database
+from parenting.server.finishes import read_finish
 from parenting.server.growth import Growth
 from parenting.server.lived import Lived
 from parenting.server.machine import diverged, follow, take_up
@@ -76,6 +77,7 @@ class RunSession:
         self.lived = Lived(self.world, db, claim, self.saved)
         self.board = BoardWriter(self.world, db, claim, self.evaluation, self.saved)
         self.why = Why(self.world, db, claim, self.saved, self.growth.lesson)
+        self.finish = read_finish(run.finish)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
@@ -253,12 +255,12 @@ class RunSession:
         return max(least, self._look_cost / LOOK_SHARE) if least else 0.0
 
     def finished(self) -> bool:
-        """Return whether a scripted parent has no more to teach: the argmax policy is optimal.
-
-        A run that was taken up from an earlier checkpoint first goes back to where it was.
-        """
-        again = self.last_tick < max(self.record_ends, self.run.tick or 0)
-        return self.run.parent == "scripted" and self.optimal and not again
+        """Return whether its rule ends the run, which first goes back to where it was before a restart."""
+        if self.finish.kind == "never" or self.last_tick < max(self.record_ends, self.run.tick or 0):
+            return False
+        state, heard = self.saved.state, int(self.saved.tally.kinds.sum())
+        stage, in_stage = int(state.maturity[0]), int(state.answered[0])
+        return self.finish.is_met(self.optimal, heard, stage, in_stage, self.saved.config)
 
     # Checkpoints
 
@@ -267,16 +269,20 @@ class RunSession:
         """Return whether a tick has passed since the last checkpoint."""
         return self.last_tick != self._saved_tick
 
+    def end(self) -> None:
+        """Measure what the last tick has changed, and save."""
+        if self._news:
+            self._measured_at = 0.0  # whatever a look costs: it is the last
+            self._measure(at_once=False)
+        self.save(last=True)
+
     def save_if_due(self) -> None:
         """Save a checkpoint if the last one is old and a tick has passed since."""
         if self.unsaved and time.monotonic() - self._saved_at >= self._save_every:
             self.save()
 
     def save(self, last: bool = False) -> None:
-        """Write a checkpoint, and with the `last` one of a life for now a whole snapshot (`board.write`).
-
-        The next one waits the longer, the longer this one took.
-        """
+        """Write a checkpoint, with a whole snapshot if it is the `last` for now; large ones seldom."""
         self.lived.write()
         self.board.write(self.saved, last)
         self.why.write()

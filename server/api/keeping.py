@@ -50,7 +50,7 @@ class DeleteBody(Strict):
 
 
 class HoldsSchema(Schema):
-    """What a run holds, which its deletion takes away."""
+    """The holdings of a run, which its deletion takes away."""
 
     run: int
     public_id: str
@@ -65,7 +65,7 @@ class HoldsSchema(Schema):
 
 
 class TombstoneSchema(Schema):
-    """What is left of a deleted run. Nothing in it was written by people."""
+    """The rest of a deleted run. Nothing in it was written by people."""
 
     run: int
     """Its number, which is never given again."""

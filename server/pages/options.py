@@ -27,6 +27,14 @@ OPTIONS = (
         "For a script as the parent, such as noisy:0.1 or boltzmann:2+tiring. Empty: it never errs.",
     ),
     Option(
+        "finish",
+        "What ends it",
+        "",
+        (),
+        "optimal (its policy is), goal:50 (it has heard 50 answers), stages:2 (stage 2 is over) or never. "
+        "Empty: optimal with a script as the parent, never with you.",
+    ),
+    Option(
         "pace",
         "Pace",
         "",

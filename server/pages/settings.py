@@ -18,11 +18,12 @@ from parenting.server.db import Database
 from parenting.server.deps import Db, notify_worker
 from parenting.server.errors import Conflict, InvalidFieldsError
 from parenting.server.keeping import LONGEST_DESCRIPTION, Description, Tag
-from parenting.server.new_run import PersonsName, messages
+from parenting.server.new_run import PersonsName
 from parenting.server.pages.render import moved, page, redirect
 from parenting.server.pages.start import FormFields
 from parenting.server.pages.texts import parent_title, size_text
 from parenting.server.tables import Run
+from parenting.server.wrong_fields import messages
 
 router = admitted_router(include_in_schema=False)
 

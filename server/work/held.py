@@ -87,8 +87,8 @@ class HeldRuns:
         return self._finish(session) if session.finished() else NOW
 
     def _finish(self, session: RunSession) -> float:
-        session.save(last=True)
-        runs.finish(self.db, session.claim, RunStatus.FINISHED, "Its argmax policy is optimal.")
+        session.end()
+        runs.finish(self.db, session.claim, RunStatus.FINISHED, session.finish.reason)
         self.drop(session.claim.run_id)
         return NOW
 

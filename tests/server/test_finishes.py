@@ -1,0 +1,114 @@
+"""What ends a run: a rule that people's and scripts' runs share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx2
+import pytest
+
+from parenting.agent.config import Config
+from parenting.server.db import Database
+from parenting.server.errors import InvalidFieldsError
+from parenting.server.finishes import read_finish
+from parenting.server.new_run import NewRun, read_form, start
+from parenting.server.queue.answers import answer
+from parenting.server.reads.metrics import latest_metrics
+from parenting.server.runs import get_run
+from parenting.server.settings import Settings
+from parenting.server.tables import Query, Run
+from parenting.server.worker import Worker
+
+STAGES = Config(max_clip_length=3, queries_per_stage=4)
+
+
+@pytest.mark.parametrize(
+    ("rule", "reached", "met"),
+    [
+        ("optimal", (True, 0, 1, 0), True),
+        ("optimal", (False, 99, 3, 99), False),
+        ("never", (True, 99, 3, 99), False),
+        ("goal:9", (True, 8, 1, 0), False),
+        ("goal:9", (False, 9, 1, 0), True),
+        ("stages:2", (True, 99, 2, 4), False),
+        ("stages:2", (False, 0, 3, 0), True),
+        ("stages:3", (True, 99, 3, 3), False),
+        ("stages:3", (False, 12, 3, 4), True),
+    ],
+)
+def test_a_rule_is_met(rule: str, reached: tuple[bool, int, int, int], met: bool) -> None:
+    assert read_finish(rule).is_met(*reached, STAGES) is met
+
+
+@pytest.mark.only("sqlite", "the rules are the agent's")
+@pytest.mark.parametrize(
+    ("rule", "reason", "heard"),
+    [
+        ("goal:3", "It has heard 3 answers.", 3),
+        ("stages:1", "Stage 1 is over.", 2),
+        ("stages:2", "Stage 2 is over.", 4),
+    ],
+)
+def test_a_scripts_run_ends_at_that_very_answer(
+    db: Database, settings: Settings, rule: str, reason: str, heard: int
+) -> None:
+    config: dict[str, Any] = {"stages": 2, "mature_every": 2}
+    new = NewRun(world="unsafe-exploration", parent="scripted", finish=rule, config=config)
+    run = raised(db, settings, start(db, new).id)
+    assert (run.status, run.reason) == ("finished", reason)
+    last = latest_metrics(db, [run.id])[run.id].values
+    assert run.standing == heard == last["guidance"] + last["preference"]
+
+
+@pytest.mark.only("sqlite", "the rules are the agent's")
+def test_a_persons_run_ends_by_the_same_rule(db: Database, settings: Settings) -> None:
+    run = start(db, NewRun(world="unsafe-exploration", finish="goal:2")).id
+
+    def say() -> None:
+        with db.read() as session:
+            asked = session.query(Query.id).where(Query.run_id == run, Query.status == "open").all()
+        for (query,) in asked:
+            answer(db, query, "left", "me", "human")
+
+    ended = raised(db, settings, run, say)
+    assert (ended.status, ended.reason, ended.standing) == ("finished", "It has heard 2 answers.", 2)
+
+
+def raised(db: Database, settings: Settings, run: int, meanwhile: object = None) -> Run:
+    """Raise a run until it has ended."""
+    worker = Worker(db, settings)
+    for _ in range(500):
+        worker._go_on()
+        if callable(meanwhile):
+            meanwhile()
+        if get_run(db, run).status == "finished":
+            worker.notifier.close()
+            return get_run(db, run)
+    raise AssertionError("it never ended")
+
+
+def test_who_names_no_rule_has_todays(db: Database) -> None:
+    for parent, rule in (("human", "never"), ("scripted", "optimal")):
+        new = read_form({"world": "unsafe-exploration", "parent": parent, "finish": ""})
+        assert start(db, new).finish == rule
+
+
+def test_a_rule_that_is_none_or_never_met_is_refused(client: httpx2.Client, db: Database) -> None:
+    """With the rules that there are, or the reason."""
+    for said, world, part in (
+        ("goal", "unsafe-exploration", "Write optimal, goal:N, stages:T or never"),
+        ("goal:0", "unsafe-exploration", "goal:N"),
+        ("answers:9", "unsafe-exploration", "goal:N"),
+        ("optimal", "reward-hacking", "no goal"),
+        ("stages:2", "unsafe-exploration", "The run has 1 stage"),
+        ("stages:1", "unsafe-exploration", "config.mature_every"),
+    ):
+        body = {"world": world, "finish": said}
+        refused = client.post("/api/v1/runs", json=body)
+        assert refused.status_code == 422
+        (wrong,) = refused.json()["error"]["fields"]
+        assert (wrong["field"], part in wrong["message"]) == ("finish", True), wrong
+        page = client.post("/runs", data={**body, "parent": "scripted"})
+        assert 'id="finish-error"' in page.text
+        with pytest.raises(InvalidFieldsError):
+            start(db, read_form(body))
