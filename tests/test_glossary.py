@@ -17,6 +17,7 @@ SECTION = re.compile(r"ours|2|2\.[1-4](, 2\.2)?|3\.1\.[1-4]|3\.2|3\.2\.1|3\.4|4\
 SAME = {
     "dataset": "X",
     "events": "operator",
+    "forecast_chance": "forecast chance",
     "init": "agent",
     "learning": "direct policy learning",
     "parenting": "tick",
