@@ -20,6 +20,7 @@ from parenting.commands.level_file import LEVEL, chosen_level
 from parenting.commands.parents import chosen_parent
 from parenting.commands.printing import say
 from parenting.commands.run_report import page
+from parenting.commands.run_store import open_store, store_trials, title_of
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
 from parenting.envs.names import UnknownNameError, did_you_mean
@@ -65,6 +66,10 @@ def run(
     ] = None,
     from_policy: FromPolicy = None,
     from_answers: FromAnswers = None,
+    store: Annotated[
+        bool, typer.Option("--store", help="Store each trial as a run of the database, to be compared there.")
+    ] = False,
+    name: Annotated[str | None, typer.Option(help="With --store, the name of these runs.")] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
     ] = False,
@@ -73,9 +78,12 @@ def run(
 
     The last lines report the outcomes of their argmax policies.
 
+    With --store the trials stand in the database afterwards, as runs that are over, beside those of people.
+
     Example: parenting run unsafe-exploration --preset conservative --trials 100
     """
     with friendly_errors():
+        title = title_of(name, store)
         _known(world, preset)
         found = chosen_level(world, level)
         config = _config(world, preset, changes or [])
@@ -85,6 +93,8 @@ def run(
         origin = begins_with(from_policy, from_answers)
         _fits(origin, found, config)
         weights = None if origin.policy is not None else _weights(found, config)
+        if store:
+            open_store().close()  # what is wrong with it is told before the work, not after
     from parenting._process import settle
     from parenting.experiments.runner.processes import WorkersDiedError
     from parenting.experiments.training.chunks import TrainPlan, train_in_chunks
@@ -94,6 +104,7 @@ def run(
     plan = TrainPlan(world, found.text, config, seed, trials, goal, max_ticks, weights, str(spec))
     if origin.about is not None:
         plan = plan._replace(beginning=_beginning(origin, found, config), origin=origin.about)
+    plan = plan._replace(history=store)
     began = time.monotonic()
     try:
         with exit_on_interrupt(), _bar(plan) as progress:
@@ -102,7 +113,12 @@ def run(
         say(str(error), err=True)
         raise typer.Exit(1) from None
     results = summarise(plan, found.name, outcomes, time.monotonic() - began)
-    say(json.dumps(results) if as_json else page(results))
+    with friendly_errors():
+        try:
+            if store:
+                results["runs"] = store_trials(plan, found, preset, outcomes, title)
+        finally:
+            say(json.dumps(results) if as_json else page(results))
 
 
 def _fits(origin: Origin, level: Level, config: Config) -> None:

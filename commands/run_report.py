@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from parenting._plural import counted
+from parenting.commands.run_store import stored
 
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 WORDS = {
@@ -38,6 +39,8 @@ def page(results: dict[str, Any]) -> str:
     lines += _endings("at the end", results["evaluation"])
     for stage in results.get("stages", ()):
         lines += _stage(f"stage {stage['stage']}", stage)
+    if "runs" in results:
+        lines.append(stored(results["runs"]))
     return "\n".join(lines)
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from typing import TYPE_CHECKING
+
+from pydantic import TypeAdapter, ValidationError
 
 from parenting._plural import counted
 from parenting.commands.database import require_file
-from parenting.commands.errors import settings
+from parenting.commands.errors import UsageError, settings
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
 from parenting.server.batches import EndedTrial, store_batch
 from parenting.server.db import Database, connect
 from parenting.server.migrate import require_current
+from parenting.server.new_run import PersonsName
 from parenting.server.weights import put_bytes
 
 if TYPE_CHECKING:
@@ -19,6 +23,9 @@ if TYPE_CHECKING:
     from parenting.experiments.training.outcomes import Outcomes
     from parenting.experiments.training.stop_rule import StopRule
     from parenting.experiments.training.trials import Trial
+
+COMPARED = 100
+"""Runs that the page compares at most."""
 
 
 def open_store() -> Database:
@@ -38,39 +45,61 @@ def open_store() -> Database:
     return db
 
 
-def store(
-    db: Database, plan: TrainPlan, level: Level, preset: str, outcomes: Outcomes, name: str | None
+def store_trials(
+    plan: TrainPlan, level: Level, preset: str, outcomes: Outcomes, name: str | None
 ) -> list[int]:
-    """Store the trials of a batch as runs that are over, and return their numbers."""
+    """Store the trials of a batch as runs that are over, and return their numbers.
+
+    Raises:
+        ServerError: the database refused.
+    """
     from parenting.experiments.training.trials import trials_of
 
     spec = registry.spec(plan.world)
-    weights = None if plan.weights is None else put_bytes(db, f"{plan.world}.safetensors", plan.weights)
     shared = {
         "world": plan.world,
         "level": level.name,
         "level_text": level.text,
         "legend": dict(spec.legend),
         "brief": {"goal": spec.brief.goal, "danger": spec.brief.danger},
-        "config": plan.config.model_dump(mode="json"),
+        # its parent answers at once, as a worker's script does in a run that waits for each answer
+        "config": {**plan.config.model_dump(mode="json"), "max_open_preferences": 0},
         "preset": preset,
         "seed": plan.seed,
         "script": plan.parent,
-        "weights": weights,
         "origin": None if plan.origin is None else dict(plan.origin),
     }
-    ended = (_ended(trial, plan) for trial in trials_of(plan, outcomes))
-    return store_batch(db, shared, ended, name)
+    ended = [_ended(trial, plan) for trial in trials_of(plan, outcomes)]
+    with closing(open_store()) as db:
+        blob = plan.weights
+        weights = None if blob is None else put_bytes(db, f"{plan.world}.safetensors", blob)
+        return store_batch(db, {**shared, "weights": weights}, ended, name)
+
+
+def title_of(name: str | None, store: bool) -> str | None:
+    """Read the name that stored runs are given.
+
+    Raises:
+        UsageError: it cannot be one, or nothing is stored.
+    """
+    if name is None:
+        return None
+    if not store:
+        raise UsageError("--name names stored runs: give --store, too.")
+    try:
+        return TypeAdapter(PersonsName).validate_python(name)
+    except ValidationError as error:
+        raise UsageError(f"--name: {error.errors()[0]['msg'].removeprefix('Value error, ')}.") from None
 
 
 def stored(runs: list[int]) -> str:
     """Return where the trials are now, in a sentence."""
-    first, last = runs[0], runs[-1]
-    if last - first + 1 == len(runs):
-        text = str(first) if first == last else f"{first}-{last}"
-    else:  # others started runs meanwhile
-        text = ",".join(map(str, runs))
-    return f"Stored as {counted(len(runs), 'run')}. Compare: /compare?runs={text}"
+    shown = runs[:COMPARED]
+    first, last = shown[0], shown[-1]
+    together = last - first + 1 == len(shown)  # else others started runs meanwhile
+    text = f"{first}-{last}" if together and last > first else ",".join(map(str, shown))
+    of = "" if len(shown) == len(runs) else f" the first {COMPARED}"
+    return f"Stored as {counted(len(runs), 'run')}. Compare{of}: /compare?runs={text}"
 
 
 def _ended(trial: Trial, plan: TrainPlan) -> EndedTrial:
@@ -79,6 +108,7 @@ def _ended(trial: Trial, plan: TrainPlan) -> EndedTrial:
         trial.ticks,
         trial.maturity,
         trial.optimal,
+        trial.answers,
         trial.finished,
         _reason(trial, plan.until, plan.max_ticks),
         trial.metrics,
@@ -92,4 +122,5 @@ def _reason(trial: Trial, until: StopRule, most: int) -> str:
         return f"It was given up as unfinished after {counted(most, 'tick')}."
     if until.kind == "optimal":
         return "Its argmax policy is optimal."
-    return f"It reached {counted(until.number, 'query' if until.kind == 'queries' else 'tick')}."
+    what = "answered question" if until.kind == "queries" else "tick"
+    return f"It reached {counted(until.number, what)}."

@@ -17,9 +17,8 @@ from parenting.server.public_ids import public_id
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Metric, Run
 
-SHARED = frozenset(
-    ("world", "level", "level_text", "legend", "brief", "config", "preset", "seed", "script", "weights", "origin")
-)
+SETTINGS = ("world", "level", "level_text", "legend", "brief", "config", "preset", "seed")
+SHARED = frozenset((*SETTINGS, "script", "weights", "origin"))
 """The columns of a run that all trials of a batch share."""
 FOREVER = "Only the numbers of a trial of a batch are kept: it has no questions, answers or checkpoints."
 
@@ -32,6 +31,7 @@ class EndedTrial:
     ticks: int
     maturity: int
     optimal: bool
+    answers: int
     finished: bool
     reason: str  # why it ended, in a sentence
     metrics: Mapping[int, Mapping[str, Any]]
@@ -63,6 +63,7 @@ def _store(db: Database, shared: Mapping[str, Any], trial: EndedTrial) -> int:
             tick=trial.ticks,
             maturity=trial.maturity,
             optimal=trial.optimal,
+            answers=trial.answers,
             **shared,
         )
         session.add(run)

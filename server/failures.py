@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from sqlalchemy.orm import Session
 
+from parenting.server.batches import refuse_if_of_batch
 from parenting.server.damage import damage, readable, sound
 from parenting.server.db import Database
 from parenting.server.notes import Failed, Resumed, add_note
@@ -39,7 +40,9 @@ def resume_in(session: Session, db: Database, run: Run) -> None:
 
     Raises:
         DamagedRowError: its row cannot be read.
+        Conflict: it is a trial of a batch, which has no checkpoint.
     """
-    reopen_in(session, readable(run).id)
+    refuse_if_of_batch(readable(run))
+    reopen_in(session, run.id)
     add_note(session, db, run.id, run.tick, Resumed())
     run.status, run.reason = RunStatus.ACTIVE, None

@@ -17,10 +17,11 @@ from sqlalchemy import ColumnElement, and_, bindparam, delete, exists, func, or_
 from sqlalchemy.orm import Session
 
 from parenting.drawing.sentences import mark
+from parenting.server.batches import refuse_if_of_batch
 from parenting.server.damage import damage, readable
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
-from parenting.server.runs import CLAIM_SECONDS, lock
+from parenting.server.runs import CLAIM_SECONDS, find, lock
 from parenting.server.statuses import JobState
 from parenting.server.store.clock import Mark, is_over
 from parenting.server.store.relay import announce
@@ -60,10 +61,11 @@ def ask(db: Database, run_id: int, kind: str, payload: dict[str, Any], client_id
 
     Raises:
         NotFound: there is no such run.
-        Conflict: too many jobs of this run are open.
+        Conflict: too many jobs of this run are open, or it is a trial of a batch.
     """
     with db.write() as session:
         lock(session, run_id)
+        refuse_if_of_batch(find(session, run_id))
         mark = db.mark(session)
         _sweep(session, mark)
         opened = select(func.count()).where(Job.run_id == run_id, Job.state.in_(OPEN))

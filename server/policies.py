@@ -10,6 +10,7 @@ from typing import Any
 from parenting.agent.config import Config
 from parenting.envs import registry
 from parenting.envs.options import SUPERVISION
+from parenting.server.batches import FOREVER
 from parenting.server.checkpoints import StoredCheckpoint, load_checkpoints
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
@@ -41,6 +42,8 @@ def present_policy(db: Database, run_id: int) -> PolicyFile:
         DamagedRowError: its row cannot be read.
     """
     run = get_run(db, run_id)
+    if run.batch is not None:
+        raise NotFound(FOREVER)
     for kept in _sound(db, run):
         try:
             return _policy(db, run, TensorArchive(kept.blob), kept.sha256)

@@ -18,6 +18,7 @@ from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.envs.gridworld import Gridworld
 from parenting.parents.replay import ReplayMismatchError, ReplayParent
+from parenting.server.batches import refuse_if_of_batch
 from parenting.server.begun import inherited
 from parenting.server.codec import kind_name
 from parenting.server.counters import count
@@ -116,6 +117,7 @@ def _beat(world: Gridworld, saved: Snapshot, parent: ReplayParent) -> Snapshot:
 
 
 def _checkpoint(db: Database, run: Run, world: Gridworld, config: Config, weights: Tensor | None) -> Recalled:
+    refuse_if_of_batch(run)
     kept = recall(db, run, world, config, weights)
     if kept.sha256 is None:
         raise NotFound(

@@ -81,6 +81,12 @@ class RunSchema(Schema):
     config: dict[str, Any]
     """Every hyperparameter as the run was started with it; changes since then are operator's events."""
     seed: int
+    batch: str | None
+    """The batch of which it is a trial (`parenting run --store`): its metrics are kept, and no questions,
+    answers or checkpoints; null: a worker raises it.
+    """
+    trial: int | None
+    """The number of the trial in its batch, from 0 on."""
     weights: str | None
     """The SHA-256 of the pre-trained weights that the agent began with; null: fresh ones."""
     origin: dict[str, Any] | None
@@ -141,29 +147,6 @@ class RunSchema(Schema):
     open: OpenSchema
     worker: Literal["alive", "silent", "done"]
     """alive, silent (none raises this run, nor will one that is alive), or done (the run is over)."""
-
-
-class CurveSchema(Schema):
-    """A curve: places on the axis, and the values there."""
-
-    name: str
-    """The metric."""
-    x: list[float]
-    y: list[float]
-
-
-class CurvesSchema(Schema):
-    """Curves of a run, each with at most as many points as were asked for."""
-
-    by: Literal["tick", "question", "minute"]
-    """The axis: ticks, questions answered so far, or minutes that answering took, breaks left out."""
-    rows: int
-    """The number of rows that they were made of."""
-    last: int | None
-    """The tick of the last of these rows; null: there are none."""
-    thinned: bool
-    """True if a curve has fewer points than there are: of each part its first, least, greatest and last."""
-    curves: list[CurveSchema]
 
 
 class FrameSchema(Schema):

@@ -122,6 +122,8 @@ class Run(Table):
     versions: Mapped[dict[str, Any] | None]  # torch build and threads: other ones give other bits
     error: Mapped[str | None]
     weights: Mapped[str | None]  # the sha256 of the pre-trained weights (`Weights`); none: fresh ones
+    batch: Mapped[str | None]  # of trials that were raised together in tensors (`server.batches`), and
+    trial: Mapped[int | None]  # which of them it is; null: a worker raises it
     origin: Mapped[dict[str, Any] | None]  # an earlier policy, answers or run that it began with (`origin`)
 
     @property

@@ -19,6 +19,7 @@ from parenting.agent.events import Change, Mature
 from parenting.agent.init import world_of
 from parenting.agent.state import AgentState
 from parenting.parents.replay import ReplayParent
+from parenting.server.batches import refuse_if_of_batch
 from parenting.server.begun import inherited
 from parenting.server.chain import Checked, check
 from parenting.server.db import Database
@@ -58,7 +59,9 @@ def verify(db: Database, run_id: int, progress: Progress = silent) -> Verified:
         NotFound: there is no such run.
         DamagedRowError: its row cannot be read.
     """
-    run, chain = get_run(db, run_id), check(db, run_id)
+    run = get_run(db, run_id)
+    refuse_if_of_batch(run)
+    chain = check(db, run_id)
     config = Config.model_validate(run.config)
     world = world_of(run.world, run.level_text, config)
     weights = initial_weights(db, run, world)

@@ -19,7 +19,7 @@ ROWS = 200
 LEARNT = ("loss", "entropy_global", "entropy_local")
 WHOLE = ("tick", "deaths", "guidance", "preference", "size", "rows", "maturity", "optimal")
 COLUMNS = (*WHOLE, "return", "seconds", *LEARNT)
-"""What a row holds; "seconds" are those since the batch began."""
+"""The columns of a row; "seconds" are those since the batch began."""
 
 Table = Float64[Tensor, "N R K"]
 

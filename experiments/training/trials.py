@@ -21,6 +21,7 @@ class Trial(NamedTuple):
     optimal: bool
     finished: bool
     stuck: bool
+    answers: int
     metrics: dict[int, dict[str, Any]]  # by tick, by the names that stored runs have
 
 
@@ -41,6 +42,9 @@ def trials_of(plan: TrainPlan, outcomes: Outcomes) -> list[Trial]:
         last, stage = int(counts.ticks[number]), int(counts.maturity[number])
         if outcomes.waterings.shape[1]:
             rows[last]["return"] = float(outcomes.waterings[number, stage - 1])
-        flags = (bool(getattr(counts, name)[number]) for name in ("optimal", "finished", "stuck"))
-        found.append(Trial(number, last, stage, *flags, rows))
+        optimal, finished, stuck = (
+            bool(flags[number]) for flags in (counts.optimal, counts.finished, counts.stuck)
+        )
+        answers = int(counts.queries[number].sum())
+        found.append(Trial(number, last, stage, optimal, finished, stuck, answers, rows))
     return found

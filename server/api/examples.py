@@ -73,6 +73,8 @@ RUN: dict[str, Any] = {
     "preset": "conservative",
     "config": compose("conservative", registry.defaults(WORLD), {}, strict=True).model_dump(mode="json"),
     "seed": 0,
+    "batch": None,
+    "trial": None,
     "weights": None,
     "origin": None,
     "parent": "human",

@@ -19,6 +19,7 @@ from parenting.server.api.lists import (
 )
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import read_responses, write_responses
+from parenting.server.curve_schemas import CurveSchema, CurvesSchema
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.identity import database_id
 from parenting.server.new_run import NewRun, start
@@ -26,7 +27,7 @@ from parenting.server.reads import pagination
 from parenting.server.reads.curves import read_curves
 from parenting.server.reads.listing import Wanted, find_runs
 from parenting.server.reads.schemas import metric_schemas, run_schema, run_schemas
-from parenting.server.schemas import CurveSchema, CurvesSchema, RunSchema
+from parenting.server.schemas import RunSchema
 
 router = admitted_router(tags=["runs"])
 

@@ -53,8 +53,14 @@ class Group:
 
     @property
     def seeds(self) -> str:
-        """Return the seeds, as "0-4, 9"."""
-        return ranges([one.run.seed for one in self.runs])
+        """Return the seeds, as "0-4, 9"; of trials of batches also their numbers."""
+        alone = [one.run.seed for one in self.runs if one.run.trial is None]
+        trials: dict[int, list[int]] = {}
+        for one in self.runs:
+            if one.run.trial is not None:
+                trials.setdefault(one.run.seed, []).append(one.run.trial)
+        batches = [f"{seed} (trials {ranges(numbers)})" for seed, numbers in sorted(trials.items())]
+        return ", ".join([ranges(alone)] * bool(alone) + batches)
 
     def mean(self, name: str) -> Mean | None:
         """Return the mean of a number over the runs that have it (`evaluation.statistics.mean_interval`)."""
@@ -104,6 +110,7 @@ def settings(run: Run) -> dict[str, Any]:
         "level": run.level,
         "level's text": run.level_text,
         "parent": run.script or run.parent,
+        "began with": run.origin,
         "weights": run.weights and run.weights[:SHORT],
         **run.config,
     }

@@ -114,7 +114,7 @@ def test_its_commands_do_what_they_say(client: httpx2.Client, db: Database) -> N
             post_query(db, agent, 1, "guidance", 1, CLIPS)
             post_query(db, agent, 2, "preference", 1, CLIPS)
     assert [status.status_code for name, status in said if name == "lease"] == [200]
-    assert len(said) == 26
+    assert len(said) == 27
 
 
 def test_an_error_looks_as_it_says(client: httpx2.Client) -> None:
