@@ -14,6 +14,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from parenting.server import chain
+from parenting.server.batches import refuse_if_of_batch
 from parenting.server.damage import readable
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
@@ -66,10 +67,12 @@ def roll_back(db: Database, run_id: int, tick: int, name: str | None = None) -> 
     Raises:
         NotFound: there is no such run.
         InvalidFieldsError: it has not come to this tick.
+        Conflict: it is a trial of a batch.
         DamagedRowError: a row of the run cannot be read.
     """
     with db.write() as session:
         old = readable(hold(session, run_id))
+        refuse_if_of_batch(old)
         if not 0 <= tick <= old.tick:
             raise InvalidFieldsError(
                 [("tick", f"Run {run_id} has come to tick {old.tick}: write 0 to that.")]

@@ -19,6 +19,7 @@ from parenting.server.reads.comparison import found_runs, grouped
 from parenting.server.reads.curves import read_curves
 from parenting.server.reads.schemas import run_schema
 from parenting.server.replay import relive
+from parenting.server.rollback import roll_back
 from parenting.server.runs import claim, get_run, set_status
 from parenting.server.statuses import RunStatus
 from parenting.server.verify import verify
@@ -71,6 +72,7 @@ def test_they_are_compared_beside_a_run_of_a_worker(db: Database, batch: list[in
         (lambda db, run: set_status(db, run, RunStatus.ACTIVE), Conflict),
         (lambda db, run: jobs.ask(db, run, "walk", {"seed": 1}, "me"), Conflict),
         (relive, Conflict),
+        (lambda db, run: roll_back(db, run, 3), Conflict),
         (verify, Conflict),
         (present_policy, NotFound),
     ],
