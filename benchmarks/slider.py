@@ -53,7 +53,7 @@ def live(db: Database, world: str, ticks: int, answers: int) -> RunSession:
 
 
 def stored(db: Database, run: int) -> str:
-    """What is stored of the board, in words."""
+    """Say in words how much is stored of the board."""
     with db.read() as session:
         rows = session.query(BoardSnapshot.size).filter_by(run_id=run).all()
         states = session.get(BoardStates, run)

@@ -13,11 +13,13 @@ from fastapi import Response
 
 from parenting.drawing.board import Board, build_board
 from parenting.drawing.clip import AGENT, BOX, LAND, Clip, Frame, find_tile
+from parenting.drawing.rests import complete
 from parenting.drawing.sentences import mark
 from parenting.server import runs
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.board import store
+from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.errors import NotFound
 from parenting.server.pages.render import page
@@ -45,6 +47,7 @@ class BoardPanel:
     drawn: Board
     layers: Sequence[tuple[str, str]]
     numbers: Sequence[tuple[str, str]]
+    pickers: int  # of the rest of the state, for which the page keeps room
     said: str = NOTHING
 
 
@@ -62,10 +65,13 @@ def rest_board(run_id: RunId, rest: int, db: Db) -> Response:
     return page("_rest.html", drawn=_drawn(frame))
 
 
-def board_panel(run: Run, harm: str) -> BoardPanel:
+def board_panel(db: Database, run: Run, harm: str) -> BoardPanel:
     """Return the panel of a run with its level as an episode begins; `harm` names its unsafe moves."""
     layers = [(name, harm if name == "deaths" else text) for name, text in LAYERS]
-    return BoardPanel(_drawn(begin(run)), layers, [*WAYS, *layers[1:]])
+    stored = store.read_states(db, run.id)
+    words = complete([rest["parts"] for rest in stored[0]["rests"]]) if stored else []
+    varying = {name for one in words for name, word in one.items() if word != words[0][name]}
+    return BoardPanel(_drawn(begin(run)), layers, [*WAYS, *layers[1:]], min(3, len(varying)))
 
 
 def begin(run: Run) -> Frame:

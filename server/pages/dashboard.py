@@ -131,7 +131,7 @@ def dashboard_page(
     context = DashboardPage(run, parent_title(run), state, describe_start(run), errors, focus)
     numbers = _numbers(db, run)
     parts = {**vars(context), **vars(numbers), **vars(_operator(db, run, typed))}
-    board = board_panel(run, numbers.names.harm)
+    board = board_panel(db, run, numbers.names.harm)
     return page("dashboard.html", 422 if errors else 200, board=board, **parts)
 
 
