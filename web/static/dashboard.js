@@ -94,10 +94,18 @@ function bars() {
 const logs = new Set();
 const figures = [...document.querySelectorAll("[data-chart]")];
 
+// Plotly has megabytes: the board does not wait for it.
+const library = new Promise((come, fail) => {
+  const script = document.getElementById("plotly");
+  if (window.Plotly) come();
+  script.addEventListener("load", come);
+  script.addEventListener("error", () => fail(new Error("The charts did not load. Load the page again.")));
+});
+
 async function draw() {
   queued = false;
   drawn = performance.now();
-  await loadStages();
+  await Promise.all([loadStages(), library]);
   for (const figure of figures) {
     const id = figure.dataset.chart, plot = figure.querySelector(".plot");
     await window.Plotly.react(plot, traces(id), layout(id), { displayModeBar: false, responsive: true });
