@@ -68,7 +68,7 @@ class RunSchema(Schema):
     created: datetime
     name: str | None
     description: str | None
-    """What its researchers keep with it: at most 2000 characters."""
+    """The notes of its researchers: at most 2000 characters."""
     tags: list[str]
     """Words by which its researchers find it."""
     archived: datetime | None
@@ -103,7 +103,7 @@ class RunSchema(Schema):
     remarks: bool
     """True if the page tells the parent of hasty and contradictory answers."""
     finish: str
-    """What ends it: optimal (its argmax policy is), goal:N (it has heard N answers), stages:T (stage T is
+    """Its end: optimal (its argmax policy is), goal:N (it has heard N answers), stages:T (stage T is
     over), or never.
     """
     status: RunStatus

@@ -52,13 +52,13 @@ class StoredTensor(NamedTuple):
 
 
 class TensorArchive:
-    """What `torch.save` wrote of nested dictionaries of tensors, texts and numbers."""
+    """A file of `torch.save`, of nested dictionaries of tensors, texts and numbers."""
 
     def __init__(self, blob: bytes) -> None:
         """Read the description; no numbers are copied yet.
 
         Raises:
-            UnreadableArchiveError: the bytes are no such archive.
+            UnreadableArchiveError: the bytes are not such an archive.
         """
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(blob))
@@ -97,7 +97,7 @@ class _Description(pickle.Unpickler):
             return _tensor
         if (module, name) == ("collections", "OrderedDict"):
             return dict
-        raise pickle.UnpicklingError(f"{module}.{name} is no part of a description of tensors")
+        raise pickle.UnpicklingError(f"{module}.{name} does not belong to a description of tensors")
 
     def persistent_load(self, pid: Any) -> _Storage:
         _, kind, key, *_ = pid

@@ -11,7 +11,7 @@ from parenting.server.table_root import Table
 
 
 class Tombstone(Table):
-    """What is left of a deleted run: its number, its public id, and what it held. Nothing that people wrote.
+    """The remains of a deleted run: its number, its public id, and what it held. Nothing that people wrote.
 
     No foreign key: the run is gone.
     """

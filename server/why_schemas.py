@@ -90,7 +90,7 @@ class GivenSchema(Schema):
     """The tick at which the agent heard it; null: not yet, or never."""
     standing: bool
     replays: int | None
-    """How often its parent had the clips played again; null: the client did not tell."""
+    """The number of times that its parent had the clips played again; null: the client did not tell."""
     effects: list[EffectSchema]
     """Before it and 1, 10 and 100 ticks after; empty for a skip, which changes nothing."""
 

@@ -1,4 +1,4 @@
-"""What a worker tidies up beside its runs: rows of deleted runs, and older checkpoints of ended ones.
+"""Chores of a worker beside its runs: rows of deleted runs, and older checkpoints of ended ones.
 
 A chore is done in pieces, each a short transaction, between the rounds of the worker's loop. Several workers
 may do the same one: a piece that is gone already is passed over.

@@ -54,7 +54,7 @@ BROKEN = [
     Mutant(
         "no lock of the run's row on PostgreSQL (A2)",
         "server/runs.py",
-        '_LOCKED = select(Run.id).where(Run.id == bindparam("run_id")).with_for_update()',
+        '_LOCKED = select(Run.id).where(Run.id == bindparam("run_id"), Run.deleting.is_(None)).with_for_update()',
         '_LOCKED = select(Run.id).where(Run.id == bindparam("run_id"))',
         f"{CLIENTS}::test_races_for_one_query_have_one_winner[postgresql]",
     ),
@@ -143,7 +143,7 @@ OLD = [
     Mutant(
         "an answer meant for another database is stored",
         "server/queue/names.py",
-        "    if _differs(row, names) or (row.query is None and isinstance(query, str)):",
+        "    if _differs(row, names) or (missing and isinstance(query, str)):",
         "    if row.query is None and isinstance(query, str):",
         "tests/server/test_elsewhere.py::test_two_databases_of_equal_numbers_never_share_an_answer",
     ),

@@ -67,7 +67,7 @@ QUEUE = [
     Mutant(
         "an answer for another database is stored here",
         "server/queue/names.py",
-        "if _differs(row, names) or (row.query is None and isinstance(query, str)):",
+        "if _differs(row, names) or (missing and isinstance(query, str)):",
         "if row.query is None and isinstance(query, str):",
         "tests/server/test_elsewhere.py::test_answer_that_names_something_else_is_not_stored",
     ),

@@ -101,7 +101,7 @@ def test_what_cannot_be_drawn_is_left_out(db: Database, mine: Claim) -> None:
 
 
 def test_by_question(db: Database, mine: Claim) -> None:
-    """What was measured before the first answer counts as question 0; a row without counts has no place."""
+    """Rows before the first answer count as question 0; a row without counts has no place."""
     asked = {1: (0, 0), 5: (2, 1), 9: (2, 3)}
     store(db, mine.run_id, {t: {"guidance": g, "preference": p, "deaths": t} for t, (g, p) in asked.items()})
     store(db, mine.run_id, {7: {"deaths": 7}})

@@ -102,7 +102,7 @@ async function open(text, which) {
     }
     const next = parse(world.value, found.header, found.rows);
     if (next.rows.length < least || next.rows.length > most || next.rows[0].length < least || next.rows[0].length > most) {
-      throw new Error(found.error?.message ?? "It is no level.");
+      throw new Error(found.error?.message ?? "This is not a level.");
     }
     change(next);
     notes = found.said.map(sentence);
