@@ -54,8 +54,8 @@ BROKEN = [
     Mutant(
         "no lock of the run's row on PostgreSQL (A2)",
         "server/runs.py",
-        '_LOCKED = select(Run.id).where(Run.id == bindparam("run_id"), Run.deleting.is_(None)).with_for_update()',
-        '_LOCKED = select(Run.id).where(Run.id == bindparam("run_id"))',
+        'bindparam("run_id"), Run.deleting.is_(None)).with_for_update()',
+        'bindparam("run_id"), Run.deleting.is_(None))',
         f"{CLIENTS}::test_races_for_one_query_have_one_winner[postgresql]",
     ),
     Mutant(
