@@ -23,6 +23,7 @@ from parenting.weights.store import Wanted
 if TYPE_CHECKING:
     from parenting.experiments.training.pretrain import PretrainResult, Progress
 
+MAX_STEPS = 50_000
 BARS = "▁▂▃▄▅▆▇█"
 
 
@@ -39,7 +40,7 @@ def pretrain(
     seed: Annotated[int, typer.Option(min=0, max=2**53 - 1, help="Seed of the weights and episodes.")] = 0,
     max_steps: Annotated[
         int, typer.Option(min=1, help="Stop after this many steps; the next call continues.")
-    ] = 50_000,
+    ] = MAX_STEPS,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the files.", show_default="weights in the data folder")
     ] = None,
@@ -61,7 +62,7 @@ def pretrain(
     results = [
         _there(each, known, quiet=as_json)
         if not force and _files(each, known)
-        else _one(each, folder, seed, max_steps, quiet=as_json)
+        else make(each, folder, seed, max_steps, quiet=as_json)
         for each in wanted
     ]
     if as_json:
@@ -81,7 +82,12 @@ def _there(wanted: Wanted, folders: tuple[Path, ...], *, quiet: bool) -> dict[st
     return {"path": str(path), "sha256": store.digest(path.read_bytes())}
 
 
-def _one(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool) -> dict[str, Any]:
+def make(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool) -> dict[str, Any]:
+    """Pre-train weights into a folder, and return what was measured, which is printed unless `quiet`.
+
+    Raises:
+        Exit: It was interrupted, did not converge, or the folder cannot be written.
+    """
     from parenting._process import settle
     from parenting.experiments.training.pretrain import DamagedWorkError, UnconvergedError, pretrain
 

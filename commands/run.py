@@ -14,6 +14,7 @@ import typer
 from pydantic import ValidationError
 
 from parenting.agent.config import FIELDS, PRESETS, Config, UnknownPresetError, compose
+from parenting.commands.before_run import PRETRAIN, provide
 from parenting.commands.beginnings import FromAnswers, FromPolicy, begins_with
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
 from parenting.commands.level_file import LEVEL, chosen_level
@@ -25,7 +26,7 @@ from parenting.envs import registry
 from parenting.envs.levels.spec import Level
 from parenting.envs.names import UnknownNameError, did_you_mean
 from parenting.weights.origin import Origin
-from parenting.weights.store import Wanted, find
+from parenting.weights.store import NoWeightsError, Wanted, find
 
 if TYPE_CHECKING:
     from parenting.agent.beginning import Beginning
@@ -66,6 +67,7 @@ def run(
     ] = None,
     from_policy: FromPolicy = None,
     from_answers: FromAnswers = None,
+    pretrain: Annotated[str | None, PRETRAIN] = None,
     store: Annotated[
         bool, typer.Option("--store", help="Store each trial as a run of the database, to be compared there.")
     ] = False,
@@ -92,7 +94,9 @@ def run(
         spec = chosen_parent(parent)
         origin = begins_with(from_policy, from_answers)
         _fits(origin, found, config)
-        weights = None if origin.policy is not None else _weights(found, config)
+        weights = None
+        if origin.policy is None:
+            config, weights = _weights(found, config, pretrain, quiet=as_json)
         if store:
             open_store().close()  # what is wrong with it is told before the work, not after
     from parenting._process import settle
@@ -224,13 +228,20 @@ def _mature(config: Config, until: StopRule) -> Config:
         ) from None
 
 
-def _weights(level: Level, config: Config) -> bytes | None:
-    """The file of pre-trained weights that these trials begin with (Sec. 3.1.4)."""
+def _weights(
+    level: Level, config: Config, pretrain: str | None, *, quiet: bool
+) -> tuple[Config, bytes | None]:
+    """The config, and the file of pre-trained weights that these trials begin with (Sec. 3.1.4)."""
     if not config.pretrain:
-        return None
-    return find(
-        Wanted(registry.spec(level.world), level.height, level.width), settings().weights
-    ).read_bytes()
+        return config, None
+    wanted, folder = Wanted(registry.spec(level.world), level.height, level.width), settings().weights
+    try:
+        return config, find(wanted, folder).read_bytes()
+    except NoWeightsError:
+        if provide(wanted, pretrain, folder, quiet=quiet):
+            return config, find(wanted, folder).read_bytes()
+    without = {**config.model_dump(by_alias=False), "pretrain": False}
+    return Config.model_validate(without), None
 
 
 @contextmanager

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from parenting.agent.config import FIELDS, Config, v1_names
+from parenting.commands.before_run import PRETRAIN, provide
 from parenting.commands.beginnings import FromAnswers, FromPolicy, begins_with
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, friendly_errors, settings
@@ -17,10 +19,13 @@ from parenting.envs import registry
 from parenting.envs.names import did_you_mean
 from parenting.parents.grammar import ParentError, read_script
 from parenting.server import new_run
+from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
+from parenting.server.missing_weights import missing_weights
 from parenting.server.new_run import FORM_FIELDS, read_form
 from parenting.server.notify import Notifier
 from parenting.server.reads.schemas import run_schema
+from parenting.weights.origin import Origin
 
 OPTIONS = ("world", "level", "level_text", "preset", "parent", "script", "seed", "goal", "finish", "name")
 """The settings of a run that are arguments or options of their own; `--set` sets the others."""
@@ -59,6 +64,7 @@ def start(
     ] = None,
     from_policy: FromPolicy = None,
     from_answers: FromAnswers = None,
+    pretrain: Annotated[str | None, PRETRAIN] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the run as JSON, as in the API, and nothing else.")
     ] = False,
@@ -84,6 +90,7 @@ def start(
         chosen, origin = settings(), begins_with(from_policy, from_answers)
         with database() as db:
             try:
+                given |= _weights(db, given, chosen.weights, pretrain, origin, quiet=as_json)
                 run = new_run.start(db, read_form(given), chosen.weights, origin)
             except InvalidFieldsError as error:
                 raise UsageError(
@@ -96,6 +103,23 @@ def start(
         return
     page = "parent" if run.parent == "human" else ""
     say(f"Run {run.id} is started. Its page: /runs/{run.public_id}/{page}".rstrip("/"))
+
+
+def _weights(
+    db: Database, given: dict[str, str], folder: Path, choice: str | None, origin: Origin, *, quiet: bool
+) -> dict[str, str]:
+    """Provide the pre-trained weights that the run lacks, or return the field by which it begins without.
+
+    Raises:
+        UsageError: they are missing, and nothing was chosen.
+        InvalidFieldsError: a field cannot be read.
+    """
+    if origin.policy is not None:
+        return {}
+    lacking = missing_weights(read_form(given), folder, db)
+    if lacking is None or provide(lacking, choice, folder, quiet=quiet):
+        return {}
+    return {new_run.PRETRAIN: "false"}
 
 
 def _parent(text: str) -> dict[str, str]:

@@ -55,6 +55,7 @@ SCRIPTS = (
     "start.js",
     "docs.js",
     "levels.js",
+    "pretraining.js",
 )
 PICTURES = ("icon.svg", "query.svg", "question.svg")
 MEDIA = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}

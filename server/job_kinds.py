@@ -10,6 +10,7 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from parenting.envs.art import LARGEST, SMALLEST
 from parenting.server.whole import WHOLE
 
 MOST_ROWS = 1_000
@@ -71,10 +72,20 @@ class StatePayload(Payload):
         return self
 
 
+class PretrainPayload(Payload):
+    """Weights for runs in one world on levels of one size (Sec. 3.1.4)."""
+
+    world: Annotated[str, Field(max_length=100)]
+    height: Annotated[int, Field(ge=SMALLEST, le=LARGEST), WHOLE]
+    width: Annotated[int, Field(ge=SMALLEST, le=LARGEST), WHOLE]
+
+
 KINDS: dict[str, type[Payload]] = {
     "walk": WalkPayload,
     "policy": PolicyPayload,
     "episode": EpisodePayload,
     "state": StatePayload,
 }
-"""The payload of each kind of job."""
+"""The payload of each kind of job of a run."""
+OF_NO_RUN: dict[str, type[Payload]] = {"pretrain": PretrainPayload}
+"""The payload of each kind of job that belongs to no run."""

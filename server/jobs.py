@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, bindparam, delete, exists, func, or_, select, tuple_, update
+from sqlalchemy import ColumnElement, and_, bindparam, delete, exists, func, or_, select, true, tuple_, update
 from sqlalchemy.orm import Session
 
 from parenting.drawing.sentences import mark
@@ -33,6 +33,8 @@ WAITS_SECONDS = 60.0
 """A job that no worker has taken for so long has failed: nobody waits for it any more."""
 KEPT_SECONDS = 600.0
 """A job is deleted so long after it was asked."""
+NO_RUN = 0
+"""The run of a job that belongs to none. Such a job takes minutes, and a worker does one at a time."""
 KEPT_OF_A_RUN = 20
 """Jobs of a run that are kept at most; the oldest go first."""
 TRIES = 3
@@ -66,22 +68,41 @@ def ask(db: Database, run_id: int, kind: str, payload: dict[str, Any], client_id
     with db.write() as session:
         lock(session, run_id)
         refuse_if_of_batch(find(session, run_id))
-        mark = db.mark(session)
-        _sweep(session, mark)
-        opened = select(func.count()).where(Job.run_id == run_id, Job.state.in_(OPEN))
-        if (session.scalar(opened) or 0) >= OPEN_OF_A_RUN:
-            raise Conflict(
-                f"{OPEN_OF_A_RUN} jobs of this run wait for a worker already. Wait until one is done."
-            )
-        job = Job(run_id=run_id, kind=kind, payload=payload, client_id=client_id, created=db.clock())
-        job.asked_epoch, job.asked_mark = mark.epoch, mark.seconds
-        session.add(job)
-        session.flush()
-        newest = select(Job.id).where(Job.run_id == run_id).order_by(Job.id.desc()).limit(KEPT_OF_A_RUN)
-        kept = session.scalars(newest).all()
-        session.execute(delete(Job).where(Job.run_id == run_id, Job.id.not_in(kept)))
-        announce(session, "worker")
-        return job
+        return _add(session, db, run_id, kind, payload, client_id)
+
+
+def ask_of_no_run(db: Database, kind: str, payload: dict[str, Any], client_id: str) -> Job:
+    """Add a job that belongs to no run; the same one that is open or done is returned instead.
+
+    Raises:
+        Conflict: too many of them are open.
+    """
+    with db.write() as session:
+        same = select(Job).where(Job.run_id == NO_RUN, Job.kind == kind, Job.state != JobState.FAILED)
+        for job in session.scalars(same.order_by(Job.id.desc())):
+            if damage(job) is None and job.payload == payload:
+                return job
+        return _add(session, db, NO_RUN, kind, payload, client_id)
+
+
+def _add(
+    session: Session, db: Database, run_id: int, kind: str, payload: dict[str, Any], client_id: str
+) -> Job:
+    mark = db.mark(session)
+    _sweep(session, mark)
+    opened = select(func.count()).where(Job.run_id == run_id, Job.state.in_(OPEN))
+    if (session.scalar(opened) or 0) >= OPEN_OF_A_RUN:
+        whose = "of this run" if run_id else "of this kind"
+        raise Conflict(f"{OPEN_OF_A_RUN} jobs {whose} wait for a worker already. Wait until one is done.")
+    job = Job(run_id=run_id, kind=kind, payload=payload, client_id=client_id, created=db.clock())
+    job.asked_epoch, job.asked_mark = mark.epoch, mark.seconds
+    session.add(job)
+    session.flush()
+    newest = select(Job.id).where(Job.run_id == run_id).order_by(Job.id.desc()).limit(KEPT_OF_A_RUN)
+    kept = session.scalars(newest).all()
+    session.execute(delete(Job).where(Job.run_id == run_id, Job.id.not_in(kept)))
+    announce(session, "worker")
+    return job
 
 
 def get(db: Database, public_id: str) -> Job:
@@ -98,18 +119,31 @@ def get(db: Database, public_id: str) -> Job:
     return readable(job)
 
 
-def waits(db: Database, seconds: float = CLAIM_SECONDS) -> bool:
-    """Return whether there is a job to claim. This takes no lock."""
+def waits(db: Database, seconds: float = CLAIM_SECONDS, long: bool = True) -> bool:
+    """Return whether there is a job to claim, of a run or, if `long`, of none. This takes no lock."""
     with db.read() as session:
-        return bool(session.scalar(select(exists().where(_free(seconds))), db.mark(session).bound()))
+        found = select(exists().where(_free(seconds), true() if long else Job.run_id != NO_RUN))
+        return bool(session.scalar(found, db.mark(session).bound()))
 
 
-def claim(db: Database, worker: str, most: int, seconds: float = CLAIM_SECONDS) -> Sequence[JobClaim]:
-    """Claim the oldest jobs that wait, or whose worker was silent for `seconds`; at most `most`."""
+def claim(
+    db: Database, worker: str, most: int, seconds: float = CLAIM_SECONDS, long: bool = True
+) -> Sequence[JobClaim]:
+    """Claim the oldest jobs that wait, or whose worker was silent for `seconds`; at most `most`.
+
+    At most one of them belongs to no run, and none unless `long`.
+    """
+    found = _claim(db, worker, most, seconds, Job.run_id != NO_RUN)
+    if long and len(found) < most:
+        found += _claim(db, worker, 1, seconds, Job.run_id == NO_RUN)
+    return found
+
+
+def _claim(db: Database, worker: str, most: int, seconds: float, of: ColumnElement[bool]) -> list[JobClaim]:
     with db.write(durable=False) as session:
         mark = db.mark(session)
         _sweep(session, mark)
-        rows = select(Job).where(_free(seconds)).order_by(Job.id).limit(most)
+        rows = select(Job).where(_free(seconds), of).order_by(Job.id).limit(most)
         found = session.scalars(rows.with_for_update(skip_locked=True), mark.bound()).all()
         return [mine for job in found if (mine := _take(job, worker, mark)) is not None]
 
@@ -190,10 +224,14 @@ def _free(seconds: float) -> ColumnElement[bool]:
 
 def _sweep(session: Session, mark: Mark) -> None:
     """Delete jobs that are kept no longer, and give up those that nobody has taken in time."""
-    old = delete(Job).where(is_over(Job.asked_epoch, Job.asked_mark, Job.asked_mark + KEPT_SECONDS))
+    old = delete(Job).where(
+        Job.state != JobState.WORKING,
+        is_over(Job.asked_epoch, Job.asked_mark, Job.asked_mark + KEPT_SECONDS),
+    )
     session.execute(old, mark.bound())
     late = and_(
         Job.state == JobState.WAITING,
+        Job.run_id != NO_RUN,  # another one of these may go on for minutes
         is_over(Job.asked_epoch, Job.asked_mark, Job.asked_mark + WAITS_SECONDS),
     )
     given_up = {"state": JobState.FAILED, "reason": bindparam("not_taken")}

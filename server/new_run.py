@@ -31,12 +31,12 @@ from parenting.server.errors import InvalidFieldsError
 from parenting.server.finishes import PATTERN, never_met, usual
 from parenting.server.identity import unused_number
 from parenting.server.tables import Run
+from parenting.server.weights import needed, put_bytes
 from parenting.server.weights import put as put_weights
-from parenting.server.weights import put_bytes
 from parenting.server.whole import WHOLE, whole
 from parenting.server.wrong_fields import messages
 from parenting.weights.origin import NO_ORIGIN, Origin
-from parenting.weights.store import NoWeightsError, Wanted, find
+from parenting.weights.store import NoWeightsError, Wanted
 
 LARGEST_INT = 2**53 - 1
 """The largest integer that every JSON reader keeps exactly."""
@@ -73,6 +73,11 @@ COLUMNS = {
 """The fields that are columns of the run as they are."""
 AS_JSON = ("seed", "goal", "pace", "remarks")
 """Fields of the form whose text is a number or a truth value."""
+Wrong = list[tuple[str, str]]
+PRETRAIN = "config.pretrain"
+"""The field that is wrong where pre-trained weights are missing."""
+
+
 Name = Annotated[
     str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\r\n\t]*$"), AfterValidator(plain)
 ]
@@ -141,16 +146,16 @@ class NewRun(BaseModel):
 def start(db: Database, new: NewRun, folder: Path | None = None, origin: Origin = NO_ORIGIN) -> Run:
     """Check a new run against worlds and hyperparameters, and add it, with all that it begins with.
 
-    `folder` holds weights of one's own; those of the built-in levels are shipped.
+    `folder` holds weights of one's own; those of the built-in levels are shipped, and others may be stored.
 
     Raises:
         InvalidFieldsError: names every wrong field, with a message each.
     """
-    columns = plan(new, folder, origin)
-    file: Path | None = columns.pop("weights")
+    columns = plan(new, folder, origin, db)
     for name, blob in origin.blobs:
         put_bytes(db, name, blob)
-    columns["weights"] = put_weights(db, file) if file else None
+    if isinstance(columns["weights"], Path):
+        columns["weights"] = put_weights(db, columns["weights"])
     with db.write() as session:
         run = Run(id=unused_number(session, Run), created=db.clock(), **columns)
         session.add(run)
@@ -158,18 +163,20 @@ def start(db: Database, new: NewRun, folder: Path | None = None, origin: Origin 
         return run
 
 
-def plan(new: NewRun, folder: Path | None = None, origin: Origin = NO_ORIGIN) -> dict[str, Any]:
-    """The columns of a new run; under `weights` the file of its pre-trained weights, or None.
+def plan(
+    new: NewRun, folder: Path | None = None, origin: Origin = NO_ORIGIN, db: Database | None = None
+) -> dict[str, Any]:
+    """The columns of a new run; under `weights` the file or the hash of its pre-trained weights, or None.
 
     Raises:
         InvalidFieldsError: names every wrong field, with a message each.
     """
-    wrong: list[tuple[str, str]] = []
+    wrong: Wrong = []
     if new.script is not None and new.parent == "human":
         wrong.append(("script", "People answer this run. Errors belong to a run with the parent scripted."))
-    level = _level(new, wrong)
+    level = level_of(new, wrong)
     config = _config(new, level, wrong)
-    weights = None if origin.policy is not None else _weights(new, level, config, folder, wrong)
+    weights = None if origin.policy is not None else _weights(level, config, folder, db, wrong)
     if level is not None and config is not None:
         wrong += [*origin.misfits(level, config), *never_met(new.finish, new.world, config)]
     if wrong or level is None or config is None:
@@ -214,7 +221,8 @@ def _unknown(what: str, name: str, known: Collection[str]) -> str:
     return f"There is no such {what}.{did_you_mean(name, known)} There is: {', '.join(known)}."
 
 
-def _level(new: NewRun, wrong: list[tuple[str, str]]) -> Level | None:
+def level_of(new: NewRun, wrong: Wrong) -> Level | None:
+    """The level of a new run; what is wrong with it is added to the list."""
     if not registry.knows(new.world, new.level_text):
         broken = registry.INSTALLED.broken().get(new.world)
         wrong.append(("world", broken or _unknown("world", new.world, registry.WORLDS)))
@@ -241,7 +249,7 @@ def _defaults(new: NewRun, level: Level | None) -> Mapping[str, object]:
     return registry.defaults(new.world) if new.world in registry.WORLDS else {}
 
 
-def _config(new: NewRun, level: Level | None, wrong: list[tuple[str, str]]) -> Config | None:
+def _config(new: NewRun, level: Level | None, wrong: Wrong) -> Config | None:
     """The preset, over it what the world sets, over it what this run sets (docs/paper.md, "Settings").
 
     A script answers at once, so its agent waits for each of its answers.
@@ -262,14 +270,14 @@ def _config(new: NewRun, level: Level | None, wrong: list[tuple[str, str]]) -> C
 
 
 def _weights(
-    new: NewRun, level: Level | None, config: Config | None, folder: Path | None, wrong: list[tuple[str, str]]
-) -> Path | None:
+    level: Level | None, config: Config | None, folder: Path | None, db: Database | None, wrong: Wrong
+) -> Path | str | None:
     if level is None or config is None or not config.pretrain:
         return None
     try:
-        return find(Wanted(registry.spec(new.world, level), level.height, level.width), folder)
+        return needed(Wanted(registry.spec(level.world, level), level.height, level.width), folder, db)
     except NoWeightsError as error:
-        wrong.append(("config.pretrain", str(error)))
+        wrong.append((PRETRAIN, str(error)))
         return None
 
 

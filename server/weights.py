@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sqlalchemy import select
+
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.tables import Weights
-from parenting.weights.store import digest
+from parenting.weights.store import SUFFIX, NoWeightsError, Wanted, digest, find
 
 
 def put(db: Database, file: Path) -> str:
@@ -22,6 +24,27 @@ def put_bytes(db: Database, name: str, blob: bytes) -> str:
         if session.get(Weights, sha256) is None:
             session.add(Weights(sha256=sha256, name=name, blob=blob, created=db.clock()))
     return sha256
+
+
+def needed(wanted: Wanted, folder: Path | None, db: Database | None) -> Path | str:
+    """Return the file of pre-trained weights, or the SHA-256 of those that are stored.
+
+    Raises:
+        NoWeightsError: there are none.
+    """
+    try:
+        return find(wanted, folder)
+    except NoWeightsError:
+        kept = None if db is None else _newest(db, f"{wanted.name}{SUFFIX}")
+        if kept is None:
+            raise
+        return kept
+
+
+def _newest(db: Database, name: str) -> str | None:
+    with db.read() as session:
+        rows = select(Weights.sha256).where(Weights.name == name)
+        return session.scalars(rows.order_by(Weights.created.desc(), Weights.sha256).limit(1)).first()
 
 
 def get(db: Database, sha256: str, what: str = "pre-trained weights") -> bytes:

@@ -133,14 +133,19 @@ def metadata(blob: bytes) -> dict[str, str]:
     return said
 
 
-def save(path: Path, wanted: Wanted, weights: Tensor, about: Mapping[str, str]) -> str:
-    """Write weights whole or not at all; `about` says how they came to be. Returns the file's SHA-256."""
+def packed(wanted: Wanted, weights: Tensor, about: Mapping[str, str]) -> bytes:
+    """Return the bytes of a file of weights; `about` says how they came to be."""
     from safetensors.torch import save as pack
 
-    path.parent.mkdir(parents=True, exist_ok=True)
     # one entry of metadata: safetensors writes several in an order that changes from call to call
     said = json.dumps({**wanted.metadata, **about}, sort_keys=True)
-    blob = pack({"weights": weights.contiguous()}, metadata={ABOUT: said})
+    return pack({"weights": weights.contiguous()}, metadata={ABOUT: said})
+
+
+def save(path: Path, wanted: Wanted, weights: Tensor, about: Mapping[str, str]) -> str:
+    """Write weights whole or not at all; `about` says how they came to be. Returns the file's SHA-256."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    blob = packed(wanted, weights, about)
     part = path.with_suffix(".new")
     part.write_bytes(blob)
     part.replace(path)

@@ -10,7 +10,13 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 from parenting.envs.people_text import plain
 from parenting.server import schemas
 from parenting.server.api.names import DatabaseId, PublicId
-from parenting.server.job_kinds import EpisodePayload, PolicyPayload, StatePayload, WalkPayload
+from parenting.server.job_kinds import (
+    EpisodePayload,
+    PolicyPayload,
+    PretrainPayload,
+    StatePayload,
+    WalkPayload,
+)
 from parenting.server.level_check import TEXT_CHARACTERS
 from parenting.server.new_run import LARGEST_INT, Goal, Name, Pace, PersonsName
 from parenting.server.schemas import By
@@ -151,5 +157,12 @@ class StateBody(LeaseBody):
     payload: StatePayload = StatePayload()
 
 
+class PretrainBody(LeaseBody):
+    """Weights for runs in a world on levels of one size (Sec. 3.1.4)."""
+
+    kind: Literal["pretrain"]
+    payload: PretrainPayload
+
+
 JobBody = Annotated[WalkBody | PolicyBody | EpisodeBody | StateBody, Field(discriminator="kind")]
-"""A job for any worker, and the client that asks for it: one body for each of `job_kinds.KINDS`."""
+"""A job of a run for any worker, and the client that asks: one body for each of `job_kinds.KINDS`."""

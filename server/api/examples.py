@@ -11,9 +11,9 @@ from parenting.drawing.surroundings import surroundings
 from parenting.envs import registry
 from parenting.server.api.board_examples import BOARD, EPISODE, NUMBERS
 from parenting.server.api.kept_examples import kept
+from parenting.server.api.level_examples import CHECKED, OWN_LEVEL, PRETRAINED, TO_CHECK
 from parenting.server.api.why_example import EXPORTED as EXPORTED_WHY
 from parenting.server.api.why_example import WHY
-from parenting.server.level_check import check
 
 WORLD = "unsafe-exploration"
 SPEC = registry.spec(WORLD)
@@ -24,9 +24,6 @@ BRIEF = {"goal": SPEC.brief.goal, "danger": SPEC.brief.danger}
 NOON = "2026-11-22T12:00:00Z"
 DATABASE, RUN_ID = "7c9e6679-7425-40de-944b-e07fc1f90ae7", "5J3mBbAH58CpQ3Y8RNJpUK"
 QUESTION_ID = "8kZ4cVxtw1Rr5Qh2mPzDvN"
-OWN_LEVEL = "WWWWW\nWA GW\nWWWWW"
-CHECKED_TEXT = {"world": WORLD, "text": OWN_LEVEL.replace("G", " ")}
-CHECKED = check(**CHECKED_TEXT).model_dump()
 
 
 def _frame(row: int, column: int) -> dict[str, Any]:
@@ -243,7 +240,7 @@ class Shown:
 
 
 SHOWN = {
-    "check_level": Shown(CHECKED, {"a level": CHECKED_TEXT}),
+    "check_level": Shown(CHECKED, {"a level": TO_CHECK}),
     "healthz": Shown({"status": "ok"}),
     "readyz": Shown({"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}),
     "list_runs": Shown({**_rows(RUN), "database": DATABASE}),
@@ -289,6 +286,10 @@ SHOWN = {
     "ask_job": Shown(
         {**WALK, "state": "waiting", "result": None},
         {"a walk": {"client_id": "me", "kind": "walk", "payload": {"seed": 7}}},
+    ),
+    "ask_pretraining": Shown(
+        {**WALK, **PRETRAINED, "run": None, "state": "waiting", "result": None},
+        {"one more row": {**LEASE, **PRETRAINED}},
     ),
     "get_job": Shown(WALK),
     "report_page_error": Shown(None, {"a fault": {"message": "x is not a function", "page": "/runs/3"}}),

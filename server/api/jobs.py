@@ -6,12 +6,14 @@ from typing import Annotated
 
 from fastapi import Path, Request
 
+from parenting.envs import registry
 from parenting.server import jobs
 from parenting.server.admission import admitted_router
-from parenting.server.api.bodies import JobBody
+from parenting.server.api.bodies import JobBody, PretrainBody
 from parenting.server.api.names import PublicId, RunId
 from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.deps import Db, notify_worker
+from parenting.server.errors import NotFound
 from parenting.server.reads.jobs import JobSchema, job_schema
 
 router = admitted_router(tags=["jobs"])
@@ -30,6 +32,20 @@ def ask_job(request: Request, run_id: RunId, body: JobBody, db: Db) -> JobSchema
     fails, and each is kept for ten minutes.
     """
     job = jobs.ask(db, run_id, body.kind, body.payload.model_dump(), body.client_id)
+    notify_worker(request)
+    return job_schema(db, job)
+
+
+@router.post("/jobs", summary="Ask for weights", status_code=202, responses=write_responses(404, 409))
+def ask_pretraining(request: Request, body: PretrainBody, db: Db) -> JobSchema:
+    """Ask any worker to pre-train weights for a world and a size of levels, which new runs then begin with.
+
+    It takes the worker a minute or more. Whoever asks for what is open or done gets the same job. An unknown
+    world is 404.
+    """
+    if body.payload.world not in registry.WORLDS:
+        raise NotFound(f"There is no such world. There is: {', '.join(registry.WORLDS)}.")
+    job = jobs.ask_of_no_run(db, body.kind, body.payload.model_dump(), body.client_id)
     notify_worker(request)
     return job_schema(db, job)
 

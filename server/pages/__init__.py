@@ -15,6 +15,7 @@ from parenting.server.pages.history import router as history
 from parenting.server.pages.levels import router as levels
 from parenting.server.pages.parent import router as parent
 from parenting.server.pages.practice import router as practice
+from parenting.server.pages.pretraining import router as pretraining
 from parenting.server.pages.render import error_page
 from parenting.server.pages.revisions import router as revisions
 from parenting.server.pages.settings import router as settings
@@ -29,6 +30,7 @@ __all__ = ["error_page", "router"]
 router = APIRouter(include_in_schema=False)
 router.include_router(start)
 router.include_router(levels)
+router.include_router(pretraining)
 router.include_router(carried)
 router.include_router(parent)
 router.include_router(revisions)

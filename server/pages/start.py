@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from fastapi import Depends, Request, Response
 
@@ -15,10 +15,13 @@ from parenting.server.admission import admitted_router
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.errors import InvalidFieldsError
-from parenting.server.new_run import LARGEST_INT, plan, read_form, start
+from parenting.server.missing_weights import missing_weights
+from parenting.server.new_run import LARGEST_INT, PRETRAIN, plan, read_form, start
 from parenting.server.pages.options import OPTIONS, Option
 from parenting.server.pages.render import page, redirect
 from parenting.server.pages.run_list import Find, FindRuns, run_list
+from parenting.weights.estimate import seconds
+from parenting.weights.store import Wanted
 
 router = admitted_router(include_in_schema=False)
 
@@ -49,6 +52,13 @@ EMPTY_FORM = {
 """The form before anything was typed."""
 
 
+class Offer(NamedTuple):
+    """Pre-trained weights that a run lacks, and the seconds that they take."""
+
+    wanted: Wanted
+    seconds: int
+
+
 @dataclass(frozen=True)
 class StartPage:
     """The content of web/templates/start.html beside the list."""
@@ -59,6 +69,7 @@ class StartPage:
     more_open: bool  # whether one of the settings below the fold was set or is wrong
     focus: str | None  # the first wrong field
     other_errors: Sequence[str]  # sentences on what has no field
+    offer: Offer | None = None  # the weights that are missing, and nothing else is wrong
     worlds: Collection[WorldSpec] = tuple(WORLDS.values())
     options: Sequence[Option] = OPTIONS
     presets: Mapping[str, str] = field(default_factory=lambda: PRESET_WORDS)
@@ -80,16 +91,33 @@ def index(db: Db, find: FindRuns) -> Response:
 
 @router.post("/runs")
 def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> Response:
-    """Start a run and go to it, or show the form again with an error next to each wrong field."""
-    given = dict(form)
-    if given.get("level_text", "").strip():
-        given.pop("level", None)  # a text of one's own stands in the list's place; the form says so
-    errors = _errors(given, settings.weights)
+    """Start a run and go to it, or show the form again with an error next to each wrong field.
+
+    Where only weights made beforehand are missing, the form offers to make them now or to begin without.
+    """
+    given = settings_of(form)
+    errors = _errors(given, settings.weights, db)
     if errors:
-        return _page(db, {**EMPTY_FORM, **form}, errors)
+        offer = missing(db, settings.weights, given) if PRETRAIN in errors else None
+        return _page(db, {**EMPTY_FORM, **form}, errors, offer=offer)
     run = start(db, read_form(given), settings.weights)
     notify_worker(request)
     return redirect(f"/runs/{run.public_id}/parent" if run.parent == "human" else f"/runs/{run.public_id}")
+
+
+def settings_of(form: Mapping[str, str]) -> dict[str, str]:
+    """Return the fields of a run: a level of one's own stands in the list's place; the form says so."""
+    own = bool(form.get("level_text", "").strip())
+    return {name: text for name, text in form.items() if not (own and name == "level")}
+
+
+def missing(db: Database, folder: Path, given: Mapping[str, str]) -> Offer | None:
+    """Return the weights that alone a run lacks; None if it lacks none, or more than these."""
+    try:
+        wanted = missing_weights(read_form(given), folder, db)
+    except InvalidFieldsError:
+        return None
+    return None if wanted is None else Offer(wanted, seconds(wanted))
 
 
 def filled_form(db: Database, form: Mapping[str, str]) -> Response:
@@ -97,13 +125,13 @@ def filled_form(db: Database, form: Mapping[str, str]) -> Response:
     return _page(db, {**EMPTY_FORM, **form}, {}, filled=True)
 
 
-def _errors(given: Mapping[str, str], folder: Path) -> dict[str, str]:
+def _errors(given: Mapping[str, str], folder: Path, db: Database) -> dict[str, str]:
     """Return an error for each wrong field: wrong by itself, or in the world that the others name."""
     errors: dict[str, str] = {}
     for _ in range(2):
         try:
             known = {name: text for name, text in given.items() if name not in errors}
-            plan(read_form(known), folder)
+            plan(read_form(known), folder, db=db)
         except InvalidFieldsError as error:
             errors = {**dict(error.fields), **errors}
     return {name: NUMBER_ERRORS.get(name, said) for name, said in errors.items()}
@@ -115,9 +143,13 @@ def _page(
     errors: Mapping[str, str],
     find: Find | None = None,
     filled: bool = False,
+    offer: Offer | None = None,
 ) -> Response:
     listed = run_list(db, find or Find())
-    untouched = not (listed.runs or listed.archived or listed.find.narrows or listed.find.before or errors)
+    wrong = bool(errors)
+    if offer is not None:
+        errors = {}  # the missing weights are all that is wrong, and the offer says so
+    untouched = not (listed.runs or listed.archived or listed.find.narrows or listed.find.before or wrong)
     context = StartPage(
         fresh=untouched and not filled,
         form=form,
@@ -125,5 +157,6 @@ def _page(
         more_open=any(form[option.field] or option.field in errors for option in OPTIONS),
         focus=next((field for field in EMPTY_FORM if field in errors), None),
         other_errors=[message for field, message in errors.items() if field not in EMPTY_FORM],
+        offer=offer,
     )
-    return page("start.html", 422 if errors else 200, **vars(context), **vars(listed))
+    return page("start.html", 422 if wrong else 200, **vars(context), **vars(listed))

@@ -17,7 +17,8 @@ class JobSchema(Schema):
 
     id: str
     """Its name: random, and never given again."""
-    run: int
+    run: int | None
+    """The run; null: the job belongs to none."""
     kind: str
     payload: dict[str, Any]
     """The arguments, with their defaults."""
@@ -37,7 +38,7 @@ def job_schema(db: Database, job: Job) -> JobSchema:
     names = ("kind", "payload", "created", "state", "result", "reason")
     return JobSchema(
         id=job.public_id,
-        run=job.run_id,
+        run=job.run_id or None,
         worker="alive" if alive(db) else "silent",
         **{name: getattr(job, name) for name in names},
     )

@@ -6,16 +6,23 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from parenting.server.db import Database
-from parenting.server.job_kinds import KINDS
+from parenting.server.job_kinds import KINDS, OF_NO_RUN
 from parenting.server.jobs import JobClaim
 from parenting.server.work.episode import episode
 from parenting.server.work.one_state import one_state
+from parenting.server.work.pretraining import pretrain
 from parenting.server.work.walk import policy, walk
 
 Doer = Callable[[Database, int, Any], dict[str, Any]]
-"""It reads the run of this id and returns a result; it writes nothing."""
+"""It reads the run of this id and returns a result; only weights are written."""
 
-DOERS: Mapping[str, Doer] = {"walk": walk, "policy": policy, "episode": episode, "state": one_state}
+DOERS: Mapping[str, Doer] = {
+    "walk": walk,
+    "policy": policy,
+    "episode": episode,
+    "state": one_state,
+    "pretrain": pretrain,
+}
 """The function that does each kind of job."""
 
 
@@ -26,4 +33,4 @@ def do(db: Database, job: JobClaim) -> dict[str, Any]:
         KeyError: the kind is of a newer version than this worker.
         ValidationError: the payload is not one of its kind.
     """
-    return DOERS[job.kind](db, job.run_id, KINDS[job.kind].model_validate(job.payload))
+    return DOERS[job.kind](db, job.run_id, (KINDS | OF_NO_RUN)[job.kind].model_validate(job.payload))

@@ -59,9 +59,10 @@ class Jobs:
         if not free or late < (LOOK_SECONDS if self._news else self.seconds / 2):
             return
         self._looked_at, self._news = time.monotonic(), False
-        if not jobs.waits(self.db, self.seconds):
+        long = not any(mine.run_id == jobs.NO_RUN for mine in self._working)
+        if not jobs.waits(self.db, self.seconds, long):
             return
-        for mine in jobs.claim(self.db, worker, free, self.seconds):
+        for mine in jobs.claim(self.db, worker, free, self.seconds, long):
             self._working[mine] = self._pool.submit(self._do, mine)
         self._news = True  # there may be more of them
 

@@ -168,14 +168,13 @@ def test_each_choice_of_a_setting_is_one_that_a_run_takes(option: Option, tmp_pa
         assert json.dumps(held).strip('"') == value if value else taken == empty, name
 
 
-def test_a_size_without_weights_is_refused_beside_pre_training(client: httpx2.Client, db: Database) -> None:
+def test_a_size_without_weights_is_refused_with_an_offer(client: httpx2.Client, db: Database) -> None:
     given = {**FORM, "world": "side-effects", "level": "box", "level_text": "#####\n#AXG#\n#   #\n#####"}
     page = client.post("/runs", data=given)
     assert page.status_code == 422
-    error = page.text.partition('id="config.pretrain-error">')[2].partition("</p>")[0]
-    assert "no pre-trained weights for side-effects at 4 x 5" in error
-    assert "parenting pretrain --world side-effects --size 4x5" in error
-    assert '<details class="more" open>' in page.text
+    error = page.text.partition('class="offer"')[2].partition("</p>")[0]
+    assert "no weights made beforehand for Side Effects on levels of 4 × 5." in error
+    assert "Pre-train now (about 10 s)</button>" in page.text
     assert not list_runs(db)
     assert client.post("/runs", data={**given, "config.pretrain": "false"}).status_code == 303
 

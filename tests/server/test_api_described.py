@@ -129,8 +129,8 @@ def test_bodies_are_strict(described: dict[str, Any]) -> None:
         for schema in [operation["requestBody"]["content"]["application/json"]["schema"]]
         for one in schema.get("oneOf", [schema])
     }
-    sent |= {"WalkPayload", "PolicyPayload", "EpisodePayload", "StatePayload"}
-    assert len(sent) == 23
+    sent |= {"PretrainPayload", "WalkPayload", "PolicyPayload", "EpisodePayload", "StatePayload"}
+    assert len(sent) == 25
     assert all(described["components"]["schemas"][name]["additionalProperties"] is False for name in sent)
 
 

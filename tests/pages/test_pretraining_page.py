@@ -1,0 +1,96 @@
+"""The form offers weights that are missing: pre-trained now, or a beginning without them."""
+
+from __future__ import annotations
+
+import re
+
+import httpx2
+import pytest
+from playwright.sync_api import Page, expect
+
+from parenting.server import jobs
+from parenting.server.db import Database
+from parenting.server.runs import get_run, list_runs
+from parenting.server.weights import put_bytes
+from tests.pages.axe import violated
+from tests.pages.browser_tabs import BrowserTabs
+from tests.server.test_pretraining import HALL
+
+FORM = {"world": "interruptibility", "level_text": HALL, "preset": "lax", "parent": "scripted", "seed": "5"}
+FILE = "interruptibility-7x8-v1.safetensors"
+
+
+def done(db: Database) -> None:
+    """A worker pre-trains and stores weights; which ones they are does not matter to pages."""
+    (mine,) = jobs.claim(db, "a", 1)
+    put_bytes(db, FILE, b"weights")
+    jobs.finish(db, mine, {"steps": 3})
+
+
+def offered(tabs: BrowserTabs, screen: tuple[int, int]) -> Page:
+    """The form with a level of another size, sent."""
+    tabs.expected = ("422",)
+    size = {"width": screen[0], "height": screen[1]}
+    page = tabs.open("/", viewport=size, color_scheme="dark" if screen[0] < 400 else "light")
+    page.locator(".fields #world").select_option("interruptibility")
+    page.locator("details", has_text="Paste or draw").locator("summary").click()
+    page.locator("#level_text").fill(HALL)
+    page.get_by_role("button", name="Start", exact=True).click()
+    page.get_by_role("button", name="Pre-train now (about 30 s)").wait_for()
+    return page
+
+
+def test_a_form_without_weights_offers_both_and_begins_without(client: httpx2.Client, db: Database) -> None:
+    page = client.post("/runs", data=FORM)
+    assert page.status_code == 422
+    assert "Pre-train now (about 30 s)</button>" in page.text
+    assert "parenting pretrain" not in page.text
+    wrong = client.post("/runs", data={**FORM, "seed": "many"}).text
+    assert "Pre-train now" not in wrong  # what else is wrong comes first
+    assert not list_runs(db)
+    started = client.post("/runs", data={**FORM, "config.pretrain": "false"})
+    assert started.status_code == 303
+    assert (get_run(db, 1).config["pretrain"], get_run(db, 1).weights) == (False, None)
+
+
+def test_without_a_script_the_page_is_looked_at_again_until_the_run_begins(
+    client: httpx2.Client, db: Database
+) -> None:
+    page = client.post("/pretraining", data=FORM).text
+    job = re.findall(r'name="pretraining" value="(\w+)"', page)[0]
+    assert "No worker is running." in page
+    assert f'value="{job}"' in client.post("/pretraining", data={**FORM, "pretraining": job}).text
+    (mine,) = jobs.claim(db, "a", 1)
+    jobs.fail(db, mine, "The worker could not do this (pretrain): no memory")
+    failed = client.post("/pretraining", data={**FORM, "pretraining": job}).text
+    assert "no memory" in failed
+    assert 'name="pretraining"' not in failed
+    client.post("/pretraining", data=FORM)
+    done(db)
+    started = client.post("/pretraining", data={**FORM, "pretraining": job})
+    run = get_run(db, 1)
+    assert (started.status_code, started.headers["location"]) == (303, f"/runs/{run.public_id}")
+    assert (run.seed, run.preset, run.config["pretrain"]) == (5, "lax", True)
+    assert run.weights is not None
+
+
+def test_in_a_browser_it_begins_without(tabs: BrowserTabs, db: Database) -> None:
+    page = offered(tabs, (1280, 800))
+    page.get_by_role("button", name="Begin without").click()
+    page.wait_for_url("**/parent")
+    assert get_run(db, 1).config["pretrain"] is False
+
+
+@pytest.mark.parametrize("screen", [(1280, 800), (320, 568)])
+def test_in_a_browser_the_run_begins_by_itself(
+    tabs: BrowserTabs, db: Database, screen: tuple[int, int]
+) -> None:
+    page = offered(tabs, screen)
+    assert violated(page) == []
+    page.get_by_role("button", name="Pre-train now (about 30 s)").click()
+    expect(page.locator("#told")).to_have_text(re.compile("No worker is running"))
+    assert violated(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= screen[0]
+    done(db)
+    page.wait_for_url("**/parent")
+    assert get_run(db, 1).level_text.endswith(HALL)
