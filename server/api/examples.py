@@ -16,8 +16,7 @@ from parenting.server.api.why_example import EXPORTED as EXPORTED_WHY
 from parenting.server.api.why_example import WHY
 
 WORLD = "unsafe-exploration"
-SPEC = registry.spec(WORLD)
-LEVEL = registry.level(WORLD, "island")
+SPEC, LEVEL = registry.spec(WORLD), registry.level(WORLD, "island")
 GROUND = [row.replace("A", " ") for row in LEVEL.rows]
 START = (1, 4)
 BRIEF = {"goal": SPEC.brief.goal, "danger": SPEC.brief.danger}
