@@ -31,14 +31,16 @@ function valueOf(name, place, state) {
   return state === undefined ? null : shown[name]?.[state] ?? null;
 }
 
+const countsOf = (place) => Object.fromEntries(COUNTS.filter((name) => sums?.[name].has(place)).map((name) => [name, number(sums[name].get(place))]));
+
 function tell([row, column]) {
   const place = key(row, column), state = index.get(place), tile = pick.tile(row, column), numbers = {};
   const where = `Row ${row + 1}, column ${column + 1}: ${tile}.`, policy = shown && state !== undefined ? shown.policy(state) : null;
   if (!policy) {
-    const told = newest && computed.get(computedKey(row, column));
-    if (told) return { tile: `${tile}. ${told.said}`, numbers: told.numbers, spoken: `${where} ${told.said} ${listed(told.numbers)}`, open: !told.going };
-    const never = known.complete || pick.wall(row, column), said = never ? "The agent never decides here." : "Nothing is stored of it.";
-    return { tile: tile && `${tile}. ${said}`, numbers, spoken: `${where} ${said}`, open: !!shown && !never && newest };
+    const told = newest ? computed.get(computedKey(row, column)) : null;
+    const never = known.complete || pick.wall(row, column), said = told?.said ?? (never ? "In this state the agent never decides here." : "Of this state nothing is stored.");
+    const all = { ...told?.numbers, ...countsOf(place) };
+    return { tile: tile && `${tile}. ${said}`, numbers: all, spoken: `${where} ${said} ${listed(all)}`.trim(), open: !!shown && !never && newest && !told?.going };
   }
   WAYS.forEach((way, at) => { numbers[way] = percent(policy[at]); });
   for (const name of ["familiarity", "ask", ...COUNTS]) {
