@@ -88,6 +88,14 @@ def watched(page: Page) -> Page:
     return page
 
 
+def explained(page: Page, url: str) -> Page:
+    """The page that says why one of the earlier questions was asked, ten answers ago."""
+    page.goto(f"{url}/runs/2/history")
+    page.locator(".why a").nth(10).click()
+    page.wait_for_selector(".given table")
+    return page
+
+
 def compared(browser: Browser, url: str) -> Page:
     """A parent's page that asks about two clips of three steps."""
     run = create(url, world="unsafe-exploration", preset="direct", config={"stages": 3}, seed=7)
@@ -144,6 +152,7 @@ def main(folder: Path) -> None:
         for name, address in (("history", "/runs/2/history"), ("runs", "/"), ("docs", "/docs")):
             page.goto(url + address)
             shoot(page, name, folder)
+        shoot(explained(page, url), "why", folder, TALL)
         tell(url, 2, "goal", goal=ANSWERS)
         parent.reload()
         parent.wait_for_selector("main[data-state=resting]")
