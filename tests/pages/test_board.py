@@ -20,12 +20,16 @@ from tests.pages.browser_tabs import BrowserTabs
 from tests.pages.test_access import light_and_dark
 
 
-@pytest.fixture
-def life(db: Database) -> RunSession:
-    new = NewRun(world="side-effects", parent="scripted", seed=3, config={"pretrain": False})
+def begin(db: Database, world: str) -> RunSession:
+    new = NewRun(world=world, parent="scripted", seed=3, config={"pretrain": False})
     run = start(db, new)
     (mine,) = claim(db, "test")
     return RunSession(db, mine, run, lambda: None)
+
+
+@pytest.fixture
+def life(db: Database) -> RunSession:
+    return begin(db, "side-effects")
 
 
 def live(life: RunSession, ticks: int) -> None:
@@ -109,15 +113,40 @@ def test_a_cell_is_told_by_keys_and_by_pointer_for_everybody(tabs: BrowserTabs, 
     assert light_and_dark(page) == []
 
 
-def test_episodes_are_shown_again_once_there_is_a_worker(tabs: BrowserTabs, life: RunSession) -> None:
-    live(life, 30)
+def work(db: Database) -> None:
+    """Do the jobs that are open, as a worker does."""
+    some = Jobs(db, 5.0, lambda: None)
+    some.begin("late")
+    some.close(60)
+
+
+def test_what_is_not_stored_is_done_by_a_worker_once_there_is_one(tabs: BrowserTabs, db: Database) -> None:
+    """An episode of the life, one of the present policy, and a state in which the agent never was."""
+    life = begin(db, "reward-hacking")
+    live(life, 12)
     page = tabs.open("/runs/1")
     page.get_by_role("button", name="Episodes of its life").click()
     dialog = page.get_by_role("dialog")
     expect(dialog.locator(".state")).to_contain_text("No worker is running")
-    some = Jobs(life.db, 5.0, lambda: None)
-    some.begin("late")
-    some.close(60)
+    work(db)
     expect(dialog.locator(".walked .board")).to_be_visible()
-    expect(dialog.get_by_label("Episode", exact=True)).to_have_value(re.compile(r"\d+"))
-    expect(dialog).to_contain_text(re.compile(r"Episode \d+, from tick \d+ to \d+"))
+    expect(dialog.get_by_label("Episode", exact=True)).to_have_value("1")
+    expect(dialog).to_contain_text("Episode 1, from tick 1 to 12")
+    dialog.get_by_role("button", name="Close").click()
+    page.get_by_role("button", name="Play the present policy").click()
+    expect(dialog.locator(".state")).to_contain_text("No worker is running")
+    work(db)
+    expect(dialog.locator(".arrows path.likely")).to_be_attached()
+    dialog.get_by_role("button", name="Close").click()
+    page.get_by_label("Dry plants").select_option(index=1)
+    board, asking = page.locator("#seen-keys"), page.get_by_role("button", name="Ask a worker")
+    board.press("Control+End")
+    for _ in range(10):
+        if asking.is_visible():
+            break
+        board.press("ArrowUp")
+    asking.click()
+    expect(page.locator("#seen-tile")).to_contain_text("No worker is running")
+    work(db)
+    expect(page.locator("#seen-tile")).to_contain_text("Computed for tick 12")
+    expect(page.locator("[data-number=up]")).to_have_text(re.compile("%"))
