@@ -1,4 +1,4 @@
-"""`parenting export`: write the answers of a run as JSON lines."""
+"""`parenting export`: write answers, metrics or the log of a run, as JSON lines or CSV."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_er
 from parenting.commands.printing import say
 from parenting.commands.progress import bar
 from parenting.server.damage import sound
-from parenting.server.export import lines
+from parenting.server.exports import Format, Part, exported
 from parenting.server.runs import stored_run
+
+NOUNS = {Part.ANSWERS: "answer", Part.METRICS: "row", Part.EVENTS: "event"}
 
 
 def export(
@@ -29,32 +31,38 @@ def export(
             "--out", "-o", metavar="FILE", help="Write to this file.", show_default="standard output"
         ),
     ] = None,
+    of: Annotated[Part, typer.Option(help="What to write; events are the log.")] = Part.ANSWERS,
+    format_: Annotated[
+        Format, typer.Option("--format", help="jsonl holds everything; csv is for spreadsheets.")
+    ] = Format.JSONL,
     force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
 ) -> None:
     """Write the answers of a run as JSON lines: the question, the choice, who answered and when.
 
-    The file is written completely or not at all. It holds the answers up to now; the run may go on meanwhile.
+    Or its metrics or its log (--of), or as CSV (--format). The file is written completely or not at all. It
+    holds what there is up to now; the run may go on meanwhile.
 
     Exit codes: 0 written; 2 the run or the database does not exist, or the file cannot be written; 130
     stopped by Ctrl-C.
 
-    Example: parenting export 3 -o run-3.jsonl
+    Example: parenting export 3 --of metrics --format csv -o run-3.csv
     """
     with exit_on_interrupt(), friendly_errors(), database() as db:
-        total, found = sound(stored_run(db, run), "answers"), lines(db, run)
+        total = sound(stored_run(db, run), "answers") if of is Part.ANSWERS else None
+        found = exported(db, run, of, format_)
         if out is None:
-            _copy(found, sys.stdout, total)
+            _copy(found, sys.stdout, total, of)
             return
         with _whole(out, force) as file:
-            written = _copy(found, file, total)
-    say(f"{counted(written, 'answer')} of run {run} written to {out}.")
+            written = _copy(found, file, total, of) - (format_ is Format.CSV)  # its head is no row
+    say(f"{counted(written, NOUNS[of])} of run {run} written to {out}.")
 
 
-def _copy(found: Iterator[str], file: TextIO, total: int | None) -> int:
+def _copy(found: Iterator[str], file: TextIO, total: int | None, of: Part) -> int:
     """Copy line by line, and return the number of lines."""
     number = 0
     # On a terminal the lines themselves show the progress, and a bar would break them.
-    with nullcontext(_quiet) if file.isatty() else bar("answers") as show:
+    with nullcontext(_quiet) if file.isatty() else bar(of.value) as show:
         for number, line in enumerate(found, start=1):
             file.write(line)
             show(number, total)

@@ -31,7 +31,7 @@ COMMANDS = {
     "runs": "List the runs, and who waits for whom.",
     "resume": "Let a paused or failed run go on.",
     "rollback": "Go on from an earlier tick of a run, as a new run.",
-    "export": "Write the answers of a run as JSON lines.",
+    "export": "Write answers, metrics or the log of a run as JSON lines or CSV.",
     "policy": "Write the present policy of a run to a file.",
     "replay": "Replay a stored run and compare it bit for bit.",
     "doctor": "Examine the installation, the data folder and the database.",

@@ -61,7 +61,7 @@ def _why(answered: Answered, known: Kept) -> dict[str, Any]:
     """Return the columns of `server.reads.why`: null where nothing was kept."""
     reason = known.reasons.get(sound(answered.query, "tick"))
     return {
-        "leased": _time(sound(answered.query, "leased")),  # when its question was first leased
+        "leased": iso_time(sound(answered.query, "leased")),  # when its question was first leased
         "replays": sound(answered.answer, "replays"),  # how often its parent had the clips played again
         "reason": None if reason is None else {name: reason.get(name) for name in REASON},
         "effects": known.effects_of(sound(answered.answer, "applied_tick")),
@@ -99,8 +99,8 @@ def _row(db: Database, database: str, run: Run, answered: Answered) -> dict[str,
         "choice": choice,
         "mu": None if choice is None else MU[choice],
         "parent": sound(answer, "parent"),
-        "asked": _time(sound(query, "posted")),
-        "received": _time(sound(answer, "received")),
+        "asked": iso_time(sound(query, "posted")),
+        "received": iso_time(sound(answer, "received")),
         "standing": sound(answer, "standing"),
         "supersedes": None if supersedes is None else number_of(db, supersedes),
         "database": database,  # the names that mean the same everywhere
@@ -116,6 +116,6 @@ def _row(db: Database, database: str, run: Run, answered: Answered) -> dict[str,
     return row if found is None else {**row, "damaged": found}
 
 
-def _time(moment: datetime | None) -> str | None:
+def iso_time(moment: datetime | None) -> str | None:
     """Format a time as ISO 8601 in UTC, always of the same length, so that it sorts as text."""
     return None if moment is None else moment.replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"

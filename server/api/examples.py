@@ -236,6 +236,7 @@ class Shown:
 
     reply: Any = None
     sent: dict[str, Any] = field(default_factory=dict)
+    others: dict[str, Any] = field(default_factory=dict)  # replies in other media
 
 
 SHOWN = {
@@ -293,7 +294,7 @@ SHOWN = {
     "get_job": Shown(WALK),
     "report_page_error": Shown(None, {"a fault": {"message": "x is not a function", "page": "/runs/3"}}),
     "follow_run": Shown(STREAM),
-    "export_run": Shown(json.dumps(EXPORTED) + "\n"),
+    "export_run": Shown(json.dumps(EXPORTED) + "\n", others={"text/csv": "run,number\r\n1,4\r\n"}),
     "download_policy": Shown("the bytes of a file of safetensors"),
     **{name: Shown(*shown) for name, shown in kept(RUN).items()},
 }

@@ -7,7 +7,7 @@ from typing import Annotated, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from parenting.server import tables
+from parenting.server import exports, tables
 from parenting.server.damage import damage
 from parenting.server.keeping import Tag
 from parenting.server.new_run import LARGEST_INT, Name
@@ -119,6 +119,13 @@ class CurvePart(Part):
     begin: OnAxis | None = Field(None, description="The first place on the axis.")
     end: OnAxis | None = Field(None, description="The last place on the axis.")
     points: int = Field(POINTS, ge=FEWEST, le=POINTS, description="At most this many points a curve.")
+
+
+class ExportPart(Part):
+    """The part of a run that is exported, and the format."""
+
+    of: exports.Part = Field(exports.Part.ANSWERS, description="answers, metrics or events (the log).")
+    format: exports.Format = Field(exports.Format.JSONL, description="jsonl or csv.")
 
 
 class EventPart(Part):

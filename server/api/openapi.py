@@ -34,5 +34,5 @@ def _show(operation: dict[str, Any]) -> None:
     for media in operation.get("requestBody", {}).get("content", {}).values():
         media["examples"] = {name: {"value": value} for name, value in shown.sent.items()}
     for reply in (reply for status, reply in operation["responses"].items() if status in DONE):
-        for media in reply["content"].values():
-            media["example"] = shown.reply
+        for kind, media in reply["content"].items():
+            media["example"] = shown.others.get(kind, shown.reply)

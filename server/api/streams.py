@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections.abc import AsyncIterable
 from typing import Annotated
 
-from fastapi import Depends, Header, Request, Response
+from fastapi import Depends, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import After
+from parenting.server.api.lists import ExportPart
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import streams
 from parenting.server.deps import Db
-from parenting.server.export import lines
+from parenting.server.exports import MEDIA, exported, file_name
 from parenting.server.policies import present_policy
 from parenting.server.runs import get_run
 
 router = admitted_router(tags=["runs"])
 
 LINES = "application/x-ndjson"
+EXPORTED = streams(LINES, "A line for each answer, tick or event; CSV has a head.", 404)
+EXPORTED[200]["content"]["text/csv"] = {}
 
 
 class PolicyResponse(Response):
@@ -74,18 +77,20 @@ async def follow_run(
 
 @router.get(
     "/runs/{run_id}/export",
-    summary="Export the answers",
+    summary="Export the answers, the metrics or the log",
     response_class=LinesResponse,
-    responses=streams(LINES, "JSON lines, one for each answer.", 404),
+    responses=EXPORTED,
 )
-def export_run(run_id: RunId, db: Db) -> LinesResponse:
-    """Export all answers up to now as JSON lines, oldest first.
+def export_run(run_id: RunId, db: Db, part: Annotated[ExportPart, Query()]) -> StreamingResponse:
+    """Export all answers up to now as JSON lines, oldest first; or the metrics or the log; or as CSV.
 
-    A line holds the question, the choice, who answered and when, the tick at which the agent heard it, and
-    the policy that asked. docs/api.md lists the fields.
+    A line of the answers holds the question, the choice, who answered and when, the tick at which the agent
+    heard it, and the policy that asked. docs/api.md lists the fields. CSV has one head, of clips the actions
+    alone, and an apostrophe before text that a spreadsheet would take for a formula.
     """
-    file = f'attachment; filename="run-{run_id}.jsonl"'
-    return LinesResponse(lines(db, run_id), headers={"Content-Disposition": file})
+    file = f'attachment; filename="{file_name(run_id, part.of, part.format)}"'
+    lines = exported(db, run_id, part.of, part.format)
+    return StreamingResponse(lines, media_type=MEDIA[part.format], headers={"Content-Disposition": file})
 
 
 @router.get(

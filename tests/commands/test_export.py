@@ -54,6 +54,17 @@ def test_to_a_file(db: Database, tmp_path: Path) -> None:
     assert list(tmp_path.glob(".*")) == []
 
 
+def test_tables_and_other_parts(db: Database, tmp_path: Path) -> None:
+    file = tmp_path / "run-1.csv"
+    said = export("1", "--format", "csv", "-o", str(file))
+    assert (said.exit_code, said.stdout) == (0, f"4 answers of run 1 written to {file}.\n")
+    assert len(file.read_text().splitlines()) == 5
+    assert export("1", "--of", "metrics").stdout == ""
+    wrong = export("1", "--format", "xlsx")
+    assert wrong.exit_code == 2
+    assert all(part in wrong.stderr for part in ("--format", "xlsx", "jsonl", "csv"))
+
+
 def test_a_run_without_answers(db: Database, tmp_path: Path) -> None:
     file = tmp_path / "none.jsonl"
     assert export("2", "--out", str(file)).stdout == f"0 answers of run 2 written to {file}.\n"
@@ -76,11 +87,11 @@ def test_a_file_is_replaced_only_by_force(db: Database, tmp_path: Path) -> None:
 def test_nothing_half_done_stays(
     db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int
 ) -> None:
-    def breaking(db: Database, run: int) -> Iterator[str]:
+    def breaking(db: Database, run: int, *_: object) -> Iterator[str]:
         yield "{}\n"
         raise error
 
-    monkeypatch.setattr("parenting.commands.export.lines", breaking)
+    monkeypatch.setattr("parenting.commands.export.exported", breaking)
     (tmp_path / "old").write_text("as it was")
     assert export("1", "-o", str(tmp_path / "old"), "--force").exit_code == code
     assert export("1", "-o", str(tmp_path / "new")).exit_code == code
