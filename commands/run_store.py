@@ -55,7 +55,7 @@ def store_trials(
     """
     from parenting.experiments.training.trials import trials_of
 
-    spec = registry.spec(plan.world)
+    spec = registry.spec(plan.world, level)
     shared = {
         "world": plan.world,
         "level": level.name,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -120,6 +122,21 @@ def painted(browser: Browser, url: str) -> Page:
     return page
 
 
+def beside(browser: Browser, url: str, data: Path) -> Page:
+    """Two batches with different presets, compared."""
+    environment = {**os.environ, "PARENTING_DATA": str(data)}
+    stored = []
+    for preset in ("lax", "direct"):
+        options = ["--preset", preset, "--trials", "8", "--store", "--json"]
+        command = [sys.executable, "-m", "parenting.commands.main", "run", "unsafe-exploration", *options]
+        said = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+        stored += json.loads(said.stdout)["runs"]
+    page = browser.new_page(reduced_motion="reduce")
+    page.goto(f"{url}/compare?runs={','.join(map(str, stored))}")
+    page.wait_for_selector("[data-chart=rows] .scatterlayer path", state="attached")
+    return page
+
+
 def main(folder: Path) -> None:
     """All pictures into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -141,6 +158,7 @@ def main(folder: Path) -> None:
         shoot(practised(browser, url), "practice", folder)
         shoot(compared(browser, url), "preference", folder)
         shoot(painted(browser, url), "levels", folder, TALL)
+        shoot(beside(browser, url, Path(data)), "compare", folder, TALL)
         page = browser.new_page(reduced_motion="reduce")
         page.goto(f"{url}/runs/{garden}")
         page.wait_for_selector("main[data-state=resting]", timeout=600_000)

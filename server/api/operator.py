@@ -81,7 +81,10 @@ def change_run(request: Request, run_id: RunId, body: ChangeBody, db: Db) -> Run
 
 
 @router.post(
-    "/runs/{run_id}/roll-back", summary="Roll a run back", status_code=201, responses=write_responses(404)
+    "/runs/{run_id}/roll-back",
+    summary="Roll a run back",
+    status_code=201,
+    responses=write_responses(404, 409),
 )
 def roll_back_run(request: Request, run_id: RunId, body: RollBackBody, db: Db) -> RunSchema:
     """Start a new run from a tick of this one: its record up to that tick is copied, and this run stays.

@@ -95,7 +95,8 @@ def compare(request: Request, db: Db, runs: RunsText = None, by: str = "tick") -
     """The page. Checkboxes of the list send each run by itself; the address to share holds one list."""
     if runs is not None and len(runs) > 1:
         others = [(name, text) for name, text in request.query_params.multi_items() if name != "runs"]
-        return redirect(f"/compare?{_query([('runs', ','.join(runs)), *others])}")
+        ticked = sorted(runs, key=lambda text: (len(text), text))  # the list begins with the newest
+        return redirect(f"/compare?{_query([('runs', ','.join(ticked)), *others])}")
     choice = choose(db, (runs or [""])[0], {name: request.query_params.get(name, "") for name in FILTERS})
     if by not in AXES:
         choice = Choice(choice.text, error=f"by: write {', '.join(AXES)}.", status=422)
