@@ -32,6 +32,7 @@ from parenting.library.result import TrainResult, collect
 from parenting.library.scripted import ScriptedParent
 from parenting.library.task import Task, prepare, stop_rule
 from parenting.library.threads import one_thread
+from parenting.library.tracking import Trackers, Tracking, feeds_of
 from parenting.library.worlds import AnyLevel, World
 from parenting.parents.fallible import FallibleParent, FallibleRule
 from parenting.parents.grammar import ParentError, read_parent
@@ -54,6 +55,7 @@ def train(
     max_ticks: int = 20_000,
     from_policy: str | Path | Policy | None = None,
     from_answers: str | Path | None = None,
+    trackers: Trackers = None,
     **changes: Any,
 ) -> TrainResult:
     """Train agents by PARENTING (Sec. 2): they ask, a parent answers, and no reward is read.
@@ -74,6 +76,7 @@ def train(
         max_ticks: Ticks after which a trial is left unfinished.
         from_policy: Begin with the weights of a `Policy` or its file, not with fresh or pre-trained ones.
         from_answers: Begin with X of the answers of an export (`parenting export`) that stand.
+        trackers: "csv:FOLDER", "jsonl:FOLDER", "tensorboard:FOLDER", a `Tracker` of one's own, or several.
         **changes: Hyperparameters that differ from the preset, by their names in `Config`.
 
     Returns:
@@ -99,21 +102,24 @@ def train(
     check_number("max_ticks", max_ticks, 1, 10**9)
     check_callback(callback)
     check_progress(progress)
+    tracking = Tracking(feeds_of(trackers))
     if isinstance(parent, Person):
         if trials != 1:
             raise ValueError(f"trials: a person raises one agent at a time, not {trials}.")
         if parent.where == "page":
+            if trackers is not None:
+                raise ValueError("trackers: a worker raises this agent. Set PARENTING_TRACKERS instead.")
             from parenting.library.page_training import train_on_page  # loads the server
 
             return train_on_page(task, rule, seed, parent, callback, progress)
         terminal = TerminalParent(parent.after)
-        with terminal.listening():
-            result, ended = _train(task, rule, terminal, trials, seed, (callback,), max_ticks)
+        with terminal.listening(), tracking.of(task, seed):
+            result, ended = _train(task, rule, terminal, trials, seed, (callback,), max_ticks, tracking)
         if ended:
             print(terminal.how_to_go_on())
         return result
-    with bar(progress, trials, rule) as show:
-        return _train(task, rule, parent, trials, seed, (show, callback), max_ticks)[0]
+    with bar(progress, trials, rule) as show, tracking.of(task, seed):
+        return _train(task, rule, parent, trials, seed, (show, callback), max_ticks, tracking)[0]
 
 
 def _train(
@@ -124,6 +130,7 @@ def _train(
     seed: int,
     told: tuple[Callback | None, ...],
     max_ticks: int,
+    tracking: Tracking,
 ) -> tuple[TrainResult, bool]:
     """Train in batches, one after the other; whether somebody ended it before its time."""
     log, parts, ended = AnswerLog(), list[batch.TrainResult](), False
@@ -131,7 +138,8 @@ def _train(
     with one_thread():
         for chunk in chunks(trials):
             trainer = _trainer(task, rule, seed, chunk, _logged(behind, log, task, trials, chunk))
-            trained, ended = _run(trainer, max_ticks, _report(chunk, trials, parts, told))
+            report = tracking.watching(trainer, _report(chunk, trials, parts, told))
+            trained, ended = _run(trainer, max_ticks, report)
             parts.append(trained)
             if ended:
                 break

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from parenting.library.show import show
     from parenting.library.training import train
     from parenting.library.worlds import World, make, register, worlds
+    from parenting.server.trackers.services import WandbTracker
+    from parenting.server.trackers.tracker import TrackedRun, Tracker
 
 _MODULES = {
     "PRESETS": "agent.config",
@@ -57,7 +59,10 @@ _MODULES = {
     "ScriptedParent": "library.scripted",
     "TableWorld": "envs.tables.world",
     "Tick": "library.loop",
+    "TrackedRun": "server.trackers.tracker",
+    "Tracker": "server.trackers.tracker",
     "TrainResult": "library.result",
+    "WandbTracker": "server.trackers.services",
     "World": "library.worlds",
     "WorldSpec": "envs.levels.spec",
     "configure": "library.loop",
@@ -98,7 +103,10 @@ __all__ = [
     "ScriptedParent",
     "TableWorld",
     "Tick",
+    "TrackedRun",
+    "Tracker",
     "TrainResult",
+    "WandbTracker",
     "World",
     "WorldSpec",
     "configure",

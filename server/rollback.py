@@ -163,7 +163,7 @@ def _copy_queries(session: Session, old: Run, new: Run, tick: int) -> dict[int, 
 
 
 def _copy_answers(session: Session, new: Run, queries: Mapping[int, Query], tick: int) -> None:
-    """Copy the answers heard by a tick, chained again; the last to each question stands."""
+    """Copy the answers heard by a tick, chained afresh; the last to each stands."""
     every: dict[int, Answer] = {}
     for ids in (list(queries)[place : place + 500] for place in range(0, len(queries), 500)):
         wanted = select(Answer).where(Answer.query_id.in_(ids)).order_by(Answer.number)

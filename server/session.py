@@ -27,17 +27,13 @@ from parenting.server.finishes import read_finish
 from parenting.server.growth import Growth
 from parenting.server.lived import Lived
 from parenting.server.machine import diverged, follow, take_up
-from parenting.server.metrics_row import NOTHING_LEARNT, learnt, measure
+from parenting.server.metrics_row import NOTHING_LEARNT, Row, learnt, measure
 from parenting.server.queue import worker_side
 from parenting.server.queue.queue_parent import QueueParent, ScriptedQueueParent
 from parenting.server.queue.worker_side import Watch
 from parenting.server.recall import recall
 from parenting.server.runs import Claim
-from parenting.server.snapshot import (
-    Snapshot,
-    initial_weights,
-    pack,
-)
+from parenting.server.snapshot import Snapshot, initial_weights, pack
 from parenting.server.statuses import Waiting
 from parenting.server.tables import Run
 from parenting.server.why import Why
@@ -83,6 +79,7 @@ class RunSession:
         self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
         self._news, self._learnt = False, NOTHING_LEARNT
         self._save_every, self._look_cost = CHECKPOINT_SECONDS, 0.0
+        self.told: Callable[[int, Row], None] = lambda tick, row: None  # trackers take each row of metrics
         self.whole, self._told, self._told_at = True, False, 0.0
         self._stuck_at = -1  # reported as stuck: who ends episodes must see the next one too
         sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
@@ -233,6 +230,7 @@ class RunSession:
         row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed, **grown}
         optimal = bool(row["optimal"])
         metrics.write_metrics(self.db, self.claim, {self.last_tick: row})
+        self.told(self.last_tick, row)
         self.why.write()
         shown = {"maturity": row["maturity"], "speed": speed, "optimal": optimal}
         shown |= self.growth.news(self.saved.state)

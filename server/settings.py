@@ -89,6 +89,11 @@ class Settings(BaseSettings):
     ballast: bool = Field(
         True, description="Keep 8 MB of disk space beside a SQLite database, for when the disk is full."
     )
+    trackers: str = Field(
+        "",
+        description="Trackers that a worker feeds, joined by commas: csv:FOLDER, jsonl:FOLDER, "
+        "tensorboard:FOLDER, or MODULE:NAME.",
+    )
     log_level: str = Field("warning", description="debug, info, warning or error.")
     log_format: Literal["text", "json"] = Field("text", description="text for people, or json, a line each.")
     log_folder: Path | None = Field(

@@ -31,6 +31,7 @@ from parenting.server.queue import worker_side
 from parenting.server.queue.worker_side import Watch
 from parenting.server.settings import Settings
 from parenting.server.store.relay import Relay
+from parenting.server.trackers.stored import chosen_feeds
 from parenting.server.work.chores import Chores
 from parenting.server.work.held import AT_NEWS, NOW, HeldRuns
 from parenting.server.work.jobs import Jobs
@@ -72,7 +73,7 @@ class Worker:
         self.patience, self.turns = Patience(), Turns(self.notifier.wake, beside_after)
         self.jobs = Jobs(db, settings.claim_seconds, self.notifier.wake)
         self.chores = Chores(db, settings.claim_seconds)
-        self.held = HeldRuns(db, self.patience, self.web_notifier.notify)
+        self.held = HeldRuns(db, self.patience, self.web_notifier.notify, chosen_feeds(settings.trackers))
         self.claims, self.sessions = self.held.claims, self.held.sessions
         self._found: dict[int, Watch] = {}
         self._seen: dict[int, Watch] = {}
@@ -219,6 +220,7 @@ class Worker:
             workers.sign_off(self.db, self.name)
         except StoreError as error:
             log.warning("store refuses at the end; runs go on from their checkpoints", why=error.message)
+        self.held.tracked.close()
         self.relay.close()
         self.notifier.close()
 

@@ -16,6 +16,8 @@ from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
 from parenting.server.session import RunSession
 from parenting.server.statuses import OVER, RunStatus
+from parenting.server.trackers.feed import Feeds
+from parenting.server.trackers.stored import TrackedRuns
 from parenting.server.work.patience import Patience, back_off
 
 log = structlog.get_logger()
@@ -29,9 +31,12 @@ NOW, AT_NEWS = 0.0, math.inf
 class HeldRuns:
     """The runs that a worker has claimed. Only one thread at a time touches a run."""
 
-    def __init__(self, db: Database, patience: Patience, asked: Callable[[], None]) -> None:
-        """Hold nothing yet; `asked` is called after each question."""
+    def __init__(
+        self, db: Database, patience: Patience, asked: Callable[[], None], told: Feeds | None = None
+    ) -> None:
+        """Hold nothing yet; `asked` is called after each question, and `told` are the trackers."""
         self.db, self._patience, self._asked = db, patience, asked
+        self.tracked = TrackedRuns(db, told or Feeds([]))
         self.claims: dict[int, Claim] = {}
         self.sessions: dict[int, RunSession] = {}
         self.surplus: set[int] = set()
@@ -95,6 +100,7 @@ class HeldRuns:
     def _begin(self, run_id: int) -> RunSession:
         run = runs.get_run(self.db, run_id)
         self.sessions[run_id] = RunSession(self.db, self.claims[run_id], run, self._asked)
+        self.sessions[run_id].told = self.tracked.begin(run)
         log.info("run taken up", run=run_id, tick=self.sessions[run_id].last_tick)
         return self.sessions[run_id]
 
@@ -112,7 +118,8 @@ class HeldRuns:
 
     def drop(self, run_id: int) -> None:
         """Hold a run no longer."""
-        self.sessions.pop(run_id, None)
+        if self.sessions.pop(run_id, None) is not None:
+            self.tracked.end(run_id)
         self.claims.pop(run_id, None)
 
     def save(self, working: Collection[int], end: float) -> None:

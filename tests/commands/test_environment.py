@@ -30,6 +30,8 @@ ARGUMENTS = {
     "export": ["1"],
     "replay": ["1"],
     "resume": ["1"],
+    "policy": ["1"],
+    "rollback": ["1", "--to", "0"],
     "start": ["unsafe-exploration"],
     "verify": ["1"],
     "restore": ["monday.db"],
