@@ -120,7 +120,10 @@ def get_snapshot(
     run = runs.get_run(db, run_id)
     row = store.read_snapshot(db, run.id, tick)
     if row is None:
-        raise NotFound(f"No snapshot of run {run.id} is stored up to tick {tick}.")
+        raise NotFound(
+            f"No snapshot of run {run.id} is stored up to tick {tick}. "
+            "A worker stores the first one when it takes the run up."
+        )
     wanted = row.stage if stage is None else stage
     other = row if wanted == row.stage else store.read_frozen(db, run.id, wanted)
     if other is None or wanted > row.stage:

@@ -1,7 +1,8 @@
 """A worker that is killed while it learns goes on with the same bits (C1): equal digests after every kill.
 
 A scripted parent answers, so nothing but the kills differs from the same run in memory, which no process and
-no database disturbs. After each kill the digest of the newest checkpoint is that of this run at its tick.
+no database disturbs. After each kill the digest of the newest checkpoint is that of this run at its tick, and
+so are the counts beside it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import time
 
 import pytest
 
+from parenting.server.board.columns import unpack
+from parenting.server.board.store import read_counts
 from parenting.server.checkpoints import load_checkpoints
 from parenting.server.db import Database
 from parenting.server.new_run import start
@@ -43,6 +46,15 @@ def digest(saved: Snapshot) -> str:
     return found.hexdigest()
 
 
+def counted(db: Database, run: int, tick: int) -> tuple[int, int, int]:
+    """The newest stored numbers of all states up to a tick: theirs, and the sums of visits and deaths."""
+    row = read_counts(db, run, tick)
+    assert row is not None
+    columns = unpack(row.blob, row.states)
+    visits, deaths = (sum(memoryview(columns[name]).cast("I")) for name in ("visits", "deaths"))
+    return row.tick, visits, deaths
+
+
 def until_newer(db: Database, run: int, tick: int, worker: Command) -> None:
     """Wait until there is a checkpoint of a later tick, or the run is over."""
     end = time.monotonic() + PATIENCE
@@ -57,11 +69,11 @@ def until_newer(db: Database, run: int, tick: int, worker: Command) -> None:
 def test_killed_learner_goes_on_with_the_same_bits(
     settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures
 ) -> None:
-    tick, digests, run, begun, alone = 0, set[str](), 0, ISLAND, Inline(ISLAND)
+    tick, moves, digests, run, begun, alone = 0, 0, set[str](), 0, ISLAND, Inline(ISLAND)
     for seed in range(KILLS[store]):
         if not run or get_run(db, run).reason is not None:  # it has learnt all; the next run has another seed
             begun = (SURE, ISLAND)[seed % 2]._replace(seed=seed + 1)
-            run, alone, tick = start(db, begun.new("scripted")).id, Inline(begun), 0
+            run, alone, tick, moves = start(db, begun.new("scripted")).id, Inline(begun), 0, 0
         worker = Command("worker", data=settings.data, patches=PATCHES, environment=store_of(settings))
         until_newer(db, run, tick, worker)
         time.sleep(rng.uniform(0, SPREAD))
@@ -70,7 +82,9 @@ def test_killed_learner_goes_on_with_the_same_bits(
         tick = int(saved.state.keys.tick[0])
         while int(alone.saved.state.keys.tick[0]) < tick:
             alone.tick()
+            moves += bool(alone.saved.state.info.moved[0])
         assert digest(saved) == digest(alone.saved), f"at tick {tick}"
+        assert counted(db, run, tick) == (tick, moves, int(saved.tally.deaths[0]))
         digests.add(digest(saved))
         figures.count("SIGKILLs of a learner", f"{begun.preset}: digest equal")
     assert len(digests) > KILLS[store] // 2, "most kills were followed by progress"

@@ -17,8 +17,6 @@ from parenting.server.queue.worker_side import watch
 from parenting.server.session import RunSession
 from tests.server.board.test_board import begin, live
 
-pytestmark = pytest.mark.only("sqlite", "the rows are bytes to every store")
-
 
 def small_portions(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a portion be one batch of one state, as on the largest boards."""
