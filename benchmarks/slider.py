@@ -88,7 +88,7 @@ def look(url: str, run: str) -> None:
         page = browser.new_page()
         devtools = page.context.new_cdp_session(page)
         began = time.monotonic()
-        page.goto(f"{url}/runs/{run}")
+        page.goto(f"{url}/runs/{run}", wait_until="commit")
         page.wait_for_selector("#seen-arrows path", state="attached")
         shown = time.monotonic() - began
         last = int(page.get_attribute("#seen-slider", "max") or 0)
