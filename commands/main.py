@@ -48,7 +48,15 @@ SUBCOMMANDS = {
     "worlds": {
         "new": "Write the skeleton of a package with a world of your own.",
         "import": "Make levels of maps of other collections.",
-    }
+    },
+    "runs": {
+        "rename": "Give a run another name.",
+        "describe": "Keep a description with a run.",
+        "tag": "Add tags to a run, or take them away.",
+        "archive": "Leave a run out of the list, or take it in again.",
+        "delete": "Delete a run for good, after it was asked.",
+        "deleted": "List what is left of deleted runs.",
+    },
 }
 """Commands below a command, each with its help text. `worlds new` is the function `command`
 in commands/worlds_new.py, and so on."""

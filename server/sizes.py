@@ -45,3 +45,13 @@ def _bytes(table: SqlTable, length: Any, run_ids: Sequence[int]) -> Select[Any]:
     total = func.sum(reduce(add, (func.coalesce(length(column), 0) for column in long), literal(0)))
     of_runs = select(table.c.run_id, total.label("bytes")).where(table.c.run_id.in_(run_ids))
     return of_runs.group_by(table.c.run_id)
+
+
+def size_text(bytes_: int) -> str:
+    """Return an amount of bytes for people."""
+    size, unit = float(bytes_), "bytes"
+    for larger in ("kB", "MB", "GB", "TB"):
+        if size < 1000:
+            break
+        size, unit = size / 1000, larger
+    return f"{size:.0f} {unit}" if unit == "bytes" or size >= 10 else f"{size:.1f} {unit}"

@@ -10,7 +10,7 @@ from parenting.agent.config import compose
 from parenting.drawing.surroundings import surroundings
 from parenting.envs import registry
 from parenting.server.api.board_examples import BOARD, EPISODE, NUMBERS
-from parenting.server.api.kept_examples import kept
+from parenting.server.api.kept_examples import TABLE, kept
 from parenting.server.api.level_examples import CHECKED, OWN_LEVEL, PRETRAINED, TO_CHECK
 from parenting.server.api.why_example import EXPORTED as EXPORTED_WHY
 from parenting.server.api.why_example import WHY
@@ -143,6 +143,7 @@ LEASED = {
     "sentences": surroundings({"left": QUERY["left"], "right": QUERY["right"]}, SPEC.legend),
 }
 LEASE = {"client_id": "me"}
+RENEWED = {**LEASE, "questions": [QUESTION_ID], "idle": 3.5}
 ANSWERS = {
     "by a person": {"choice": "left", "client_id": "me"},
     "to this question and no other": {
@@ -277,10 +278,7 @@ SHOWN = {
     "change_answer": Shown(CHANGED, {"to right": {"choice": "right", "client_id": "me"}}),
     "withdraw_answer": Shown(WITHDRAWN, {"mine": LEASE}),
     "skip_question": Shown(SKIPPED, {"mine": LEASE}),
-    "renew_leases": Shown(
-        {"yours": [QUESTION_ID], "elsewhere": [], "closed": []},
-        {"looking": {"client_id": "me", "questions": [QUESTION_ID], "idle": 3.5}},
-    ),
+    "renew_leases": Shown({"yours": [QUESTION_ID], "elsewhere": [], "closed": []}, {"looking": RENEWED}),
     "leave_questions": Shown(None, {"me": LEASE}),
     "release_question": Shown(None, {"me": LEASE}),
     "ask_job": Shown(
@@ -294,7 +292,7 @@ SHOWN = {
     "get_job": Shown(WALK),
     "report_page_error": Shown(None, {"a fault": {"message": "x is not a function", "page": "/runs/3"}}),
     "follow_run": Shown(STREAM),
-    "export_run": Shown(json.dumps(EXPORTED) + "\n", others={"text/csv": "run,number\r\n1,4\r\n"}),
+    "export_run": Shown(json.dumps(EXPORTED) + "\n", others=TABLE),
     "download_policy": Shown("the bytes of a file of safetensors"),
     **{name: Shown(*shown) for name, shown in kept(RUN).items()},
 }

@@ -6,6 +6,8 @@ from typing import Any
 
 HELD = {"answers": 51, "questions": 52, "checkpoints": 1, "metrics": 80, "events": 0, "bytes": 512_345}
 
+TABLE = {"text/csv": "run,number\r\n1,4\r\n"}
+
 
 def kept(run: dict[str, Any]) -> dict[str, tuple[Any, ...]]:
     """Return the reply and the named requests of each operation, for an example of a run."""

@@ -16,12 +16,12 @@ from parenting.server.db import Database
 from parenting.server.keeping import known_tags, split_tags
 from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.labels import metric_labels
-from parenting.server.pages.texts import run_title, size_text
+from parenting.server.pages.texts import run_title
 from parenting.server.reads.listing import Order, Wanted, find_runs
 from parenting.server.reads.metrics import latest_metrics
 from parenting.server.reads.schemas import run_schemas
 from parenting.server.schemas import DamagedSchema
-from parenting.server.sizes import sizes
+from parenting.server.sizes import size_text, sizes
 from parenting.server.statuses import STATE_LABELS, RunState
 from parenting.server.tables import Metric, Run
 

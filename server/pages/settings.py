@@ -21,7 +21,8 @@ from parenting.server.keeping import LONGEST_DESCRIPTION, Description, Tag
 from parenting.server.new_run import PersonsName
 from parenting.server.pages.render import moved, page, redirect
 from parenting.server.pages.start import FormFields
-from parenting.server.pages.texts import parent_title, size_text
+from parenting.server.pages.texts import parent_title
+from parenting.server.sizes import size_text
 from parenting.server.tables import Run
 from parenting.server.wrong_fields import messages
 

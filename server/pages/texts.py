@@ -97,13 +97,3 @@ def run_title(run: Run) -> str:
 def parent_title(run: Run) -> str:
     """Return the title of a run on its own pages: its parent may open them, and knows no numbers of runs."""
     return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}"
-
-
-def size_text(bytes_: int) -> str:
-    """Return an amount of bytes for people."""
-    size, unit = float(bytes_), "bytes"
-    for larger in ("kB", "MB", "GB", "TB"):
-        if size < 1000:
-            break
-        size, unit = size / 1000, larger
-    return f"{size:.0f} {unit}" if unit == "bytes" or size >= 10 else f"{size:.1f} {unit}"
