@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+import random
 
 import pytest
-from sqlalchemy import delete, update
+from sqlalchemy import delete, select, update
 
 from parenting.server.board import states as known_states
 from parenting.server.board import store, sweep, writer
 from parenting.server.board.columns import unpack
-from parenting.server.board.store import COUNTS_ALONE
+from parenting.server.board.store import COUNTS_ALONE, Numbers
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.db import Database
 from parenting.server.queue.worker_side import watch
+from parenting.server.runs import Claim
 from parenting.server.session import RunSession
 from tests.server.board.test_board import begin, live
 
@@ -25,7 +27,11 @@ def small_portions(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def ticks(db: Database, life: RunSession) -> list[int]:
-    return [row.tick for row in store.list_snapshots(db, life.claim.run_id)]
+    return ticks_of(db, life.claim.run_id)
+
+
+def ticks_of(db: Database, run_id: int) -> list[int]:
+    return [row.tick for row in store.list_snapshots(db, run_id)]
 
 
 def test_a_snapshot_is_of_the_tick_at_which_it_was_begun(
@@ -115,3 +121,23 @@ def test_damaged_numbers_end_no_life(db: Database, table: type[BoardSnapshot | B
     assert stored is not None
     visits = memoryview(unpack(row.blob, row.states)["visits"]).cast("I")
     assert (sum(visits), row.states) == (moves, len(stored[0]["cells"]))
+
+
+def test_all_that_is_stored_of_a_board_stays_within_its_bytes(
+    db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Snapshots make room for the states, and for the policies of earlier stages."""
+    monkeypatch.setattr(store, "MOST_BYTES", 30_000)
+    draw = random.Random(1)
+    cells = [[row, draw.randrange(1_000), 0] for row in range(2_000)]
+    board: store.Stored = {"rests": [{"ground": ["#"], "box": None, "parts": {}}], "cells": cells}
+    for tick in range(1, 60):
+        rows = [Numbers(tick, 2, 0, 0.9, 2_000, draw.randbytes(1_000))]
+        rows += [Numbers(tick, 1, 0, 0.9, 2_000, draw.randbytes(2_000), frozen=True)]
+        store.write(db, mine, board if tick == 1 else None, False, rows, None)
+    with db.read() as session:
+        states = len(session.get_one(BoardStates, mine.run_id).blob)
+        sizes = session.scalars(select(BoardSnapshot.size)).all()
+    assert states > 3_000
+    assert 28_000 < sum(sizes) + states <= 30_000
+    assert ticks_of(db, mine.run_id)[-1] == 59
