@@ -38,26 +38,8 @@ from jaxtyping import Float, Int64, UInt8
 from torch import Tensor
 from torch.autograd.function import FunctionCtx
 
+from parenting.agent.architecture import ACTIONS, FILTERS, HIDDEN, Padding, padding
 from parenting.envs.rng import Keys, Stream
-
-HIDDEN = 64
-FILTERS = (16, 32, 64, 64)
-ACTIONS = 4
-
-
-class Padding(NamedTuple):
-    """A convolution's padding before and after one axis, in cells, and the length of its output."""
-
-    before: int
-    after: int
-    length: int
-
-
-def padding(length: int) -> Padding:
-    """Longer than 3 shrinks by 2; 3 shrinks to 2 (one cell behind); 2 or less keeps its size (ours)."""
-    if length > 3:
-        return Padding(0, 0, length - 2)
-    return Padding(0, 1, 2) if length == 3 else Padding(1, 1, length)
 
 
 class Layer(NamedTuple):

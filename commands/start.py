@@ -25,6 +25,8 @@ from parenting.server.missing_weights import missing_weights
 from parenting.server.new_run import FORM_FIELDS, read_form
 from parenting.server.notify import Notifier
 from parenting.server.reads.schemas import run_schema
+from parenting.server.tables import Run
+from parenting.weights.cost import estimate
 from parenting.weights.origin import Origin
 
 OPTIONS = ("world", "level", "level_text", "preset", "parent", "script", "seed", "goal", "finish", "name")
@@ -91,7 +93,7 @@ def start(
         with database() as db:
             try:
                 given |= _weights(db, given, chosen.weights, pretrain, origin, quiet=as_json)
-                run = new_run.start(db, read_form(given), chosen.weights, origin)
+                run = new_run.start(db, read_form(given), chosen.weights, origin, chosen.bound)
             except InvalidFieldsError as error:
                 raise UsageError(
                     "\n".join(_said(field, given, rule) for field, rule in error.fields)
@@ -102,6 +104,7 @@ def start(
         say(json.dumps(shown.model_dump(mode="json")))
         return
     page = "parent" if run.parent == "human" else ""
+    _tell_cost(run)
     say(f"Run {run.id} is started. Its page: /runs/{run.public_id}/{page}".rstrip("/"))
 
 
@@ -120,6 +123,14 @@ def _weights(
     if lacking is None or provide(lacking, choice, folder, quiet=quiet):
         return {}
     return {new_run.PRETRAIN: "false"}
+
+
+def _tell_cost(run: Run) -> None:
+    """Say what ticks and checkpoints of an expensive run cost."""
+    level = registry.level(run.world, run.level_text)
+    cost = estimate(registry.spec(run.world, level), level, Config.model_validate(run.config))
+    if cost.notable:
+        say(f"This run is expensive: {cost}.", err=True)
 
 
 def _parent(text: str) -> dict[str, str]:

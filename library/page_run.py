@@ -57,7 +57,7 @@ def begin(db: Database, settings: Settings, task: Task, rule: StopRule, seed: in
         goal=rule.number if rule.kind == "queries" else None,
     )
     try:
-        return new_run.start(db, new, settings.weights, task.origin).id
+        return new_run.start(db, new, settings.weights, task.origin, settings.bound).id
     except InvalidFieldsError as error:
         raise ValueError(str(error)) from None
 

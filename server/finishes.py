@@ -6,7 +6,7 @@ import re
 from typing import NamedTuple
 
 from parenting.agent.config import Config
-from parenting.envs import registry
+from parenting.envs.levels.spec import WorldSpec
 
 PATTERN = r"^(optimal|never|(goal|stages):[1-9][0-9]{0,6})$"
 _RULE = re.compile(PATTERN)
@@ -68,12 +68,12 @@ def usual(parent: str) -> str:
     return "never" if parent == "human" else "optimal"
 
 
-def never_met(text: str | None, world: str, config: Config) -> list[tuple[str, str]]:
+def never_met(text: str | None, world: WorldSpec, config: Config) -> list[tuple[str, str]]:
     """Return why a rule that somebody chose is never met in a world and with a config, as a wrong field."""
     finish, stages = read_finish(text or "never"), config.max_clip_length
     last = finish.kind == "stages" and finish.number == stages
-    if finish.kind == "optimal" and not registry.spec(world).ends_at_goal:
-        said = f"No policy counts as optimal in {world}, which has no goal. Write goal:N, for example."
+    if finish.kind == "optimal" and not world.ends_at_goal:
+        said = f"No policy counts as optimal in {world.name}, which has no goal. Write goal:N, for example."
     elif finish.kind == "stages" and finish.number > stages:
         said = f"The run has {stages} {'stage' if stages == 1 else 'stages'} (config.stages)."
     elif last and config.queries_per_stage is None:

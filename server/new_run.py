@@ -35,6 +35,7 @@ from parenting.server.weights import needed, put_bytes
 from parenting.server.weights import put as put_weights
 from parenting.server.whole import WHOLE, whole
 from parenting.server.wrong_fields import messages
+from parenting.weights.cost import BOUND, Bound, estimate
 from parenting.weights.origin import NO_ORIGIN, Origin
 from parenting.weights.store import NoWeightsError, Wanted
 
@@ -143,15 +144,22 @@ class NewRun(BaseModel):
     )
 
 
-def start(db: Database, new: NewRun, folder: Path | None = None, origin: Origin = NO_ORIGIN) -> Run:
+def start(
+    db: Database,
+    new: NewRun,
+    folder: Path | None = None,
+    origin: Origin = NO_ORIGIN,
+    bound: Bound = BOUND,
+) -> Run:
     """Check a new run against worlds and hyperparameters, and add it, with all that it begins with.
 
     `folder` holds weights of one's own; those of the built-in levels are shipped, and others may be stored.
+    `bound` is the most that it may cost.
 
     Raises:
         InvalidFieldsError: names every wrong field, with a message each.
     """
-    columns = plan(new, folder, origin, db)
+    columns = plan(new, folder, origin, db, bound)
     for name, blob in origin.blobs:
         put_bytes(db, name, blob)
     if isinstance(columns["weights"], Path):
@@ -164,7 +172,11 @@ def start(db: Database, new: NewRun, folder: Path | None = None, origin: Origin 
 
 
 def plan(
-    new: NewRun, folder: Path | None = None, origin: Origin = NO_ORIGIN, db: Database | None = None
+    new: NewRun,
+    folder: Path | None = None,
+    origin: Origin = NO_ORIGIN,
+    db: Database | None = None,
+    bound: Bound = BOUND,
 ) -> dict[str, Any]:
     """The columns of a new run; under `weights` the file or the hash of its pre-trained weights, or None.
 
@@ -178,10 +190,11 @@ def plan(
     config = _config(new, level, wrong)
     weights = None if origin.policy is not None else _weights(level, config, folder, db, wrong)
     if level is not None and config is not None:
-        wrong += [*origin.misfits(level, config), *never_met(new.finish, new.world, config)]
+        spec, field = registry.spec(new.world, level), "level" if new.level_text is None else "level_text"
+        wrong += [*origin.misfits(level, config), *never_met(new.finish, spec, config)]
+        wrong += bound.misfits(field, estimate(spec, level, config))
     if wrong or level is None or config is None:
         raise InvalidFieldsError(wrong)
-    spec = registry.spec(new.world, level)
     return {
         **new.model_dump(include=COLUMNS),
         "script": _script(new),
@@ -243,12 +256,6 @@ def level_of(new: NewRun, wrong: Wrong) -> Level | None:
     return None
 
 
-def _defaults(new: NewRun, level: Level | None) -> Mapping[str, object]:
-    if level is not None:
-        return registry.spec(new.world, level).defaults
-    return registry.defaults(new.world) if new.world in registry.WORLDS else {}
-
-
 def _config(new: NewRun, level: Level | None, wrong: Wrong) -> Config | None:
     """The preset, over it what the world sets, over it what this run sets (docs/paper.md, "Settings").
 
@@ -257,7 +264,8 @@ def _config(new: NewRun, level: Level | None, wrong: Wrong) -> Config | None:
     if new.preset not in PRESETS:
         wrong.append(("preset", _unknown("preset", new.preset, PRESETS)))
         return None
-    world = _defaults(new, level)
+    known = level is not None or new.world in registry.WORLDS
+    world = registry.spec(new.world, level).defaults if known else {}
     waits = {"max_open_preferences": 0} if new.parent == "scripted" else {}
     changes = waits | {name: whole(value) for name, value in new.config.items()}
     try:

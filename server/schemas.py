@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from parenting.agent.config import GardenParent
 from parenting.server.statuses import QueryStatus, RunState, RunStatus, Waiting
@@ -167,7 +167,7 @@ class ClipSchema(Schema):
     actions: list[Literal["up", "down", "left", "right"]]
     length: int
     frames: list[FrameSchema]
-    chance: float | None = None  # of guidance: the probability of the outcome shown, the likeliest
+    chance: float | None = Field(None, exclude_if=lambda chance: chance is None)  # of a likeliest outcome
 
 
 class PolicySchema(Schema):

@@ -41,9 +41,9 @@ from parenting.server.why import Why
 log = structlog.get_logger()
 
 CHECKPOINT_SECONDS, LONGEST_CHECKPOINT_SECONDS = 2.0, 120.0
-"""A restart repeats the ticks of this long; they replay exactly. Where checkpoints are large it is longer, so
-that they take `CHECKPOINT_SHARE` of the time and `CHECKPOINT_SPEED` bytes a second at most, but never longer
-than the second: no more than that is repeated when a run is taken up again."""
+"""A restart repeats the ticks of this long. Large checkpoints take `CHECKPOINT_SHARE` of the time and
+`CHECKPOINT_SPEED` bytes a second at most, but come after the second at the latest; there the time counts that
+ticks took, not the wait for a parent."""
 CHECKPOINT_SHARE, CHECKPOINT_SPEED = 0.05, 1e6
 TOLD_SECONDS = 5.0
 """The log tells of checkpoints that are written at longer intervals."""
@@ -76,12 +76,15 @@ class RunSession:
         self.finish = read_finish(run.finish)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
-        self._measured_tick, self._lived_at, self._heard_at = self.last_tick, 0.0, 0.0
-        self._news, self._learnt = False, NOTHING_LEARNT
-        self._save_every, self._look_cost = CHECKPOINT_SECONDS, 0.0
+        self._measured_tick, self._lived_at, self._heard_at, self._news = self.last_tick, 0.0, 0.0, False
+        self._save_every, self._look_cost, self._unsaved_work, self._stuck_at = (
+            CHECKPOINT_SECONDS,
+            0.0,
+            0.0,
+            -1,
+        )
         self.told: Callable[[int, Row], None] = lambda tick, row: None  # trackers take each row of metrics
-        self.whole, self._told, self._told_at = True, False, 0.0
-        self._stuck_at = -1  # reported as stuck: who ends episodes must see the next one too
+        self.whole, self._told, self._told_at, self._learnt = True, False, 0.0, NOTHING_LEARNT
         sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
         self.parent.follow_until = take_up(db, claim, run, self._recalled, self.record_ends)
 
@@ -138,7 +141,7 @@ class RunSession:
     def rests_until(self) -> float:
         """Return when a run that waits has to report again though nothing has happened; `inf` for never."""
         due = self.board.next_portion()
-        if self.unsaved:
+        if self.unsaved and self._worth_saving:
             due = min(due, self._saved_at + self._save_every)
         return min(due, self._measured_at + self._look_every) if self._news else due
 
@@ -156,7 +159,7 @@ class RunSession:
         `seen` is what a look at the mailbox has just shown; a tick right after another does not look. A
         session that is not `whole` afterwards was left amid a tick by an error, and is of no more use.
         """
-        self.whole = False
+        began, self.whole = time.monotonic(), False
         replayed = self.last_tick < self.record_ends
         parent = self.parent.looking(
             answers=replayed or bool(seen and seen.answers),
@@ -166,6 +169,7 @@ class RunSession:
             self.world, self.saved.config, self.saved.state, self.growth.overhear(parent)
         )
         self._lived_at = time.monotonic()
+        self._unsaved_work += self._lived_at - began
         tally = count(self.world, self.saved.tally, answer, state, events)
         self.saved = Snapshot(state, tally, config)
         self.growth.milestones.see(state, tally)
@@ -276,8 +280,12 @@ class RunSession:
 
     def save_if_due(self) -> None:
         """Save a checkpoint if the last one is old and a tick has passed since."""
-        if self.unsaved and time.monotonic() - self._saved_at >= self._save_every:
+        if self.unsaved and self._worth_saving and time.monotonic() - self._saved_at >= self._save_every:
             self.save()
+
+    @property
+    def _worth_saving(self) -> bool:
+        return self._save_every < TOLD_SECONDS or self._unsaved_work >= self._save_every
 
     def save(self, last: bool = False) -> None:
         """Write a checkpoint, with a whole snapshot if it is the `last` for now; large ones seldom."""
@@ -286,7 +294,7 @@ class RunSession:
         self.why.write()
         began, blob = time.monotonic(), pack(self.saved)
         checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, blob)
-        self._saved_tick, self._saved_at = self.last_tick, time.monotonic()
+        self._saved_tick, self._saved_at, self._unsaved_work = self.last_tick, time.monotonic(), 0.0
         by_time, by_size = (self._saved_at - began) / CHECKPOINT_SHARE, len(blob) / CHECKPOINT_SPEED
         wanted = min(max(CHECKPOINT_SECONDS, by_time, by_size), LONGEST_CHECKPOINT_SECONDS)
         if wanted >= TOLD_SECONDS and not self._told:

@@ -11,6 +11,7 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 from sqlalchemy import URL
 
 from parenting.server.environment import PREFIX, EnvironmentFile
+from parenting.weights.cost import Bound
 
 FILE = Path(".env")
 """Settings of the folder where the program is started."""
@@ -86,6 +87,12 @@ class Settings(BaseSettings):
         ge=1,
         description="Connections of one address at once; loopback, where a proxy stands, has no such limit.",
     )
+    tick_seconds: float = Field(
+        2.0, gt=0, description="Seconds that a tick of a new run may take, as estimated from its level."
+    )
+    checkpoint_megabytes: float = Field(
+        500.0, gt=0, description="Megabytes that a checkpoint of a new run may have, as estimated."
+    )
     ballast: bool = Field(
         True, description="Keep 8 MB of disk space beside a SQLite database, for when the disk is full."
     )
@@ -121,6 +128,11 @@ class Settings(BaseSettings):
     def weights(self) -> Path:
         """Return the folder where `parenting pretrain` writes weights and where new runs look for them."""
         return self.data / "weights"
+
+    @property
+    def bound(self) -> Bound:
+        """Return the most that a new run may cost."""
+        return Bound(self.tick_seconds, self.checkpoint_megabytes)
 
     @property
     def url(self) -> str:

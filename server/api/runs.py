@@ -49,7 +49,7 @@ def start_run(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> Ru
 
     Settings that are left out come from the world, or else from the preset.
     """
-    run = start(db, new, settings.weights)
+    run = start(db, new, settings.weights, bound=settings.bound)
     notify_worker(request)
     return run_schema(db, run.id)
 

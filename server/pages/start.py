@@ -20,6 +20,7 @@ from parenting.server.new_run import LARGEST_INT, PRETRAIN, plan, read_form, sta
 from parenting.server.pages.options import OPTIONS, Option
 from parenting.server.pages.render import page, redirect
 from parenting.server.pages.run_list import Find, FindRuns, run_list
+from parenting.server.settings import Settings
 from parenting.weights.estimate import seconds
 from parenting.weights.store import Wanted
 
@@ -96,11 +97,11 @@ def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> 
     Where only weights made beforehand are missing, the form offers to make them now or to begin without.
     """
     given = settings_of(form)
-    errors = _errors(given, settings.weights, db)
+    errors = _errors(given, settings, db)
     if errors:
         offer = missing(db, settings.weights, given) if PRETRAIN in errors else None
         return _page(db, {**EMPTY_FORM, **form}, errors, offer=offer)
-    run = start(db, read_form(given), settings.weights)
+    run = start(db, read_form(given), settings.weights, bound=settings.bound)
     notify_worker(request)
     return redirect(f"/runs/{run.public_id}/parent" if run.parent == "human" else f"/runs/{run.public_id}")
 
@@ -125,13 +126,13 @@ def filled_form(db: Database, form: Mapping[str, str]) -> Response:
     return _page(db, {**EMPTY_FORM, **form}, {}, filled=True)
 
 
-def _errors(given: Mapping[str, str], folder: Path, db: Database) -> dict[str, str]:
+def _errors(given: Mapping[str, str], settings: Settings, db: Database) -> dict[str, str]:
     """Return an error for each wrong field: wrong by itself, or in the world that the others name."""
     errors: dict[str, str] = {}
     for _ in range(2):
         try:
             known = {name: text for name, text in given.items() if name not in errors}
-            plan(read_form(known), folder, db=db)
+            plan(read_form(known), settings.weights, db=db, bound=settings.bound)
         except InvalidFieldsError as error:
             errors = {**dict(error.fields), **errors}
     return {name: NUMBER_ERRORS.get(name, said) for name, said in errors.items()}

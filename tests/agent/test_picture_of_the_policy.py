@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from torch.nn.functional import one_hot
 
 from parenting.agent import policy
+from parenting.agent.architecture import padding
 from parenting.agent.policy import Network, network_for
 from parenting.envs.rng import Stream, keys
 from tests.agent.batched_runs import layers
@@ -21,7 +22,7 @@ CODES = 5
 def picture(height: int, width: int) -> nn.Module:
     """The class in the docstring, for boards of this size."""
     code = (policy.__doc__ or "").partition("::\n")[2].partition("\nHere all parameters")[0]
-    names: dict[str, Any] = {"nn": nn, "padding": policy.padding}
+    names: dict[str, Any] = {"nn": nn, "padding": padding}
     exec(textwrap.dedent(code), names)
     made: nn.Module = names["Policy"](height, width, CODES)
     return made.double()

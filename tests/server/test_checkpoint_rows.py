@@ -239,6 +239,28 @@ def test_large_checkpoints_are_seldom_but_bound_what_is_repeated(
     assert 0 < size < 2 * CHECKPOINT_SPEED, "checkpoints of the built-in levels come every two seconds"
 
 
+def test_a_large_checkpoint_waits_for_ticks_and_not_for_the_clock(
+    db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that waits for its parent writes no large checkpoint for a few ticks."""
+    session = RunSession(db, mine, get_run(db, mine.run_id), lambda: None)
+    saved: list[int] = []
+    monkeypatch.setattr(session, "save", lambda: saved.append(session.last_tick))
+    session.tick()
+    session._saved_at -= 1000.0
+    session._save_every = 100.0
+    session.save_if_due()
+    assert saved == []
+    session._news = False
+    assert session.rests_until() == session.board.next_portion()
+    session._unsaved_work = 101.0
+    session.save_if_due()
+    assert saved == [1]
+    session._save_every, session._unsaved_work = 4.0, 0.0
+    session.save_if_due()
+    assert saved == [1, 1]  # a small one goes by the clock alone
+
+
 def test_a_run_that_ended_keeps_its_last_checkpoint(db: Database, mine: Claim, part_bytes: int) -> None:
     """Parts of the one before go first, one by one; while a worker has the run, nothing goes."""
     for tick in (1, 2):
