@@ -76,13 +76,8 @@ class RunSession:
         self.finish = read_finish(run.finish)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
-        self._measured_tick, self._lived_at, self._heard_at, self._news = self.last_tick, 0.0, 0.0, False
-        self._save_every, self._look_cost, self._unsaved_work, self._stuck_at = (
-            CHECKPOINT_SECONDS,
-            0.0,
-            0.0,
-            -1,
-        )
+        self._measured_tick, self._lived_at, self._heard_at, self._look_cost = self.last_tick, 0.0, 0.0, 0.0
+        self._save_every, self._unsaved_work, self._stuck_at, self._news = CHECKPOINT_SECONDS, 0.0, -1, False
         self.told: Callable[[int, Row], None] = lambda tick, row: None  # trackers take each row of metrics
         self.whole, self._told, self._told_at, self._learnt = True, False, 0.0, NOTHING_LEARNT
         sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
