@@ -2,7 +2,7 @@
 import "./errors.js";
 import { curvesOf } from "./curves.js";
 
-const CALM = 400; // ms between two drawings while curves arrive
+const CALM = 1500; // ms between two drawings while curves arrive
 const COLOURS = ["blue", "agent", "leaf", "unreal", "dry"];
 const DASHES = ["solid", "dash", "dot", "dashdot"];
 const STEPS = new Set(["deaths", "guidance", "preference", "rows"]);
@@ -53,7 +53,11 @@ async function draw() {
   }
 }
 
-const redraw = () => { timer ||= setTimeout(draw, CALM); };
+function redraw(wait = 0) {
+  if (timer && wait) return;
+  clearTimeout(timer);
+  timer = setTimeout(draw, wait);
+}
 
 // A part that is looked at closely is drawn with points of its own.
 async function zoomed(metric, { "xaxis.range[0]": begin, "xaxis.range[1]": end, "xaxis.autorange": reset }) {
@@ -69,6 +73,9 @@ for (const figure of figures) {
   }
 }
 for (const one of runs) {
-  one.curves.load(() => {}).then(() => { one.loaded = true; redraw(); });
+  one.curves.load(() => {}).then(() => {
+    one.loaded = true;
+    redraw(runs.every(({ loaded }) => loaded) ? 0 : CALM);
+  });
 }
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw());
