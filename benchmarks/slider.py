@@ -5,10 +5,10 @@
     python -m benchmarks.slider --world reward-hacking --ticks 2000
 
 A life is lived in this process, with a scripted parent, and stored as a worker stores it. It is then served
-by `parenting web`. *shown* counts from the click to the board with its newest snapshot; *a step* is the time
-from a key on the slider to the snapshot that it leads to, read for the first time and read again. *heap* is
-the JavaScript heap of the page after a garbage collection, before and after the slider went through all
-snapshots; *web* the resident memory of the server.
+by `parenting web`. *shown* counts from the second click on the dashboard's address to the board with its
+newest snapshot; *a step* is the time from a key on the slider to the snapshot that it leads to, read for the
+first time and read again. *heap* is the JavaScript heap of the page after a garbage collection, before and
+after the slider went through all snapshots; *web* the resident memory of the server.
 """
 
 from __future__ import annotations
@@ -87,6 +87,7 @@ def look(url: str, run: str) -> None:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
         page = browser.new_page()
         devtools = page.context.new_cdp_session(page)
+        page.goto(f"{url}/runs/{run}")
         began = time.monotonic()
         page.goto(f"{url}/runs/{run}", wait_until="commit")
         page.wait_for_selector("#seen-arrows path", state="attached")
