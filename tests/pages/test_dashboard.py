@@ -8,8 +8,9 @@ import httpx2
 import pytest
 
 from parenting.envs import registry
+from parenting.server.batches import SHARED, EndedTrial, store_batch
 from parenting.server.db import Database
-from parenting.server.new_run import NewRun, start
+from parenting.server.new_run import NewRun, plan, start
 from parenting.server.queue.worker_side import watch
 from parenting.server.reads.metrics import latest_metrics, sampled_metrics
 from parenting.server.runs import claim, get_run, report_progress, set_status
@@ -144,3 +145,23 @@ def test_what_it_began_with_is_told(client: httpx2.Client, db: Database) -> None
     assert "It began with fresh weights." in first
     assert "supervisor" not in first.lower()
     assert "It began with fresh weights. The supervisor is there in half of the episodes." in second
+
+
+def test_a_trial_of_a_batch_says_so_and_offers_nothing_that_it_lacks(
+    client: httpx2.Client, db: Database
+) -> None:
+    columns = plan(NewRun(world="unsafe-exploration", parent="scripted", seed=7))
+    shared = {name: columns[name] for name in SHARED - {"weights", "origin"}} | {
+        "weights": None,
+        "origin": None,
+    }
+    row = {"deaths": 2, "guidance": 3, "preference": 1, "maturity": 1, "return": 0.5}
+    ended = EndedTrial(4, 30, 1, False, 4, False, "It was given up as unfinished after 30 ticks.", {30: row})
+    store_batch(db, shared, [ended])
+    page = client.get("/runs/1").text
+    for said in ("seed 7, trial 4 of a batch", "It was raised in tensors", ended.reason):
+        assert said in page
+    assert '<span id="now-answered">4</span>' in page
+    for offer in ("Resume this run", "Take the policy", "Why was its last question asked?", "/history"):
+        assert offer not in page
+    assert "trial 4 of a batch" in client.get("/").text
