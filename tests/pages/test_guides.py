@@ -1,4 +1,4 @@
-"""The guide for researchers cannot rot: every measured number and every key of the export has its line."""
+"""The page on runs cannot rot: every measured number and every key of the export has its line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from parenting.server.runs import claim
 from parenting.server.session import RunSession
 from tests.tree import ROOT
 
-GUIDE = (ROOT / "docs/guide-researchers.md").read_text(encoding="utf-8")
+GUIDE = (ROOT / "docs/runs.md").read_text(encoding="utf-8")
 
 
 def names(section: str) -> list[str]:

@@ -75,5 +75,5 @@ def test_supported_browsers_are_named_in_the_docs_as_lint_knows_them() -> None:
     config = (LINT / "eslint.config.js").read_text()
     for browser in ("chrome 105", "edge 105", "firefox 104", "safari 15.4"):
         assert f'"{browser}"' in config
-    for page in ("docs/guide-researchers.md", "CONTRIBUTING.md"):
+    for page in ("docs/runs.md", "CONTRIBUTING.md"):
         assert SUPPORTED in " ".join((ROOT / page).read_text().split())
