@@ -17,6 +17,7 @@ import httpx2
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from parenting.envs import registry
+from parenting.envs.levels.spec import Level
 from tests.server.serving import until_up
 
 ROOT = Path(__file__).parents[1]
@@ -78,9 +79,9 @@ def start(page: Page, url: str, preset: str, seed: int = 3, goal: int | None = N
     page.wait_for_selector("#main[data-run]")
 
 
-def distances(level: str = "island") -> dict[Cell, int]:
+def distances(level: str | Level = "island") -> dict[Cell, int]:
     """Steps to the goal on dry land, as anyone sees them who looks at the drawing."""
-    drawn = registry.level("unsafe-exploration", level)
+    drawn = registry.level("unsafe-exploration", level) if isinstance(level, str) else level
     reached = {drawn.find("G")[0]: 0}
     edge = list(reached)
     while edge:

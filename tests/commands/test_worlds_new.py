@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import torch
 from typer.testing import CliRunner
 
 import parenting as pt
@@ -84,6 +85,19 @@ def test_a_broken_package_is_named_in_a_sentence_and_ends_nothing(path: Path, po
     assert [(found.state, said in found.said) for found in packages()] == [("warning", True)]
     refused = CliRunner().invoke(app, ["run", NAME])
     assert (refused.exit_code, refused.stdout) == (2, "")
+
+
+def test_an_entry_point_may_lead_to_a_table(path: Path) -> None:
+    """A module of two lines is a world for commands, pages and workers."""
+    table = "{s: {a: [(1.0, 1, 1.0, True)] for a in range(4)} for s in range(2)}"
+    (path / f"{MODULE}.py").write_text(
+        f"import parenting as pt\nmine = pt.TableWorld({table}, (1, 2), goal={{1}}, name='{NAME}')\n"
+    )
+    put_on_the_path(path, f"{NAME} = {MODULE}:mine")
+    assert pt.worlds()[NAME] == ("start",)
+    planned = plan(NewRun(world=NAME))
+    assert (planned["level"], "\ntable: " in planned["level_text"]) == ("start", True)
+    assert pt.make(NAME).likelihood(pt.make(NAME).beginnings(), torch.tensor([0])).tolist() == [1.0]
 
 
 def test_a_package_that_is_just_being_imported_is_not_taken_for_a_broken_one(path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 import parenting as pt
 from parenting.library import page_training
 from tests.library.person_at_page import PersonAtPage
+from tests.simulated_person import Cell
 
 
 @pytest.fixture(scope="session")
@@ -28,9 +29,11 @@ def person_at_the_page(
     """Where `train` would open a browser, a browser is opened that answers."""
     opened: list[PersonAtPage] = []
 
-    def prepare(answers: int, then: Callable[[], None] = lambda: None) -> list[PersonAtPage]:
+    def prepare(
+        answers: int, then: Callable[[], None] = lambda: None, to_goal: dict[Cell, int] | None = None
+    ) -> list[PersonAtPage]:
         def open_page(url: str, _browser: bool) -> None:
-            opened.append(PersonAtPage(url, chromium_path, answers, then))
+            opened.append(PersonAtPage(url, chromium_path, answers, then, to_goal))
             opened[-1].start()
 
         monkeypatch.setattr(page_training, "open_page", open_page)

@@ -15,8 +15,16 @@ from tests import simulated_person
 class PersonAtPage(threading.Thread):
     """Answers so many questions, then calls `then`."""
 
-    def __init__(self, url: str, chromium: str, answers: int, then: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        url: str,
+        chromium: str,
+        answers: int,
+        then: Callable[[], None],
+        to_goal: dict[simulated_person.Cell, int] | None = None,
+    ) -> None:
         super().__init__(daemon=True)
+        self.to_goal = simulated_person.distances() if to_goal is None else to_goal
         self.url, self.chromium, self.answers, self.then = url, chromium, answers, then
         self.error: BaseException | None = None
 
@@ -28,9 +36,8 @@ class PersonAtPage(threading.Thread):
                 )
                 page = browser.new_page()
                 page.goto(self.url)
-                to_goal = simulated_person.distances()
                 for _ in range(self.answers):
-                    simulated_person.answer(page, to_goal)
+                    simulated_person.answer(page, self.to_goal)
                 self.then()
                 browser.close()
         except BaseException as error:
