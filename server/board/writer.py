@@ -134,9 +134,9 @@ class BoardWriter:
 
     def _begin(self, saved: Snapshot) -> None:
         stage, learner = int(saved.state.maturity[0]), saved.state.learner
-        for early in range(1, stage):
-            if early not in self._frozen:
-                self._frozen[early] = Policy(learner.frozen[early - 1])  # nothing changes it any more
+        for early in range(1, stage):  # their policies never change, but the tensor that holds them does
+            known = self._frozen[early].known if early in self._frozen else bytearray()
+            self._frozen[early] = Policy(learner.frozen[early - 1], known)
         sweep = Sweep(self._states, {stage: Policy(learner.params.clone()), **self._frozen})
         self._begun = Begun(
             replace(self._numbers(saved, {}), stage=stage, frozen=False), self._columns(saved), sweep
