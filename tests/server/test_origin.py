@@ -15,8 +15,9 @@ from sqlalchemy import text
 import parenting as pt
 from parenting.server import runs
 from parenting.server.db import Database
-from parenting.server.errors import InvalidFieldsError
+from parenting.server.errors import InvalidFieldsError, SetupError
 from parenting.server.export import lines
+from parenting.server.migrate import downgrade
 from parenting.server.new_run import NewRun, plan, start
 from parenting.server.policies import present_policy
 from parenting.server.queue import revisions, worker_side
@@ -98,6 +99,8 @@ def test_answers_alone_leave_the_weights_fresh(db: Database, files: tuple[Path, 
     begun = taken_up(db, run.id).saved.state
     assert torch.equal(begun.learner.params, ISLAND.initial_snapshot().state.learner.params)
     assert int(begun.x.size[0]) > 5
+    with pytest.raises(SetupError, match=f"Run {run.id} began with an earlier policy, answers or run"):
+        downgrade(db, "0022")
 
 
 @pytest.mark.parametrize(

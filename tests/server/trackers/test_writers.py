@@ -56,7 +56,7 @@ def test_tensorboard_reads_the_curves(tmp_path: Path) -> None:
 
 
 class FakeWandb:
-    """What wandb's module and its runs are called with."""
+    """A stand-in for the module wandb and its runs, which keeps the calls."""
 
     def __init__(self) -> None:
         self.calls: list[tuple[str, Any]] = []
