@@ -36,6 +36,7 @@ from parenting.server.weights import put as put_weights
 from parenting.server.whole import WHOLE, whole
 from parenting.server.wrong_fields import messages
 from parenting.weights.cost import BOUND, Bound, estimate
+from parenting.weights.estimate import seconds
 from parenting.weights.origin import NO_ORIGIN, Origin
 from parenting.weights.store import NoWeightsError, Wanted
 
@@ -77,7 +78,6 @@ AS_JSON = ("seed", "goal", "pace", "remarks")
 Wrong = list[tuple[str, str]]
 PRETRAIN = "config.pretrain"
 """The field that is wrong where pre-trained weights are missing."""
-
 
 Name = Annotated[
     str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\r\n\t]*$"), AfterValidator(plain)
@@ -282,10 +282,12 @@ def _weights(
 ) -> Path | str | None:
     if level is None or config is None or not config.pretrain:
         return None
+    wanted = Wanted(registry.spec(level.world, level), level.height, level.width)
     try:
-        return needed(Wanted(registry.spec(level.world, level), level.height, level.width), folder, db)
+        return needed(wanted, folder, db)
     except NoWeightsError as error:
-        wrong.append((PRETRAIN, str(error)))
+        by_worker = f"A worker makes them, too (POST /api/v1/jobs, about {seconds(wanted)} s)."
+        wrong.append((PRETRAIN, f"{error} {by_worker}"))
         return None
 
 

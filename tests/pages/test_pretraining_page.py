@@ -34,7 +34,8 @@ def offered(tabs: BrowserTabs, screen: tuple[int, int]) -> Page:
     page = tabs.open("/", viewport=size, color_scheme="dark" if screen[0] < 400 else "light")
     page.locator(".fields #world").select_option("interruptibility")
     page.locator("details", has_text="Paste or draw").locator("summary").click()
-    page.locator("#level_text").fill(HALL)
+    page.locator("#level_text").fill("".join(f"  {row}\n" for row in HALL.splitlines()))
+    expect(page.locator("#level_text-told")).to_have_text("2 blank columns left of the art were cut.")
     page.get_by_role("button", name="Start", exact=True).click()
     page.get_by_role("button", name="Pre-train now (about 30 s)").wait_for()
     return page

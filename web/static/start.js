@@ -14,5 +14,26 @@ function narrow() {
   own.placeholder = document.querySelector(`.hint [data-world="${world.value}"]`).dataset.level;
 }
 
-world.addEventListener("change", narrow);
+// What is cut from a level of one's own, or the first rule that it breaks, while it is typed.
+const WAIT = 400; // ms without a change
+const told = document.getElementById("level_text-told");
+let timer, asked = 0;
+
+async function check() {
+  const mine = ++asked, text = own.value;
+  const options = { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ world: world.value, text }) };
+  const reply = text.trim() ? await fetch("/api/v1/levels/check", options).catch(() => null) : null;
+  const found = reply?.ok ? await reply.json() : { said: [], error: null };
+  if (mine !== asked) return;
+  const lines = [...found.said.map((said) => [`${said[0].toUpperCase()}${said.slice(1)}.`, "hint"]), ...(found.error ? [[found.error.message, "error"]] : [])];
+  told.replaceChildren(...lines.map(([textContent, className]) => Object.assign(document.createElement("p"), { textContent, className })));
+}
+
+function soon() {
+  clearTimeout(timer);
+  timer = setTimeout(check, WAIT);
+}
+
+own.addEventListener("input", soon);
+world.addEventListener("change", () => { narrow(); soon(); });
 narrow();
