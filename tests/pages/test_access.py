@@ -28,6 +28,7 @@ SCREENS: dict[str, ViewportSize] = {
 SIZES: tuple[ViewportSize, ...] = (*SCREENS.values(), {"width": 320, "height": 568})
 PATHS = (
     "/",
+    "/?q=island&sort=name&archived=true",
     "/levels",
     "/practice",
     "/practice?at=1&choice=left",
@@ -35,6 +36,8 @@ PATHS = (
     "/practice?at=6",
     "/runs/1",
     "/runs/1/end",
+    "/runs/1/settings",
+    "/runs/1/delete",
     "/runs/1/history",
     "/runs/1/why?query=3",
     "/runs/1/parent?query=1",
