@@ -54,7 +54,7 @@ def export(
             _copy(found, sys.stdout, total, of)
             return
         with _whole(out, force) as file:
-            written = _copy(found, file, total, of) - (format_ is Format.CSV)  # its head is no row
+            written = _copy(found, file, total, of) - (format_ is Format.CSV)  # its head does not count
     say(f"{counted(written, NOUNS[of])} of run {run} written to {out}.")
 
 

@@ -1,4 +1,4 @@
-"""What is exported of a run: its answers, its metrics or its log, as JSON lines or as CSV."""
+"""Exports of a run: its answers, its metrics or its log, as JSON lines or as CSV."""
 
 from __future__ import annotations
 

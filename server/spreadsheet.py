@@ -24,7 +24,7 @@ def as_csv(rows: Callable[[], Iterable[Mapping[str, Any]]], first: Sequence[str]
     The rows are read twice, in as little memory as one needs: once for the names of all columns.
 
     Args:
-        rows: Begins the rows anew. What is added between is left out.
+        rows: Begins the rows again. What is added between is left out.
         first: Columns that stand first, also where there are no rows.
     """
     columns, number = dict.fromkeys(first), 0

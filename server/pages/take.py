@@ -1,4 +1,4 @@
-"""What is taken from a run on its dashboard: a new run that goes on from one of its ticks."""
+"""The form of a dashboard that takes from a run: a new run that goes on from one of its ticks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ends a run: a rule that people's and scripts' runs share."""
+"""The end of a run: a rule that people's and scripts' runs share."""
 
 from __future__ import annotations
 
