@@ -33,7 +33,7 @@ class Tracker(Protocol):
         """A run begins, or a worker goes on with it."""
 
     def log(self, run: str, step: int, values: Values) -> None:
-        """Take the metrics of a run, by its id. The step, a tick, only ever grows; None stands for a missing number."""
+        """Take the metrics of a run, by its id. The step, a tick, grows; None: no value."""
 
     def end(self, run: str, reason: str) -> None:
         """A run has ended, or a worker goes on with it no more."""
