@@ -129,13 +129,13 @@ class RunSession:
         if reason != self.waiting or (reason is Waiting.STUCK and self.last_tick != self._stuck_at):
             self.waiting, self._stuck_at = reason, self.last_tick
             runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
-        self.why.write()
+        self.why.write_if_due()
         self.board.go_on(self.saved)
         self.save_if_due()
 
     def rests_until(self) -> float:
         """Return when a run that waits has to report again though nothing has happened; `inf` for never."""
-        due = self.board.next_portion()
+        due = min(self.board.next_portion(), self.why.due)
         if self.unsaved and self._worth_saving:
             due = min(due, self._saved_at + self._save_every)
         return min(due, self._measured_at + self._look_every) if self._news else due
@@ -180,6 +180,7 @@ class RunSession:
         self.whole = True
         if not hurried:
             self.board.go_on(self.saved)
+            self.why.write_if_due()
             self.save_if_due()
         return at_once
 
@@ -230,7 +231,6 @@ class RunSession:
         optimal = bool(row["optimal"])
         metrics.write_metrics(self.db, self.claim, {self.last_tick: row})
         self.told(self.last_tick, row)
-        self.why.write()
         shown = {"maturity": row["maturity"], "speed": speed, "optimal": optimal}
         shown |= self.growth.news(self.saved.state)
         runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None, **shown)

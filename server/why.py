@@ -8,6 +8,8 @@ comes again with the ticks that its run repeats.
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -34,6 +36,10 @@ TICKS = (1, 10, 100)
 """The ticks after which the effect of an answer is measured; the one in which it is heard is the first."""
 
 
+WRITE_SECONDS = 0.5
+"""Rows wait so long for others, and for the question that may follow at once."""
+
+
 class Measurement(NamedTuple):
     """A measurement to come: the policy in a state that was asked about."""
 
@@ -53,12 +59,15 @@ class Why:
         self._due: dict[int, list[Measurement]] = {}
         self._reasons: dict[int, dict[str, Any]] = {}
         self._effects: dict[tuple[int, int], dict[str, Any]] = {}
+        self._since = 0.0
         self._go_on(world, int(saved.state.keys.tick[0]))
 
     def see(self, saved: Snapshot, query: Query) -> None:
         """Look at the tick that has just passed: its question, the answer that it heard, and what is due."""
         tick = int(saved.state.keys.tick[0])
         kind = int(query.kind[0])
+        if not self._reasons and not self._effects:
+            self._since = time.monotonic()
         if kind == QueryKind.GUIDANCE:
             self._reasons[tick] = self._guidance(saved)
         elif kind == QueryKind.PREFERENCE:
@@ -73,6 +82,16 @@ class Why:
     def forget(self, tick: int) -> None:
         """Drop the reason of a tick whose recorded question came from another machine."""
         self._reasons.pop(tick, None)
+
+    @property
+    def due(self) -> float:
+        """Return when what was seen has to be written; `inf` where there is nothing."""
+        return self._since + WRITE_SECONDS if self._reasons or self._effects else math.inf
+
+    def write_if_due(self) -> None:
+        """Store what was seen, if the first of it is old enough: the next question goes first."""
+        if time.monotonic() >= self.due:
+            self.write()
 
     def write(self) -> None:
         """Store what was seen up to now.

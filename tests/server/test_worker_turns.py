@@ -106,6 +106,7 @@ def test_a_run_that_waits_has_no_turn_without_news(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+    monkeypatch.setattr("parenting.server.why.WRITE_SECONDS", 1e9)
     worker = Worker(db, settings)
     ids = begin(db, 12)
     rounds(worker, lambda: all(get_run(db, run).waiting == "guidance" for run in ids))
