@@ -8,9 +8,11 @@ import httpx2
 import pytest
 
 from parenting.agent.config import Config
+from parenting.server import deletion
 from parenting.server.db import Database
-from parenting.server.errors import InvalidFieldsError
+from parenting.server.errors import InvalidFieldsError, SetupError
 from parenting.server.finishes import read_finish
+from parenting.server.migrate import downgrade, upgrade
 from parenting.server.new_run import NewRun, read_form, start
 from parenting.server.queue.answers import answer
 from parenting.server.reads.metrics import latest_metrics
@@ -112,3 +114,20 @@ def test_a_rule_that_is_none_or_never_met_is_refused(client: httpx2.Client, db: 
         assert 'id="finish-error"' in page.text
         with pytest.raises(InvalidFieldsError):
             start(db, read_form(body))
+
+
+def test_runs_of_before_keep_the_rule_that_they_had(db: Database) -> None:
+    """There and back: a script's run ends at an optimal policy; a rule of one's own is not silently lost."""
+    for parent in ("human", "scripted"):
+        start(db, read_form({"world": "unsafe-exploration", "parent": parent}))
+    downgrade(db, "0021")
+    upgrade(db)
+    assert [get_run(db, run).finish for run in (1, 2)] == ["never", "optimal"]
+    start(db, NewRun(world="unsafe-exploration", parent="scripted", finish="goal:9"))
+    with pytest.raises(SetupError, match="Run 3 ends by a rule that revision 0021 does not know"):
+        downgrade(db, "0021")
+    with db.write() as session:
+        session.get_one(Run, 3).finish = "optimal"
+    deletion.begin(db, 1)
+    with pytest.raises(SetupError, match="Run 1 ends by a rule"):
+        downgrade(db, "0021")
