@@ -1,4 +1,4 @@
-"""The end of a run: a rule that people's and scripts' runs share."""
+"""The rule that ends a run, which is the same for people and scripts."""
 
 from __future__ import annotations
 
