@@ -32,9 +32,10 @@ from parenting.server.workers import sign
 from tests.server.conftest import CLIPS
 
 RUNS, QUESTIONS, JOBS = 4, 8, 2
-UNTOLD: dict[str, list[Any]] = dict.fromkeys(
-    ("start_run", "check_level", "ask_job", "ask_pretraining", "roll_back_run"), [positive_data_acceptance]
-)
+UNTOLD: dict[str, list[Any]] = {
+    name: [positive_data_acceptance]
+    for name in ("start_run", "check_level", "ask_job", "ask_pretraining", "roll_back_run")
+}
 """Rules that a schema cannot hold: which worlds, levels, presets and settings there are, which fields go
 together, and the ticks that a run has lived."""
 
