@@ -108,9 +108,10 @@ def _lead(case: Case[Any], db: Database) -> None:
         if type(drawn) is int and 0 < drawn <= LARGEST_INT:
             case.path_parameters[name] = 1 + drawn % (count + 1)
 
-    tick = case.body.get("tick") if isinstance(case.body, dict) else None
-    if type(tick) is int and 0 < tick <= LARGEST_INT:
-        case.body["tick"] = tick % 2  # else nearly all would be beyond the life of a run
+    if isinstance(case.body, dict):
+        tick = case.body.get("tick")
+        if type(tick) is int and 0 < tick <= LARGEST_INT:
+            case.body["tick"] = tick % 2  # else nearly all would be beyond the life of a run
     if isinstance(case.body, dict) and is_public_id(str(case.body.get("confirm"))):
         run = case.path_parameters.get("run_id")  # what deletes a run names it twice
         name = _public_id(db, Run, run) if type(run) is int else str(run)
