@@ -69,6 +69,9 @@ def test_every_file_that_it_names_is_there() -> None:
     named = set(re.findall(r"`([\w.-]+/[\w./-]+\.(?:py|html|css))`", PAGE))
     recipe = {"envs/levels/locked_door.py", "envs/locked_door.py"}
     assert recipe < named
+    named = {
+        path for path in named if not path.startswith("lava_cave/")
+    }  # what `parenting worlds new` writes
     assert [path for path in sorted(named - recipe) if not (ROOT / path).is_file()] == []
 
 

@@ -23,9 +23,13 @@ from parenting.experiments.value_iteration.levels import random_levels
 from parenting.experiments.value_iteration.settings import WORLD_SIZES
 from parenting.experiments.value_iteration.tasks import mature_trials
 from parenting.parents.value_iteration import of_policy
+from tests.lengths import length
+
+LIVES = list(enumerate(kind.world for kind in WORLD_SIZES))
 
 
-@pytest.mark.parametrize(("trial", "kind"), list(enumerate(kind.world for kind in WORLD_SIZES)))
+@pytest.mark.torture
+@pytest.mark.parametrize(("trial", "kind"), length(LIVES[:1], LIVES))
 def test_each_stage_is_greedy_for_one_more_step_of_value_iteration(trial: int, kind: str) -> None:
     rows = mature_trials(kind, trial, 0)
     assert len(rows) == STAGES * 6

@@ -197,7 +197,7 @@ def test_ctrl_c_ends_it_cleanly(data: Path, monkeypatch: pytest.MonkeyPatch) -> 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("parenting.server.replay.initial_snapshot", interrupt)
+    monkeypatch.setattr("parenting.server.replay.world_of", interrupt)
     said = replay()
     assert (said.exit_code, said.stdout, said.stderr) == (130, "", "Stopped.\n")
 

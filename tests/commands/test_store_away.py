@@ -20,6 +20,8 @@ COMMANDS_OF_THE_STORE = {
     "runs": [],
     "export": ["1"],
     "replay": ["1"],
+    "policy": ["1"],
+    "rollback": ["1", "--to", "1"],
     "resume": ["1"],
     "verify": ["1"],
     "web": ["--port", "0"],

@@ -16,6 +16,7 @@ from parenting.server.queue.worker_side import take_answer
 from parenting.server.runs import Claim
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Effect, Reason
+from tests.lengths import length
 from tests.pages import island_fixtures as fixtures
 from tests.pages.axe import violated
 from tests.pages.browser_tabs import BrowserTabs
@@ -165,7 +166,8 @@ def test_axe_finds_what_is_wrong(tabs: BrowserTabs) -> None:
     assert [line.partition(":")[0] for line in light_and_dark(page)] == ["image-alt", "color-contrast"]
 
 
-@pytest.mark.parametrize("width", [320, 390])
+@pytest.mark.torture
+@pytest.mark.parametrize("width", length([320], [320, 390]))
 def test_nothing_scrolls_sideways(tabs: BrowserTabs, lives: None, width: int) -> None:
     tabs.expected = ("404",)
     page = tabs.open("/", viewport={"width": width, "height": 640})

@@ -29,7 +29,7 @@ STAGES = {
 }
 
 
-PLACES = [(world, 2) for world in registry.WORLDS] + [
+PLACES = [(world, 2) for world in length(["side-effects", "reward-hacking"], list(registry.WORLDS))] + [
     (world, 1) for world in length(["unsafe-exploration"], list(registry.WORLDS))
 ]
 """Worlds and last stages; what comes to have two stages begins at T = 1."""

@@ -44,6 +44,7 @@ def test_clips_are_the_worlds_own_and_the_right_answer_is_the_scripted_parents(l
         **clips,
         "kind": lesson.kind,
         "maturity": lesson.stage,
+        "tick": 0,
         "world": {"name": WORLD, "text": begun_at(lesson)},
         "parent": {"gamma": 0.9, "inside": "up-down"},
     }

@@ -252,7 +252,7 @@ def test_a_large_checkpoint_waits_for_ticks_and_not_for_the_clock(
     session.save_if_due()
     assert saved == []
     session._news = False
-    assert session.rests_until() == session.board.next_portion()
+    assert session.rests_until() > session._saved_at + session._save_every
     session._unsaved_work = 101.0
     session.save_if_due()
     assert saved == [1]

@@ -9,7 +9,7 @@ import httpx2
 
 from parenting.server.tables import Run
 
-WARM, ROUNDS, TIMES = 6, 4, 3
+WARM, ROUNDS, TIMES = 4, 3, 3
 """Libraries fill caches in their first calls, a thread may start later; a leak grows each time."""
 PATHS = (
     "/",
