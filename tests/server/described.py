@@ -123,9 +123,9 @@ def _lead(case: Case[Any], db: Database) -> None:
         if type(tick) is int and 0 < tick <= LARGEST_INT:
             case.body["tick"] = tick % 2  # else nearly all would be beyond the life of a run
     if isinstance(case.body, dict) and is_public_id(str(case.body.get("confirm"))):
-        run = case.path_parameters.get("run_id")  # what deletes a run names it twice
-        name = _public_id(db, Run, run) if type(run) is int else str(run)
-        case.body["confirm"] = name if is_public_id(name) else case.body["confirm"]
+        last = _public_id(db, Run, RUNS)  # the only one that is deleted: all others would soon be gone, too
+        if case.path_parameters.get("run_id") in (RUNS, last):
+            case.body["confirm"] = last
 
 
 def _public_id(db: Database, table: type[Run] | type[Query] | type[Job], number: int) -> str:
