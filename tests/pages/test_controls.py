@@ -18,6 +18,7 @@ from parenting.server.queue.queries import open_counts
 from parenting.server.runs import Claim, get_run, report_progress, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
+from tests.pages.browser_tabs import BrowserTabs
 from tests.pages.parent_page import address, form, look
 
 PROBABILITIES = {"p_guid": "0.95", "p_rec": "0.8", "p_pref": "0.8", "p_train": "1"}
@@ -243,3 +244,17 @@ def test_at_its_goal_it_says_so_and_offers_more(client: httpx2.Client, db: Datab
     client.post("/runs/1/goal", data={"goal": "51", "back": "parent"})
     assert 'data-state="exploring"' in look(client).text.partition("<main")[2]
     assert "of <span>51</span>" in look(client).text
+
+
+def test_a_field_beside_a_long_button_has_room_for_a_number(
+    tabs: BrowserTabs, db: Database, mine: Claim
+) -> None:
+    """The numbers of a long run can be read in it: a button that leaves too little room stands below."""
+    fixtures.measure(db, mine, 40)
+    report_progress(db, mine, tick=40)
+    page = tabs.open("/runs/1")
+    for width in (1280, 800, 390):
+        page.set_viewport_size({"width": width, "height": 900})
+        widths = page.locator(".line input").evaluate_all("(all) => all.map((one) => one.clientWidth)")
+        assert len(widths) == 3
+        assert min(widths) >= 90, (width, widths)

@@ -159,7 +159,7 @@ def test_a_trial_of_a_batch_says_so_and_offers_nothing_that_it_lacks(
     ended = EndedTrial(4, 30, 1, False, 4, False, "It was given up as unfinished after 30 ticks.", {30: row})
     store_batch(db, shared, [ended])
     page = client.get("/runs/1").text
-    for said in ("seed 7, trial 4 of a batch", "It was raised in tensors", ended.reason):
+    for said in ("seed 7, trial 4 of a batch", "It was trained in a batch", ended.reason):
         assert said in page
     assert '<span id="now-answered">4</span>' in page
     for offer in ("Resume this run", "Take the policy", "Why was its last question asked?", "/history"):
