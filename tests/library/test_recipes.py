@@ -101,6 +101,18 @@ def test_the_table_names_each_recipe() -> None:
     assert [place for _, place in linked] == [name.lower().replace(" ", "-") for name in RECIPES]
 
 
+def test_the_keys_of_the_first_recipe_are_those_of_the_page() -> None:
+    """An arrow is the move in its direction: `↓` for "neither" would choose a move."""
+    recipe = " ".join(RECIPES["Raise an agent by hand"].split())
+    keys = (ROOT / "web/static/keys.js").read_text(encoding="utf-8")
+    choices = dict(re.findall(r'(\w): "(\w+)"', keys.partition("const CHOICES = {")[2].partition("}")[0]))
+    told = re.findall(r"`(\w)`", recipe.partition("2. Answer:")[2].partition("[")[0])
+    assert [choices[key.lower()] for key in told] == ["left", "right", "either", "neither"]
+    assert "the agent has found the optimal way" in recipe
+    page = (ROOT / "web/templates/parent.html").read_text(encoding="utf-8")
+    assert "The agent has found the optimal way." in page
+
+
 def test_raise_an_agent_by_hand(db: Database, folder: Path) -> None:
     """A script raises it here; tests/pages/test_first_light.py does so by keys in a browser."""
     run = start(db, NewRun(world="unsafe-exploration", preset="frugal", parent="scripted")).id
