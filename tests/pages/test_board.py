@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from parenting.drawing.policy import policy_arrows
 from parenting.server.board import store
@@ -41,7 +41,7 @@ def live(life: RunSession, ticks: int) -> None:
 
 
 def drawn(page: Page) -> set[str]:
-    """The arrows on the board."""
+    """The arrows on the board, which are painted before the page says of which tick they are."""
     paths = page.locator("#seen-arrows path").evaluate_all("all => all.map(path => path.getAttribute('d'))")
     return set(re.findall("M[^z]*z", "".join(paths)))
 
@@ -64,6 +64,12 @@ def stored(life: RunSession, tick: int, rest: int) -> set[str]:
     return set(re.findall("M[^z]*z", arrows.likely + arrows.less))
 
 
+def pick(page: Page, name: str) -> None:
+    """Choose another box, other dry plants, and so on, and wait until the board shows it."""
+    page.get_by_label(name).select_option(index=1)
+    expect(page.locator("#seen-over")).not_to_have_attribute("aria-busy", "true")
+
+
 def test_the_board_shows_the_stored_policy_and_follows_it(tabs: BrowserTabs, life: RunSession) -> None:
     live(life, 12)
     page = tabs.open("/runs/1")
@@ -82,11 +88,33 @@ def test_the_board_shows_the_stored_policy_and_follows_it(tabs: BrowserTabs, lif
     page.get_by_role("button", name="Newest").click()
     expect(now).to_contain_text("Tick 21")
     before = drawn(page)
-    page.get_by_label("Box").select_option(index=1)
-    expect(page.locator("#seen-over .board:first-child .box")).to_have_attribute(
-        "transform", re.compile("translate")
-    )
+    pick(page, "Box")
     assert drawn(page) == stored(life, 21, 1) != before
+
+
+def test_what_is_named_is_what_is_drawn(tabs: BrowserTabs, life: RunSession) -> None:
+    """A tick is named once its arrows are there; where a board does not come, the former one stays picked."""
+    live(life, 12)
+    page = tabs.open("/runs/1")
+    now, box = page.locator("#seen-at"), page.get_by_label("Box")
+    expect(now).to_contain_text("Tick 12")
+    held: list[Route] = []
+    page.route("**/board/18?*", lambda route: held.append(route))
+    live(life, 6)
+    expect(page.get_by_role("slider", name="Time")).to_have_attribute("aria-valuetext", re.compile("Tick 18"))
+    while not held:
+        page.wait_for_timeout(20)
+    expect(now).to_contain_text("Tick 12")
+    assert drawn(page) == stored(life, 12, 0)
+    held[0].continue_()
+    expect(now).to_contain_text("Tick 18")
+    tabs.expected = ("Failed to load resource",)
+    page.route("**/board/1", lambda route: route.abort())
+    before, arrows = box.input_value(), drawn(page)
+    pick(page, "Box")
+    expect(now).to_have_text("The board did not load. Pick it again.")
+    expect(box).to_have_value(before)
+    assert drawn(page) == arrows == stored(life, 18, 0)
 
 
 def test_a_cell_is_told_by_keys_and_by_pointer_for_everybody(tabs: BrowserTabs, life: RunSession) -> None:
@@ -138,7 +166,7 @@ def test_what_is_not_stored_is_done_by_a_worker_once_there_is_one(tabs: BrowserT
     work(db)
     expect(dialog.locator(".arrows path.likely")).to_be_attached()
     dialog.get_by_role("button", name="Close").click()
-    page.get_by_label("Dry plants").select_option(index=1)
+    pick(page, "Dry plants")
     board, asking = page.locator("#seen-keys"), page.get_by_role("button", name="Ask a worker")
     board.press("Control+End")
     for _ in range(10):

@@ -105,11 +105,7 @@ function turned() {
 
 // ---- which snapshot
 
-function say({ tick, maturity, answers }) {
-  const words = `Tick ${number(tick)}, stage ${maturity}, ${number(answers)} answer${answers === 1 ? "" : "s"}`;
-  put("seen-at", words + (newest ? " · the newest" : ""));
-  slider.setAttribute("aria-valuetext", words);
-}
+const wordsOf = ({ tick, maturity, answers }) => `Tick ${number(tick)}, stage ${maturity}, ${number(answers)} answer${answers === 1 ? "" : "s"}`;
 
 // The policies pi_1 to pi_T of this snapshot; the one that acts is chosen until another one is.
 function offerStages(maturity) {
@@ -130,11 +126,12 @@ async function show(place) {
       const one = known.snapshots[wanted];
       wanted = null;
       offerStages(one.maturity);
-      say(one);
+      slider.setAttribute("aria-valuetext", wordsOf(one)); // where the slider is; the heading names what is drawn
       shown = await data.at(one.tick, Number(form.elements.stage.value));
       if (shown.states > known.cells.length) await data.news();
       sumUp();
       turned();
+      put("seen-at", wordsOf(one) + (newest && one === known.snapshots.at(-1) ? " · the newest" : ""));
     }
   } catch ({ message }) { put("seen-at", message); } finally { busy = false; }
 }
@@ -168,7 +165,7 @@ function begin() {
   for (const control of panel.querySelectorAll(".seen-time *, .seen-choices *")) control.disabled = false;
 }
 
-const pick = pickers(run, known, turned);
+const pick = pickers(run, known, turned, () => put("seen-at", "The board did not load. Pick it again."));
 const showCell = cells(tell, ask);
 slider.addEventListener("input", () => go(Number(slider.value)));
 for (const button of panel.querySelectorAll("[data-time]")) button.addEventListener("click", () => go(Number(slider.value) + Number(button.dataset.time)));

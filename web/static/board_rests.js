@@ -2,38 +2,54 @@
 // draws the board of each.
 const $ = (id) => document.getElementById(id);
 
-export function pickers(run, known, turned) {
+// Calls `turned` once another rest is drawn, and `failed` where its board did not come: then the former one stays picked.
+export function pickers(run, known, turned, failed) {
   const holder = $("seen-rests"), over = $("seen-over"), drawn = new Map(), offered = {};
   const names = JSON.parse($("seen").dataset.legend);
-  let rest = 0;
+  let rest = 0, wanted = 0; // what is drawn, and what was picked last
 
   const parts = (at) => known.rests[at]?.parts ?? {};
 
   // The rest that has what was just picked and most of what the other pickers say.
   function nearest(name, value) {
-    const now = parts(rest);
+    const now = parts(wanted);
     const like = (at) => Object.entries(parts(at)).filter(([other, found]) => now[other] === found).length;
     const fitting = known.rests.map((_, at) => at).filter((at) => parts(at)[name] === value);
     return fitting.reduce((best, at) => (like(at) > like(best) ? at : best), fitting[0]);
   }
 
-  async function draw() {
-    const mine = rest;
-    if (!drawn.has(mine)) {
-      const reply = await fetch(`/runs/${run}/board/${mine}`).catch(() => null);
-      if (!reply?.ok) return;
+  async function boardOf(at) {
+    if (!drawn.has(at)) {
+      const reply = await fetch(`/runs/${run}/board/${at}`).catch(() => null);
+      if (!reply?.ok) return null;
       const part = document.createElement("template");
       part.innerHTML = await reply.text();
-      drawn.set(mine, part.content.querySelector("svg"));
+      drawn.set(at, part.content.querySelector("svg"));
     }
-    if (mine === rest) over.querySelector(".board").replaceWith(drawn.get(mine).cloneNode(true));
+    return drawn.get(at);
   }
 
-  function choose(at) {
+  function show(at, board) {
     rest = at;
-    for (const select of holder.querySelectorAll("select")) select.value = parts(rest)[select.name];
-    draw();
+    over.querySelector(".board").replaceWith(board.cloneNode(true));
     turned();
+  }
+
+  function say(at) {
+    wanted = at;
+    for (const select of holder.querySelectorAll("select")) select.value = parts(at)[select.name];
+  }
+
+  // The board and what is painted over it change together: no arrow stands over the board of another rest.
+  async function choose(at) {
+    say(at);
+    over.setAttribute("aria-busy", true);
+    const board = await boardOf(at);
+    if (wanted !== at) return; // another was picked meanwhile
+    over.removeAttribute("aria-busy");
+    if (board) return show(at, board);
+    say(rest);
+    failed();
   }
 
   holder.addEventListener("change", (event) => {
@@ -63,7 +79,7 @@ export function pickers(run, known, turned) {
           holder.append(label);
         }
         offered[name].replaceChildren(...[...found].map((value) => new Option(value)));
-        offered[name].value = parts(rest)[name];
+        offered[name].value = parts(wanted)[name];
       }
     },
   };
