@@ -136,7 +136,9 @@ def test_axe_finds_nothing_in_states_that_come_later(tabs: BrowserTabs, lives: N
     page.evaluate("document.getElementById('alert').textContent = 'Your answer was not used.'")
     assert everywhere(page) == []
     page.goto(f"{tabs.address}/runs/1/parent")
+    page.wait_for_selector("#question[data-listening]")
     page.keyboard.press("?")
+    expect(page.get_by_role("dialog")).to_be_visible()  # it is loaded when it is asked for
     assert everywhere(page) == []
     page.keyboard.press("Escape")
     page.keyboard.press("e")
@@ -206,8 +208,8 @@ def test_who_wants_no_motion_gets_steps(tabs: BrowserTabs, lives: None) -> None:
     moving = "document.getAnimations().filter(a => a.playState === 'running').length"
     assert page.evaluate(moving) == 0
     agent = page.locator(".card").nth(1).locator(".board .agent")
-    start = agent.bounding_box()
     expect(page.locator(".steps output")).to_have_text("Step 0 of 4")
+    start = agent.bounding_box()
     page.get_by_role("button", name="One step on").click()
     expect(page.locator(".steps output")).to_have_text("Step 1 of 4")
     assert agent.bounding_box() != start

@@ -108,7 +108,7 @@ def test_a_text_is_opened_as_people_have_it_and_one_of_several_is_chosen(pond: P
     box = registry.level("side-effects", "box").text
     open_text(pond, box)
     expect(pond.locator("#world")).to_have_value("side-effects")
-    assert pond.locator("#brushes kbd").all_inner_texts() == ["#", "G", "X", "A"]
+    expect(pond.locator("#brushes kbd")).to_have_text(["#", "G", "X", "A"])
     open_text(pond, b"caf\xe9")
     expect(pond.locator("#told")).to_have_text("This file cannot be read as text in UTF-8. Save it as UTF-8.")
     assert text_of(pond).endswith("### G#\n######\n")

@@ -13,7 +13,7 @@ from parenting.server.queue import answers, worker_side
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
-from tests.pages.browser_tabs import BrowserTabs
+from tests.pages.browser_tabs import BrowserTabs, until
 from tests.pages.parent_page import shown
 
 
@@ -40,9 +40,9 @@ def test_the_table_of_stages_grows_as_it_is_drawn(tabs: BrowserTabs, db: Databas
     assert drawn[2].startswith("3 – –")
     expect(page.locator("#now-maturity")).to_have_text("2")
     plots = "[...document.querySelectorAll('.plot')].map(plot => plot.layout.shapes?.map(line => line.x0))"
-    assert page.evaluate(plots) == [[31]] * 4 + [None] + [[31]] * 3
+    until(lambda: page.evaluate(plots) == [[31]] * 4 + [None] + [[31]] * 3)  # one chart after the other
     bars = "document.querySelector('[data-chart=stages] .plot').data[0].y"
-    assert len(page.evaluate(bars)) == 2
+    until(lambda: len(page.evaluate(bars)) == 2)
 
 
 def test_an_event_gets_its_tick_on_the_page(tabs: BrowserTabs, db: Database) -> None:
