@@ -14,7 +14,7 @@ const WAYS = ["up", "down", "left", "right"], COUNTS = ["visits", "deaths", "ent
 const NAMES = Object.fromEntries([...panel.querySelectorAll("[data-number]")].map(({ dataset, previousElementSibling }) => [dataset.number, previousElementSibling.textContent]));
 const CALM = 1000; // ms between two looks for new snapshots
 let shown = null, sums = null, index = new Map(); // the snapshot, its counts by cell, the states of this rest by cell
-let newest = true, wanted = null, busy = false, looked = -CALM, timer = 0;
+let newest = true, wanted = null, busy = false, looked = -CALM, timer = 0, looking = false, again = false;
 
 const percent = (share) => share > 0 && share < 0.005 ? "under 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
 const number = (value) => Number.isInteger(value) ? value.toLocaleString("en") : String(Number(value.toPrecision(3)));
@@ -145,15 +145,22 @@ function go(place) {
 }
 
 // Ask for new snapshots, at most once in a while; the newest is shown unless the researcher has moved the slider.
+// What is told while the page looks may be newer than what the server has read for it: then it looks again.
 export function seen() {
-  if (timer) return;
-  timer = setTimeout(look, Math.max(0, looked + CALM - performance.now()));
+  if (looking) again = true;
+  else timer ||= setTimeout(look, Math.max(0, looked + CALM - performance.now()));
 }
 
 async function look() {
+  timer = 0;
+  looking = true;
+  again = false;
   looked = performance.now();
   const had = known.snapshots.length;
-  try { await data.news(); } catch { return; } finally { timer = 0; } // the next event asks again
+  try { await data.news(); } catch { return; } finally { // where it failed, the next event asks again
+    looking = false;
+    if (again) seen();
+  }
   if (known.snapshots.length === had) return;
   if (!had) begin();
   slider.max = known.snapshots.length - 1;
