@@ -9,16 +9,15 @@ import hashlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import ColumnElement, delete, func, or_, select
+from sqlalchemy import ColumnElement, delete, func, select
 from sqlalchemy.orm import Session
 
 from parenting.server import checkpoint_parts
 from parenting.server.checkpoint_parts import join_parts, sweep_parts, write_parts
 from parenting.server.damage import sound
 from parenting.server.db import Database
-from parenting.server.runs import CLAIM_SECONDS, Claim, held
+from parenting.server.runs import CLAIM_SECONDS, Claim, held, silent
 from parenting.server.statuses import RunStatus
-from parenting.server.store.clock import is_over
 from parenting.server.tables import Checkpoint, CheckpointPart, Run
 
 KEPT = 2
@@ -110,9 +109,8 @@ def thin(db: Database, run_id: int, seconds: float = CLAIM_SECONDS) -> bool:
 
 
 def _ended(seconds: float) -> tuple[ColumnElement[bool], ...]:
-    silent = is_over(Run.claim_epoch, Run.claim_mark, Run.claim_mark + seconds)
     ended = Run.status.in_((RunStatus.STOPPED, RunStatus.FINISHED))
-    return ended, Run.deleting.is_(None), or_(Run.worker.is_(None), silent)
+    return ended, Run.deleting.is_(None), silent(seconds)
 
 
 def _whole(session: Session, checkpoint_id: int) -> bool:

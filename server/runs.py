@@ -11,7 +11,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, bindparam, or_, select, tuple_, update
+from sqlalchemy import ColumnElement, and_, bindparam, exists, or_, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from parenting.drawing.sentences import mark
@@ -21,8 +21,8 @@ from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.failures import fail_if_damaged, note_failure, resume_in
 from parenting.server.queue.queries import withdraw_in
 from parenting.server.statuses import LIVING, OVER, RESUMABLE, RunStatus
-from parenting.server.store.clock import is_over
-from parenting.server.tables import Run
+from parenting.server.store.clock import holds, is_over
+from parenting.server.tables import Run, Worker
 
 CLAIM_SECONDS = 5.0
 PROGRESS_FIELDS = {"tick", "waiting", "optimal", "versions", "maturity", "speed", "milestones", "lesson"}
@@ -125,8 +125,19 @@ def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
 
 def free(seconds: Any) -> ColumnElement[bool]:
     """Return the condition that a run may be claimed, at the mark that is bound."""
-    silent = is_over(Run.claim_epoch, Run.claim_mark, Run.claim_mark + seconds)
-    return and_(Run.status.in_(LIVING), or_(Run.worker.is_(None), silent))
+    return and_(Run.status.in_(LIVING), silent(seconds))
+
+
+def silent(seconds: Any) -> ColumnElement[bool]:
+    """Return the condition that nobody raises a run, at the mark that is bound.
+
+    A claim holds for so many seconds after it was given or the worker wrote to the run, and after each sign
+    of life of the worker: a run that waits needs none of its own.
+    """
+    claimed = is_over(Run.claim_epoch, Run.claim_mark, Run.claim_mark + seconds)
+    signed = holds(Worker.epoch, Worker.mark, Worker.mark + seconds)
+    lives = exists().where(Worker.name == Run.worker, signed).correlate(Run)
+    return or_(Run.worker.is_(None), and_(claimed, ~lives))
 
 
 def claim(
@@ -173,17 +184,6 @@ def let_go(db: Database, claims: Sequence[Claim]) -> None:
             .where(_of(claims))
             .values(worker=None, heartbeat=None, claim_epoch=None, claim_mark=None)
         )
-
-
-def heartbeat(db: Database, claims: Sequence[Claim]) -> Sequence[Claim]:
-    """Renew the claims of a worker, in one statement, and return those that still hold."""
-    if not claims:
-        return []
-    with db.write(durable=False) as session:
-        mark = db.mark(session)
-        sign = {"heartbeat": db.clock(), "claim_epoch": mark.epoch, "claim_mark": mark.seconds}
-        found = set(session.scalars(update(Run).where(_of(claims)).values(sign).returning(Run.id)).all())
-        return [mine for mine in claims if mine.run_id in found]
 
 
 def _of(claims: Sequence[Claim]) -> ColumnElement[bool]:

@@ -73,6 +73,14 @@ class Settings(BaseSettings):
     claim_seconds: float = Field(
         5.0, gt=0, description="How long a run stays with a worker that gives no sign of life."
     )
+    lives: int = Field(
+        100,
+        ge=1,
+        description="Agents that a worker keeps in memory; others that wait are in their checkpoints.",
+    )
+    lives_megabytes: float = Field(
+        500.0, gt=0, description="Megabytes of the tensors of those agents, as far as the others wait."
+    )
     frame_ancestors: str = Field(
         "none",
         description="Sites that may show the pages in a frame, as the header Content-Security-Policy names "

@@ -1,7 +1,8 @@
 """The worker: it raises every run in turn, a few ticks each, and waits for parents that have not answered.
 
 Between rounds it waits for a notification, which the web sends after each answer, and polls every 50 ms. A
-run has a turn only when something is new for it or due, so that a waiting run costs nothing.
+run has a turn only when something is new for it or due, so that a waiting run costs nothing. Its sign of life
+is that of its worker, which another thread gives.
 """
 
 from __future__ import annotations
@@ -27,23 +28,24 @@ from parenting.server.db import Database, connect
 from parenting.server.errors import StoreError
 from parenting.server.migrate import require_current
 from parenting.server.notify import Notifier
-from parenting.server.queue import worker_side
-from parenting.server.queue.worker_side import Watch
 from parenting.server.settings import Settings
 from parenting.server.store.relay import Relay
 from parenting.server.trackers.stored import chosen_feeds
 from parenting.server.work.chores import Chores
-from parenting.server.work.held import AT_NEWS, NOW, HeldRuns
+from parenting.server.work.held import HeldRuns
 from parenting.server.work.jobs import Jobs
+from parenting.server.work.load import Load
 from parenting.server.work.patience import Patience
+from parenting.server.work.schedule import Schedule
 from parenting.server.work.sharing import prospect, surplus
+from parenting.server.work.signs import Signs
 from parenting.server.work.turns import BESIDE_SECONDS, HUNG_SECONDS, Turns
-from parenting.server.workers import SIGN_SECONDS
+from parenting.server.work.watching import News, Watching
 
 log = structlog.get_logger()
 
 POLL_SECONDS = 0.05
-CLAIM_EVERY = 0.5
+CLAIM_EVERY = 0.25
 CLOSE_SECONDS = 3.0
 """Seconds that saving at the end may take. What is not saved by then goes on from its last checkpoint."""
 JOB_SECONDS = 0.2
@@ -73,14 +75,21 @@ class Worker:
         self.patience, self.turns = Patience(), Turns(self.notifier.wake, beside_after)
         self.jobs = Jobs(db, settings.claim_seconds, self.notifier.wake)
         self.chores = Chores(db, settings.claim_seconds)
-        self.held = HeldRuns(db, self.patience, self.web_notifier.notify, chosen_feeds(settings.trackers))
+        self.held = HeldRuns(
+            db,
+            self.patience,
+            self.web_notifier.notify,
+            chosen_feeds(settings.trackers),
+            settings.lives,
+            1e6 * settings.lives_megabytes,
+        )
         self.claims, self.sessions = self.held.claims, self.held.sessions
-        self._found: dict[int, Watch] = {}
-        self._seen: dict[int, Watch] = {}
-        self._given: dict[int, Watch] = {}
-        self._due: dict[int, float] = {}
-        self._claimed_at, self._signed_at, self._committed = -math.inf, -math.inf, True
-        self._soonest = POLL_SECONDS
+        self.schedule, self.watching, self.load = Schedule(), Watching(db), Load()
+        every = min(workers.SIGN_SECONDS, settings.claim_seconds / 4)
+        self.signs = Signs(self._give_sign, every, HUNG_SECONDS, self.patience)
+        self._found: News | None = None
+        self._lost: set[int] = set()
+        self._claimed_at, self._committed, self._soonest = -math.inf, True, POLL_SECONDS
 
     @property
     def stopping(self) -> bool:
@@ -96,18 +105,20 @@ class Worker:
     def work(self) -> None:
         """Raise runs in turn until stopped, then save them and give them back."""
         self.relay.start()
+        self.signs.start()
         while not self.stopping:
             try:
                 self._go_on()
             except StoreError as error:
                 self.patience.refused(error)
             if self.patience.waits:
-                self.patient(partial(self._sign, at_once=True))
+                self.patient(self.signs.give)
         self._close()
 
     def patient(self, act: Callable[[], None]) -> None:
         """Do something as soon as the store does not refuse it, unless told to stop before."""
         while not self.told.wait(self.patience.left()):
+            self.signs.round()
             try:
                 act()
             except StoreError as error:
@@ -116,28 +127,22 @@ class Worker:
                 return
 
     def _go_on(self) -> None:
+        self.signs.round()
         ticked = self._round()
-        self._sign(at_once=self.patience.doubts)
+        self.signs.if_due(at_once=self.patience.doubts)
         self._claim()
         self.chores.go_on()
         if not ticked:
             self.notifier.wait(self._soonest)
 
-    def _sign(self, at_once: bool = False) -> None:
-        """A sign of life of this process, and of all that it raises, but for a run whose turn hangs."""
-        now = time.monotonic()
-        if not at_once and now - self._signed_at < min(SIGN_SECONDS, self.settings.claim_seconds / 4):
-            return
-        workers.sign(self.db, self.name)
-        hung = self.turns.working(HUNG_SECONDS)
-        mine = [claim for run_id, claim in list(self.claims.items()) if run_id not in hung]
-        kept, busy = {claim.run_id for claim in runs.heartbeat(self.db, mine)}, self.turns.working()
-        for claim in mine:
-            if claim.run_id not in kept and claim.run_id not in busy:
-                self.held.drop(claim.run_id)  # a turn that goes on finds out itself, at its next write
+    def _give_sign(self) -> None:
+        """Sign for this process and all that it raises, and give up the runs whose turn hangs."""
+        figures = self.load.figures(len(self.claims), len(self.sessions), self.schedule.waited())
+        workers.sign(self.db, self.name, figures)
+        hung = [self.claims[run_id] for run_id in self.turns.working(HUNG_SECONDS) & self.claims.keys()]
+        if hung:
+            runs.let_go(self.db, hung)
         self.jobs.renew()
-        self._signed_at = now
-        self.patience.granted()
 
     def _claim(self) -> None:
         """Look for runs that nobody raises, up to a fair share, and give up what is above it.
@@ -154,13 +159,18 @@ class Worker:
             hung = self.turns.working(HUNG_SECONDS)
             fresh = runs.claim(self.db, self.name, seconds, more, hung)
             self.claims.update({claim.run_id: claim for claim in fresh})
+            self.held.lives.claimed(self.db, [claim.run_id for claim in fresh], len(self.claims))
         self._claimed_at, self._committed = time.monotonic(), False
 
     def _give_up(self, most: int) -> None:
-        """Choose the runs that other workers should raise; each has a last turn."""
-        order = sorted(self.claims, key=lambda run_id: (self._due.get(run_id, AT_NEWS), run_id))
-        self.held.surplus = set(surplus(order, most))
-        self._due.update(dict.fromkeys(self.held.surplus & self._due.keys(), NOW))
+        """Choose the runs that other workers should raise; each that has a life in memory has a last turn."""
+        self.held.surplus = set(surplus(self.schedule.busy_first(self.claims), most))
+        working = self.turns.working()
+        if idle := self.held.surplus - self.sessions.keys() - working:
+            runs.let_go(self.db, [self.claims[run_id] for run_id in idle])
+            for run_id in idle:
+                self.held.drop(run_id)
+        self.schedule.hurry(self.held.surplus - idle)
 
     # A round
 
@@ -169,42 +179,47 @@ class Worker:
         self._end_turns()
         self._look()
         self.jobs.begin(self.name)
-        now = time.monotonic()
-        due = [run_id for run_id, at in self._due.items() if at <= now]
-        for run_id in sorted(due, key=lambda run_id: not self._seen[run_id].answers):
+        for run_id in self.schedule.due():
             if self.stopping or self.patience.doubts:
                 break
             if self.turns.may_begin(run_id, run_id not in self.sessions):
-                self._given[run_id] = self._seen[run_id]
-                self.turns.begin(run_id, partial(self.held.turn, run_id, self._seen[run_id]))
+                self.turns.begin(run_id, partial(self.held.turn, run_id, self.schedule.begin(run_id)))
                 self.jobs.begin(self.name)
-        ticked, now = self._end_turns(), time.monotonic()
-        self._soonest = min([POLL_SECONDS, *(at - now for at in self._due.values() if at > now)])
+        ticked = self._end_turns()
+        self._make_room()
+        self._soonest = self.schedule.soonest(POLL_SECONDS)
         return ticked
 
     def _end_turns(self) -> bool:
         """Take note of the turns that have ended; return whether another one of such a run is due at once."""
-        at_once = False
-        for run_id, due in self.turns.ended().items():
-            given = self._given.pop(run_id)
-            if run_id in self._due:
-                self._due[run_id] = due if self._seen.get(run_id) is given else NOW
-                at_once |= self._due[run_id] == NOW
-        return at_once
+        ended = self.turns.ended()
+        self.watching.touched(ended.keys())
+        return self.schedule.ended(ended)
+
+    def _make_room(self) -> None:
+        """Let lives that wait leave memory where there are too many."""
+        for run_id in self.held.lives.too_many(self.schedule.at_rest()):
+            if self.turns.may_begin(run_id, new=True):
+                self.schedule.begin(run_id)
+                self.turns.begin(run_id, partial(self.held.rest, run_id))
 
     def _look(self) -> None:
         """See what is new: a run is due if anything of it has changed."""
-        found = worker_side.watch(self.db, list(self.claims))
-        if found is self._found:
-            return  # nobody has committed anything
-        self._found, self._committed = found, True
-        self.jobs.news()
-        self.chores.news()
-        for run_id, seen in found.items():
-            if self._seen.get(run_id) != seen:
-                self._seen[run_id], self._due[run_id] = seen, NOW
-        for run_id in self._seen.keys() - found.keys():
-            del self._seen[run_id], self._due[run_id]
+        working = self.turns.working()
+        self.watching.touched(working)
+        news = self.watching.look(self.name, self.claims)
+        if news is not self._found:
+            self._found, self._committed = news, True
+            self._lost.update(news.lost)
+            self.jobs.news()
+            self.chores.news()
+            if news.unknown:  # it was claimed, but nobody told: the store was gone before it could
+                runs.let_go(self.db, news.unknown)
+            self.schedule.news(news.found)
+        for run_id in self._lost - working:  # a turn that goes on finds out itself, at its next write
+            self.held.drop(run_id)
+        self._lost &= working
+        self.schedule.keep(self.claims.keys())
 
     # The end
 
@@ -213,6 +228,7 @@ class Worker:
         end = time.monotonic() + CLOSE_SECONDS
         self.turns.close(CLOSE_SECONDS / 2)
         self.jobs.close(JOB_SECONDS)
+        self.signs.close()
         try:
             self.held.save(self.turns.working(), end)
             runs.let_go(self.db, list(self.claims.values()))

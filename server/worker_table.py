@@ -6,6 +6,7 @@ from datetime import datetime
 
 from sqlalchemy.orm import Mapped, mapped_column
 
+from parenting.server.columns import Big
 from parenting.server.table_root import Table
 
 
@@ -19,3 +20,9 @@ class Worker(Table):
     heartbeat: Mapped[datetime]  # by the wall clock, for display
     epoch: Mapped[str | None]  # by the clock that decides (`server.store.clock`)
     mark: Mapped[float | None]
+    # what it says of itself (`server.workers.Figures`); null: a worker of before, or one that says nothing
+    runs: Mapped[int | None]
+    lives: Mapped[int | None]
+    busy: Mapped[float | None]
+    memory: Mapped[int | None] = mapped_column(Big)
+    waited: Mapped[float | None]

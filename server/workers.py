@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
 from sqlalchemy import delete, select
 
 from parenting.server.db import Database
-from parenting.server.store.clock import holds, is_over
+from parenting.server.store.clock import Mark, holds, is_over
 from parenting.server.tables import Worker
 
 SIGN_SECONDS = 2.0
@@ -18,8 +19,29 @@ SILENT_SECONDS = 10.0
 evaluation of a large level."""
 
 
-def sign(db: Database, name: str) -> None:
-    """Give a sign of life of a worker. Rows of workers that were silent for a day are removed."""
+class Figures(NamedTuple):
+    """What a worker says of itself with each sign of life."""
+
+    runs: int | None = None
+    """The runs that it raises."""
+    lives: int | None = None
+    """Those of them whose life is in its memory."""
+    busy: float | None = None
+    """Processor seconds a second since the last sign: 1 is a whole core."""
+    memory: int | None = None
+    """Its resident bytes."""
+    waited: float | None = None
+    """Seconds that a turn which was due has waited since the last sign, at the most."""
+
+
+NO_FIGURES = Figures()
+
+
+def sign(db: Database, name: str, figures: Figures = NO_FIGURES) -> None:
+    """Give a sign of life of a worker, and so of all that it raises (`runs.silent`).
+
+    Rows of workers that were silent for a day are removed.
+    """
     with db.write(durable=False) as session:
         now, mark = db.clock(), db.mark(session)
         gone = is_over(Worker.epoch, Worker.mark, Worker.mark + DAY)
@@ -29,6 +51,7 @@ def sign(db: Database, name: str) -> None:
             row = Worker(name=name, started=now)
             session.add(row)
         row.heartbeat, row.epoch, row.mark = now, mark.epoch, mark.seconds
+        row.runs, row.lives, row.busy, row.memory, row.waited = figures
 
 
 def sign_off(db: Database, name: str) -> None:
@@ -42,3 +65,20 @@ def alive(db: Database, seconds: float = SILENT_SECONDS) -> Sequence[str]:
     with db.read() as session:
         rows = select(Worker.name).where(holds(Worker.epoch, Worker.mark, Worker.mark + seconds))
         return session.scalars(rows.order_by(Worker.name), db.mark(session).bound()).all()
+
+
+def living(db: Database, seconds: float = SILENT_SECONDS) -> Sequence[Worker]:
+    """Return the workers that gave a sign of life within `seconds`, by name."""
+    with db.read() as session:
+        rows = select(Worker).where(holds(Worker.epoch, Worker.mark, Worker.mark + seconds))
+        return session.scalars(rows.order_by(Worker.name), db.mark(session).bound()).all()
+
+
+def last_signs(db: Database, names: Collection[str]) -> dict[str, Mark]:
+    """Return when each of these workers gave its last sign of life."""
+    if not names:
+        return {}
+    rows = select(Worker.name, Worker.epoch, Worker.mark).where(Worker.name.in_(names))
+    with db.read() as session:
+        found = session.execute(rows).all()
+    return {row.name: Mark(row.epoch, row.mark) for row in found if None not in (row.epoch, row.mark)}

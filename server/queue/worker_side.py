@@ -116,14 +116,15 @@ _WATCH = select(
 
 def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
     """Return the state of some runs, by id. Until somebody commits, a second call costs almost nothing."""
+    return db.cached(("watch", *run_ids), lambda: look(db, run_ids))
 
-    def look() -> dict[int, Watch]:
-        with db.read() as session:
-            rows = session.execute(_WATCH, {"run_ids": run_ids}).all()
-        seen = {row.run_id: _watched(dict(row._mapping)) for row in rows}
-        return {run_id: seen[run_id] for run_id in run_ids if run_id in seen}
 
-    return db.cached(("watch", *run_ids), look)
+def look(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
+    """Return the state of some runs as it is now, by id."""
+    with db.read() as session:
+        rows = session.execute(_WATCH, {"run_ids": run_ids}).all()
+    seen = {row.run_id: _watched(dict(row._mapping)) for row in rows}
+    return {run_id: seen[run_id] for run_id in run_ids if run_id in seen}
 
 
 def _watched(columns: dict[str, Any]) -> Watch:

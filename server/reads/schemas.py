@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from typing import Any, Literal
 
@@ -39,7 +39,7 @@ from parenting.server.statuses import OVER, QueryStatus, RunState, RunStatus, Wa
 from parenting.server.store.clock import Mark
 from parenting.server.store.patience import patience
 from parenting.server.tables import KINDS, Answer, Identity, Metric, Query, Run
-from parenting.server.workers import alive
+from parenting.server.workers import alive, last_signs
 
 Sign = Literal["alive", "silent", "done"]
 
@@ -214,9 +214,9 @@ def _run_state(run: Run, opened: Open, resting: bool, worker: Sign) -> RunState:
 
 def _workers(db: Database, runs: Sequence[Run], now: Mark) -> dict[int, Sign]:
     """Return the sign of each run's worker. While the store takes no sign, none is missed."""
-    soon = _taken_soon(db, runs)
-    signs = {run.id: _worker(run, now, soon) for run in runs}
-    missed = [run.id for run in runs if signs[run.id] == "silent" and _signed(run, now, FORGIVEN)]
+    soon, last = _taken_soon(db, runs), last_signs(db, {run.worker for run in runs if run.worker})
+    signs = {run.id: _worker(run, now, soon, last) for run in runs}
+    missed = [run.id for run in runs if signs[run.id] == "silent" and _signed(run, now, FORGIVEN, last)]
     if missed:
         with patience(PROBE_SECONDS):
             refusal = db.refusal() or db.last_refusal()  # a worker may wait a little longer
@@ -231,16 +231,18 @@ def _taken_soon(db: Database, runs: Sequence[Run]) -> bool:
     return unclaimed and bool(alive(db))
 
 
-def _worker(run: Run, now: Mark, taken_soon: bool) -> Sign:
+def _worker(run: Run, now: Mark, taken_soon: bool, last: Mapping[str, Mark]) -> Sign:
     if run.status in OVER:
         return "done"
     if run.worker is None:
         return "alive" if taken_soon else "silent"
-    return "alive" if _signed(run, now, SILENT_AFTER) else "silent"
+    return "alive" if _signed(run, now, SILENT_AFTER, last) else "silent"
 
 
-def _signed(run: Run, now: Mark, within: timedelta) -> bool:
-    return now.is_recent(run.claim_epoch, run.claim_mark, within.total_seconds())
+def _signed(run: Run, now: Mark, within: timedelta, last: Mapping[str, Mark]) -> bool:
+    """Return whether a run's worker has written to it lately, or given a sign of life."""
+    marks = [(run.claim_epoch, run.claim_mark), last.get(run.worker or "", (None, None))]
+    return any(now.is_recent(epoch, mark, within.total_seconds()) for epoch, mark in marks)
 
 
 # What every leased question needs is built once.

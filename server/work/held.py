@@ -18,27 +18,43 @@ from parenting.server.session import RunSession
 from parenting.server.statuses import OVER, RunStatus
 from parenting.server.trackers.feed import Feeds
 from parenting.server.trackers.stored import TrackedRuns
+from parenting.server.work.lives import Lives
 from parenting.server.work.patience import Patience, back_off
+from parenting.server.work.schedule import AT_NEWS, NOW
 
 log = structlog.get_logger()
 
 SLICE_SECONDS = 0.01
 """Seconds that one run may go on after a tick before the next has its turn."""
-NOW, AT_NEWS = 0.0, math.inf
-"""When the next turn of a run is due: at once, or when something is new for it."""
 
 
 class HeldRuns:
     """The runs that a worker has claimed. Only one thread at a time touches a run."""
 
     def __init__(
-        self, db: Database, patience: Patience, asked: Callable[[], None], told: Feeds | None = None
+        self,
+        db: Database,
+        patience: Patience,
+        asked: Callable[[], None],
+        told: Feeds | None = None,
+        most: float = math.inf,
+        most_bytes: float = math.inf,
     ) -> None:
-        """Hold nothing yet; `asked` is called after each question, and `told` are the trackers."""
+        """Hold nothing yet.
+
+        Args:
+            db: The database.
+            patience: The state of the store.
+            asked: Called after each question.
+            told: The trackers.
+            most: Lives that stay in memory, as far as the others wait.
+            most_bytes: Bytes of those lives.
+        """
         self.db, self._patience, self._asked = db, patience, asked
         self.tracked = TrackedRuns(db, told or Feeds([]))
         self.claims: dict[int, Claim] = {}
         self.sessions: dict[int, RunSession] = {}
+        self.lives = Lives(self.sessions, most, most_bytes)
         self.surplus: set[int] = set()
         self._refusals: dict[int, int] = {}
 
@@ -66,7 +82,11 @@ class HeldRuns:
         try:
             if run_id in self.surplus or seen.status in OVER:
                 return self._last(run_id)
-            return self._usual(run_id, seen) if seen.status is RunStatus.ACTIVE else AT_NEWS
+            if seen.status is not RunStatus.ACTIVE or self.lives.sleeps(run_id, seen):
+                return AT_NEWS
+            due = self._usual(run_id, seen)
+            self.lives.used(run_id)
+            return due
         except (LostClaimError, StoreError):
             raise
         except Exception as error:
@@ -104,6 +124,23 @@ class HeldRuns:
         log.info("run taken up", run=run_id, tick=self.sessions[run_id].last_tick)
         return self.sessions[run_id]
 
+    def rest(self, run_id: int) -> float:
+        """Let the life of a run that waits leave memory, after a checkpoint."""
+        session = self.sessions.get(run_id)
+        if session is None:
+            return AT_NEWS
+        try:
+            if session.unsaved:
+                session.save()
+        except LostClaimError as error:
+            log.warning("run lost", run=run_id, reason=error.message)
+            self.drop(run_id)
+        except StoreError as error:
+            self._patience.doubted(error, run_id)
+        else:
+            self.lives.leave(run_id)
+        return AT_NEWS
+
     def _last(self, run_id: int) -> float:
         """Save what was ticked of a run that somebody stopped, or that another worker raises, and let go.
 
@@ -118,8 +155,9 @@ class HeldRuns:
 
     def drop(self, run_id: int) -> None:
         """Hold a run no longer."""
-        if self.sessions.pop(run_id, None) is not None:
-            self.tracked.end(run_id)
+        self.sessions.pop(run_id, None)
+        self.lives.forget(run_id)
+        self.tracked.end(run_id)
         self.claims.pop(run_id, None)
 
     def save(self, working: Collection[int], end: float) -> None:

@@ -85,7 +85,7 @@ class Turns:
     def working(self, longer_than: float = -math.inf) -> set[int]:
         """Return the runs whose turn has begun and not ended, for longer than some seconds."""
         since = time.monotonic() - longer_than
-        going_on = self._working.items()
+        going_on = list(self._working.items())  # signs of life look from a thread of their own
         return {run_id for run_id, turn in going_on if turn.began < since and not turn.done.done()}
 
     def close(self, seconds: float) -> None:

@@ -117,7 +117,7 @@ WORKER = [
     *around("old checkpoints' end", r"DELETE FROM checkpoint\b"),
     *around("an old part's end", r"DELETE FROM checkpoint_part\b"),
     *around("a claim", r"UPDATE run SET .*fencing_token=", seldom=True),
-    *around("a sign of life", r"UPDATE run SET .*heartbeat="),
+    *around("a sign of life", r"UPDATE (run|worker) SET .*heartbeat="),
     *around("metrics", r"INSERT INTO metric"),
 ]
 CLOSING = [

@@ -25,9 +25,9 @@ QUEUE = [
     Mutant(
         "a run is taken from a worker that lives",
         "server/runs.py",
-        "Run.claim_mark + seconds)",
-        "Run.claim_mark)",
-        f"{RUNS}::test_sign_of_life_keeps_the_claim",
+        "Worker.mark + seconds)",
+        "Worker.mark)",
+        f"{RUNS}::test_a_sign_of_life_keeps_every_claim_of_its_worker",
     ),
     Mutant(
         "a lease never ends",

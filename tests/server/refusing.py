@@ -69,7 +69,7 @@ class Brisk(Worker):
         if not self.claims:  # it made one, and was told that it did not: it has to lapse
             self.clock.pass_seconds(10)
             self._claimed_at = -1.0
-        rests = [seen.answered >= GOAL and not seen.answers for seen in self._seen.values()]
+        rests = [seen.answered >= GOAL and not seen.answers for seen in self.schedule.seen.values()]
         if rests and all(rests) and not self.patience.waits:
             self.stop()
         return False

@@ -12,7 +12,6 @@ from parenting.server.runs import (
     claim,
     finish,
     get_run,
-    heartbeat,
     let_go,
     list_runs,
     report_progress,
@@ -20,6 +19,7 @@ from parenting.server.runs import (
 )
 from parenting.server.statuses import OVER, RunStatus
 from parenting.server.tables import Run
+from parenting.server.workers import sign
 from tests.server.conftest import CLIPS, Clock
 
 
@@ -58,14 +58,15 @@ def test_one_worker_a_run(db: Database, run: Run, clock: Clock) -> None:
     assert [mine.fencing_token for mine in claim(db, "b")] == [2]
 
 
-def test_sign_of_life_keeps_the_claim(db: Database, mine: ClaimOf, clock: Clock) -> None:
+def test_a_sign_of_life_keeps_every_claim_of_its_worker(db: Database, mine: ClaimOf, clock: Clock) -> None:
+    """Signs of others keep nothing of it."""
     for _ in range(3):
         clock.pass_seconds(4)
-        assert heartbeat(db, [mine]) == [mine]
+        sign(db, mine.worker)
         assert claim(db, "b") == []
     clock.pass_seconds(6)
-    claim(db, "b")
-    assert heartbeat(db, [mine]) == []
+    sign(db, "c")
+    assert [theirs.run_id for theirs in claim(db, "b")] == [mine.run_id]
 
 
 def test_run_that_was_let_go_is_free_at_once(db: Database, mine: ClaimOf) -> None:

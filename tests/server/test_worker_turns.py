@@ -69,8 +69,7 @@ def test_a_run_that_takes_long_holds_up_no_other(
     slow(monkeypatch, name, held, gate)
     rounds(worker, lambda: all(get_run(db, run).waiting == "guidance" for run in others))
     rounds(worker, lambda: worker.turns.working() == {held})  # the turn that asked may still save
-    worker._signed_at = -1e9
-    worker._sign()
+    worker.signs.give()
     assert alive(db) == [worker.name]
     gate.set()
     rounds(worker, lambda: get_run(db, held).waiting == "guidance")
@@ -91,7 +90,7 @@ def test_a_hung_run_loses_its_claim_and_another_worker_takes_it(
     monkeypatch.setattr(worker.turns, "working", lambda longer_than=0.0: {hung})
     assert HUNG_SECONDS > 60
     clock.pass_seconds(settings.claim_seconds + 1)
-    worker._sign(at_once=True)
+    worker.signs.give()
     other = Worker(db, settings)
     other.name = "elsewhere:1"
     other._claim()
@@ -115,7 +114,7 @@ def test_a_run_that_waits_has_no_turn_without_news(
     monkeypatch.setattr(worker.turns, "begin", lambda run_id, turn: begun.append(run_id))
     for _ in range(20):
         worker._round()
-        worker._sign(at_once=True)
+        worker.signs.give()
     assert begun == []
 
 

@@ -37,7 +37,7 @@ def test_signs_of_life(db: Database, clock: Clock) -> None:
 
 def test_a_worker_signs_and_signs_off(db: Database, settings: Settings) -> None:
     worker = Worker(db, settings)
-    worker._sign()
+    worker.signs.give()
     assert alive(db) == [worker.name]
     worker._close()
     assert alive(db) == []

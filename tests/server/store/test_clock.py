@@ -13,13 +13,14 @@ from sqlalchemy import text
 
 from parenting.server import workers
 from parenting.server.db import Database, connect
+from parenting.server.errors import LostClaimError
 from parenting.server.migrate import downgrade, upgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease, may_lease
 from parenting.server.queue.worker_side import post_query
 from parenting.server.reads.schemas import run_schema
-from parenting.server.runs import claim, heartbeat
+from parenting.server.runs import claim, report_progress
 from parenting.server.settings import Settings
 from parenting.server.store import clock as store_clock
 from parenting.server.store.clock import SLACK, Mark, boot_mark
@@ -96,7 +97,8 @@ def test_a_clock_that_is_off_holds_nothing_for_longer(
         assert run_schema(db, held).worker == "silent"
         (mine,) = claim(db, "worker-3", 5)
         assert mine.fencing_token == theirs.fencing_token + 1
-        assert heartbeat(other, [theirs]) == []
+        with pytest.raises(LostClaimError):
+            report_progress(other, theirs, tick=6)
         assert lease(db, held, "c") is None, "60 s are not over yet"
         let_pass(db, 55)
         assert lease(db, held, "c") is not None

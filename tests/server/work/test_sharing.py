@@ -30,8 +30,8 @@ def together(*workers: Worker) -> None:
     """Do as their loops do, until nothing changes hands any more."""
     for _ in range(4):
         for worker in workers:
-            worker._signed_at = worker._claimed_at = -1e9
-            worker._sign()
+            worker._claimed_at = -1e9
+            worker.signs.give()
             worker._round()
             worker._claim()
 

@@ -1,0 +1,100 @@
+"""When the next turn of each run is due, and how long turns that are due wait until they begin."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+from parenting.server.queue.worker_side import Watch
+
+NOW, AT_NEWS = 0.0, math.inf
+"""When the next turn of a run is due: at once, or when something is new for it."""
+
+
+class Schedule:
+    """The turns of a worker's runs to come. A run that waits for its parent has none."""
+
+    def __init__(self) -> None:
+        """Nothing is due."""
+        self.seen: dict[int, Watch] = {}
+        self._given: dict[int, Watch] = {}
+        self._at: dict[int, float] = {}
+        self._since: dict[int, float] = {}
+        self._longest = 0.0
+
+    def news(self, found: Mapping[int, Watch]) -> None:
+        """Take note of what is new: a run is due if anything of it has changed."""
+        for run_id, seen in found.items():
+            if self.seen.get(run_id) != seen:
+                self.seen[run_id] = seen
+                self._set(run_id, NOW)
+
+    def keep(self, run_ids: Collection[int]) -> None:
+        """Forget all other runs."""
+        for run_id in self.seen.keys() - run_ids:
+            for table in (self.seen, self._at, self._since):
+                table.pop(run_id, None)
+
+    def hurry(self, run_ids: Iterable[int]) -> None:
+        """Let these runs have a turn at once."""
+        for run_id in run_ids:
+            if run_id in self._at:
+                self._set(run_id, NOW)
+
+    def due(self) -> Sequence[int]:
+        """Return the runs whose turn is due, first those with an answer."""
+        now = time.monotonic()
+        due = [run_id for run_id, at in self._at.items() if at <= now]
+        return sorted(due, key=lambda run_id: not self.seen[run_id].answers)
+
+    def begin(self, run_id: int) -> Watch:
+        """Take note that a run's turn begins; return what was seen of the run."""
+        self._longest = max(self._longest, self._waits(run_id, time.monotonic()))
+        self._since.pop(run_id, None)
+        self._given[run_id] = self.seen[run_id]
+        return self.seen[run_id]
+
+    def ended(self, turns: Mapping[int, float]) -> bool:
+        """Take note of turns that have ended, and return whether another one of such a run is due at once.
+
+        Args:
+            turns: When the next turn of each run is due.
+        """
+        at_once = False
+        for run_id, due in turns.items():
+            given = self._given.pop(run_id)
+            if run_id in self._at:
+                self._set(run_id, due if self.seen.get(run_id) is given else NOW)
+                at_once |= self._at[run_id] == NOW
+        return at_once
+
+    def soonest(self, most: float) -> float:
+        """Return the seconds until the next turn is due that is not due yet, at most so many."""
+        now = time.monotonic()
+        return min([most, *(at - now for at in self._at.values() if at > now)])
+
+    def busy_first(self, run_ids: Collection[int]) -> Sequence[int]:
+        """Return runs by the time of their next turn."""
+        return sorted(run_ids, key=lambda run_id: (self._at.get(run_id, AT_NEWS), run_id))
+
+    def at_rest(self) -> Sequence[int]:
+        """Return the runs that wait for news."""
+        return [run_id for run_id, at in self._at.items() if at == AT_NEWS]
+
+    def waited(self) -> float:
+        """Return the longest time that a turn which was due has waited since the last call."""
+        now, longest = time.monotonic(), self._longest
+        self._longest = 0.0
+        waits = (self._waits(run_id, now) for run_id in list(self._since) if run_id not in self._given)
+        return max([longest, *waits])
+
+    def _waits(self, run_id: int, now: float) -> float:
+        return max(0.0, now - self._since.get(run_id, now))
+
+    def _set(self, run_id: int, at: float) -> None:
+        self._at[run_id] = at
+        if at == AT_NEWS:
+            self._since.pop(run_id, None)
+        else:
+            self._since[run_id] = max(at, time.monotonic())

@@ -1,0 +1,160 @@
+"""Lives that wait leave memory, and come back as they were once something is new for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from sqlalchemy import select
+
+from parenting.server.db import Database
+from parenting.server.new_run import NewRun, start
+from parenting.server.operator_events import add_operator_event
+from parenting.server.queue.answers import answer
+from parenting.server.queue.leases import lease
+from parenting.server.queue.revisions import supersede, withdraw
+from parenting.server.queue.skips import skip
+from parenting.server.queue.worker_side import look, post_query
+from parenting.server.runs import Claim, claim, let_go, set_goal, set_pace, set_status
+from parenting.server.session import RunSession
+from parenting.server.settings import Settings
+from parenting.server.statuses import RunStatus
+from parenting.server.tables import Query
+from parenting.server.work.watching import Watching
+from parenting.server.worker import Worker
+from tests.server.conftest import CLIPS
+
+ANSWERS = 2
+
+
+@pytest.fixture(autouse=True)
+def brisk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Checkpoints follow each tick, so that a run that waits is at rest at once."""
+    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr("parenting.server.why.WRITE_SECONDS", 0.0)
+
+
+def begin(db: Database, number: int) -> list[int]:
+    new = NewRun(world="unsafe-exploration", parent="human", seed=3, config={"p_pref": 0.0})
+    return [start(db, new).id for _ in range(number)]
+
+
+def few(settings: Settings, most: int = 1) -> Settings:
+    return settings.model_copy(update={"lives": most})
+
+
+def rounds(worker: Worker, met: Callable[[], bool]) -> None:
+    """Do as the worker's loop does, until something holds."""
+    for _ in range(400):
+        if met():
+            return
+        worker._go_on()
+    raise AssertionError("it does not come to that")
+
+
+def asked(db: Database, run: int) -> list[tuple[Any, ...]]:
+    """What a run has asked, by its ticks."""
+    with db.read() as session:
+        rows = select(Query.tick, Query.kind, Query.clips).where(Query.run_id == run).order_by(Query.tick)
+        return [tuple(row) for row in session.execute(rows)]
+
+
+def raise_them(db: Database, worker: Worker, runs: list[int]) -> None:
+    """Answer the questions of some runs in turn, each once its agent has asked."""
+    for number in range(1, ANSWERS + 1):
+        rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
+        for run in runs:
+            found = lease(db, run, "me")
+            assert found is not None
+            answer(db, found.id, "either", "me", "human")
+            rounds(worker, lambda: len(asked(db, run)) > number)  # noqa: B023
+
+
+def test_lives_that_come_back_go_on_as_if_they_had_never_left(db: Database, settings: Settings) -> None:
+    (stayed,) = begin(db, 1)
+    worker = Worker(db, settings)
+    raise_them(db, worker, [stayed])
+    worker._close()
+    set_status(db, stayed, RunStatus.STOPPED)
+    runs = begin(db, 3)
+    worker = Worker(db, few(settings))
+    raise_them(db, worker, runs)
+    rounds(worker, lambda: len(worker.sessions) == 1)
+    assert set(worker.claims) == set(runs), "they leave memory, not the worker"
+    assert all(asked(db, run) == asked(db, stayed) for run in runs)
+    worker._close()
+
+
+def test_runs_that_wait_are_not_taken_up_beyond_what_memory_should_hold(
+    db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run whose record goes beyond its last checkpoint is: it has ticks to repeat."""
+    runs, worker = begin(db, 4), Worker(db, settings)
+    raise_them(db, worker, runs)
+    worker._close()
+    with db.write() as session:
+        late = session.scalars(select(Query).where(Query.run_id == runs[3]).order_by(Query.tick)).all()[-1]
+        late.tick += 1
+    taken: list[int] = []
+    take_up = RunSession.__init__
+
+    def noted(self: RunSession, db: Database, mine: Claim, *more: Any) -> None:
+        taken.append(mine.run_id)
+        take_up(self, db, mine, *more)
+
+    monkeypatch.setattr(RunSession, "__init__", noted)
+    worker = Worker(db, few(settings))
+    for _ in range(5):
+        worker._go_on()
+    assert taken == [runs[0], runs[3]]
+    worker._close()
+
+
+def test_the_least_recently_used_life_leaves_first(db: Database, settings: Settings) -> None:
+    runs, worker = begin(db, 3), Worker(db, few(settings, 2))
+    rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
+    raise_them(db, worker, [runs[1], runs[0], runs[2]])
+    rounds(worker, lambda: len(worker.sessions) == 2)
+    assert set(worker.sessions) == {runs[0], runs[2]}
+    worker._close()
+
+
+def test_every_deed_of_a_parent_or_an_operator_is_news(db: Database) -> None:
+    """The one statement that watches over all runs misses nothing that a look at each would show."""
+    (run, other) = begin(db, 2)
+    claims = {mine.run_id: mine for mine in claim(db, "me")}
+    watching = Watching(db)
+    one = post_query(db, claims[run], 1, "guidance", 1, CLIPS)
+    two = post_query(db, claims[run], 2, "preference", 1, CLIPS)
+    assert set(watching.look("me", claims).found) == {run, other}
+    deeds: list[Callable[[], Any]] = [
+        lambda: answer(db, one, "left", "a", "human"),
+        lambda: withdraw(db, one, "a"),
+        lambda: answer(db, one, "right", "a", "human"),
+        lambda: supersede(db, one, "left", "a", "human"),
+        lambda: skip(db, two, "a", "human"),
+        lambda: add_operator_event(db, run, "change", {"kind": "change", "name": "p_guid", "value": 0.5}),
+        lambda: set_goal(db, run, 5),
+        lambda: set_pace(db, run, 2.0),
+        lambda: set_status(db, run, RunStatus.PAUSED),
+        lambda: set_status(db, run, RunStatus.ACTIVE),
+    ]
+    for deed in deeds:
+        deed()
+        news = watching.look("me", claims)
+        assert news.found == look(db, [run])
+        assert watching.look("me", claims) is news, "nobody has committed since"
+    set_status(db, run, RunStatus.STOPPED)
+    assert watching.look("me", claims).found[run].status is RunStatus.STOPPED
+
+
+def test_what_is_lost_and_what_nobody_told_of_is_seen(db: Database) -> None:
+    lost, kept, untold = begin(db, 3)
+    mine = {one.run_id: one for one in claim(db, "me")}
+    let_go(db, [mine[lost]])
+    known = {run_id: one for run_id, one in mine.items() if run_id != untold}
+    news = Watching(db).look("me", known)
+    assert set(news.lost) == {lost}
+    assert list(news.unknown) == [mine[untold]]
+    assert set(news.found) == {kept}
