@@ -20,7 +20,7 @@ evaluation of a large level."""
 
 
 class Figures(NamedTuple):
-    """What a worker says of itself with each sign of life."""
+    """The figures that a worker tells of itself with each sign of life."""
 
     runs: int | None = None
     """The runs that it raises."""

@@ -1,4 +1,4 @@
-"""Which lives stay in memory: those that go on, and of those that wait the ones that had a turn lately.
+"""The lives that stay in memory: those that go on, and of those that wait the ones that had a turn lately.
 
 The others come back from their checkpoints once something is new for them. That takes some hundredths of a
 second, and nothing of the agent depends on it: it is what happens to every life when a worker begins.

@@ -1,4 +1,4 @@
-"""When the next turn of each run is due, and how long turns that are due wait until they begin."""
+"""The times at which turns of runs are due, and the time that a turn which is due waits until it begins."""
 
 from __future__ import annotations
 

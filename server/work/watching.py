@@ -1,4 +1,4 @@
-"""What is new of the runs that a worker raises: one statement for all of them, whenever somebody commits.
+"""The news of the runs that a worker raises: one statement for all of them, whenever somebody commits.
 
 It reads what any verb of a parent or an operator changes. Only where that differs from the last look, or
 where a turn of the worker itself may have changed more, is a run looked at as a whole. So a commit costs a
@@ -27,7 +27,7 @@ _MARKS = text(
 
 @dataclass(frozen=True)
 class News:
-    """What a look has shown."""
+    """The result of a look."""
 
     found: Mapping[int, Watch]
     """The runs that may have changed."""

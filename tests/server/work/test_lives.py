@@ -54,7 +54,7 @@ def rounds(worker: Worker, met: Callable[[], bool]) -> None:
 
 
 def asked(db: Database, run: int) -> list[tuple[Any, ...]]:
-    """What a run has asked, by its ticks."""
+    """The questions of a run, by their ticks."""
     with db.read() as session:
         rows = select(Query.tick, Query.kind, Query.clips).where(Query.run_id == run).order_by(Query.tick)
         return [tuple(row) for row in session.execute(rows)]
