@@ -1,55 +1,68 @@
-"""Live streams: browsers follow a run by server-sent events.
+"""Live streams: browsers follow runs by server-sent events, and requests for a question lie here.
 
-However many browsers follow a run, one task polls the database for it, four times a second and after each
-notification of the worker. A question is sent without delay, everything else at most once in 250 ms. Streams
-end at once when the server stops.
+However many follow however many runs, one task looks at all of them with one read of the database, four times
+a second and after each notification of a worker. Who waits for a question is told at once, everything else at
+most once in 250 ms, and what is told of a run is written once for all of its streams. Streams end at once
+when the server stops.
 """
 
 from __future__ import annotations
 
 import asyncio
-import json
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from fastapi.sse import ServerSentEvent
 
 from parenting.server.admission import Admission
 from parenting.server.db import Database
-from parenting.server.errors import NotFound, ServerError, StoreError, TooManyStreamsError
+from parenting.server.errors import ServerError, StoreError, TooManyStreamsError
 from parenting.server.notify import Notifier
-from parenting.server.queue.leases import waiting
-from parenting.server.queue.presence import held
-from parenting.server.reads.metrics import list_metrics
-from parenting.server.reads.schemas import metric_schemas, run_schema
+from parenting.server.reads.watching import Look, Rows, Seen, look, told_metrics, told_runs
 from parenting.server.store.relay import Relay
 
 POLL_SECONDS = 0.25
-"""Seconds between polls, and at least between two events of the same browser, questions excepted."""
-YIELD_SECONDS = 0.1
-"""After a notification, streams wait this many seconds so that requests for a question are served first."""
+"""Seconds between looks, and at least between two events of the same run, questions and leases excepted."""
+REST = 9
+"""The watcher rests for so many times the processor's time that a look took, `LONGEST_REST` at most."""
+LONGEST_REST = 0.1
+UNSURE_SECONDS = 1.0
+"""Seconds after which a run whose worker is silent is read again: others decide whether one may come."""
+AGAIN_SECONDS = 1.0
+"""Seconds after which who waits for a question asks again, whether anything was seen to change or not."""
 
 Found = TypeVar("Found")
-Seen = tuple[dict[str, Any], dict[str, Any] | None, list[dict[str, str]]]
-
-ROWS = 10_000
-"""Metrics in one event, at most."""
 
 
 @dataclass
 class Subscription:
-    """The last known state of one run, shared by every stream of it."""
+    """The last known state of one run, shared by all who wait for news of it."""
 
     streams: int = 0
-    run: dict[str, Any] = field(default_factory=dict)
-    question: dict[str, Any] | None = None
-    leases: list[dict[str, str]] = field(default_factory=list)
+    requests: int = 0  # that wait for a question
+    holders: int = 0  # both of them, and who else has it watched
+    seen: Seen | None = None
+    run: str = ""  # as JSON
+    stale: bool = True  # it has changed since
+    read: float = float("-inf")  # when it was read, by the monotonic clock
+    rows: dict[int, asyncio.Future[Rows]] = field(default_factory=dict)  # its metrics after a tick
     changed: asyncio.Event = field(default_factory=asyncio.Event)
-    task: asyncio.Task[None] | None = None
+    offered: asyncio.Event = field(default_factory=asyncio.Event)
     gone: bool = False  # the run was deleted
+
+    def offer(self) -> None:
+        """Wake those who wait for a question."""
+        self.offered.set()
+        self.offered = asyncio.Event()
+
+    def tell(self) -> None:
+        """Wake the streams."""
+        self.changed.set()
+        self.changed = asyncio.Event()
 
 
 class Streams:
@@ -60,9 +73,10 @@ class Streams:
         self.subscriptions: dict[int, Subscription] = {}
         self.relay = Relay(db.engine, "web", notifier.wake)
         self.closed = False
-        self.waiting_requests = 0  # requests for a question that lie here
-        self._notified = asyncio.Event()
+        self._news = asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._watcher: asyncio.Task[None] | None = None
+        self._ends, self._ended = float("inf"), 0  # the next end of a lease, and how many have come
 
     def open(self) -> None:
         """Begin to listen for notifications, in the running event loop."""
@@ -86,114 +100,150 @@ class Streams:
 
     async def subscribe(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
         """The events of a run; `metrics` of the ticks after `after` are among them unless that is None."""
-        subscription = self._join(run_id)
-        try:
-            seen: dict[str, Any] = {}
-            asked: Any = ...
-            leases: Any = []
-            ready = 0.0
-            while not self.closed and not subscription.gone:
-                changed = subscription.changed
-                if subscription.run and subscription.question != asked:
-                    asked = subscription.question
-                    yield ServerSentEvent(event="question", raw_data=json.dumps(asked))  # "null" is data too
-                if subscription.leases != leases:
-                    leases = subscription.leases
-                    yield ServerSentEvent(event="leases", raw_data=json.dumps(leases))
-                now = asyncio.get_running_loop().time()
-                if subscription.run != seen and now >= ready:
-                    seen, ready = subscription.run, now + POLL_SECONDS
-                    yield ServerSentEvent(event="run", data=seen)
-                    async for event in self._metrics(run_id, after):
-                        after = int(event.id or -1)
-                        yield event
-                await either(changed, ready - now if subscription.run != seen else None)
-        finally:
-            self._leave(run_id, subscription)
-
-    async def _metrics(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
-        while after is not None:
+        question, leases, run = "", "[]", ""
+        with self.joined(run_id) as subscription:
+            subscription.streams += 1
             try:
-                rows = await self.admission.read(list_metrics, self.db, run_id, after, ROWS)
+                while not self.closed and not subscription.gone:
+                    changed, seen = subscription.changed, subscription.seen
+                    if seen is not None and seen.question != question:
+                        question = seen.question
+                        yield ServerSentEvent(event="question", raw_data=question)  # "null" is data too
+                    if seen is not None and seen.leases != leases:
+                        leases = seen.leases
+                        yield ServerSentEvent(event="leases", raw_data=leases)
+                    if subscription.run != run:
+                        run = subscription.run
+                        yield ServerSentEvent(event="run", raw_data=run)
+                        async for event in self._metrics(run_id, subscription, after):
+                            after = int(event.id or -1)
+                            yield event
+                    await changed.wait()
+            finally:
+                subscription.streams -= 1
+
+    async def _metrics(
+        self, run_id: int, subscription: Subscription, after: int | None
+    ) -> AsyncIterator[ServerSentEvent]:
+        more = after is not None
+        while more and after is not None:
+            reading = subscription.rows.get(after)
+            if reading is None:
+                read = self.admission.read(told_metrics, self.db, run_id, after)
+                reading = subscription.rows[after] = asyncio.ensure_future(read)
+                asyncio.get_running_loop().call_later(POLL_SECONDS, subscription.rows.pop, after, None)
+            try:
+                rows = await asyncio.shield(reading)
             except StoreError:  # the next change of the run sends them
                 return
-            shown = [row.model_dump(mode="json") for row in metric_schemas(rows)]
-            ticks = [row["tick"] for row in shown if row["tick"] is not None]
-            if ticks:
-                yield ServerSentEvent(event="metrics", data={"rows": shown}, id=str(ticks[-1]))
-            # there may be more: a run that is over stays so
-            after = ticks[-1] if ticks and len(rows) == ROWS else None
+            if rows.last is not None:
+                after = rows.last
+                yield ServerSentEvent(event="metrics", raw_data=rows.text, id=str(after))
+            more = rows.more  # a run that is over does not change again
 
     async def wait_for(
-        self, look: Callable[[], Found | None], seconds: float, gone: Callable[[], Awaitable[bool]]
+        self,
+        run_id: int,
+        look: Callable[[], Awaitable[Found | None]],
+        seconds: float,
+        gone: Callable[[], Awaitable[bool]],
     ) -> Found | None:
         """Return what `look` finds now or within `seconds`; None if it finds nothing.
 
-        It looks again after each notification and every `POLL_SECONDS`. It does not wait when as many
-        requests wait already as streams are allowed. It stops looking once the client is `gone`: a question
-        would be leased to nobody.
+        It looks again when another question of the run may be leased. It does not wait when as many requests
+        wait already as streams are allowed. It stops once the client is `gone`: a question would be leased to
+        nobody.
         """
-        until = time.monotonic() + (seconds if self.waiting_requests < self.limit else 0.0)
-        self.waiting_requests += 1
-        try:
-            while not await gone():
-                notified = self._notified
-                found = await self.admission.write(look)
-                left = until - time.monotonic()
-                if found is not None or left <= 0 or self.closed:
-                    return found
-                await either(notified, min(left, POLL_SECONDS))
-            return None
-        finally:
-            self.waiting_requests -= 1
-
-    def _join(self, run_id: int) -> Subscription:
-        subscription = self.subscriptions.setdefault(run_id, Subscription())
-        subscription.streams += 1
-        if subscription.task is None:
-            subscription.task = asyncio.create_task(self._watch(run_id, subscription))
-        return subscription
-
-    def _leave(self, run_id: int, subscription: Subscription) -> None:
-        subscription.streams -= 1
-        if not subscription.streams and subscription.task is not None:
-            subscription.task.cancel()
-            del self.subscriptions[run_id]
-
-    async def _watch(self, run_id: int, subscription: Subscription) -> None:
-        while not self.closed:
-            notified = self._notified
-            look = partial(_look, self.db, run_id)
-            ends_in: float | None = None
+        waiting = sum(one.requests for one in self.subscriptions.values())
+        until = time.monotonic() + (seconds if waiting < self.limit else 0.0)
+        with self.joined(run_id) as subscription:
+            subscription.requests += 1
             try:
-                now, ends_in = await self.admission.read(look)
-            except NotFound:
-                subscription.gone = True  # its streams end, and whoever opens one again gets 404
-                _tell(subscription)
-                return
-            except ServerError:  # busy: the next look will tell
-                now = subscription.run, subscription.question, subscription.leases
-            if now != (subscription.run, subscription.question, subscription.leases):
-                subscription.run, subscription.question, subscription.leases = now
-                _tell(subscription)
-            # nobody notifies of the end of a lease
-            await either(notified, POLL_SECONDS if ends_in is None else min(POLL_SECONDS, ends_in))
-            if notified.is_set() and self.waiting_requests:
-                await asyncio.sleep(YIELD_SECONDS)
+                while not await gone():
+                    offered, again = subscription.offered, time.monotonic() + AGAIN_SECONDS
+                    found = await look()
+                    if found is not None or time.monotonic() >= until or self.closed:
+                        return found
+                    while not offered.is_set() and time.monotonic() < min(until, again):
+                        await either(offered, min(min(until, again) - time.monotonic(), POLL_SECONDS))
+                        if await gone():
+                            return None
+                return None
+            finally:
+                subscription.requests -= 1
 
-    def news(self) -> asyncio.Event:
-        """Return what the next notification sets; take it before the look that it is to repeat."""
-        return self._notified
+    @contextmanager
+    def joined(self, run_id: int) -> Iterator[Subscription]:
+        """Have a run watched within the block."""
+        subscription = self.subscriptions.setdefault(run_id, Subscription())
+        subscription.holders += 1
+        if subscription.seen is None:
+            self._wake_watcher()
+        if self._watcher is None or self._watcher.done():
+            self._watcher = asyncio.create_task(self._watch())
+        try:
+            yield subscription
+        finally:
+            subscription.holders -= 1
+            if not subscription.holders:
+                self.subscriptions.pop(run_id, None)
+                self._wake_watcher()  # it ends where nothing is watched any more
+
+    async def _watch(self) -> None:
+        while self.subscriptions and not self.closed:
+            news, cost = self._news, 0.0
+            with suppress(ServerError):  # busy: the next look will tell
+                cost = await self._look()
+                await self._read()
+            await asyncio.sleep(min(REST * cost, LONGEST_REST))
+            await either(news, self._pause())
+
+    async def _look(self) -> float:
+        """Look at every run that is watched, unless nobody has committed since; return what that cost."""
+        ids, now = tuple(self.subscriptions), time.monotonic()
+        self._ended += now >= self._ends
+        key = ("watched", *ids, now // UNSURE_SECONDS, self._ended)
+        found: Look = await self.admission.read(self.db.cached, key, partial(look, self.db, ids))
+        self._ends = found.ends
+        for run_id in ids:
+            if run_id in self.subscriptions:
+                _take(self.subscriptions[run_id], found.runs.get(run_id), now)
+        return found.cost
+
+    async def _read(self) -> None:
+        """Read the runs that have changed and have streams, each at most once in `POLL_SECONDS`."""
+        now = time.monotonic()
+        due = {i: one for i, one in self.subscriptions.items() if one.streams and _ready(one) <= now}
+        if not due:
+            return
+        for subscription in due.values():
+            subscription.read = now
+        texts = await self.admission.read(told_runs, self.db, list(due))
+        for run_id, subscription in due.items():
+            subscription.stale = False
+            text = texts.get(run_id, subscription.run)
+            if text != subscription.run:
+                subscription.run, subscription.rows = text, {}
+                subscription.tell()
+
+    def _pause(self) -> float:
+        now = time.monotonic()
+        ready = (_ready(one) for one in self.subscriptions.values() if one.streams)
+        return min(POLL_SECONDS, self._ends - now, min(ready, default=float("inf")) - now)
+
+    def _wake_watcher(self) -> None:
+        self._news.set()
+        self._news = asyncio.Event()
 
     def _on_notification(self) -> None:
         self.notifier.drain()
-        self._notified.set()
-        self._notified = asyncio.Event()
+        self._wake_watcher()
 
     def _wake_all(self) -> None:
-        self._notified.set()
+        self._wake_watcher()
         for subscription in self.subscriptions.values():
-            _tell(subscription)
+            subscription.offer()
+            subscription.tell()
 
     def number(self) -> int:
         """Return how many streams are open."""
@@ -209,22 +259,29 @@ class Streams:
             raise TooManyStreamsError
 
 
-def _tell(subscription: Subscription) -> None:
-    subscription.changed.set()
-    subscription.changed = asyncio.Event()
+def _ready(subscription: Subscription) -> float:
+    """Return when a run may be read; never where it has not changed."""
+    return subscription.read + POLL_SECONDS if subscription.stale else float("inf")
 
 
-def _look(db: Database, run_id: int) -> tuple[Seen, float | None]:
-    """The run, its most urgent open question, and its leases; then the seconds until one of them ends."""
-    query = waiting(db, run_id)
-    question = None if query is None else {"id": query.id, "public_id": query.public_id, "kind": query.kind}
-    leases = held(db, run_id)
-    return (run_schema(db, run_id).model_dump(mode="json"), question, leases.leases), leases.ends_in
-
-
-async def either(event: asyncio.Event, timeout: float | None) -> None:
-    """Wait for an event, or for so many seconds; None waits for the event alone."""
-    try:
-        await asyncio.wait_for(event.wait(), None if timeout is None else max(timeout, 0.0))
-    except TimeoutError:
+def _take(subscription: Subscription, seen: Seen | None, now: float) -> None:
+    """Note what was seen of a run, and wake those whom it concerns."""
+    before, subscription.seen = subscription.seen, seen
+    if seen is None:
+        subscription.gone = True  # its streams end, and whoever opens one again gets 404
+        subscription.offer()
+        subscription.tell()
         return
+    if before is None or seen.offers != before.offers:
+        subscription.offer()
+    if before is None or (seen.question, seen.leases) != (before.question, before.leases):
+        subscription.tell()
+    changed = before is None or (seen.row, seen.signed) != (before.row, before.signed)
+    if changed or (not seen.signed and now - subscription.read >= UNSURE_SECONDS):
+        subscription.stale = True
+
+
+async def either(event: asyncio.Event, timeout: float) -> None:
+    """Wait for an event, or for so many seconds."""
+    with suppress(TimeoutError):
+        await asyncio.wait_for(event.wait(), max(timeout, 0.0))

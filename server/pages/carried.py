@@ -23,14 +23,14 @@ from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import ClientId, Strict
 from parenting.server.api.names import PublicId
 from parenting.server.db import Database
-from parenting.server.deps import Db, SettingsOf
+from parenting.server.deps import Db, SettingsOf, store
 from parenting.server.errors import NotFound, ServerError
 from parenting.server.identity import database_id
 from parenting.server.pages.question import question_view
 from parenting.server.pages.render import render
-from parenting.server.queue.leases import lease_more
+from parenting.server.queue.leases import More
 from parenting.server.reads.names import query_numbers, run_number
-from parenting.server.streams import POLL_SECONDS, Streams, either
+from parenting.server.streams import AGAIN_SECONDS, POLL_SECONDS, Streams, either
 from parenting.server.tables import Query, Run
 
 router = admitted_router(include_in_schema=False)
@@ -83,7 +83,7 @@ async def carry(
             continue
         tasks.append(asyncio.create_task(_follow(streams, run.id, at, events)))
         if page.asks:
-            asks = _ask(streams, db, run, page, settings.lease_seconds, at, events)
+            asks = _ask(request, db, run, page, settings.lease_seconds, at, events)
             tasks.append(asyncio.create_task(asks))
     try:
         while (event := await events.get()) is not None:
@@ -98,13 +98,12 @@ async def _follow(
 ) -> None:
     """Pass on what happens in a run; the server's end ends the stream."""
     async for event in streams.subscribe(run_id, None):
-        data = json.loads(event.raw_data) if event.raw_data is not None else event.data
-        await events.put(_event(event.event, at, data))
+        await events.put(ServerSentEvent(event=event.event, raw_data=f"[{at}, {event.raw_data}]"))
     await events.put(None)
 
 
 async def _ask(
-    streams: Streams,
+    request: Request,
     db: Database,
     run: Run,
     page: CarriedPage,
@@ -112,18 +111,25 @@ async def _ask(
     at: int,
     events: asyncio.Queue[ServerSentEvent | None],
 ) -> None:
-    """Lease the next question whenever the page has room for one, and pass it on."""
+    """Lease the next question whenever the page has room for one, and pass it on.
+
+    A look that follows a change and finds nothing is repeated once after `POLL_SECONDS`, since a question
+    that the page gave up is offered to others first.
+    """
+    streams: Streams = request.app.state.streams
     has = set(await streams.admission.read(query_numbers, db, page.shown))
-    lease = partial(lease_more, db, run.id, page.client_id, has, seconds)
-    while not streams.closed:
-        news, query = streams.news(), None
-        with suppress(ServerError):  # busy: the next look will tell
-            query = await streams.admission.write(lease)
-        if query is None:
-            await either(news, POLL_SECONDS)
-            continue
-        has.add(query.id)
-        await events.put(_event("asked", at, await streams.admission.read(_markup, db, run, query, page)))
+    wish, pause = More(db, run.id, page.client_id, has, seconds), POLL_SECONDS
+    with streams.joined(run.id) as subscription:
+        while not streams.closed:
+            offered, query = subscription.offered, None
+            with suppress(ServerError):  # busy: the next look will tell
+                query = await store(request, wish.hold, durable=False, worth=wish.is_offered)
+            if query is None:
+                await either(offered, pause)
+                pause = POLL_SECONDS if offered.is_set() else AGAIN_SECONDS
+                continue
+            has.add(query.id)
+            await events.put(_event("asked", at, await streams.admission.read(_markup, db, run, query, page)))
 
 
 def _markup(db: Database, run: Run, query: Query, page: CarriedPage) -> str:

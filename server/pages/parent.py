@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -32,7 +32,7 @@ from parenting.server.pages.render import page, redirect
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, parent_title
 from parenting.server.public_ids import LENGTH
 from parenting.server.queue import answers, leases
-from parenting.server.queue.leases import lease_ahead, may_lease
+from parenting.server.queue.leases import may_lease
 from parenting.server.queue.names import Names
 from parenting.server.queue.presence import holder
 from parenting.server.reads.names import query_number, query_numbers
@@ -141,10 +141,10 @@ async def question(
     streams: Streams = request.app.state.streams
     run = await streams.admission.read(runs.get_run, db, run_id)
     numbers = await streams.admission.read(query_numbers, db, shown)
-    lease = partial(_lease_next, db, run_id, client_id, numbers, settings.lease_seconds)
+    wish = leases.wanted(db, run_id, client_id, settings.lease_seconds, numbers or None)
     if take:
-        lease = partial(leases.take, db, run_id, client_id, settings.lease_seconds)
-    query = await streams.wait_for(lease, wait, request.is_disconnected)
+        wish = leases.taken(db, run_id, client_id, settings.lease_seconds)
+    query = await wait_for(request, run_id, wish, wait)
     if query is None:
         return Response(status_code=204)
     if await request.is_disconnected():  # it left while the question was looked up
@@ -189,16 +189,15 @@ async def answer(
     stored = await store(request, partial(answers.answer_in, db=db, query=question, said=said, names=names))
     notify_worker(request)
     run = await streams.admission.read(runs.get_run, db, stored.run)
-    lease = partial(leases.lease, db, run.id, client_id, settings.lease_seconds)
-    return redirect(address(run, await streams.wait_for(lease, PATIENCE, request.is_disconnected)))
+    wish = leases.wanted(db, run.id, client_id, settings.lease_seconds)
+    return redirect(address(run, await wait_for(request, run.id, wish, PATIENCE)))
 
 
-def _lease_next(
-    db: Database, run_id: int, client_id: str, shown: Sequence[int], seconds: float
-) -> tables.Query | None:
-    if shown:
-        return lease_ahead(db, run_id, client_id, shown, seconds)
-    return leases.lease(db, run_id, client_id, seconds)
+async def wait_for(request: Request, run_id: int, wish: leases.Wish, seconds: float) -> tables.Query | None:
+    """Hold the question that a page wishes for, once there is one; None if none comes in time."""
+    look = partial(store, request, wish.hold, durable=False, worth=wish.is_offered)
+    streams: Streams = request.app.state.streams
+    return await streams.wait_for(run_id, look, seconds, request.is_disconnected)
 
 
 def _markup(db: Database, run: Run, query: tables.Query, client_id: str) -> Response:

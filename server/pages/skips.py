@@ -13,7 +13,7 @@ from parenting.server.admission import admitted_router
 from parenting.server.api.names import PublicId, RunId
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
 from parenting.server.pages.fields import ClientField, DatabaseField, QuestionField
-from parenting.server.pages.parent import PATIENCE, address
+from parenting.server.pages.parent import PATIENCE, address, wait_for
 from parenting.server.pages.render import redirect
 from parenting.server.queue import leases
 from parenting.server.queue.answers import Said
@@ -49,8 +49,8 @@ async def skip(
     await asyncio.sleep(OTHERS_FIRST)
     streams: Streams = request.app.state.streams
     run = await streams.admission.read(runs.get_run, db, found.run)
-    lease = partial(leases.lease, db, run.id, client_id, settings.lease_seconds)
-    return redirect(address(run, await streams.wait_for(lease, PATIENCE, request.is_disconnected)))
+    wish = leases.wanted(db, run.id, client_id, settings.lease_seconds)
+    return redirect(address(run, await wait_for(request, run.id, wish, PATIENCE)))
 
 
 @router.get("/runs/{run_id}/parent/again")

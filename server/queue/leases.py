@@ -7,6 +7,7 @@ browser dies. Each verb is one transaction.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
@@ -41,7 +42,7 @@ def lease(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECO
     Guidance goes first, then the oldest query. A client that holds one already gets the same one again, for
     `seconds` more. A run that has reached its goal offers nothing.
     """
-    return _hold(db, _OFFER, {"run_id": run_id, "client_id": client_id}, seconds)
+    return _hold(wanted(db, run_id, client_id, seconds))
 
 
 def lease_ahead(
@@ -51,33 +52,14 @@ def lease_ahead(
 
     None if nothing is free, or if the run's goal is reached once those shown are answered.
     """
-    asks = {"run_id": run_id, "client_id": client_id, "shown": list(shown), "to_come": list(shown)}
-    return _hold(db, _AHEAD, asks, seconds)
+    return _hold(wanted(db, run_id, client_id, seconds, shown))
 
 
 def lease_more(
     db: Database, run_id: int, client_id: str, has: set[int], seconds: float = LEASE_SECONDS
 ) -> Query | None:
-    """Hold one query more for a page that has room for it, besides those that it `has`; None if not.
-
-    A page has room for `ROOM`, and for guidance also where it has so many preferences. Queries that are no
-    longer open, or held by this client, leave `has`. Where it gave one up, such as one that was put back,
-    other parents come first: nothing is held until the next call.
-    """
-    with db.read() as session:
-        seen = {"run_id": run_id, "client_id": client_id, "has": list(has), **db.mark(session).bound()}
-        rows = session.execute(_OPEN_OF, seen).all()
-        first = session.execute(_FIRST, {"run_id": run_id}).first()
-    has.intersection_update(row.id for row in rows if row.mine)
-    if first is None or not all(row.mine for row in rows):
-        return None
-    if len(has) >= ROOM and (first.id in has or first.kind != "guidance"):
-        return None
-    return (
-        lease_ahead(db, run_id, client_id, sorted(has), seconds)
-        if has
-        else lease(db, run_id, client_id, seconds)
-    )
+    """Hold one query more for a page that has room for it, as `More` says; None if not."""
+    return _hold(More(db, run_id, client_id, has, seconds))
 
 
 def take(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECONDS) -> Query | None:
@@ -85,13 +67,98 @@ def take(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECON
 
     Their page says so; whoever answers first, that answer stands. None if nothing is open.
     """
-    return _hold(db, _TAKEN, {"run_id": run_id, "client_id": client_id}, seconds)
+    return _hold(taken(db, run_id, client_id, seconds))
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A client's wish for a query, to be granted in a transaction that is already open."""
+
+    db: Database
+    offer: Any
+    asks: dict[str, Any]
+    seconds: float
+
+    def is_offered(self, session: Session) -> bool:
+        """Return whether there is such a query; this locks nothing."""
+        seen = {**self.asks, **self.db.mark(session).bound()}
+        return session.execute(self.offer.with_only_columns(Query.id), seen).first() is not None
+
+    def hold(self, session: Session) -> Query | None:
+        """Hold it, and return it; None if there is none. Not durable by itself."""
+        db = self.db
+        if not db.one_writer:
+            lock(session, self.asks["run_id"])
+        mark = db.mark(session)  # behind the lock: nobody else's lease begins later
+        query = _first_readable(session, self.offer, {**self.asks, **mark.bound()})
+        if query is not None:
+            held = _columns(db, mark, self.asks["client_id"], self.seconds)
+            session.execute(_HELD, {"query_id": query.id, "leased_at": db.clock(), **held})
+            for name, value in held.items():
+                set_committed_value(query, name, value)
+            db.outlive_crash(session)
+        return query
+
+
+def wanted(
+    db: Database,
+    run_id: int,
+    client_id: str,
+    seconds: float = LEASE_SECONDS,
+    shown: Sequence[int] | None = None,
+) -> Wish:
+    """Return the wish that `lease` grants, or `lease_ahead` where it is told what is `shown`."""
+    asks: dict[str, Any] = {"run_id": run_id, "client_id": client_id}
+    if shown is None:
+        return Wish(db, _OFFER, asks, seconds)
+    return Wish(db, _AHEAD, asks | {"shown": list(shown), "to_come": list(shown)}, seconds)
+
+
+def taken(db: Database, run_id: int, client_id: str, seconds: float = LEASE_SECONDS) -> Wish:
+    """Return the wish that `take` grants."""
+    return Wish(db, _TAKEN, {"run_id": run_id, "client_id": client_id}, seconds)
+
+
+@dataclass(frozen=True)
+class More:
+    """A page's wish for one query more, where it has room for it, besides those that it `has`.
+
+    A page has room for `ROOM`, and for guidance also where it has so many preferences. Queries that are no
+    longer open, or held by this client, leave `has`. Where it gave one up, such as one that was put back,
+    other parents come first: nothing is held until the next call.
+    """
+
+    db: Database
+    run_id: int
+    client_id: str
+    has: set[int]
+    seconds: float = LEASE_SECONDS
+
+    def is_offered(self, session: Session) -> bool:
+        """Return whether there is room, and a query for it; this locks nothing."""
+        return self._has_room(session) and self._wish().is_offered(session)
+
+    def hold(self, session: Session) -> Query | None:
+        """Hold it as `Wish.hold` does."""
+        return self._wish().hold(session) if self._has_room(session) else None
+
+    def _wish(self) -> Wish:
+        return wanted(self.db, self.run_id, self.client_id, self.seconds, sorted(self.has) or None)
+
+    def _has_room(self, session: Session) -> bool:
+        seen = {"run_id": self.run_id, "client_id": self.client_id, "has": list(self.has)}
+        rows = session.execute(_OPEN_OF, seen | self.db.mark(session).bound()).all()
+        first = session.execute(_FIRST, {"run_id": self.run_id}).first()
+        self.has.intersection_update(row.id for row in rows if row.mine)
+        if first is None or not all(row.mine for row in rows):
+            return False
+        return len(self.has) < ROOM or (first.id not in self.has and first.kind == "guidance")
 
 
 def may_lease(db: Database, run_id: int, client_id: str) -> bool:
     """Return whether a query is free for this client, or held for it already."""
     with db.read() as session:
-        return is_offered(session, db, run_id, client_id)
+        return wanted(db, run_id, client_id).is_offered(session)
 
 
 def release(db: Database, query_id: int, client_id: str) -> None:
@@ -109,41 +176,20 @@ def release(db: Database, query_id: int, client_id: str) -> None:
 
 def is_offered(session: Session, db: Database, run_id: int, client_id: str) -> bool:
     """Return whether a query is free for this client, or held for it already, in an open transaction."""
-    return _is_offered(session, db, _OFFER, {"run_id": run_id, "client_id": client_id})
+    return wanted(db, run_id, client_id).is_offered(session)
 
 
 def lease_in(session: Session, db: Database, run_id: int, client_id: str, seconds: float) -> Query | None:
     """Hold a query as `lease` does, in a transaction that is already open; not durable by itself."""
-    return _hold_in(session, db, _OFFER, {"run_id": run_id, "client_id": client_id}, seconds)
+    return wanted(db, run_id, client_id, seconds).hold(session)
 
 
-def _hold(db: Database, offer: Any, asks: dict[str, Any], seconds: float) -> Query | None:
-    with db.read() as session:  # nothing to offer is the common case, and takes no lock
-        if not _is_offered(session, db, offer, asks):
+def _hold(wish: Wish | More) -> Query | None:
+    with wish.db.read() as session:  # nothing to offer is the common case, and takes no lock
+        if not wish.is_offered(session):
             return None
-    with db.write(durable=False) as session:
-        return _hold_in(session, db, offer, asks, seconds)
-
-
-def _is_offered(session: Session, db: Database, offer: Any, asks: dict[str, Any]) -> bool:
-    seen = {**asks, **db.mark(session).bound()}
-    return session.execute(offer.with_only_columns(Query.id), seen).first() is not None
-
-
-def _hold_in(
-    session: Session, db: Database, offer: Any, asks: dict[str, Any], seconds: float
-) -> Query | None:
-    if not db.one_writer:
-        lock(session, asks["run_id"])
-    mark = db.mark(session)  # behind the lock: nobody else's lease begins later
-    query = _first_readable(session, offer, {**asks, **mark.bound()})
-    if query is not None:
-        held = _columns(db, mark, asks["client_id"], seconds)
-        session.execute(_HELD, {"query_id": query.id, "leased_at": db.clock(), **held})
-        for name, value in held.items():
-            set_committed_value(query, name, value)
-        db.outlive_crash(session)
-    return query
+    with wish.db.write(durable=False) as session:
+        return wish.hold(session)
 
 
 def hold_in(session: Session, db: Database, query_id: int, client_id: str, seconds: float) -> None:

@@ -1,26 +1,33 @@
 """Live streams through a real server: what is told, how soon, how often."""
 
+import asyncio
 import json
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import httpx2
 import pytest
 import uvicorn
+from sqlalchemy import event
 
+from parenting.server.admission import Admission
 from parenting.server.app import create_app
 from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
+from parenting.server.new_run import NewRun, start
 from parenting.server.notify import Notifier
 from parenting.server.queue.answers import answer, get_query
 from parenting.server.queue.leases import lease
 from parenting.server.queue.presence import holder, leave
 from parenting.server.queue.worker_side import post_query
-from parenting.server.runs import Claim, report_progress
+from parenting.server.reads.watching import look, told_runs
+from parenting.server.runs import Claim, claim, report_progress
 from parenting.server.settings import Settings
-from parenting.server.streams import POLL_SECONDS
+from parenting.server.streams import POLL_SECONDS, Streams
+from parenting.server.tables import Run
 from tests.database import migrated
 from tests.server.conftest import CLIPS
 from tests.server.serving import Stream, until_up
@@ -140,7 +147,7 @@ def test_metrics_follow_a_tick(url: str, db: Database, mine: Claim) -> None:
 def test_metrics_of_a_long_life_come_in_parts(
     url: str, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("parenting.server.streams.ROWS", 2)
+    monkeypatch.setattr("parenting.server.reads.watching.ROWS", 2)
     write_metrics(db, mine, {tick: {"loss": 0.5} for tick in range(5)})
     told = follow(url, mine, "?after=-1").wait_for("metrics", 3)
     assert [[row["tick"] for row in part["rows"]] for part in told] == [[0, 1], [2, 3], [4]]
@@ -161,3 +168,70 @@ def test_one_stream_too_many_is_refused(url: str, mine: Claim) -> None:
     with httpx2.stream("GET", f"{url}/api/v1/runs/{mine.run_id}/events") as refused:
         assert refused.status_code == 503  # a stream that is not refused has no end to wait for
         assert json.loads(refused.read())["error"]["code"] == "too_many"
+
+
+def test_many_runs_are_looked_at_by_as_many_statements_as_one(db: Database, run: Run) -> None:
+    others = [start(db, NewRun(world="unsafe-exploration")).id for _ in range(5)]
+    said: list[str] = []
+    event.listen(db.engine, "before_cursor_execute", lambda *words: said.append(words[2]))
+    assert sorted(look(db, [run.id]).runs) == [run.id]
+    one = len(said)
+    assert sorted(look(db, [run.id, *others]).runs) == [run.id, *others]
+    assert len(said) == 2 * one
+
+
+def test_a_run_is_read_once_for_all_of_its_streams(
+    url: str, db: Database, settings: Settings, mine: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[Sequence[int]] = []
+
+    def noted(db: Database, runs: Sequence[int]) -> dict[int, str]:
+        read.append(runs)
+        return told_runs(db, runs)
+
+    monkeypatch.setattr("parenting.server.streams.told_runs", noted)
+    streams = [follow(url, mine) for _ in range(2)]
+    for stream in streams:
+        stream.wait_for("run")
+    before = len(read)
+    report_progress(db, mine, tick=9)
+    Notifier(settings.data, "web").notify()
+    for stream in streams:
+        assert stream.wait_for("run", 2)[1]["tick"] == 9
+    assert len(read) == before + 1
+
+
+def test_who_waits_for_a_question_of_one_run_does_not_look_when_another_asks(
+    settings: Settings, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The notification is the same; what the watcher saw decides."""
+    start(db, NewRun(world="unsafe-exploration"))
+    (other,) = claim(db, "worker-1")
+    streams = Streams(db, Notifier(settings.data, "web"), 2, Admission())
+    monkeypatch.setattr("parenting.server.streams.AGAIN_SECONDS", 3600)
+    looks = {mine.run_id: 0, other.run_id: 0}
+
+    def leases(run: int) -> Callable[[], Any]:
+        async def try_it() -> object:
+            looks[run] += 1
+            return lease(db, run, "a")
+
+        return try_it
+
+    async def here() -> bool:
+        return False
+
+    async def both() -> list[Any]:
+        streams.open()
+        waits = [asyncio.ensure_future(streams.wait_for(run, leases(run), 20, here)) for run in looks]
+        while min(looks.values()) < 2:  # one at once, one when the watcher has first seen the run
+            await asyncio.sleep(0.01)
+        await asyncio.to_thread(post_query, db, other, 1, "guidance", 1, CLIPS)
+        found = await waits[1]
+        await asyncio.to_thread(post_query, db, mine, 1, "guidance", 1, CLIPS)
+        found = [await waits[0], found]
+        streams.end()
+        return found
+
+    assert [query.run_id for query in asyncio.run(both())] == list(looks)
+    assert set(looks.values()) == {3}

@@ -1,0 +1,132 @@
+"""Look at many runs at once: what streams tell of them, and whether another question may be leased."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Row, bindparam, select
+
+from parenting.server.db import Database
+from parenting.server.queue.presence import holder
+from parenting.server.queue.queries import urgency
+from parenting.server.reads.metrics import list_metrics
+from parenting.server.reads.schemas import SILENT_AFTER, metric_schemas, run_schemas
+from parenting.server.schemas import RunSchema
+from parenting.server.statuses import OVER, QueryStatus
+from parenting.server.store.clock import Mark
+from parenting.server.tables import Query, Run
+
+ROWS = 10_000
+"""Metrics in one event, at most."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """One look at a run. Two of them are equal where nothing has changed that anybody is told."""
+
+    question: str
+    """The most urgent open question (id and kind) as JSON, or null."""
+    leases: str
+    """Who holds which open question, as JSON."""
+    offers: Any
+    """What decides which questions can be leased."""
+    row: Any
+    """The columns that the run's schema shows and that may change."""
+    signed: bool
+    """Whether its worker has given a sign of life. Where it has not, others decide what is told."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """One look at many runs: those that are there, and when the first of their leases ends."""
+
+    runs: dict[int, Seen]
+    ends: float  # by the monotonic clock; infinite where nobody holds any
+    cost: float  # seconds of the processor
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Some metrics of a run as an event tells them, their last tick, and whether there may be more."""
+
+    text: str
+    last: int | None
+    more: bool
+
+
+def look(db: Database, run_ids: Sequence[int]) -> Look:
+    """Look at runs by three statements, however many they are."""
+    began = time.thread_time()
+    asks = {"runs": list(run_ids)}
+    with db.read() as session:
+        mark = db.mark(session)
+        runs = session.execute(_RUNS, asks).all()
+        asked: dict[int, list[Row[Any]]] = defaultdict(list)
+        for row in session.execute(_ASKED, asks):
+            asked[row.run_id].append(row)
+    found, left = {}, float("inf")
+    for row in runs:
+        if isinstance(row.deleting, datetime):
+            continue
+        found[row.id], soonest = _seen(row, asked[row.id], mark)
+        left = min(left, soonest)
+    return Look(found, time.monotonic() + left, time.thread_time() - began)
+
+
+def _seen(run: Row[Any], asked: Sequence[Row[Any]], mark: Mark) -> tuple[Seen, float]:
+    """Return what is seen of a run, and the seconds until its first lease ends."""
+    first = asked[0] if asked else None
+    question = None if first is None else {"id": first.id, "public_id": first.public_id, "kind": first.kind}
+    held = [row for row in asked if row.leased_by is not None and _holds(row, mark)]
+    held.sort(key=lambda row: row.id)
+    leases = [{"question": row.public_id, "holder": holder(row.leased_by)} for row in held]
+    free = [(row.id, row.put_back) for row in asked], [(row.id, row.leased_by) for row in held]
+    offers = (run.status, run.goal, run.answers, run.retracted, *free)
+    *shown, epoch, seconds = tuple(run)
+    signed = run.status in OVER or mark.is_recent(epoch, seconds, SILENT_AFTER.total_seconds())
+    opened = tuple(sorted(row.kind for row in asked))
+    seen = Seen(json.dumps(question), json.dumps(leases), offers, (*shown, opened), signed)
+    return seen, min((row.lease_end - mark.seconds for row in held), default=float("inf"))
+
+
+def _holds(row: Row[Any], mark: Mark) -> bool:
+    """Return whether a lease holds, as `server.store.clock.holds` says it in SQL."""
+    begun = mark.is_recent(row.lease_epoch, row.lease_begin, float("inf"))
+    return begun and isinstance(row.lease_end, float) and row.lease_end > mark.seconds
+
+
+def told_runs(db: Database, run_ids: Sequence[int]) -> dict[int, str]:
+    """Return runs as the API does, as JSON; a damaged one is left out."""
+    with db.read() as session:
+        runs = session.scalars(_WHOLE, {"runs": list(run_ids)}).all()
+    schemas = run_schemas(db, runs)
+    return {one.id: one.model_dump_json() for one in schemas if isinstance(one, RunSchema)}
+
+
+def told_metrics(db: Database, run_id: int, after: int) -> Rows:
+    """Return the metrics of a run after a tick as an event tells them."""
+    rows = list_metrics(db, run_id, after, ROWS)
+    shown = [row.model_dump(mode="json") for row in metric_schemas(rows)]
+    ticks = [row["tick"] for row in shown if row["tick"] is not None]
+    return Rows(json.dumps({"rows": shown}), ticks[-1] if ticks else None, bool(ticks) and len(rows) == ROWS)
+
+
+# What never changes, or is large, or is only a sign of life, is not read at each look.
+_LEFT_OUT = {"level_text", "legend", "brief", "config", "versions", "origin", "heartbeat", "fencing_token"}
+_SIGNS = ("claim_epoch", "claim_mark")
+_COLUMNS = [column for column in Run.__table__.columns if column.name not in {*_LEFT_OUT, *_SIGNS}]
+_NAMED = Run.id.in_(bindparam("runs", expanding=True))
+_RUNS = select(*_COLUMNS, Run.claim_epoch, Run.claim_mark).where(_NAMED)
+_WHOLE = select(Run).where(_NAMED)
+_ASKED = (
+    select(Query.run_id, Query.id, Query.public_id, Query.kind, Query.put_back)
+    .add_columns(Query.leased_by, Query.lease_epoch, Query.lease_begin, Query.lease_end)
+    .where(Query.run_id.in_(bindparam("runs", expanding=True)), Query.status == QueryStatus.OPEN)
+    .order_by(Query.run_id, *urgency())
+)
