@@ -33,13 +33,13 @@ class Seen:
     question: str
     """The most urgent open question (id and kind) as JSON, or null."""
     leases: str
-    """Who holds which open question, as JSON."""
+    """The leases that hold, as JSON."""
     offers: Any
-    """What decides which questions can be leased."""
+    """The values on which it depends which questions can be leased."""
     row: Any
     """The columns that the run's schema shows and that may change."""
     signed: bool
-    """Whether its worker has given a sign of life. Where it has not, others decide what is told."""
+    """True if its worker has given a sign of life. Where it has not, others decide what is told."""
 
 
 @dataclass(frozen=True)
