@@ -20,7 +20,7 @@ from parenting.server.reads.schemas import SILENT_AFTER, metric_schemas, run_sch
 from parenting.server.schemas import RunSchema
 from parenting.server.statuses import OVER, QueryStatus
 from parenting.server.store.clock import Mark
-from parenting.server.tables import Query, Run
+from parenting.server.tables import Query, Run, Worker
 
 ROWS = 10_000
 """Metrics in one event, at most."""
@@ -88,8 +88,9 @@ def _seen(run: Row[Any], asked: Sequence[Row[Any]], mark: Mark) -> tuple[Seen, f
     leases = [{"question": row.public_id, "holder": holder(row.leased_by)} for row in held]
     free = [(row.id, row.put_back) for row in asked], [(row.id, row.leased_by) for row in held]
     offers = (run.status, run.goal, run.answers, run.retracted, *free)
-    *shown, epoch, seconds = tuple(run)
-    signed = run.status in OVER or mark.is_recent(epoch, seconds, SILENT_AFTER.total_seconds())
+    *shown, epoch, seconds, its_epoch, its_seconds = tuple(run)
+    marks, within = ((epoch, seconds), (its_epoch, its_seconds)), SILENT_AFTER.total_seconds()
+    signed = run.status in OVER or any(mark.is_recent(*one, within) for one in marks)
     opened = tuple(sorted(row.kind for row in asked))
     seen = Seen(json.dumps(question), json.dumps(leases), offers, (*shown, opened), signed)
     return seen, min((row.lease_end - mark.seconds for row in held), default=float("inf"))
@@ -122,7 +123,11 @@ _LEFT_OUT = {"level_text", "legend", "brief", "config", "versions", "origin", "h
 _SIGNS = ("claim_epoch", "claim_mark")
 _COLUMNS = [column for column in Run.__table__.columns if column.name not in {*_LEFT_OUT, *_SIGNS}]
 _NAMED = Run.id.in_(bindparam("runs", expanding=True))
-_RUNS = select(*_COLUMNS, Run.claim_epoch, Run.claim_mark).where(_NAMED)
+_RUNS = (
+    select(*_COLUMNS, Run.claim_epoch, Run.claim_mark, Worker.epoch, Worker.mark)
+    .outerjoin(Worker, Worker.name == Run.worker)
+    .where(_NAMED)
+)
 _WHOLE = select(Run).where(_NAMED)
 _ASKED = (
     select(Query.run_id, Query.id, Query.public_id, Query.kind, Query.put_back)
