@@ -24,12 +24,14 @@ from parenting.server.columns import Blob
 from parenting.server.damage import sound
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
+from parenting.server.origins import stored_hashes
 from parenting.server.public_ids import public_id
 from parenting.server.runs import become, find, hold
 from parenting.server.sizes import sizes_in, tables_of_runs
 from parenting.server.statuses import OVER, RunStatus
 from parenting.server.store.relay import announce
 from parenting.server.tables import Answer, Checkpoint, Metric, OperatorEvent, Query, Run, Tombstone
+from parenting.server.weights import remove_unused
 
 ROWS = 200
 """Rows that one transaction deletes; of a table that holds bytes, such as parts of checkpoints, one."""
@@ -193,10 +195,17 @@ def _delete_rows(session: Session, table: SqlTable, run_id: int) -> None:
 
 
 def _end(session: Session, now: datetime, run_id: int) -> bool:
-    """Delete the row of a run whose other rows are gone; SQLite keeps its number from being given again."""
+    """Delete the row of a run whose other rows are gone, and what it alone began with.
+
+    SQLite keeps its number from being given again.
+    """
     if any(_has_rows(session, table, run_id) for table in tables_of_runs()):
         return False  # what somebody stored between the look and this transaction
+    began = session.execute(select(Run.weights, Run.origin).where(Run.id == run_id)).one_or_none()
     session.execute(delete(Run).where(Run.id == run_id, Run.deleting.is_not(None)))
+    if began is not None:
+        inherited = stored_hashes(began.origin) | {began.weights}
+        remove_unused(session, [name for name in inherited if isinstance(name, str)])
     stone = session.get_one(Tombstone, run_id)
     stone.gone = stone.gone or now
     return True

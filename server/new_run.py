@@ -31,14 +31,14 @@ from parenting.server.errors import InvalidFieldsError
 from parenting.server.finishes import PATTERN, never_met, usual
 from parenting.server.identity import unused_number
 from parenting.server.tables import Run
-from parenting.server.weights import needed, put_bytes
+from parenting.server.weights import needed, put_in
 from parenting.server.weights import put as put_weights
 from parenting.server.whole import WHOLE, whole
 from parenting.server.wrong_fields import messages
 from parenting.weights.cost import BOUND, Bound, estimate
 from parenting.weights.estimate import seconds
 from parenting.weights.origin import NO_ORIGIN, Origin
-from parenting.weights.store import NoWeightsError, Wanted
+from parenting.weights.store import NoWeightsError, Wanted, digest
 
 LARGEST_INT = 2**53 - 1
 """The largest integer that every JSON reader keeps exactly."""
@@ -160,11 +160,12 @@ def start(
         InvalidFieldsError: names every wrong field, with a message each.
     """
     columns = plan(new, folder, origin, db, bound)
-    for name, blob in origin.blobs:
-        put_bytes(db, name, blob)
     if isinstance(columns["weights"], Path):
         columns["weights"] = put_weights(db, columns["weights"])
+    hashed = [(digest(blob), name, blob) for name, blob in origin.blobs]
     with db.write() as session:
+        for sha256, name, blob in hashed:  # with the run, so that nobody removes them as unused before
+            put_in(session, sha256, name, blob, db.clock())
         run = Run(id=unused_number(session, Run), created=db.clock(), **columns)
         session.add(run)
         session.flush()

@@ -15,3 +15,11 @@ def rolled_back_to(origin: dict[str, Any] | Damaged | None) -> int:
     if origin is None or isinstance(origin, Damaged) or ROLLED_BACK not in origin:
         return -1
     return int(origin[ROLLED_BACK]["tick"])
+
+
+def stored_hashes(origin: dict[str, Any] | Damaged | None) -> set[str]:
+    """Return the SHA-256 of the policy and of the answers that a run began with; none where it is damaged."""
+    if origin is None or isinstance(origin, Damaged):
+        return set()
+    parts = (origin[name] for name in ("policy", "answers") if name in origin)
+    return {str(part["stored"]) for part in parts}

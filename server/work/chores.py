@@ -1,4 +1,4 @@
-"""Chores of a worker beside its runs: rows of deleted runs, and older checkpoints of ended ones.
+"""Chores of a worker beside its runs: rows of deleted runs, what these began with, older checkpoints.
 
 A chore is done in pieces, each a short transaction, between the rounds of the worker's loop. Several workers
 may do the same one: a piece that is gone already is passed over.
@@ -11,7 +11,7 @@ import time
 
 import structlog
 
-from parenting.server import checkpoints, deletion
+from parenting.server import checkpoints, deletion, weights
 from parenting.server.checkpoint_parts import LONGEST_REST, REST
 from parenting.server.db import Database
 
@@ -31,6 +31,7 @@ class Chores:
         self._thinned: int | None = None
         self._done: int | None = None
         self._kept: set[int] = set()
+        self._swept = False
         self._news, self._due = True, -math.inf
 
     def news(self) -> None:
@@ -63,3 +64,7 @@ class Chores:
         if self._thinned is not None and self._thinned == self._done:  # its last one is damaged, so both stay
             self._kept.add(self._thinned)
             self._thinned = None
+        if self._thinned is None and not self._swept:
+            if removed := weights.sweep(self.db):
+                log.info("policies and answers of deleted runs removed", rows=removed)
+            self._swept = True

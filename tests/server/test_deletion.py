@@ -8,8 +8,9 @@ from typing import Any
 import httpx2
 import pytest
 from sqlalchemy import func, insert, select
+from sqlalchemy import text as sql
 
-from parenting.server import deletion, jobs
+from parenting.server import deletion, jobs, weights
 from parenting.server.checkpoints import save_checkpoint
 from parenting.server.db import Database
 from parenting.server.errors import ElsewhereError, LostClaimError, NotFound
@@ -24,9 +25,13 @@ from parenting.server.runs import Claim, claim, get_run, report_progress, set_st
 from parenting.server.settings import Settings
 from parenting.server.sizes import sizes, tables_of_runs
 from parenting.server.statuses import RunStatus
-from parenting.server.tables import Metric, Query, Run, Tombstone
+from parenting.server.tables import Metric, Query, Run, Tombstone, Weights
+from parenting.server.weights import put_bytes
+from parenting.server.work.chores import Chores
 from parenting.server.worker import Worker
-from tests.server.conftest import CLIPS
+from parenting.weights.origin import Origin
+from parenting.weights.store import digest
+from tests.server.conftest import CLIPS, Clock
 
 
 def full(db: Database, mine: Claim) -> int:
@@ -93,6 +98,52 @@ def test_nothing_that_people_wrote_is_left(db: Database, mine: Claim) -> None:
     stone = delete(db, mine.run_id)
     assert not any(word in str(vars(stone)).lower() for word in ("ada", "first"))
     assert stone.held["world"] == "unsafe-exploration"
+
+
+def inheriting(db: Database, policy: bytes, answers: bytes = b"x") -> int:
+    """Start a run that begins with bytes of an earlier one; none of them is read here."""
+    blobs = (("first.safetensors", policy), ("first.jsonl", answers))
+    parts = {
+        name: {"stored": digest(blob)} for name, (_, blob) in zip(("policy", "answers"), blobs, strict=True)
+    }
+    return start(db, NewRun(world="unsafe-exploration"), origin=Origin(about=parts, blobs=blobs)).id
+
+
+def kept(db: Database) -> set[bytes]:
+    with db.read() as session:
+        return set(session.scalars(select(Weights.blob)))
+
+
+def test_what_it_alone_began_with_goes_with_it(db: Database) -> None:
+    """The policy of two runs goes with the last; pre-trained weights stay for runs to come."""
+    put_bytes(db, "side-effects-6x6-v1.safetensors", b"pre-trained")
+    before = kept(db)
+    one, two = inheriting(db, b"shared", b"of one"), inheriting(db, b"shared", b"of two")
+    assert kept(db) == before | {b"shared", b"of one", b"of two"}
+    delete(db, one)
+    assert kept(db) == before | {b"shared", b"of two"}
+    delete(db, two)
+    assert kept(db) == before >= {b"pre-trained"}
+
+
+def test_a_worker_removes_what_earlier_versions_left(
+    db: Database, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not what a run begins with, nor what was stored a minute ago for a run to come."""
+    before = kept(db)
+    run = inheriting(db, b"in use")
+    monkeypatch.setattr(deletion, "remove_unused", lambda *_: 0)  # as up to version 0.5
+    delete(db, inheriting(db, b"left", b"left, too"))
+    put_bytes(db, "side-effects.safetensors", b"of no run")
+    clock.pass_seconds(3600 + 1)
+    put_bytes(db, "side-effects.safetensors", b"young")
+    chores = Chores(db, 10)
+    chores.go_on()
+    assert kept(db) == before | {b"in use", b"x", b"young"}
+    with db.write() as session:
+        session.execute(sql("UPDATE run SET origin = '5' WHERE id = :id"), {"id": run})
+    delete(db, inheriting(db, b"stays"))
+    assert weights.sweep(db) == 0  # nobody knows what the damaged one began with
 
 
 def test_a_worker_that_raises_it_loses_it(db: Database, mine: Claim) -> None:
