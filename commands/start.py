@@ -22,9 +22,9 @@ from parenting.server import new_run
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.missing_weights import missing_weights
-from parenting.server.new_run import FORM_FIELDS, read_form
 from parenting.server.notify import Notifier
 from parenting.server.reads.schemas import run_schema
+from parenting.server.run_form import FORM_FIELDS, read_form
 from parenting.server.tables import Run
 from parenting.weights.cost import estimate
 from parenting.weights.origin import Origin

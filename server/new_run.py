@@ -1,12 +1,11 @@
-"""New runs from a form or a JSON body; each field is checked on its own and has its own message.
+"""New runs; each field is checked on its own and has its own message.
 
 This module imports no torch.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -42,23 +41,6 @@ from parenting.weights.store import NoWeightsError, Wanted, digest
 
 LARGEST_INT = 2**53 - 1
 """The largest integer that every JSON reader keeps exactly."""
-FORM_FIELDS = (
-    "world",
-    "level",
-    "level_text",
-    "parent",
-    "script",
-    "finish",
-    "preset",
-    "name",
-    "seed",
-    "goal",
-    "pace",
-    "guidance_layout",
-    "practice",
-    "words",
-    "remarks",
-)
 COLUMNS = {
     "world",
     "preset",
@@ -73,8 +55,6 @@ COLUMNS = {
     "remarks",
 }
 """The fields that are columns of the run as they are."""
-AS_JSON = ("seed", "goal", "pace", "remarks")
-"""Fields of the form whose text is a number or a truth value."""
 Wrong = list[tuple[str, str]]
 PRETRAIN = "config.pretrain"
 """The field that is wrong where pre-trained weights are missing."""
@@ -210,23 +190,6 @@ def plan(
     }
 
 
-def read_form(form: Mapping[str, str]) -> NewRun:
-    """A new run from a web form's text; an empty field is an absent one, `config.p_guid` sets `p_guid`.
-
-    Raises:
-        InvalidFieldsError: names every wrong field, with a message each.
-    """
-    given = {name: text for name, text in form.items() if text.strip()}
-    fields: dict[str, Any] = {name: given[name] for name in FORM_FIELDS if name in given}
-    fields |= {name: _number(fields[name]) for name in AS_JSON if name in fields}
-    changes = {name: text for name, text in given.items() if name.startswith("config.")}
-    fields["config"] = {name.removeprefix("config."): _number(text) for name, text in changes.items()}
-    try:
-        return NewRun.model_validate(fields)
-    except ValidationError as error:
-        raise InvalidFieldsError(messages(error.errors())) from None
-
-
 def _script(new: NewRun) -> str | None:
     return (new.script or str(SCRIPTED)) if new.parent == "scripted" else None
 
@@ -290,12 +253,3 @@ def _weights(
         by_worker = f"A worker makes them, too (POST /api/v1/jobs, about {seconds(wanted)} s)."
         wrong.append((PRETRAIN, f"{error} {by_worker}"))
         return None
-
-
-def _number(text: str) -> Any:
-    """Read a form's text as a number, true, false or null; return the text if it is none of these."""
-    try:
-        value = json.loads(text)
-    except ValueError:
-        return text.strip()
-    return text.strip() if isinstance(value, str | list | dict) else value

@@ -20,7 +20,7 @@ from parenting.weights.store import SUFFIX, NoWeightsError, Wanted, digest, find
 OF_A_SIZE = re.compile(r".+-\d+x\d+-v\d+\.safetensors")
 """The name of pre-trained weights that every later run on levels of their size begins with, too."""
 YOUNG = timedelta(hours=1)
-"""What was stored so lately is left alone: the runs that begin with it may be about to be stored."""
+"""Rows as young as this are left alone: the runs that begin with them may be about to be stored."""
 
 
 def put(db: Database, file: Path) -> str:
@@ -63,7 +63,7 @@ def remove_unused(session: Session, hashes: Collection[str]) -> int:
 
 
 def sweep(db: Database) -> int:
-    """Delete what deleted runs left behind, as versions up to 0.5 did; return how many rows."""
+    """Delete rows that deleted runs left behind, as versions up to 0.5 did; return their number."""
     with db.read() as session:
         rows = session.execute(select(Weights.sha256, Weights.name, Weights.created)).all()
     until = db.clock() - YOUNG

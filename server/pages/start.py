@@ -16,10 +16,11 @@ from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.missing_weights import missing_weights
-from parenting.server.new_run import LARGEST_INT, PRETRAIN, plan, read_form, start
+from parenting.server.new_run import LARGEST_INT, PRETRAIN, plan, start
 from parenting.server.pages.options import OPTIONS, Option
 from parenting.server.pages.render import page, redirect
 from parenting.server.pages.run_list import Find, FindRuns, run_list
+from parenting.server.run_form import read_form
 from parenting.server.settings import Settings
 from parenting.weights.estimate import seconds
 from parenting.weights.store import Wanted

@@ -11,10 +11,11 @@ import pytest
 
 from parenting.envs.registry import WORLDS
 from parenting.server.db import Database
-from parenting.server.new_run import NewRun, plan, read_form, start
+from parenting.server.new_run import NewRun, plan, start
 from parenting.server.pages.options import OPTIONS, Option
 from parenting.server.pages.run_list import PAGE
 from parenting.server.queue.answers import answer
+from parenting.server.run_form import read_form
 from parenting.server.runs import get_run, let_go, list_runs, report_progress, set_goal, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures

@@ -13,9 +13,10 @@ from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError, SetupError
 from parenting.server.finishes import read_finish
 from parenting.server.migrate import downgrade, upgrade
-from parenting.server.new_run import NewRun, read_form, start
+from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.reads.metrics import latest_metrics
+from parenting.server.run_form import read_form
 from parenting.server.runs import get_run
 from parenting.server.settings import Settings
 from parenting.server.tables import Query, Run

@@ -4,7 +4,8 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
-from parenting.server.new_run import NewRun, plan, read_form, start
+from parenting.server.new_run import NewRun, plan, start
+from parenting.server.run_form import read_form
 
 WORLD = "unsafe-exploration"
 

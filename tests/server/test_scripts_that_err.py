@@ -12,9 +12,10 @@ from parenting.parents.grammar import read_parent
 from parenting.server.codec import CHOICE_NAMES
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
-from parenting.server.new_run import NewRun, read_form, start
+from parenting.server.new_run import NewRun, start
 from parenting.server.queue import worker_side
 from parenting.server.replay import relive
+from parenting.server.run_form import read_form
 from parenting.server.runs import claim, get_run
 from parenting.server.session import RunSession
 from parenting.server.tables import Answer, Query
