@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Protocol
 
 from parenting.server.lifeline import VARIABLE
 
@@ -74,7 +75,15 @@ class Child:
         self._tell(f"{why}; it starts again in {wait:g} s.")
 
 
-def watch(children: Sequence[Child], told: threading.Event) -> None:
+class Watched(Protocol):
+    """A process, or several, that `watch` keeps running."""
+
+    def look(self) -> None:
+        """Start again what is dead."""
+        ...
+
+
+def watch(children: Sequence[Watched], told: threading.Event) -> None:
     """Keep processes running until the event is set.
 
     Raises:

@@ -20,7 +20,7 @@ from parenting.envs.names import did_you_mean
 from parenting.envs.people_text import printable
 
 COMMANDS = {
-    "up": "Start everything (migrate, web and worker) and open the pages in a browser.",
+    "up": "Start everything (migrate, web and workers) and open the pages in a browser.",
     "start": "Start a run in the database.",
     "run": "Train agents with a scripted parent, without a database.",
     "experiment": "Run the paper's experiments and compare its numbers with ours.",
@@ -40,6 +40,7 @@ COMMANDS = {
     "restore": "Put a backup in place of the database.",
     "web": "Serve the pages and the API.",
     "worker": "Train the agents of the runs in the database.",
+    "workers": "List the workers that are alive, their runs, load and memory.",
     "migrate": "Bring the database's tables up to date.",
 }
 """Each command with its help text. The command `up` is the function `up` in commands/up.py, and so on."""

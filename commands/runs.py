@@ -22,8 +22,8 @@ from parenting.server.sizes import size_text, sizes
 from parenting.server.statuses import STATE_LABELS, RunState
 
 WHAT = ("run", "name", "tags", "world", "level", "preset", "parent")
-COLUMNS = (*WHAT, "now", "stage", "tick", "answers", "size", "optimal")
-NARROW = ("name", "level", "parent", "preset", "tags", "size")
+COLUMNS = (*WHAT, "now", "stage", "tick", "answers", "size", "optimal", "worker")
+NARROW = ("name", "level", "parent", "preset", "tags", "size", "worker")
 """Columns that a terminal narrower than `ENOUGH` characters does not show."""
 ENOUGH, WIDE = 120, 200
 """`WIDE` is the width when the output is not a terminal."""
@@ -42,7 +42,7 @@ def runs(
         bool, typer.Option("--json", help="Print the runs as JSON, as in the API, and nothing else.")
     ] = False,
 ) -> None:
-    """List the runs, newest first, with their progress, who waits for whom, and the disk space of each.
+    """List the runs, newest first, with their progress, who waits for whom, disk space and worker of each.
 
     `parenting runs rename`, `describe`, `tag`, `archive` and `delete` keep them in order, and `parenting runs
     deleted` lists what is left of deleted ones.
@@ -93,6 +93,7 @@ def _row(run: RunSchema | DamagedSchema) -> dict[str, str]:
         "optimal": "yes" if run.optimal else "no",
         "preset": run.preset,
         "tags": ", ".join(run.tags),
+        "worker": run.raised_by or "",
     }
 
 

@@ -1,7 +1,7 @@
 """`parenting up`: start everything by one command.
 
-Web and worker are separate processes, so that neither blocks the other. They load their libraries while this
-one migrates the database, and begin once it has: a pipe that this process closes tells them.
+Web and workers are separate processes, so that none blocks another. They load their libraries while this one
+migrates the database, and begin once it has: a pipe that this process closes tells them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
@@ -22,12 +22,17 @@ import typer
 
 from parenting.commands import children
 from parenting.commands.children import Child
+from parenting.commands.crew import Crew
 from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.printing import say
+from parenting.commands.sizing import Sizing, most_workers
 from parenting.server.lifeline import follow
 from parenting.server.listener import bind
 from parenting.server.settings import Settings
 from parenting.server.store.private import make_files_private
+
+MOST_WORKERS = 64
+"""A larger number would be a slip of the hand."""
 
 
 def up(
@@ -35,32 +40,72 @@ def up(
         int | None, typer.Option(help="Port of the pages; 0 takes a free one.", show_default="8765")
     ] = None,
     browser: Annotated[bool, typer.Option(help="Open the pages in a browser.")] = True,
+    workers: Annotated[
+        str,
+        typer.Option(
+            help="How many workers raise the runs. auto: one, and one more each time that runs wait longer "
+            "than 100 ms for their turns, up to a core each less one for the pages; an idle one ends after a "
+            "minute."
+        ),
+    ] = "auto",
 ) -> None:
-    """Migrate the database, start the pages and a worker, and open a browser. Ctrl-C stops everything.
+    """Migrate the database, start the pages and the workers, and open a browser. Ctrl-C stops everything.
 
     A process that dies is started again: the pages never go down because a worker died.
 
-    Example: parenting up --port 0 --no-browser
+    Example: parenting up --port 0 --no-browser --workers 2
     """
+    number = _number(workers)
     follow()
     make_files_private()
     with friendly_errors():
         chosen = settings(port=port)
         listener = bind(chosen.host, chosen.port, chosen.container)
-        with listener, _signals() as told, _children(listener) as (both, migrated):
+        with listener, _signals() as told, _children(listener, number or 1) as (web, crew, migrated):
             _migrate(chosen)
             migrated()
-            _watch(both, told, listener.getsockname()[1], browser)
+            with _sized(crew, chosen, number):
+                _watch(web, crew, told, listener.getsockname()[1], browser)
 
 
-def _watch(both: Sequence[Child], told: threading.Event, port: int, browser: bool) -> None:
+def _number(workers: str) -> int | None:
+    """Return the number of workers; None where it follows their load."""
+    if workers == "auto":
+        return None
+    if not workers.isascii() or not workers.isdigit() or not 1 <= int(workers) <= MOST_WORKERS:
+        raise typer.BadParameter(
+            f"{workers} is neither auto nor a number from 1 to {MOST_WORKERS}.", param_hint="'--workers'"
+        )
+    return int(workers)
+
+
+@contextmanager
+def _sized(crew: Crew, chosen: Settings, number: int | None) -> Iterator[None]:
+    """Let the number of workers follow their load, unless it is fixed or can only be one."""
+    most = most_workers()
+    if number is not None or most == 1:
+        yield
+        return
+    from parenting.commands.following import follow_load
+    from parenting.server.db import connect
+
+    db, ended = connect(chosen), threading.Event()
+    following = threading.Thread(target=follow_load, args=(crew, db, Sizing(most), ended), daemon=True)
+    following.start()
+    try:
+        yield
+    finally:
+        ended.set()  # it ends with this process, at the latest: it only reads
+
+
+def _watch(web: Child, crew: Crew, told: threading.Event, port: int, browser: bool) -> None:
     """Say where the pages are, and keep the processes running until told to stop."""
     url = f"http://localhost:{port}/"
     say(f"Parenting is at {url}  (Ctrl-C stops it)")
     if browser and _has_screen():
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
     try:
-        children.watch(both, told)
+        children.watch([web, crew], told)
     except children.RefusedError as error:
         _tell(str(error))
         raise typer.Exit(children.REFUSED) from None
@@ -94,24 +139,24 @@ def _signals() -> Iterator[threading.Event]:
 
 
 @contextmanager
-def _children(listener: socket.socket) -> Iterator[tuple[Sequence[Child], Callable[[], None]]]:
-    """Start web and worker, and yield them with what lets them begin.
+def _children(listener: socket.socket, workers: int) -> Iterator[tuple[Child, Crew, Callable[[], None]]]:
+    """Start web and workers, and yield them with what lets them begin.
 
     A web process that is started again takes the same listening socket.
     """
-    started: list[Child] = []
+    started: list[Callable[[], list[Child]]] = []
     with children.lifeline() as followed, children.gate() as (gate, opened):
         fd = listener.fileno()
         after = ["--after-fd", str(gate)]
         web = partial(children.start, ["web", "--fd", str(fd), *after], followed, [fd, gate])
         try:
-            started.append(Child("web", web, _tell))
-            started.append(
-                Child("worker", partial(children.start, ["worker", *after], followed, [gate]), _tell)
-            )
-            yield started, opened
+            pages = Child("web", web, _tell)
+            started.append(lambda: [pages])
+            crew = Crew(partial(children.start, ["worker", *after], followed, [gate]), _tell, workers)
+            started.append(crew.all)
+            yield pages, crew, opened
         finally:
-            children.stop(started)
+            children.stop([child for these in started for child in these()])
 
 
 def _tell(sentence: str) -> None:

@@ -147,6 +147,8 @@ class RunSchema(Schema):
     open: OpenSchema
     worker: Literal["alive", "silent", "done"]
     """alive, silent (none raises this run, nor will one that is alive), or done (the run is over)."""
+    raised_by: str | None
+    """The name of the worker that raises it, HOST:PROCESS; null: none does now."""
 
 
 class FrameSchema(Schema):

@@ -103,9 +103,10 @@ RUN: dict[str, Any] = {
     },
     "skipped": 0,
     "open": {"guidance": 1, "preference": 0},
-    "worker": "alive",
+    **{"worker": "alive", "raised_by": "laboratory:4711"},
 }
-STOPPED = {"status": "stopped", "reason": "Stopped by the operator.", "state": "over", "worker": "done"}
+STOPPED = {"status": "stopped", "reason": "Stopped by the operator.", "state": "over"}
+STOPPED |= {"worker": "done", "raised_by": None}
 QUERY: dict[str, Any] = {
     "id": 7,
     "run": 1,

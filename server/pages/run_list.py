@@ -24,6 +24,7 @@ from parenting.server.schemas import DamagedSchema
 from parenting.server.sizes import size_text, sizes
 from parenting.server.statuses import STATE_LABELS, RunState
 from parenting.server.tables import Metric, Run
+from parenting.server.workers import alive
 
 PAGE = 20
 """Runs on a page."""
@@ -83,6 +84,7 @@ class RunList:
     find: Find
     tags: Sequence[str]  # every tag that a run has
     archived: bool  # whether there are archived runs
+    several_workers: bool  # whether more than one is alive, so that each run says which raises it
     orders: Mapping[Order, str] = field(default_factory=lambda: ORDERS)
     state_labels: Mapping[RunState, str] = field(default_factory=lambda: STATE_LABELS)
 
@@ -93,7 +95,7 @@ def run_list(db: Database, find: Find) -> RunList:
     wanted = Wanted(find.q, find.tag or None, find.world or None, shown, find.sort)
     listed = find_runs(db, wanted, find.before, PAGE)
     hidden = bool(find_runs(db, Wanted(archived=True), None, 1).rows)
-    return RunList(_rows(db, listed.rows), listed.next, find, known_tags(db), hidden)
+    return RunList(_rows(db, listed.rows), listed.next, find, known_tags(db), hidden, len(alive(db)) > 1)
 
 
 def _rows(db: Database, listed: Sequence[Run]) -> list[RunRow]:

@@ -188,12 +188,13 @@ def _answer_schema(answer: Answer) -> AnswerSchema:
 
 
 def _run_schema(run: Run, opened: Open, worker: Sign, database: str) -> RunSchema:
-    made = ("open", "worker", "resting", "state", "database", "tags")
+    made = ("open", "worker", "raised_by", "resting", "state", "database", "tags")
     own = {name: getattr(run, name) for name in RunSchema.model_fields if name not in made}
     shown = OpenSchema(guidance=opened.guidance, preference=opened.preference)
     resting = run.status not in OVER and run.goal is not None and run.standing >= run.goal
     state = _run_state(run, opened, resting, worker)
     own |= {"tags": split_tags(run.tags), "database": database}
+    own["raised_by"] = run.worker if worker == "alive" else None
     return RunSchema(**own, open=shown, worker=worker, resting=resting, state=state)
 
 

@@ -67,7 +67,7 @@ def test_a_narrow_terminal_gets_fewer_columns(
 def test_who_waits_for_whom(db: Database, mine: Claim) -> None:
     assert "exploring" in now()
     runs.report_progress(db, mine, tick=12, optimal=True)
-    assert now().split()[-1] == "yes"
+    assert now().split()[-2:] == ["yes", mine.worker]
     query = post_query(db, mine, 12, "guidance", 1, CLIPS)
     assert "a question waits" in now()
     answer(db, query, "left", "me", "human")
@@ -90,3 +90,11 @@ def test_no_worker(db: Database) -> None:
 def test_as_json_it_is_what_the_api_says(db: Database, mine: Claim) -> None:
     (text,) = listed("--json")
     assert json.loads(text) == [run_schema(db, 1).model_dump(mode="json")]
+
+
+def test_it_says_which_worker_raises_which_run(db: Database, mine: Claim) -> None:
+    start(db, NewRun(world="unsafe-exploration"))
+    head, second, first = listed()
+    assert head.split()[-1] == "worker"
+    assert first.split()[-1] == "worker"  # the name of the one that claimed it
+    assert not second.rstrip().endswith("worker")

@@ -1,0 +1,37 @@
+"""A thread of `parenting up` that reads how its workers are, and says how many there should be."""
+
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import suppress
+
+from parenting.commands.crew import Crew
+from parenting.commands.sizing import Sizing
+from parenting.server.db import Database
+from parenting.server.errors import StoreError
+from parenting.server.workers import Figures, living
+
+LOOK_SECONDS = 1.0
+"""Seconds between two looks at what the workers say of themselves."""
+
+
+def follow_load(crew: Crew, db: Database, sizing: Sizing, told: threading.Event) -> None:
+    """Keep the number of workers at what their load asks for, until told to stop; runs in a thread.
+
+    Args:
+        crew: The workers.
+        db: The database in which they say how they are.
+        sizing: The rule.
+        told: Ends it.
+    """
+    while not told.wait(LOOK_SECONDS):
+        with suppress(StoreError):  # it can say nothing now: their number stays
+            crew.wanted = sizing.look(_said(crew, db), time.monotonic())
+
+
+def _said(crew: Crew, db: Database) -> list[Figures]:
+    """Return what the workers of this crew say of themselves."""
+    mine = {str(child.process.pid) for child in list(crew.children)}
+    rows = [row for row in living(db) if row.name.rpartition(":")[2] in mine]
+    return [Figures(row.runs, row.lives, row.busy, row.memory, row.waited) for row in rows]
