@@ -105,7 +105,7 @@ RUN: dict[str, Any] = {
     "open": {"guidance": 1, "preference": 0},
     **{"worker": "alive", "raised_by": "laboratory:4711"},
 }
-STOPPED = {"status": "stopped", "reason": "Stopped by the operator.", "state": "over"}
+STOPPED: dict[str, Any] = {"status": "stopped", "reason": "Stopped by the operator.", "state": "over"}
 STOPPED |= {"worker": "done", "raised_by": None}
 QUERY: dict[str, Any] = {
     "id": 7,
