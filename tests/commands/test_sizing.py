@@ -64,9 +64,7 @@ def test_none_ends_that_the_others_could_not_stand_in_for() -> None:
 
 def test_there_is_a_core_for_the_web(monkeypatch: pytest.MonkeyPatch) -> None:
     for cores, most in ((1, 1), (2, 1), (8, 7)):
-        monkeypatch.setattr(
-            sizing.os, "sched_getaffinity", lambda _pid, n=cores: set(range(n)), raising=False
-        )
+        monkeypatch.setattr("os.sched_getaffinity", lambda _pid, n=cores: set(range(n)), raising=False)
         assert sizing.most_workers() == most
 
 
