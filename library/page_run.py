@@ -135,11 +135,10 @@ def read_back(db: Database, number: int, task: Task, rule: StopRule, seed: int) 
 
 
 def _snapshot(db: Database, run: Run, task: Task, seed: int) -> Snapshot:
-    weights = initial_weights(db, run, task.world)
-    saved = next((one for one in checkpoints.load_checkpoints(db, run.id) if one.intact), None)
+    saved = next((one for one in checkpoints.newest_first(db, run.id) if one.intact), None)
     if saved is None:
-        return first_snapshot(db, run, task.world, task.config, weights)
-    return unpack(task.world, task.config, saved.blob, weights)
+        return first_snapshot(db, run, task.world, task.config, initial_weights(db, run, task.world))
+    return unpack(task.world, task.config, saved.blob)
 
 
 def _as_batch(snapshot: Snapshot, run: Run, task: Task, rule: StopRule) -> batch.TrainResult:

@@ -35,6 +35,7 @@ from parenting.server.log_limit import LogLimit
 from parenting.server.meters import Meters
 from parenting.server.migrate import require_current
 from parenting.server.notify import Notifier
+from parenting.server.pages.render import compile_first
 from parenting.server.requests import RequestMiddleware
 from parenting.server.security import SecurityMiddleware
 from parenting.server.settings import Settings
@@ -135,12 +136,25 @@ def _route_name(route: APIRoute) -> str:
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    _warm(app)
     app.state.streams.open()
     yield
     app.state.streams.end()
     if app.state.group_commit is not None:
         app.state.group_commit.close()
     app.state.db.close()
+
+
+def _warm(app: FastAPI) -> None:
+    """Do before anybody is served what the first requests would else wait for.
+
+    The framework works out what a route needs when an address is first held against it, and templates are
+    compiled when they are first used. On a busy machine the first page took seconds.
+    """
+    nowhere = {"type": "http", "method": "GET", "path": "/-", "root_path": "", "headers": []}
+    for route in app.router.routes:
+        route.matches(nowhere)
+    compile_first()
 
 
 def _add_errors(app: FastAPI) -> None:

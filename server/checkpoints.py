@@ -6,7 +6,7 @@ A large one is written in parts (`server.checkpoint_parts`), and exists once its
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import ColumnElement, delete, func, select
@@ -120,13 +120,25 @@ def _whole(session: Session, checkpoint_id: int) -> bool:
 
 
 def load_checkpoints(db: Database, run_id: int) -> Sequence[StoredCheckpoint]:
-    """Return the stored checkpoints, newest first.
+    """Return the stored checkpoints, newest first."""
+    return list(newest_first(db, run_id))
 
-    The caller takes the first one that is intact and can be read (`server.recall`).
+
+def newest_first(db: Database, run_id: int) -> Iterator[StoredCheckpoint]:
+    """Yield the stored checkpoints, newest first; each is read when it is asked for.
+
+    The caller takes the first one that is intact and can be read (`server.recall`), and the one before it has
+    as many bytes.
     """
-    rows = select(Checkpoint).where(Checkpoint.run_id == run_id).order_by(Checkpoint.id.desc())
-    with db.read() as session:
-        return [_stored(session, row) for row in session.scalars(rows)]
+    rows = select(Checkpoint).where(Checkpoint.run_id == run_id).order_by(Checkpoint.id.desc()).limit(1)
+    before: tuple[ColumnElement[bool], ...] = ()
+    while True:
+        with db.read() as session:
+            row = session.scalars(rows.where(*before)).first()
+            if row is None:
+                return
+            found, before = _stored(session, row), (Checkpoint.id < row.id,)
+        yield found
 
 
 def _stored(session: Session, row: Checkpoint) -> StoredCheckpoint:

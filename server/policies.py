@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ from parenting.agent.config import Config
 from parenting.envs import registry
 from parenting.envs.options import SUPERVISION
 from parenting.server.batches import FOREVER
-from parenting.server.checkpoints import StoredCheckpoint, load_checkpoints
+from parenting.server.checkpoints import StoredCheckpoint, newest_first
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.identity import database_id
@@ -55,10 +55,10 @@ def present_policy(db: Database, run_id: int) -> PolicyFile:
     )
 
 
-def _sound(db: Database, run: Run) -> list[StoredCheckpoint]:
-    """Return the checkpoints whose bytes are those that were written, but for those that are passed over."""
+def _sound(db: Database, run: Run) -> Iterator[StoredCheckpoint]:
+    """Yield the checkpoints whose bytes are those that were written, but for those that are passed over."""
     passed = {note.sha256 for _, note in notes(db, run.id) if isinstance(note, CheckpointDamaged)}
-    return [kept for kept in load_checkpoints(db, run.id) if kept.intact and kept.sha256 not in passed]
+    return (kept for kept in newest_first(db, run.id) if kept.intact and kept.sha256 not in passed)
 
 
 def _policy(db: Database, run: Run, archive: TensorArchive, sha256: str) -> PolicyFile:

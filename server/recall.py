@@ -14,7 +14,7 @@ from torch import Tensor
 from parenting.agent.config import Config
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import keys
-from parenting.server.checkpoints import StoredCheckpoint, load_checkpoints
+from parenting.server.checkpoints import StoredCheckpoint, newest_first
 from parenting.server.db import Database
 from parenting.server.notes import CheckpointDamaged, notes
 from parenting.server.snapshot import DamagedCheckpointError, Snapshot, Written, first_snapshot, read
@@ -55,24 +55,22 @@ def recall(db: Database, run: Run, world: Gridworld, config: Config, weights: Te
     """
     known = {note.sha256: note for _, note in notes(db, run.id) if isinstance(note, CheckpointDamaged)}
     passed = []
-    for kept in load_checkpoints(db, run.id):
+    for kept in newest_first(db, run.id):
         if kept.sha256 in known:
             passed.append(Passed(kept.tick, known[kept.sha256], noted=True))
             continue
         try:
-            return Recalled(*_read(kept, run, world, config, weights), kept.sha256, kept.tick, passed)
+            return Recalled(*_read(kept, run, world, config), kept.sha256, kept.tick, passed)
         except DamagedCheckpointError as error:
             note = CheckpointDamaged(sha256=kept.sha256, reason=error.message)
             passed.append(Passed(kept.tick, note, noted=False))
     return Recalled(first_snapshot(db, run, world, config, weights), None, None, 0, passed)
 
 
-def _read(
-    kept: StoredCheckpoint, run: Run, world: Gridworld, config: Config, weights: Tensor | None
-) -> Written:
+def _read(kept: StoredCheckpoint, run: Run, world: Gridworld, config: Config) -> Written:
     if not kept.intact:
         raise DamagedCheckpointError(CHANGED_BYTES)
-    found = read(world, config, kept.blob, weights)
+    found = read(world, config, kept.blob)
     here = found.saved.state.keys
     if (int(here.tick[0]), int(here.seed[0])) != (kept.tick, int(keys(run.seed, 1).seed[0])):
         raise DamagedCheckpointError("it is of another run or another tick")

@@ -13,6 +13,7 @@ from torch import Tensor
 from parenting.agent import parenting
 from parenting.agent.beginning import inherit
 from parenting.agent.config import Config
+from parenting.agent.init import network_of
 from parenting.agent.query import Answer
 from parenting.agent.state import AgentState, Confirmation, current_names
 from parenting.envs.gridworld import Gridworld
@@ -124,19 +125,18 @@ def pack(saved: Snapshot) -> bytes:
     return out.getvalue()
 
 
-def unpack(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None = None) -> Snapshot:
+def unpack(world: Gridworld, config: Config, blob: bytes) -> Snapshot:
     """Read the snapshot of a checkpoint's bytes, as `read` does."""
-    return read(world, config, blob, weights).saved
+    return read(world, config, blob).saved
 
 
-def read(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None = None) -> Written:
+def read(world: Gridworld, config: Config, blob: bytes) -> Written:
     """Read a checkpoint's bytes.
 
     Args:
         world: The run's world.
         config: The config that the run was started with.
         blob: What `pack` returned.
-        weights: The pre-trained weights that the run began with.
 
     Raises:
         DamagedCheckpointError: they are not the content of a checkpoint, or a piece is missing or has another
@@ -144,7 +144,7 @@ def read(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None =
     """
     try:
         whole = torch.load(io.BytesIO(blob), weights_only=True)
-        template = initial_snapshot(world, config, 0, weights)
+        template = _template(world, config)
         saved = Snapshot(
             state=_restore(template.state, current_names(whole["state"])).check(),
             tally=_restore(template.tally, whole["tally"]).check(),
@@ -157,6 +157,11 @@ def read(world: Gridworld, config: Config, blob: bytes, weights: Tensor | None =
         Exception
     ) as error:  # damaged bytes cause almost any error in torch, whose advice helps nobody here
         raise DamagedCheckpointError(f"its content cannot be read ({type(error).__name__})") from error
+
+
+def _template(world: Gridworld, config: Config) -> Snapshot:
+    """Return a snapshot whose pieces have the right names and shapes. No weights are drawn for it."""
+    return initial_snapshot(world, config, 0, torch.zeros(network_of(world).size))
 
 
 def _restore(template: S, parts: dict[str, Tensor]) -> S:

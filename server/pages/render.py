@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from jinja2.meta import find_referenced_templates
 from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse
@@ -18,6 +19,8 @@ from parenting.server.languages import language
 from parenting.server.public_ids import ALPHABET, LENGTH
 from parenting.server.tables import Run
 
+FIRST = ("start.html", "dashboard.html", "parent.html")
+"""The pages that people open first. No request for one of them waits until it is compiled."""
 WEB = Path(__file__).parent.parent.parent / "web"
 
 
@@ -41,6 +44,18 @@ def page(template: str, status: int = 200, **context: object) -> HTMLResponse:
 def render(template: str, **context: object) -> str:
     """A template's text."""
     return _templates.get_template(template).render(**context)
+
+
+def compile_first() -> None:
+    """Compile the templates that `FIRST` names, with the parts that they hold."""
+    known: set[str] = set()
+    names = [*FIRST]
+    while names:
+        name = names.pop()
+        known.add(name)
+        source = _templates.get_template(name).filename
+        parts = find_referenced_templates(_templates.parse(Path(str(source)).read_text("utf-8")))
+        names += {part for part in parts if part} - known
 
 
 def format_number(number: float | None) -> str:

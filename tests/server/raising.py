@@ -70,7 +70,7 @@ class Begun(NamedTuple):
 
     def unpack(self, blob: bytes) -> Snapshot:
         """A checkpoint of the run."""
-        return unpack(self.make(), self.config, blob, self.weights())
+        return unpack(self.make(), self.config, blob)
 
 
 ISLAND = Begun("unsafe-exploration", "island", CONFIG)
