@@ -11,8 +11,10 @@ from typing import Annotated, Any, Literal
 import typer
 
 from parenting._plural import counted
+from parenting.commands.answer_many import answer_many
 from parenting.commands.answering import EXITS, Answering, Ending, Order, Told
 from parenting.commands.client import Client, RefusedError, UnavailableError
+from parenting.commands.crowd import Plan, Thinking
 from parenting.commands.errors import UsageError, friendly_errors
 from parenting.commands.parents import chosen_parent
 from parenting.commands.printing import say
@@ -23,7 +25,14 @@ Until = Literal["optimal", "over"]
 
 
 def answer(
-    run: Annotated[int, typer.Option(min=1, help="The run's number; `parenting runs` lists them.")],
+    run: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="The run's number; `parenting runs` lists them.",
+            show_default="none; --people has --runs",
+        ),
+    ] = None,
     url: Annotated[str, typer.Option(help="The server's address.")] = "http://localhost:8765",
     limit: Annotated[
         int | None,
@@ -58,12 +67,42 @@ def answer(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
     ] = False,
+    people: Annotated[
+        int | None,
+        typer.Option(min=1, max=1000, help="Answer as so many people at once.", show_default="one script"),
+    ] = None,
+    think: Annotated[
+        float, typer.Option(min=0, max=3600, metavar="SECONDS", help="With --people: how long each thinks.")
+    ] = 1.0,
+    thinking: Annotated[
+        Thinking, typer.Option(help="With --people: thinking times vary, or are all the same.")
+    ] = "exponential",
+    runs: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N,N-N",
+            help="With --people: the runs, over which people spread.",
+            show_default="all that people answer",
+        ),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(metavar="WORLD", help="With --people: start a run for each.", show_default="none"),
+    ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(min=0.1, help="With --people: end after this long.", show_default="when all is over"),
+    ] = None,
 ) -> None:
     """Answer a run's questions as the scripted parent does (Sec. 3.1.3), or another, over the HTTP API.
 
     The script knows the rules of the worlds and the question, nothing else. Web and worker may stop and come
     back meanwhile: an answer is sent until the server has confirmed it. The command ends after --limit
     answers, when the run is over or has reached its goal, or as --until says, whichever comes first.
+
+    With --people a crowd answers many runs at once, each person with a connection and a name: it leases,
+    thinks, answers, and waits for the next question. Live counts go to standard error; at the end come
+    percentiles of the wait for the next question and of the answer's request. --limit counts all answers.
 
     Exit codes: 0 one of these ends was reached; 1 the run failed, asked nothing for --timeout seconds, or
     found no acceptable action; 2 the run or the server does not exist, or an option is wrong; 130 stopped by
@@ -75,6 +114,12 @@ def answer(
         spec = chosen_parent(parent)
         client = Client(url)
         stack.callback(client.close)
+        if people is not None:
+            _only_one_way(run, runs, start, until, receipts)
+            plan = Plan(people, think, thinking, limit, seconds, timeout, end_episodes)
+            raise typer.Exit(answer_many(client, plan, spec, runs, start, as_json))
+        if run is None:
+            raise UsageError("--run: name a run to answer, or with --people how many people answer many.")
         found = _first_look(client, run)
         optimal = _until(found["world"], until, limit) == "optimal"
         order = Order(
@@ -97,6 +142,22 @@ def answer(
         ending = _work(work)
     say(_as_json(run, work.told, ending) if as_json else _said(run, work.told, ending))
     raise typer.Exit(EXITS[ending.kind])
+
+
+def _only_one_way(
+    run: int | None, runs: str | None, start: str | None, until: Until | None, receipts: Path | None
+) -> None:
+    """Refuse what does not go with --people.
+
+    Raises:
+        UsageError: one of the options was given.
+    """
+    alone = {"--run": run, "--until": until, "--receipts": receipts}
+    given = [name for name, value in alone.items() if value is not None]
+    if given:
+        raise UsageError(f"{given[0]}: it does not go with --people. Leave one of them out.")
+    if runs is not None and start is not None:
+        raise UsageError("--runs: with --start the crowd answers what it starts. Leave one of them out.")
 
 
 def _work(work: Answering) -> Ending:

@@ -59,7 +59,7 @@ class Client:
             RefusedError: the server refuses the request.
             UsageError: the address is not that of a Parenting server.
         """
-        return self._read(self._send("GET", path, None))
+        return self.read(self._send("GET", path, None))
 
     def post(self, path: str, **body: Any) -> Any:
         """Return the reply to a POST to a path of the API; None if it is empty.
@@ -67,15 +67,24 @@ class Client:
         Raises:
             UnavailableError, RefusedError, UsageError: as `get`.
         """
-        return self._read(self._send("POST", path, body or None))
+        return self.read(self._send("POST", path, body or None))
 
     def _send(self, method: str, path: str, body: Any) -> httpx2.Response:
         try:
             return self.http.request(method, f"{self.url}/api/v1/{path}", json=body)
         except httpx2.TransportError as error:
-            raise UnavailableError(f"No server answers at {self.url} ({_reason(error)}).") from error
+            raise self.away(error) from error
 
-    def _read(self, reply: httpx2.Response) -> Any:
+    def away(self, error: httpx2.TransportError) -> UnavailableError:
+        """Return the error for a request that nobody answered."""
+        return UnavailableError(f"No server answers at {self.url} ({_reason(error)}).")
+
+    def read(self, reply: httpx2.Response) -> Any:
+        """Return what a reply of the API says; None if it is empty.
+
+        Raises:
+            UnavailableError, RefusedError, UsageError: as `get`.
+        """
         if reply.status_code == 204:
             return None
         try:

@@ -46,6 +46,14 @@ class LeaseBody(Strict):
     )
 
 
+class NextBody(LeaseBody):
+    """The client that leases a question, and how long it waits for one."""
+
+    wait: float = Field(
+        0.0, ge=0, le=10, description="Seconds for which the request lies at the server while none is free."
+    )
+
+
 class RenewBody(LeaseBody):
     """The client that shows questions, and how long ago its person gave a sign of life."""
 

@@ -9,7 +9,7 @@ from fastapi import Query, Request, Response
 from sqlalchemy.orm import Session
 
 from parenting.server.admission import admitted_router
-from parenting.server.api.bodies import AnswerBody, LeaseBody
+from parenting.server.api.bodies import AnswerBody, LeaseBody, NextBody
 from parenting.server.api.lists import AskedPart, AskedRows
 from parenting.server.api.names import QueryId, QueryName, RunId, RunName
 from parenting.server.api.responses import read_responses, write_responses
@@ -19,12 +19,13 @@ from parenting.server.queue.answers import Said, Stored, answer_in
 from parenting.server.queue.leases import is_offered, lease_in, release
 from parenting.server.queue.names import Names
 from parenting.server.reads import pagination
-from parenting.server.reads.names import run_number_in
+from parenting.server.reads.names import run_number, run_number_in
 from parenting.server.reads.schemas import asked_schema, asked_schemas, leased_schema
 from parenting.server.reads.why import why
 from parenting.server.receipts import StoredSchema
 from parenting.server.runs import find
 from parenting.server.schemas import AskedSchema, LeasedSchema
+from parenting.server.streams import Streams
 from parenting.server.tables import Run
 from parenting.server.why_schemas import WhySchema
 
@@ -48,16 +49,22 @@ def list_questions(run_id: RunId, db: Db, part: Annotated[AskedPart, Query()]) -
     responses={204: {"description": "No question waits."}, **write_responses(404)},
 )
 async def lease_question(
-    request: Request, run_id: RunName, body: LeaseBody, db: Db, settings: SettingsOf
+    request: Request, run_id: RunName, body: NextBody, db: Db, settings: SettingsOf
 ) -> Response:
     """Lease the most urgent open question (guidance first, then the oldest) for this client, for 60 s.
 
     The reply holds all that a parent needs to answer it. Leasing again renews the lease. The status is 204 if
-    no question waits or if the run has reached its goal.
+    no question waits or if the run has reached its goal. With `wait` the request lies at the server for so
+    many seconds until one is free; where too many lie there already, the status is 204 at once.
     """
     asks = (db, run_id, body.client_id)
     verb, worth = partial(_lease, *asks, settings.lease_seconds), partial(_is_worth_it, *asks)
-    leased = await store(request, verb, durable=False, worth=worth)
+    look = partial(store, request, verb, durable=False, worth=worth)
+    leased: LeasedSchema | None = await look()
+    if leased is None and body.wait:
+        streams: Streams = request.app.state.streams
+        number = await streams.admission.read(run_number, db, run_id)
+        leased = await streams.wait_for(number, look, body.wait, request.is_disconnected)
     if leased is None:
         return Response(status_code=204)
     return Response(leased.model_dump_json(), media_type="application/json")

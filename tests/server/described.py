@@ -108,7 +108,13 @@ def reply_to(case: Case[Any], app: FastAPI) -> int:
 
 
 def _lead(case: Case[Any], db: Database) -> None:
-    """Well-formed ids lead to what is there, and one in so many beyond; malformed ones stay as they are."""
+    """Well-formed ids lead to what is there, and one in so many beyond; malformed ones stay as they are.
+
+    Nobody waits for a question that nobody asks.
+    """
+    wait = case.body.get("wait") if isinstance(case.body, dict) else None
+    if isinstance(case.body, dict) and isinstance(wait, float) and 0 <= wait <= 10:
+        case.body["wait"] = 0.0
     for name, count, table in (("run_id", RUNS, Run), ("query_id", QUESTIONS, Query), ("job_id", JOBS, Job)):
         drawn = case.path_parameters.get(name)
         if isinstance(drawn, list | dict):  # as text it is escaped; else a "?" in it would end the path
