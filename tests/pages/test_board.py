@@ -184,7 +184,7 @@ def test_what_is_not_stored_is_done_by_a_worker_once_there_is_one(tabs: BrowserT
 
 
 def test_news_that_comes_while_the_page_looks_is_not_lost(tabs: BrowserTabs, life: RunSession) -> None:
-    """What the server has read for it is old, and no event follows the one that tells of more."""
+    """The server has read an old state for it, and no event follows the one that tells of more."""
     live(life, 12)
     page = tabs.open("/runs/1")
     expect(page.locator("#seen-at")).to_contain_text("Tick 12")

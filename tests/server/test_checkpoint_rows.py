@@ -7,15 +7,9 @@ from typing import Any
 import pytest
 from sqlalchemy import event, select, text, update
 
-from parenting.server import checkpoint_parts, checkpoints
+from parenting.server import checkpoint_parts
 from parenting.server.checkpoint_parts import sweep_parts
-from parenting.server.checkpoints import (
-    ended_with_more,
-    load_checkpoints,
-    newest_first,
-    save_checkpoint,
-    thin,
-)
+from parenting.server.checkpoints import ended_with_more, load_checkpoints, save_checkpoint, thin
 from parenting.server.db import Database
 from parenting.server.errors import LostClaimError
 from parenting.server.metrics import write_metrics
@@ -296,17 +290,3 @@ def test_a_failed_run_keeps_both_and_a_damaged_last_checkpoint_is_not_relied_on(
     assert (ended_with_more(db), thin(db, mine.run_id)) == (mine.run_id, False)
     assert ended_with_more(db, but=[mine.run_id]) is None
     assert [kept.tick for kept in load_checkpoints(db, mine.run_id)] == [2, 1]
-
-
-def test_whoever_takes_the_newest_checkpoint_reads_no_other(
-    db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for tick in (10, 20):
-        save_checkpoint(db, mine, tick, bytes([tick]))
-    read = []
-    monkeypatch.setattr(checkpoints, "_stored", lambda _, row: read.append(row.tick))
-    each = newest_first(db, mine.run_id)
-    next(each)
-    assert read == [20]
-    next(each)
-    assert read == [20, 10]

@@ -14,7 +14,6 @@ import pytest
 import torch
 
 from parenting.agent.confirmation import unsettled
-from parenting.agent.policy import Network
 from parenting.agent.query import Choice, Query
 from parenting.agent.state import RENAMED
 from parenting.server.db import Database
@@ -296,11 +295,3 @@ def test_ticks_that_were_lived_ask_nothing_twice(db: Database) -> None:
             session.connection().exec_driver_sql("SELECT id, tick, clips FROM query ORDER BY id").all()
             == before
         )
-
-
-def test_no_weights_are_drawn_to_read_a_checkpoint(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A large network has millions, and all of them would be replaced by those that are read."""
-    saved = ISLAND.initial_snapshot()
-    blob = pack(saved)
-    monkeypatch.setattr(Network, "init_params", None)
-    assert same_bits(ISLAND.unpack(blob), saved) == []
