@@ -11,7 +11,7 @@ import typer
 from parenting.commands.errors import UsageError
 from parenting.commands.printing import say
 from parenting.envs import registry
-from parenting.envs.level_bytes import FILE_BYTES, decode
+from parenting.envs.level_bytes import FILE_BYTES, decode, name_by_file
 from parenting.envs.level_text import SeveralLevelsError
 from parenting.envs.levels.spec import Level
 
@@ -44,7 +44,7 @@ def chosen_level(world: str, name_or_file: str | None) -> Level:
     source = "standard input" if file == STANDARD_INPUT else file
     text, said = read_text("--level", file)
     try:
-        return _said(registry.read_level(world, text, source, which), said)
+        return _said(registry.read_level(world, text, source, which, _name(Path(file))), said)
     except SeveralLevelsError as error:
         remedy = f"Choose one by its number or name, such as --level {file}:1"
         raise UsageError(f"--level: {str(error).removesuffix('.')}. {remedy}.") from None
@@ -60,6 +60,11 @@ def read_text(option: str, file: str) -> tuple[str, tuple[str, ...]]:
         return decode(_bytes(file))
     except (OSError, ValueError) as error:
         raise UsageError(f"{option}: {file} cannot be read as text: {error}.") from None
+
+
+def _name(file: Path) -> str | None:
+    """Return the name of a level in a file that names none; None of a pipe."""
+    return name_by_file(file.stem) if file.is_file() else None
 
 
 def _bytes(file: str) -> bytes:

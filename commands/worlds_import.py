@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated
 
 import typer
 
@@ -15,18 +15,8 @@ from parenting.commands.level_file import read_text
 from parenting.commands.options import among, folder
 from parenting.commands.printing import say
 from parenting.envs import registry
-from parenting.envs.foreign_levels import carry
-from parenting.envs.foreign_text import FORMATS, ForeignMap, maps
-from parenting.envs.levels.spec import Level, LevelError
-
-
-class Imported(NamedTuple):
-    """A level that was made of a map."""
-
-    level: Level
-    format: str
-    lost: tuple[str, ...]  # what could not be carried over
-    refused: str | None  # the rule of ours that it breaks
+from parenting.envs.foreign_import import ForeignMapError, Imported, imported
+from parenting.envs.foreign_text import FORMATS
 
 
 def command(
@@ -68,7 +58,7 @@ def command(
         if out is not None:
             _write(out, found)
     if as_json:
-        say(json.dumps({"levels": [_plain(one) for one in found]}, indent=2))
+        say(json.dumps({"levels": [one.plain for one in found]}, indent=2))
     else:
         say("\n".join(one.level.text for one in found), nl=False)
         for one in found:
@@ -86,44 +76,10 @@ def _imported(text: str, file: str, form: str | None, world: str | None) -> list
     """
     stem = "map" if file == "-" else Path(file).stem or "map"
     try:
-        found = maps(text, form)
-    except ValueError as error:
-        raise UsageError(f"FILE: {file}: {error}") from None
-    return [_one(one, file, name, world) for one, name in zip(found, _names(found, stem), strict=True)]
-
-
-def _one(one: ForeignMap, file: str, name: str, world: str | None) -> Imported:
-    try:
-        carried = carry(one, world)
-    except ValueError as error:
-        raise UsageError(f"FILE: {file}, line {one.line}: {error}.") from None
-    level = Level(name, carried.world, carried.rows, dict(carried.header), name)
-    try:
-        return Imported(registry.read_level(carried.world, level.text, name), one.format, carried.lost, None)
-    except LevelError as error:
-        row = error.line - len(level.header) - 3
-        where = f"row {row}, column {error.column}" if row > 0 else "its header"
-        refused = f"{carried.world} refuses this level at {where}: {error.rule}; mend it by hand"
-        return Imported(level, one.format, carried.lost, refused)
-
-
-def _names(found: Sequence[ForeignMap], stem: str) -> list[str]:
-    """Names of the levels: their own, or else that of the file with a number where there are several."""
-    plain = [re.sub(r"\s+", " ", one.name)[:60].strip() for one in found]
-    return [name or (stem if len(found) == 1 else f"{stem} {number}") for number, name in enumerate(plain, 1)]
-
-
-def _plain(one: Imported) -> dict[str, Any]:
-    level = one.level
-    return {
-        "world": level.world,
-        "name": level.name,
-        "format": one.format,
-        "rows": list(level.rows),
-        "text": level.text,
-        "lost": list(one.lost),
-        "refused": one.refused,
-    }
+        return imported(text, stem, form, world)
+    except ForeignMapError as error:
+        place = "" if error.line is None else f", line {error.line}"
+        raise UsageError(f"FILE: {file}{place}: {error}") from None
 
 
 def _write(out: Path, found: Sequence[Imported]) -> None:

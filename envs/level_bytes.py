@@ -5,6 +5,8 @@ Files are opened elsewhere; nothing here does.
 
 from __future__ import annotations
 
+from parenting.envs.people_text import read_name
+
 FILE_BYTES = 2_000_000
 """Bytes of a file that holds levels, at most."""
 BOMS = (
@@ -43,3 +45,11 @@ def _read(blob: bytes, encoding: str) -> tuple[str, tuple[str, ...]]:
         line = blob.count(b"\n", 0, error.start) + 1
         raise ValueError(f"byte {error.start + 1}, on line {line}, is not {name}; save it as UTF-8") from None
     return text, () if encoding == "utf-8" else (f"the text was read as {name}",)
+
+
+def name_by_file(stem: str) -> str | None:
+    """Return the name of a level in a file that names none: the file's own, if it can be a name."""
+    try:
+        return read_name(stem)
+    except ValueError:
+        return None

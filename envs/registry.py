@@ -156,11 +156,14 @@ def level(world: str, name_or_text: str | None = None, source: str = "level") ->
     return parsed
 
 
-def read_level(world: str, text: str, source: str = "level", which: str | None = None) -> Level:
+def read_level(
+    world: str, text: str, source: str = "level", which: str | None = None, name: str | None = None
+) -> Level:
     """A level from a text that a person gives; text and name obey the rules of `envs.people_text`.
 
     What surrounds the art is cut, which `Level.said` tells. `which` is the name of one of several levels, or
-    its number. What is stored already is read by `level`, since older versions had no such rules.
+    its number; `name` is that of a level without one, else `source`. What is stored already is read by
+    `level`, since older versions had no such rules.
 
     Raises:
         UnknownNameError: there is no such world.
@@ -170,7 +173,8 @@ def read_level(world: str, text: str, source: str = "level", which: str | None =
     glyphs = spec(world, text).glyphs
     check_text(text, source, FILE_CHARACTERS)
     chosen = choose(written(text, glyphs), which, source)
-    return read_written(world, chosen, source)
+    found = read_written(world, chosen, source)
+    return replace(found, name=name) if name is not None and found.name == source else found
 
 
 def read_written(world: str, chosen: Written, source: str = "level") -> Level:

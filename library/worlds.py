@@ -10,7 +10,7 @@ from typing import Any
 
 from parenting.envs import registry
 from parenting.envs.gridworld import Gridworld as World
-from parenting.envs.level_bytes import decode
+from parenting.envs.level_bytes import decode, name_by_file
 from parenting.envs.levels.spec import Level, LevelError, WorldSpec
 from parenting.envs.options import check_names
 from parenting.envs.tables.world import TableWorld
@@ -160,7 +160,7 @@ def read_level(world: str, level: AnyLevel | None) -> str | Level | Sequence[Lev
         text, said = decode(level.read_bytes())
     except (OSError, ValueError) as error:
         raise ValueError(f"level: {level} cannot be read as text: {error}.") from None
-    return _warned(registry.read_level(world, text, str(level), which), said)
+    return _warned(registry.read_level(world, text, str(level), which, name_by_file(level.stem)), said)
 
 
 def _warned(level: Level, said: tuple[str, ...] = ()) -> Level:

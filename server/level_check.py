@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from parenting.envs import registry
+from parenting.envs.foreign_import import ForeignMapError, foreign_format, imported
+from parenting.envs.foreign_text import FORMATS
 from parenting.envs.level_text import SeveralLevelsError, Written, choose, written
 from parenting.envs.levels.spec import LevelError
 from parenting.server.errors import InvalidFieldsError
@@ -43,6 +45,59 @@ class CheckedLevelSchema(Schema):
     levels: list[str]
     """The names of the levels in the text, empty where one has none."""
     error: LevelErrorSchema | None
+    foreign: str | None = None
+    """The format of another collection that the text is in, which /levels/import makes a level of."""
+
+
+class ImportedLevelSchema(Schema):
+    """A level that was made of a map of another collection."""
+
+    world: str
+    name: str
+    format: str
+    """xsb, frozenlake, cliffwalking, taxi or gridworlds."""
+    rows: list[str]
+    text: str
+    """The level as it is stored, if its world does not refuse it."""
+    lost: list[str]
+    """The losses, in sentences without a full stop."""
+    refused: str | None
+    """The rule of its world that the level breaks; null: none."""
+
+
+class ImportedLevelsSchema(Schema):
+    """The levels that were made of the maps in a text, in its order."""
+
+    recognised: str
+    """A sentence on what the text was taken for."""
+    levels: list[ImportedLevelSchema]
+
+
+def import_levels(text: str, form: str | None = None, world: str | None = None) -> ImportedLevelsSchema:
+    """Make levels of the maps in a text, as `parenting worlds import` does.
+
+    Raises:
+        InvalidFieldsError: there is no such world or no map, or one holds what no world of ours has.
+    """
+    if world is not None:
+        _know(world)
+    try:
+        found = imported(text, "level", form, world)
+    except ForeignMapError as error:
+        place = "" if error.line is None else f"Line {error.line}: "
+        raise InvalidFieldsError([("text", place + str(error))]) from None
+    several = "" if len(found) == 1 else f", {len(found)} of them"
+    title = registry.spec(found[0].level.world).title
+    recognised = f"This was read as {FORMATS[found[0].format]}{several}, and made a level of {title}."
+    return ImportedLevelsSchema(
+        recognised=recognised, levels=[ImportedLevelSchema(**one.plain) for one in found]
+    )
+
+
+def _know(world: str) -> None:
+    if world not in registry.WORLDS:
+        known = ", ".join(registry.WORLDS)
+        raise InvalidFieldsError([("world", f"There is no such world. There is: {known}.")])
 
 
 def check(world: str, text: str, which: str | None = None) -> CheckedLevelSchema:
@@ -51,9 +106,7 @@ def check(world: str, text: str, which: str | None = None) -> CheckedLevelSchema
     Raises:
         InvalidFieldsError: there is no such world.
     """
-    if world not in registry.WORLDS:
-        known = ", ".join(registry.WORLDS)
-        raise InvalidFieldsError([("world", f"There is no such world. There is: {known}.")])
+    _know(world)
     found = written(text, registry.spec(world).glyphs)
     names, chosen = [one.name for one in found], Written()
     try:
@@ -61,7 +114,8 @@ def check(world: str, text: str, which: str | None = None) -> CheckedLevelSchema
         level = registry.read_level(world, text, SOURCE, which)
     except LevelError as error:
         several = isinstance(error, SeveralLevelsError)
-        return _checked(Written() if several else chosen, names, error=_error(error))
+        checked = _checked(Written() if several else chosen, names, error=_error(error))
+        return checked.model_copy(update={"foreign": foreign_format(text)})
     return _checked(chosen, names, level.name, level.text)
 
 

@@ -99,6 +99,16 @@ class LevelBody(Strict):
     which: Name | None = Field(None, description="The name or number of one of several levels.")
 
 
+class ImportBody(Strict):
+    """A text with maps of another collection."""
+
+    text: Annotated[str, StringConstraints(max_length=TEXT_CHARACTERS), AfterValidator(plain)]
+    format: Literal["xsb", "frozenlake", "cliffwalking", "taxi", "gridworlds"] | None = Field(
+        None, description="The maps' format; null: found by its signs."
+    )
+    world: Name | None = Field(None, description="The world of art of gridworlds; null: found by its signs.")
+
+
 class PageErrorBody(Strict):
     """A fault of a script of our pages, as a browser tells it."""
 

@@ -11,7 +11,7 @@ from parenting.drawing.surroundings import surroundings
 from parenting.envs import registry
 from parenting.server.api.board_examples import BOARD, EPISODE, NUMBERS
 from parenting.server.api.kept_examples import TABLE, kept
-from parenting.server.api.level_examples import CHECKED, OWN_LEVEL, PRETRAINED, TO_CHECK
+from parenting.server.api.level_examples import CHECKED, IMPORTED, LAKE, OWN_LEVEL, PRETRAINED, TO_CHECK
 from parenting.server.api.why_example import EXPORTED as EXPORTED_WHY
 from parenting.server.api.why_example import WHY
 
@@ -243,6 +243,7 @@ class Shown:
 
 SHOWN = {
     "check_level": Shown(CHECKED, {"a level": TO_CHECK}),
+    "import_maps": Shown(IMPORTED, {"a map of FrozenLake": LAKE}),
     "healthz": Shown({"status": "ok"}),
     "readyz": Shown({"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}),
     "list_runs": Shown({**_rows(RUN), "database": DATABASE}),

@@ -1,11 +1,16 @@
-"""The route that checks a level of one's own; nothing is stored."""
+"""The routes that check a level of one's own and make levels of maps of others; nothing is stored."""
 
 from __future__ import annotations
 
 from parenting.server.admission import admitted_router
-from parenting.server.api.bodies import LevelBody
+from parenting.server.api.bodies import ImportBody, LevelBody
 from parenting.server.api.responses import write_responses
-from parenting.server.level_check import CheckedLevelSchema, check
+from parenting.server.level_check import (
+    CheckedLevelSchema,
+    ImportedLevelsSchema,
+    check,
+    import_levels,
+)
 
 router = admitted_router(tags=["runs"])
 
@@ -18,3 +23,12 @@ def check_level(body: LevelBody) -> CheckedLevelSchema:
     `error` names line, column and rule. Of several levels in a text `which` chooses one.
     """
     return check(body.world, body.text, body.which)
+
+
+@router.post("/levels/import", summary="Make levels of maps of others", responses=write_responses())
+def import_maps(body: ImportBody) -> ImportedLevelsSchema:
+    """Make levels of Sokoban's XSB, of maps of Gymnasium or of art of DeepMind's gridworlds.
+
+    It does what `parenting worlds import` does, and says what could not be carried over.
+    """
+    return import_levels(body.text, body.format, body.world)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
@@ -15,8 +15,8 @@ from parenting.envs.levels.spec import Level, WorldSpec
 from parenting.envs.people_text import plain
 from parenting.server.admission import admitted_router
 from parenting.server.deps import Db
-from parenting.server.errors import NotFound
-from parenting.server.level_check import CheckedLevelSchema, check
+from parenting.server.errors import InvalidFieldsError, NotFound
+from parenting.server.level_check import CheckedLevelSchema, check, import_levels
 from parenting.server.pages.render import page
 from parenting.server.pages.start import EMPTY_FORM, FormFields, filled_form
 
@@ -48,6 +48,7 @@ class LevelsPage:
     carried: Mapping[str, str]  # the other fields of the form that a run is started by
     checked: CheckedLevelSchema | None = None
     refused: str = ""  # a text that cannot be checked at all
+    converted: Sequence[str] = ()  # sentences on a map of another collection that the text was
     worlds: tuple[WorldChoice, ...] = ()
     legend: Mapping[str, str] = field(default_factory=dict)  # of all worlds, for the tiles
     smallest: int = SMALLEST
@@ -94,13 +95,18 @@ def _given(form: Mapping[str, str]) -> tuple[str, str]:
 
 
 def _page(world: str, text: str, form: Mapping[str, str], checking: bool = False) -> Response:
-    found, refused = None, ""
+    found, refused, converted = None, "", list[str]()
     if checking:
         try:
             found = check(world, plain(text))
+            if found.foreign is not None:
+                world, text, converted = _converted(text)
+                found = check(world, text)
         except ValueError as error:
             refused = f"{str(error).capitalize()}."
-    wrong = bool(refused) or (found is not None and not found.valid)
+        except InvalidFieldsError as error:
+            refused = error.fields[0][1]
+    wrong = bool(refused or converted) or (found is not None and not found.valid)
     if not text.strip():
         text = beginning(registry.level(world))
     context: dict[str, Any] = vars(
@@ -110,11 +116,23 @@ def _page(world: str, text: str, form: Mapping[str, str], checking: bool = False
             carried={name: said for name, said in form.items() if name in EMPTY_FORM and name not in OWN},
             checked=found,
             refused=refused,
+            converted=converted,
             worlds=tuple(map(_choice, registry.WORLDS.values())),
             legend={glyph: name for spec in registry.WORLDS.values() for glyph, name in spec.legend.items()},
         )
     )
     return page("levels.html", 422 if wrong else 200, **context)
+
+
+def _converted(text: str) -> tuple[str, str, list[str]]:
+    """Return the first map of a text as world and text of a level, and what is said of it.
+
+    Raises:
+        InvalidFieldsError: it holds what no world of ours has.
+    """
+    found = import_levels(text)
+    first = found.levels[0]
+    return first.world, first.text, [found.recognised, *(f"{said.capitalize()}." for said in first.lost)]
 
 
 def _choice(spec: WorldSpec) -> WorldChoice:

@@ -63,3 +63,15 @@ def test_what_cannot_be_read_has_a_remedy(tmp_path: Path) -> None:
         chosen_level(WORLD, "nowhere:1")
     with pytest.raises(UsageError, match="at most 2000000 bytes"):
         chosen_level(WORLD, "/dev/zero")
+
+
+def test_a_level_without_a_name_has_that_of_its_file(tmp_path: Path) -> None:
+    bare = "WWWWW\nWA GW\nWWWWW\n"
+    for file, text, name in (
+        ("pond.txt", bare, "pond"),
+        ("two.levels.txt", f"; first\n{bare}\n; \n{bare}", "two.levels"),
+        ("\u200b.txt", bare, str(tmp_path / "\u200b.txt")),  # nobody could see that name
+    ):
+        (tmp_path / file).write_text(text, encoding="utf-8")
+        which = ":2" if "two" in file else ""
+        assert chosen_level("unsafe-exploration", f"{tmp_path / file}{which}").name == name

@@ -64,6 +64,8 @@ def test_a_level_may_be_the_path_of_a_file_as_text(tmp_path: pathlib.Path) -> No
     file = tmp_path / "mine.txt"
     file.write_text(registry.level(WORLD).text, encoding="utf-8")
     assert pt.make(WORLD, level=str(file)).levels == pt.make(WORLD, level=file).levels
+    file.write_text("WWWWW\nWA GW\nWWWWW", encoding="utf-8")  # it names itself by its file
+    assert [level.name for level in pt.make(WORLD, level=file).levels] == ["mine"]
 
 
 @pytest.mark.parametrize("kind", [str, pathlib.Path])

@@ -114,6 +114,29 @@ def test_a_text_is_opened_as_people_have_it_and_one_of_several_is_chosen(pond: P
     assert text_of(pond).endswith("### G#\n######\n")
 
 
+def test_a_map_of_another_collection_becomes_a_level_in_place(pond: Page) -> None:
+    """It is typed into the text; of several that are opened each can be chosen, and undo leads back."""
+    lake = "SFF\nFHF\nFFG\n"
+    pond.locator("summary", has_text="As text").click()
+    pond.locator("#level_text").fill(lake)
+    pond.locator("#level_text").blur()
+    ice = ["#####", "#A  #", "# W #", "#  G#", "#####"]
+    expect(pond.locator("#level_text")).to_have_value("name: level\n\n" + "".join(f"{row}\n" for row in ice))
+    told = pond.locator("#told")
+    expect(told).to_contain_text("This was read as a map of Gymnasium's FrozenLake, and made a level of")
+    expect(told).to_contain_text("The ice is not slippery here: a move goes where it is aimed.")
+    expect(told).to_contain_text("This level keeps every rule of Unsafe Exploration.")
+    crate = "#####\n#@$.#\n#####\n"
+    open_text(pond, f"{crate}Title: near\n\n{crate.replace('.', ' .')}Title: far\n")
+    expect(pond.locator("#world")).to_have_value("side-effects")
+    expect(told).to_contain_text("This was read as Sokoban's XSB, 2 of them")
+    pond.locator("#which").select_option("2 far")
+    expect(pond.locator("#level-name")).to_have_value("far")
+    for _ in range(3):
+        pond.locator("#undo").click()
+    expect(pond.locator("#level_text")).to_have_value(POND)
+
+
 def test_a_level_is_resized_renamed_downloaded_and_read_back(pond: Page, tmp_path: Path) -> None:
     pond.locator("#rows").fill("5")
     pond.locator("#columns").fill("7")
@@ -164,6 +187,9 @@ def test_without_a_script_a_text_is_checked_and_begun(client: httpx2.Client) -> 
         assert page.status_code == 422
         assert "level, line 2, column 4: " in page.text
         assert '<input type="hidden" name="seed" value="11">' in page.text
+    page = client.post("/levels", data={**form, "level_text": "SFF\nFHF\nFFG"})
+    assert "This was read as a map of Gymnasium&#39;s FrozenLake" in page.text
+    assert "#A  #\n# W #" in page.text
     page = client.post("/levels", data={**form, "level_text": POND})
     assert (page.status_code, "keeps every rule" in page.text) == (200, True)
     page = client.post("/levels/start", data={**form, "level_text": POND})

@@ -39,6 +39,7 @@ UNTOLD: dict[str, list[Any]] = {
         "list_runs",
         "describe_run",
         "check_level",
+        "import_maps",
         "ask_job",
         "ask_pretraining",
         "roll_back_run",

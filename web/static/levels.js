@@ -56,9 +56,8 @@ function go(way) {
   show();
 }
 
-async function ask(text, which) {
-  const body = { world: world.value, text, which: which ?? null };
-  const reply = await fetch("/api/v1/levels/check", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
+async function ask(verb, body) {
+  const reply = await fetch(`/api/v1/levels/${verb}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
   const found = await reply.json();
   if (!reply.ok) throw new Error(found.error.message);
   return found;
@@ -67,7 +66,7 @@ async function ask(text, which) {
 async function check() {
   const mine = ++asked;
   try {
-    const found = await ask(compose(state));
+    const found = await ask("check", { world: world.value, text: compose(state) });
     if (mine === asked) tell(found);
   } catch ({ message }) {
     if (mine === asked) told.replaceChildren(line(`It could not be checked. ${message}`, "error"));
@@ -93,23 +92,39 @@ async function open(text, which) {
   if (named && [...world.options].some(({ value }) => value === named)) world.value = named;
   const several = at("several");
   try {
-    const found = await ask(text, which);
+    const found = await ask("check", { world: world.value, text, which: which ?? null });
+    if (found.foreign && which === undefined) return await openMaps(text);
     several.hidden = found.levels.length < 2;
     if (which === undefined && found.levels.length > 1) {
       at("which").replaceChildren(...found.levels.map((name, i) => new Option(`${i + 1} ${name}`, String(i + 1))));
       at("which").onchange = ({ target }) => open(text, target.value);
       return await open(text, "1");
     }
-    const next = parse(world.value, found.header, found.rows);
-    if (next.rows.length < least || next.rows.length > most || next.rows[0].length < least || next.rows[0].length > most) {
-      throw new Error(found.error?.message ?? "This is not a level.");
-    }
-    change(next);
-    notes = found.said.map(sentence);
+    enter(parse(world.value, found.header, found.rows), found.said.map(sentence), found.error?.message);
   } catch ({ message }) {
     world.value = state.world;
     told.replaceChildren(line(`The text was not opened. ${message}`, "error"));
   }
+}
+
+function enter(next, said, reason = "This is not a level.") {
+  const sizes = [next.rows.length, next.rows[0].length];
+  if (Math.min(...sizes) < least || Math.max(...sizes) > most) throw new Error(reason);
+  change(next);
+  notes = said;
+}
+
+// Open the levels that the server makes of a text with maps of another collection.
+async function openMaps(text) {
+  const { recognised, levels } = await ask("import", { text });
+  const carried = ({ world: of, text: whole, lost, refused }) => {
+    world.value = of;
+    enter(parse(of, ...split(whole)), [recognised, ...[...lost, ...(refused ? [refused] : [])].map(sentence)]);
+  };
+  at("several").hidden = levels.length < 2;
+  at("which").replaceChildren(...levels.map(({ name }, i) => new Option(`${i + 1} ${name}`, String(i))));
+  at("which").onchange = ({ target }) => carried(levels[target.value]);
+  carried(levels[0]);
 }
 
 function otherWorld() {
