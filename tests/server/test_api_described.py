@@ -130,7 +130,7 @@ def test_bodies_are_strict(described: dict[str, Any]) -> None:
         for one in schema.get("oneOf", [schema])
     }
     sent |= {"PretrainPayload", "WalkPayload", "PolicyPayload", "EpisodePayload", "StatePayload"}
-    assert len(sent) == 26
+    assert len(sent) == 27
     assert all(described["components"]["schemas"][name]["additionalProperties"] is False for name in sent)
 
 
