@@ -15,6 +15,7 @@ from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
 from parenting.server.pages.comparison import points_each, read_numbers
 from parenting.server.reads.comparison import letter, ranges
+from parenting.server.runs import claim as claims
 from parenting.server.runs import report_progress, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
@@ -163,3 +164,30 @@ def test_curves_lie_over_each_other(tabs: BrowserTabs, db: Database, runs: None)
     assert page.evaluate("document.documentElement.scrollWidth") == 390
     page.get_by_role("link", name="by minute").click()
     expect(page.get_by_text("In a batch, minutes of computing.")).to_be_visible()
+
+
+def test_the_curves_and_tables_of_runs_that_go_on_follow_them(
+    tabs: BrowserTabs, db: Database, runs: None
+) -> None:
+    """Of three runs that are over nothing is asked again; once all are, nothing at all."""
+    page = tabs.open("/compare?runs=1-4&by=minute")
+    deaths = page.locator("[data-chart=deaths] .plot")
+    last = "plot => plot.data?.map(({ y }) => y.at(-1)).toSorted()"
+    until(lambda: deaths.evaluate(last) == [1, 2, 3, 6])
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url.partition("/api/v1/")[2].partition("?")[0]))
+    (mine,) = (claim for claim in claims(db, "another", seconds=-1) if claim.run_id == 4)
+    counts = {"guidance": 9, "preference": 4, "loss": None, "return": -1.0, "rows": 2, "deaths": 8}
+    write_metrics(db, mine, {12: counts})
+    report_progress(db, mine, tick=12)
+    until(lambda: deaths.evaluate(last) == [1, 2, 6, 8])
+    row = page.locator("tr[data-run='4']")
+    expect(row.locator("td").nth(3)).to_have_text("8")
+    expect(page.locator("#living")).to_have_text("1 run goes on: the last numbers count.")
+    set_status(db, 4, RunStatus.STOPPED)
+    expect(row).to_contain_text("stopped")
+    expect(page.locator("#living")).to_have_text("")
+    assert {path for path in asked if path} == {"runs/4/curves"}
+    asked.clear()
+    page.wait_for_timeout(2500)
+    assert asked == []

@@ -1,5 +1,6 @@
 // Runs compared: a chart for each metric, in which every run is a curve of its group's colour and dash.
 import "./errors.js";
+import { following } from "./comparison_live.js";
 import { curvesOf } from "./curves.js";
 
 const CALM = 1500; // ms between two drawings while curves arrive
@@ -72,10 +73,11 @@ for (const figure of figures) {
       window.Plotly.downloadImage(figure.querySelector(".plot"), { format: button.dataset.save, scale: 2, filename: `compare-${figure.dataset.chart}-by-${by}` }));
   }
 }
-for (const one of runs) {
-  one.curves.load(() => {}).then(() => {
-    one.loaded = true;
-    redraw(runs.every(({ loaded }) => loaded) ? 0 : CALM);
-  });
-}
+const load = async (one) => {
+  await one.curves.load(() => {});
+  one.loaded = true;
+  redraw(runs.every(({ loaded }) => loaded) ? 0 : CALM);
+};
+for (const one of runs) load(one);
+following((numbers) => Promise.all(runs.filter(({ run }) => numbers.includes(run)).map(load)));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw());

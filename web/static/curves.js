@@ -23,6 +23,7 @@ async function fetched(run, names, part) {
 // The curves of some metrics; `how` may hold another axis (`by`) and another number of points.
 export function curvesOf(run, names, how = {}) {
   let whole = Object.fromEntries(names.map((name) => [name, { x: [], y: [] }]));
+  const { by = "tick" } = how; // rows come in by their ticks
   let last = -1, fresh = 0, thinned = false;
   const parts = {}; // what is looked at closely, by chart
 
@@ -35,7 +36,7 @@ export function curvesOf(run, names, how = {}) {
       await new Promise((resolve) => setTimeout(resolve, AGAIN));
     }
     const until = found.last ?? -1;
-    for (const name of names) whole[name] = joined([found.curves[name], chosen(whole[name], (tick) => tick > until)]);
+    for (const name of names) whole[name] = by === "tick" ? joined([found.curves[name], chosen(whole[name], (tick) => tick > until)]) : found.curves[name];
     last = Math.max(last, until);
     ({ thinned } = found);
   }
