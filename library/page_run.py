@@ -20,12 +20,13 @@ from parenting.library.threads import one_thread
 from parenting.parents.scripted import ScriptedRule
 from parenting.server import checkpoints, new_run, operator_events, runs
 from parenting.server.db import Database
-from parenting.server.errors import InvalidFieldsError, NotFound
+from parenting.server.errors import InvalidFieldsError, NotFound, TooManyRunsError
 from parenting.server.identity import database_id
 from parenting.server.new_run import NewRun
 from parenting.server.notes import AGENT_KINDS
 from parenting.server.queue import leases
 from parenting.server.reads import answers
+from parenting.server.run_limits import require_room
 from parenting.server.settings import Settings
 from parenting.server.snapshot import Snapshot, first_snapshot, initial_weights, unpack
 from parenting.server.statuses import QueryStatus
@@ -57,8 +58,9 @@ def begin(db: Database, settings: Settings, task: Task, rule: StopRule, seed: in
         goal=rule.number if rule.kind == "queries" else None,
     )
     try:
+        require_room(db, settings.runs)
         return new_run.start(db, new, settings.weights, task.origin, settings.bound).id
-    except InvalidFieldsError as error:
+    except (InvalidFieldsError, TooManyRunsError) as error:
         raise ValueError(str(error)) from None
 
 

@@ -37,6 +37,7 @@ from parenting.server.migrate import require_current
 from parenting.server.notify import Notifier
 from parenting.server.pages.render import compile_first
 from parenting.server.requests import RequestMiddleware
+from parenting.server.run_limits import StartedRuns
 from parenting.server.security import SecurityMiddleware
 from parenting.server.settings import Settings
 from parenting.server.static import OthersFiles, OurFiles
@@ -79,6 +80,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     app.state.db, app.state.settings = db, settings
     app.state.languages = Languages(settings.languages or SHIPPED)
     app.state.worker_notifier = Notifier(settings.data, "worker")
+    app.state.started_runs = StartedRuns(settings.runs_per_client)
     app.state.admission, app.state.health_threads = Admission(), health.health_threads()
     app.state.group_commit = GroupCommit(db) if db.one_writer else None
     notifier = Notifier(settings.data, "web")

@@ -84,6 +84,12 @@ class TooManyStreamsError(ServerError):
     status, code = 503, "too_many"
 
 
+class TooManyRunsError(ServerError):
+    """As many runs live as may. Stop some of them."""
+
+    status, code = 409, "too_many_runs"
+
+
 class NotReadyError(ServerError):
     """This server is not ready."""
 

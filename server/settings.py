@@ -81,6 +81,10 @@ class Settings(BaseSettings):
     lives_megabytes: float = Field(
         500.0, gt=0, description="Megabytes of the tensors of those agents, as far as the others wait."
     )
+    runs: int = Field(5000, ge=1, description="Runs that may live at once; those that are over do not count.")
+    runs_per_client: int = Field(
+        250, ge=1, description="Living runs that one address may have started on the pages or the API."
+    )
     frame_ancestors: str = Field(
         "none",
         description="Sites that may show the pages in a frame, as the header Content-Security-Policy names "

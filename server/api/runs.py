@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import Query, Request
@@ -20,7 +21,7 @@ from parenting.server.api.lists import (
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.curve_schemas import CurveSchema, CurvesSchema
-from parenting.server.deps import Db, SettingsOf, notify_worker
+from parenting.server.deps import Db, SettingsOf, start_within_limits
 from parenting.server.identity import database_id
 from parenting.server.new_run import NewRun, start
 from parenting.server.reads import pagination
@@ -43,15 +44,15 @@ def list_runs(db: Db, part: Annotated[RunPart, Query()]) -> RunRows:
     return RunRows(rows=run_schemas(db, page.rows), next=page.next, database=database_id(db))
 
 
-@router.post("/runs", summary="Start a run", status_code=201, responses=write_responses())
+@router.post("/runs", summary="Start a run", status_code=201, responses=write_responses(409))
 def start_run(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> RunSchema:
     """Start a run: a new agent in a world, which a worker raises at once.
 
-    Settings that are left out come from the world, or else from the preset.
+    Settings that are left out come from the world, or else from the preset. Where as many runs live as may,
+    in all or of this client, it is refused (409, `too_many_runs`).
     """
-    run = start(db, new, settings.weights, bound=settings.bound)
-    notify_worker(request)
-    return run_schema(db, run.id)
+    begin = partial(start, db, new, settings.weights, bound=settings.bound)
+    return run_schema(db, start_within_limits(request, begin).id)
 
 
 @router.get("/runs/{run_id}", summary="Look at a run", responses=read_responses(404))

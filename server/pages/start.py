@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -13,7 +14,7 @@ from parenting.envs.levels.spec import WorldSpec
 from parenting.envs.registry import WORLDS
 from parenting.server.admission import admitted_router
 from parenting.server.db import Database
-from parenting.server.deps import Db, SettingsOf, notify_worker
+from parenting.server.deps import Db, SettingsOf, start_within_limits
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.missing_weights import missing_weights
 from parenting.server.new_run import LARGEST_INT, PRETRAIN, plan, start
@@ -102,8 +103,8 @@ def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> 
     if errors:
         offer = missing(db, settings.weights, given) if PRETRAIN in errors else None
         return _page(db, {**EMPTY_FORM, **form}, errors, offer=offer)
-    run = start(db, read_form(given), settings.weights, bound=settings.bound)
-    notify_worker(request)
+    begin = partial(start, db, read_form(given), settings.weights, bound=settings.bound)
+    run = start_within_limits(request, begin)
     return redirect(f"/runs/{run.public_id}/parent" if run.parent == "human" else f"/runs/{run.public_id}")
 
 

@@ -99,3 +99,12 @@ def test_what_is_wrong_is_named_and_nothing_is_started(
 def test_hyperparameters_have_either_name(db: Database) -> None:
     for name in (*Config.model_fields, *FIELDS):
         assert "there is no setting" not in said("side-effects", "--set", f"{name}=no").output
+
+
+def test_no_more_runs_are_started_than_may_live(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PARENTING_RUNS", "1")
+    assert CliRunner().invoke(app, ["start", "unsafe-exploration"]).exit_code == 0
+    said = CliRunner().invoke(app, ["start", "unsafe-exploration"])
+    assert said.exit_code == 2
+    assert "1 runs live, and no more may: nothing was started." in said.output.replace("\n", " ")
+    assert len(list_runs(db)) == 1

@@ -1,0 +1,53 @@
+"""So many runs may live, in all and of one client, and no more."""
+
+from __future__ import annotations
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+
+from parenting.server.app import create_app
+from parenting.server.db import Database
+from parenting.server.runs import list_runs, set_status
+from parenting.server.settings import Settings
+from parenting.server.statuses import RunStatus
+
+RUN = {"world": "unsafe-exploration"}
+
+
+def client(db: Database, settings: Settings, **limits: int) -> TestClient:
+    return TestClient(create_app(settings.model_copy(update=limits), db), base_url="http://localhost")
+
+
+def refused(reply: httpx2.Response, setting: str) -> None:
+    assert reply.status_code == 409
+    error = reply.json()["error"]
+    assert error["code"] == "too_many_runs"
+    assert error["message"].startswith("2 runs ")
+    assert error["message"].endswith(f"raise {setting}.")
+
+
+@pytest.mark.parametrize(
+    ("limits", "setting"),
+    [({"runs": 2}, "PARENTING_RUNS"), ({"runs_per_client": 2}, "PARENTING_RUNS_PER_CLIENT")],
+)
+def test_one_more_is_refused_until_one_is_over(
+    db: Database, settings: Settings, limits: dict[str, int], setting: str
+) -> None:
+    web = client(db, settings, **limits)
+    for _ in range(2):
+        assert web.post("/api/v1/runs", json=RUN).status_code == 201
+    refused(web.post("/api/v1/runs", json=RUN), setting)
+    assert web.post("/runs", data=RUN, follow_redirects=False).status_code == 409
+    assert len(list_runs(db)) == 2, "nothing was started"
+    set_status(db, 1, RunStatus.STOPPED)
+    assert web.post("/api/v1/runs", json=RUN).status_code == 201
+    refused(web.post("/api/v1/runs", json=RUN), setting)
+
+
+def test_the_runs_of_others_count_for_nobody_else(db: Database, settings: Settings) -> None:
+    web = client(db, settings, runs_per_client=2)
+    other = TestClient(web.app, base_url="http://localhost", client=("192.0.2.7", 5000))
+    for one in (web, other, web, other):
+        assert one.post("/api/v1/runs", json=RUN).status_code == 201
+    refused(other.post("/api/v1/runs", json=RUN), "PARENTING_RUNS_PER_CLIENT")
