@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
 from torch.optim.adam import adam as fused_adam
 
+from parenting.agent import backpropagation
 from parenting.agent.config import Config
 from parenting.agent.dataset import Dataset
 from parenting.agent.policy import Heads, Network
@@ -119,16 +120,31 @@ def differentiate(
     network: Network, config: Config, parameters: Float[Tensor, "N P"], rows: Rows
 ) -> tuple[Terms, Float[Tensor, "N P"]]:
     """The terms of the objective and its gradient, each trial's by itself."""
-    layers = network.leaf_params(parameters)
-    with torch.enable_grad():
-        terms = objective(network.heads(layers, rows.s0, rows.local_state), rows)
-        value = (
-            terms.loss
-            - config.lambda_global * terms.entropy_global
-            - config.lambda_local * terms.entropy_local
-        )
-        gradient = network.gradient(value, layers)
-    return Terms(*(term.detach() for term in terms)), gradient
+    with torch.no_grad():
+        layers = network.unpack(parameters)
+        trace = network.trace(layers, rows.s0, rows.local_state)
+        found = forward_pass(trace.heads, rows)
+        return found.terms, backpropagation.gradient(network, layers, trace, found.by_heads(config))
+
+
+class Pass(NamedTuple):
+    """The terms of one forward pass, and what their derivatives need."""
+
+    terms: Terms
+    mu: Float[Tensor, "N R 2"]
+    at: Int64[Tensor, "N R 4"]  # each row's state, for every action
+    a0: Int64[Tensor, "N R 2"]
+    margin: Float[Tensor, "N R"]
+    weight: Float[Tensor, "N S"]
+    logs: Heads  # the logarithms of each head's softmax
+
+    def by_heads(self, config: Config) -> Heads:
+        """The derivative of loss - lambda_global H_global - lambda_local H_local by both heads' logits."""
+        margin = backpropagation.by_margin(self.margin, self.mu)
+        half = backpropagation.by_logits(margin, self.logs.local, self.at, self.a0) / 2
+        by_local = backpropagation.by_entropy(self.logs.local, self.weight, config.lambda_local)
+        by_overall = backpropagation.by_entropy(self.logs.overall, self.weight, config.lambda_global)
+        return Heads(half + by_local, half + by_overall)
 
 
 def objective(heads: Heads, rows: Rows) -> Terms:
@@ -136,21 +152,32 @@ def objective(heads: Heads, rows: Rows) -> Terms:
 
     With logits z, pi(a_i) / (pi(a_0) + pi(a_1)) is sigmoid(z[a_i] - z[a_other]), and -log of it a softplus.
     """
+    return forward_pass(heads, rows).terms
+
+
+def forward_pass(heads: Heads, rows: Rows) -> Pass:
+    """The same, with what its derivatives need."""
     mu = rows.mu.to(heads.local.dtype)
-    z = heads.logits.gather(1, rows.state_index[:, :, None].expand(-1, -1, 4)).gather(2, rows.a0)
+    at = rows.state_index[:, :, None].expand(-1, -1, 4)
+    z = heads.logits.gather(1, at).gather(2, rows.a0)
     margin = z[..., 0] - z[..., 1]
     loss = mu[..., 0] * F.softplus(-margin) + mu[..., 1] * F.softplus(margin)
     weight = rows.weight.to(heads.local.dtype)
-    return Terms(
+    logs = Heads(heads.local.log_softmax(-1), heads.overall.log_softmax(-1))
+    terms = Terms(
         loss=loss.sum(-1),
-        entropy_global=(weight * entropy(heads.overall)).sum(-1),
-        entropy_local=(weight * entropy(heads.local)).sum(-1),
+        entropy_global=(weight * _entropy(logs.overall)).sum(-1),
+        entropy_local=(weight * _entropy(logs.local)).sum(-1),
     )
+    return Pass(terms, mu, at, rows.a0, margin, weight, logs)
 
 
 def entropy(logits: Float[Tensor, "N S 4"]) -> Float[Tensor, "N S"]:
     """The entropy of softmax(logits), in nats."""
-    logs = logits.log_softmax(-1)
+    return _entropy(logits.log_softmax(-1))
+
+
+def _entropy(logs: Float[Tensor, "N S 4"]) -> Float[Tensor, "N S"]:
     return -(logs.exp() * logs).sum(-1)
 
 

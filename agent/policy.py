@@ -33,7 +33,6 @@ from math import sqrt
 from typing import NamedTuple
 
 import torch
-import torch.nn.functional as F
 from jaxtyping import Float, Int64, UInt8
 from torch import Tensor
 from torch.autograd.function import FunctionCtx
@@ -87,6 +86,14 @@ class Affine(NamedTuple):
     def __call__(self, x: Float[Tensor, "N B fan_in"]) -> Float[Tensor, "N B fan_out"]:
         """Every trial's inputs through its own layer."""
         return torch.baddbmm(self.bias, x, self.weight)
+
+
+class Trace(NamedTuple):
+    """One pass through the network: the logits, and what `agent.backpropagation` needs of the layers."""
+
+    heads: Heads
+    inputs: list[Float[Tensor, "N B fan_in"]]  # what each layer multiplied, in their order
+    grids: list[Float[Tensor, "N S H2 W2 C"]]  # what each convolution gave
 
 
 class Network:
@@ -162,20 +169,30 @@ class Network:
         self, layers: list[Affine], observation: UInt8[Tensor, "N S H W"], local_state: UInt8[Tensor, "N S 4"]
     ) -> Heads:
         """Both heads' logits in S states a trial: `observation`, and `local_state`, its l(s)."""
+        return self.trace(layers, observation, local_state).heads
+
+    def trace(
+        self, layers: list[Affine], observation: UInt8[Tensor, "N S H W"], local_state: UInt8[Tensor, "N S 4"]
+    ) -> Trace:
+        """The same, with what every layer saw."""
         local_in, local_out, *convolutions, dense, out = layers
         x = self._one_hot(local_state, out.weight.dtype).flatten(2)
-        local = local_out(local_in(x).relu_())
+        near = local_in(x).relu_()
         y = self._one_hot(observation, out.weight.dtype)
+        inputs, grids = [x, near], []
         for layer, affine in zip(self.convolutions, convolutions, strict=True):
             assert layer.padding
             patches = _patches(y, layer.padding)
-            y = affine(patches.flatten(1, 3)).relu_().view(*patches.shape[:4], layer.fan_out)
-        return Heads(local, out(dense(y.flatten(2)).relu_()))
+            inputs.append(patches.flatten(1, 3))
+            y = affine(inputs[-1]).relu_().view(*patches.shape[:4], layer.fan_out)
+            grids.append(y)
+        flat = y.flatten(2)
+        far = dense(flat).relu_()
+        return Trace(Heads(local_out(near), out(far)), [*inputs, flat, far], grids)
 
     def _one_hot(self, codes: UInt8[Tensor, "*places"], dtype: torch.dtype) -> Float[Tensor, "*places O"]:
         # torch's one_hot would go by way of 64-bit integers
-        kinds = torch.arange(self.codes, dtype=torch.uint8, device=codes.device)
-        return (codes.unsqueeze(-1) == kinds).to(dtype)
+        return (codes.unsqueeze(-1) == _kinds(self.codes, codes.device)).to(dtype)
 
     def logits(
         self,
@@ -196,6 +213,11 @@ def network_for(height: int, width: int, codes: int) -> Network:
     return Network(height, width, codes)
 
 
+@cache
+def _kinds(codes: int, device: torch.device) -> UInt8[Tensor, "O"]:
+    return torch.arange(codes, dtype=torch.uint8, device=device)
+
+
 class _Patches(torch.autograd.Function):
     """The 3 x 3 surroundings of every place, one after the other: what a convolution multiplies.
 
@@ -205,28 +227,42 @@ class _Patches(torch.autograd.Function):
     @staticmethod
     def forward(context: FunctionCtx, x: Float[Tensor, "N S H W C"]) -> Float[Tensor, "N S H2 W2 9C"]:
         """One copy of overlapping windows."""
-        context.shape = x.shape  # type: ignore[attr-defined]
-        return x.unfold(2, 3, 1).unfold(3, 3, 1).movedim(4, -1).flatten(4)
+        return windows(x)
 
     @staticmethod
     def backward(context: FunctionCtx, gradient: Float[Tensor, "N S H2 W2 9C"]) -> Float[Tensor, "N S H W C"]:
-        """Every cell gathers from the places that it surrounds: along its column, then along its row."""
-        trials, states, _height, _width, channels = context.shape  # type: ignore[attr-defined]
-        tall, wide = gradient.shape[2:4]
-        columns = gradient.new_zeros(trials, states, tall + 2, wide, 3 * channels)
-        for shift, part in enumerate(gradient.chunk(3, dim=-1)):
-            columns.narrow(2, shift, tall).add_(part)
-        total = gradient.new_zeros(context.shape)  # type: ignore[attr-defined]
-        for shift, part in enumerate(columns.chunk(3, dim=-1)):
-            total.narrow(3, shift, wide).add_(part)
-        return total
+        """Every cell gathers from the places that it surrounds."""
+        return gathered(gradient)
+
+
+def windows(x: Float[Tensor, "N S H W C"]) -> Float[Tensor, "N S H2 W2 9C"]:
+    """The 3 x 3 surroundings of every place that has them all, as one copy."""
+    trials, states, height, width, channels = x.shape
+    step = x.stride()
+    shape = (trials, states, height - 2, width - 2, 3, 3, channels)
+    return x.as_strided(shape, (*step[:4], *step[2:])).flatten(4)
+
+
+def gathered(gradient: Float[Tensor, "N S H2 W2 9C"]) -> Float[Tensor, "N S H W C"]:
+    """The gradient by the cells, given that by their `windows`: along each column, then along each row."""
+    trials, states, tall, wide, nine = gradient.shape
+    channels = nine // 9
+    columns = gradient.new_zeros(trials, states, tall + 2, wide, 3 * channels)
+    for shift, part in enumerate(gradient.chunk(3, dim=-1)):
+        columns.narrow(2, shift, tall).add_(part)
+    total = gradient.new_zeros(trials, states, tall + 2, wide + 2, channels)
+    for shift, part in enumerate(columns.chunk(3, dim=-1)):
+        total.narrow(3, shift, wide).add_(part)
+    return total
 
 
 def _patches(x: Float[Tensor, "N S H W C"], pads: tuple[Padding, Padding]) -> Float[Tensor, "N S H2 W2 9C"]:
     """The patches of a grid, padded first where it has a padding."""
     tall, wide = pads
     if tall.before or tall.after or wide.before or wide.after:
-        x = F.pad(x, (0, 0, wide.before, wide.after, tall.before, tall.after))
+        x = torch.constant_pad_nd(x, [0, 0, wide.before, wide.after, tall.before, tall.after])
+    if not x.requires_grad:
+        return windows(x)
     patches: Tensor = _Patches.apply(x)  # type: ignore[no-untyped-call]
     return patches
 

@@ -75,6 +75,8 @@ class FallibleParent(ScriptedParent):
 
     def take(self, state: AgentState) -> Answer:
         """The answers to what was asked a tick ago: `state` is as that tick left it."""
+        if not bool(self.query.kind.any()):  # as in most ticks of a single trial
+            return Answer(query=self.query, choice=torch.zeros_like(self.query.kind))
         choice = self.fallible.answer(self.query, state.keys, self.answers)
         self.answers = self.answers + (self.query.kind != QueryKind.NONE)
         return Answer(query=self.query, choice=choice)

@@ -84,7 +84,9 @@ class ScriptedParent:
 
     def take(self, state: AgentState) -> Answer:
         """The answers to what was asked a tick ago."""
-        return Answer(query=self.query, choice=self.rule.answer(self.query))
+        silent = not bool(self.query.kind.any())  # as in most ticks of a single trial
+        choice = torch.zeros_like(self.query.kind) if silent else self.rule.answer(self.query)
+        return Answer(query=self.query, choice=choice)
 
     def post(self, query: Query) -> None:
         """Remember what is asked."""
