@@ -135,8 +135,9 @@ def _imported(path: str) -> type[Part]:
     module, _, name = path.rpartition(".")
     try:
         found = getattr(import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise ParentError(f"The parent '{path}' cannot be imported: {error}.") from None
+    except (Exception, SystemExit) as error:  # the module runs as it is imported, and may raise anything
+        why = str(error).strip() or type(error).__name__
+        raise ParentError(f"The parent '{path}' cannot be imported: {why.rstrip('.')}.") from None
     if not (isinstance(found, type) and issubclass(found, Part)):
         raise ParentError(f"'{path}' is not a subclass of parenting.parents.errors.Part.")
     if isabstract(found):

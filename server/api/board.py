@@ -114,7 +114,9 @@ def get_snapshot(
     run_id: RunId,
     tick: Annotated[int, Path(ge=0, le=LARGEST_INT, description="Its tick, or a later one.", examples=[41])],
     db: Db,
-    stage: Annotated[int | None, Query(ge=1, description="An earlier stage's policy.")] = None,
+    stage: Annotated[
+        int | None, Query(ge=1, le=LARGEST_INT, description="An earlier stage's policy.")
+    ] = None,
 ) -> NumbersSchema:
     """Read the last snapshot up to a tick, with the policy that acted or that of an earlier stage."""
     run = runs.get_run(db, run_id)

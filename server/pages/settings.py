@@ -32,9 +32,9 @@ router = admitted_router(include_in_schema=False)
 class KeptWords(Strict):
     """The fields of the form."""
 
-    name: PersonsName | None
-    description: Description | None
-    tags: list[Tag]
+    name: PersonsName | None = None
+    description: Description | None = None
+    tags: list[Tag] | None = None
 
 
 _WORDS = TypeAdapter(KeptWords)
@@ -100,15 +100,18 @@ def _typed(run: Run) -> dict[str, str]:
 
 
 def _read(form: Mapping[str, str]) -> dict[str, Any]:
-    """Return what the form says.
+    """Return what the form says; a field that it lacks stays as it is.
 
     Raises:
         InvalidFieldsError: names every wrong field, with a message each.
     """
-    given: dict[str, Any] = {name: form.get(name, "").strip() or None for name in ("name", "description")}
-    given["tags"] = [tag.strip() for tag in form.get("tags", "").split(",") if tag.strip()]
+    given: dict[str, Any] = {
+        name: form[name].strip() or None for name in ("name", "description") if name in form
+    }
+    if "tags" in form:
+        given["tags"] = [tag.strip() for tag in form["tags"].split(",") if tag.strip()]
     try:
-        return _WORDS.validate_python(given).model_dump()
+        return _WORDS.validate_python(given).model_dump(include=set(given))
     except ValidationError as error:
         wrong = [(field.partition(".")[0], message) for field, message in messages(error.errors())]
         raise InvalidFieldsError(wrong) from None

@@ -81,9 +81,13 @@ class Group:
 
 
 def found_runs(db: Database, numbers: Sequence[int]) -> tuple[list[Run], list[int], list[int]]:
-    """Return the runs of these numbers, in this order; numbers of no run; those of damaged runs."""
+    """Return the runs of these numbers, in this order; numbers of no run; those of damaged runs.
+
+    A run that is being deleted is none.
+    """
+    wanted = select(Run).where(Run.id.in_(numbers), Run.deleting.is_(None))
     with db.read() as session:
-        there = {run.id: run for run in session.scalars(select(Run).where(Run.id.in_(numbers)))}
+        there = {run.id: run for run in session.scalars(wanted)}
     damaged = [number for number in numbers if number in there and damage(there[number]) is not None]
     sound = [there[number] for number in numbers if number in there and number not in damaged]
     return sound, [number for number in numbers if number not in there], damaged

@@ -12,6 +12,7 @@ from playwright.sync_api import expect
 from scipy.stats import t
 
 from parenting.server.db import Database
+from parenting.server.deletion import begin
 from parenting.server.metrics import write_metrics
 from parenting.server.pages.comparison import points_each, read_numbers
 from parenting.server.reads.comparison import letter, ranges
@@ -118,6 +119,15 @@ def test_a_damaged_run_is_left_out(client: httpx2.Client, db: Database, runs: No
     page = client.get("/compare?runs=1-3").text
     assert "Left out, because they are damaged: 2." in page
     assert [row[2] for row in rows(page, "Numbers of each run")] == ["0", "2"]
+
+
+def test_a_run_that_is_being_deleted_is_there_no_more(
+    client: httpx2.Client, db: Database, runs: None
+) -> None:
+    begin(db, 2)
+    for address in ("/compare?runs=1-3", "/compare/data?runs=1-3&metric=deaths"):
+        gone = client.get(address)
+        assert (gone.status_code // 100, "There is no run 2." in gone.text) == (4, True)
 
 
 def test_the_data_of_a_chart(client: httpx2.Client, runs: None) -> None:

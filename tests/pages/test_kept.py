@@ -63,6 +63,9 @@ def test_words_are_kept_or_come_back_with_an_error(client: httpx2.Client, db: Da
     assert {'id="name-error"', 'id="tags-error"'} <= set(re.findall(r'id="\w+-error"', wrong.text))
     assert "y" * 41 in wrong.text
     assert get_run(db, 1).name == "Group A"
+    assert client.post(page, data={"name": "Group B"}).status_code == 303
+    assert (get_run(db, 1).name, get_run(db, 1).description) == ("Group B", "strict\nparent")
+    assert keeping.split_tags(get_run(db, 1).tags) == ["pilot", "week two"]
     for part in ("answers", "metrics", "events"):
         (href,) = re.findall(rf'href="([^"]*of={part}&amp;format=csv)"', wrong.text)
         assert client.get(href.replace("&amp;", "&")).text.startswith("run,")

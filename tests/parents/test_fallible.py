@@ -209,6 +209,7 @@ def test_the_text_of_a_parent_reads_as_the_same(text: str) -> None:
         ("scripted:1", "scripted has no parameter '1'. It has none."),
         ("", "There is no parent ''."),
         ("no_such.module.Parent", "The parent 'no_such.module.Parent' cannot be imported"),
+        ("..module.Parent", "The parent '..module.Parent' cannot be imported: the 'package' argument"),
         ("parenting.parents.errors.Wrong", "'parenting.parents.errors.Wrong' leaves open: chance."),
         ("parenting.parents.scripted.TIE", "'parenting.parents.scripted.TIE' is not a subclass"),
     ],

@@ -73,6 +73,7 @@ def test_what_is_stored_is_what_the_agent_would_do_and_has_done(db: Database, cl
     assert found["familiarity"].max() == int(state.familiarity.max())
     assert found["p_guid"] == life.saved.config.p_guid
     assert client.get(f"/api/v1/runs/{number}/board/25?stage=2").status_code == 404
+    assert client.get(f"/api/v1/runs/{number}/board/25?stage={10**30}").status_code == 422
     newer = client.get(f"/api/v1/runs/{number}/board?after=25&states={board['states']}&rests=2").json()
     assert (newer["snapshots"], newer["cells"], len(newer["rests"])) == ([], [], len(board["rests"]) - 2)
 
