@@ -42,6 +42,7 @@ TRIES = 3
 RESULT_BYTES = 2_000_000
 """A result has at most this many characters."""
 OPEN = (JobState.WAITING, JobState.WORKING)
+CANCELLED = mark("It was cancelled.")
 NOT_TAKEN = mark("No worker took it within a minute. Start one (parenting worker) and ask again.")
 GIVEN_UP = mark("Three workers ended while they were at it. Ask again, or look into the worker's log.")
 
@@ -180,6 +181,32 @@ def let_go(db: Database, claims: Sequence[JobClaim]) -> None:
             announce(session, "worker")
 
 
+def tell(db: Database, mine: JobClaim, progress: dict[str, Any]) -> None:
+    """Store the progress of a job, in the place of its result to come.
+
+    Raises:
+        LostClaimError: it was cancelled, or another worker has it.
+    """
+    _set(db, mine, result=progress)
+
+
+def cancel(db: Database, public_id: str) -> Job:
+    """End an open job without a result; its worker leaves it when it next tells how far it is.
+
+    Raises:
+        NotFound: there is none of this id, or none any more.
+        Conflict: it is over.
+    """
+    ended = {"state": JobState.FAILED, "reason": CANCELLED, "result": None}
+    with db.write() as session:
+        opened = update(Job).where(Job.public_id == public_id, Job.state.in_(OPEN))
+        found = session.execute(opened.values(ended).returning(Job.id)).all()
+    job = get(db, public_id)
+    if not found:
+        raise Conflict("This job is over already.")
+    return job
+
+
 def finish(db: Database, mine: JobClaim, result: dict[str, Any]) -> None:
     """Store the result of a job; one that is too large makes it fail.
 
@@ -190,7 +217,7 @@ def finish(db: Database, mine: JobClaim, result: dict[str, Any]) -> None:
     if size > RESULT_BYTES:
         fail(db, mine, f"Its result has {size} characters, and {RESULT_BYTES} are kept at most.")
         return
-    _end(db, mine, state=JobState.DONE, result=result)
+    _set(db, mine, state=JobState.DONE, result=result)
 
 
 def fail(db: Database, mine: JobClaim, reason: str) -> None:
@@ -199,14 +226,14 @@ def fail(db: Database, mine: JobClaim, reason: str) -> None:
     Raises:
         LostClaimError: another worker has the job now, or it is kept no longer.
     """
-    _end(db, mine, state=JobState.FAILED, reason=reason)
+    _set(db, mine, state=JobState.FAILED, reason=reason, result=None)
 
 
-def _end(db: Database, mine: JobClaim, **values: Any) -> None:
+def _set(db: Database, mine: JobClaim, **values: Any) -> None:
     with db.write(durable=False) as session:
-        ended = session.execute(update(Job).where(_of([mine])).values(values).returning(Job.id)).all()
-        if not ended:
-            raise LostClaimError(f"Job {mine.job_id} is another worker's now, or is kept no longer.")
+        mine_still = session.execute(update(Job).where(_of([mine])).values(values).returning(Job.id)).all()
+        if not mine_still:
+            raise LostClaimError(f"Job {mine.job_id} was cancelled, is another worker's now, or is not kept.")
 
 
 def _of(claims: Sequence[JobClaim]) -> ColumnElement[bool]:

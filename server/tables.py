@@ -285,7 +285,7 @@ class Job(Table):
     asked_epoch: Mapped[str]  # by the clock that decides (`server.store.clock`)
     asked_mark: Mapped[float]
     state: Mapped[JobState] = mapped_column(default=JobState.WAITING)
-    result: Mapped[dict[str, Any] | None]
+    result: Mapped[dict[str, Any] | None]  # while it goes on, its progress
     reason: Mapped[str | None]  # why it failed, in a sentence
     # which worker has it
     worker: Mapped[str | None]

@@ -16,7 +16,13 @@ that others used as well."""
 
 
 def seconds(wanted: Wanted) -> int:
-    """Return the seconds that pre-training is expected to take, rounded up to ten.
+    """Return the seconds that pre-training is expected to take, rounded up to ten."""
+    expected = expected_steps(wanted) * wanted.height * wanted.width * STEP_SECONDS
+    return 10 * int(-(-expected // 10))
+
+
+def expected_steps(wanted: Wanted) -> int:
+    """Return the number of steps after which pre-training is expected to converge.
 
     Steps are taken to grow as the number of cells does, from those of the world's shipped weights; a world
     without any is taken to need as many as most.
@@ -24,8 +30,7 @@ def seconds(wanted: Wanted) -> int:
     cells = wanted.height * wanted.width
     own = [(steps, size) for world, steps, size in _shipped() if world == wanted.world.name]
     shares = [steps / size for steps, size in own or [(steps, size) for _, steps, size in _shipped()]]
-    expected = median(shares) * cells * cells * STEP_SECONDS
-    return 10 * int(-(-expected // 10))
+    return round(median(shares) * cells)
 
 
 def _shipped() -> list[tuple[str, int, int]]:

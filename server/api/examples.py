@@ -10,8 +10,9 @@ from parenting.agent.config import compose
 from parenting.drawing.surroundings import surroundings
 from parenting.envs import registry
 from parenting.server.api.board_examples import BOARD, EPISODE, NUMBERS
+from parenting.server.api.job_examples import of_jobs
 from parenting.server.api.kept_examples import TABLE, kept
-from parenting.server.api.level_examples import CHECKED, IMPORTED, LAKE, OWN_LEVEL, PRETRAINED, TO_CHECK
+from parenting.server.api.level_examples import CHECKED, IMPORTED, LAKE, OWN_LEVEL, TO_CHECK
 from parenting.server.api.why_example import EXPORTED as EXPORTED_WHY
 from parenting.server.api.why_example import WHY
 
@@ -214,6 +215,7 @@ WALK: dict[str, Any] = {
     "payload": {"seed": 0},
     "created": NOON,
     "state": "done",
+    "progress": None,
     "result": {
         "tick": 41,
         "maturity": 1,
@@ -283,15 +285,7 @@ SHOWN = {
     "renew_leases": Shown({"yours": [QUESTION_ID], "elsewhere": [], "closed": []}, {"looking": RENEWED}),
     "leave_questions": Shown(None, {"me": LEASE}),
     "release_question": Shown(None, {"me": LEASE}),
-    "ask_job": Shown(
-        {**WALK, "state": "waiting", "result": None},
-        {"a walk": {"client_id": "me", "kind": "walk", "payload": {"seed": 7}}},
-    ),
-    "ask_pretraining": Shown(
-        {**WALK, **PRETRAINED, "run": None, "state": "waiting", "result": None},
-        {"one more row": {**LEASE, **PRETRAINED}},
-    ),
-    "get_job": Shown(WALK),
+    **{name: Shown(*shown) for name, shown in of_jobs(WALK, LEASE).items()},
     "report_page_error": Shown(None, {"a fault": {"message": "x is not a function", "page": "/runs/3"}}),
     "follow_run": Shown(STREAM),
     "export_run": Shown(json.dumps(EXPORTED) + "\n", others=TABLE),

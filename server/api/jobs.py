@@ -54,3 +54,12 @@ def ask_pretraining(request: Request, body: PretrainBody, db: Db) -> JobSchema:
 def get_job(job_id: JobId, db: Db) -> JobSchema:
     """Read a job, with its result once it is done."""
     return job_schema(db, jobs.get(db, job_id))
+
+
+@router.post("/jobs/{job_id}/cancel", summary="Cancel a job", responses=write_responses(404, 409))
+def cancel_job(job_id: JobId, db: Db) -> JobSchema:
+    """Cancel a job that is not over: it fails, and its worker leaves it within a second or a step.
+
+    Whoever else waits for the same weights is told so, and may ask for them again.
+    """
+    return job_schema(db, jobs.cancel(db, job_id))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from fastapi import Request, Response
 
 from parenting.server import jobs
 from parenting.server.admission import admitted_router
 from parenting.server.deps import Db, SettingsOf, notify_worker
-from parenting.server.errors import NotFound
+from parenting.server.errors import Conflict, NotFound
 from parenting.server.pages.render import page
-from parenting.server.pages.start import FormFields, create, missing, settings_of
+from parenting.server.pages.start import FormFields, create, filled_form, missing, settings_of
 from parenting.server.reads.jobs import job_schema
 from parenting.server.statuses import JobState
 
@@ -17,12 +19,21 @@ router = admitted_router(include_in_schema=False)
 
 JOB = "pretraining"
 """The field of the form that names the job."""
+CANCEL = "cancel"
+"""The field of the button that cancels it."""
 
 
 @router.post("/pretraining")
 def pretraining(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> Response:
-    """Ask for the weights, tell how far they are, and start the run once they are there."""
-    given = {name: text for name, text in form.items() if name != JOB}
+    """Ask for the weights, tell how far they are, and start the run once they are there.
+
+    Whoever cancels comes back to the form.
+    """
+    given = {name: text for name, text in form.items() if name not in (JOB, CANCEL)}
+    if CANCEL in form:
+        with suppress(NotFound, Conflict):  # it is over
+            jobs.cancel(db, form.get(JOB, ""))
+        return filled_form(db, given)
     offer = missing(db, settings.weights, settings_of(given))
     if offer is None:
         return create(request, db, settings, given)  # they are there, or something else is wrong

@@ -12,6 +12,16 @@ from parenting.server.tables import Job
 from parenting.server.workers import alive
 
 
+class ProgressSchema(Schema):
+    """The progress of a job that takes minutes."""
+
+    steps: int
+    expected: int
+    """The steps after which it is expected to be done; it may need fewer or more."""
+    seconds: float
+    """The seconds for which its worker has been at it."""
+
+
 class JobSchema(Schema):
     """A job that was asked of any worker, and its result."""
 
@@ -27,6 +37,8 @@ class JobSchema(Schema):
     """waiting (no worker has taken it), working, done, or failed."""
     result: dict[str, Any] | None
     """The result; null until it is done. docs/api.md describes the result of each kind."""
+    progress: ProgressSchema | None
+    """The progress of pre-training; null: it has not told, or the job is not at work."""
     reason: str | None
     """The reason for its failure, in a sentence."""
     worker: Literal["alive", "silent"]
@@ -35,10 +47,14 @@ class JobSchema(Schema):
 
 def job_schema(db: Database, job: Job) -> JobSchema:
     """Return the schema of a job that can be read."""
-    names = ("kind", "payload", "created", "state", "result", "reason")
+    names = ("kind", "payload", "created", "state", "reason")
+    at_work = job.state is JobState.WORKING
+    progress = ProgressSchema(**job.result) if at_work and job.result is not None else None
     return JobSchema(
         id=job.public_id,
         run=job.run_id or None,
         worker="alive" if alive(db) else "silent",
+        result=None if at_work else job.result,
+        progress=progress,
         **{name: getattr(job, name) for name in names},
     )

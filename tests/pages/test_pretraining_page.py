@@ -10,8 +10,10 @@ from playwright.sync_api import Page, expect
 
 from parenting.server import jobs
 from parenting.server.db import Database
+from parenting.server.errors import LostClaimError
 from parenting.server.runs import get_run, list_runs
 from parenting.server.weights import put_bytes
+from parenting.server.workers import sign
 from tests.pages.axe import violated
 from tests.pages.browser_tabs import BrowserTabs
 from tests.server.test_pretraining import HALL
@@ -73,6 +75,28 @@ def test_without_a_script_the_page_is_looked_at_again_until_the_run_begins(
     assert (started.status_code, started.headers["location"]) == (303, f"/runs/{run.public_id}")
     assert (run.seed, run.preset, run.config["pretrain"]) == (5, "lax", True)
     assert run.weights is not None
+
+
+def test_its_steps_are_shown_survive_a_reload_and_it_is_cancelled(tabs: BrowserTabs, db: Database) -> None:
+    page = offered(tabs, (1280, 800))
+    page.get_by_role("button", name="Pre-train now (about 30 s)").click()
+    page.locator("#told").wait_for()
+    sign(db, "a")
+    (mine,) = jobs.claim(db, "a", 1)
+    jobs.tell(db, mine, {"steps": 400, "expected": 1600, "seconds": 10.0})
+    told = page.locator("#told")
+    expect(told).to_have_text("400 of about 1600 steps, about 30 s left.")
+    expect(page.get_by_role("progressbar", name="Steps of pre-training")).to_have_js_property("value", 0.25)
+    page.reload()
+    expect(told).to_have_text(re.compile("400 of about 1600 steps"))
+    jobs.tell(db, mine, {"steps": 1700, "expected": 1600, "seconds": 40.0})
+    expect(told).to_have_text("1700 of about 1600 steps, it takes longer than most.")
+    assert violated(page) == []
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.locator("#level_text")).to_have_value(re.compile("# I    #"))
+    with pytest.raises(LostClaimError):
+        jobs.tell(db, mine, {"steps": 1800, "expected": 1600, "seconds": 45.0})
+    assert not list_runs(db)
 
 
 def test_in_a_browser_it_begins_without(tabs: BrowserTabs, db: Database) -> None:

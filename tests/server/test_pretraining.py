@@ -12,12 +12,13 @@ from parenting.agent.pretraining_loop import Pretrainer
 from parenting.envs import registry
 from parenting.server import jobs
 from parenting.server.db import Database
-from parenting.server.errors import InvalidFieldsError
+from parenting.server.errors import InvalidFieldsError, LostClaimError
 from parenting.server.new_run import NewRun, start
 from parenting.server.settings import Settings
 from parenting.server.snapshot import initial_weights
 from parenting.server.statuses import JobState
 from parenting.server.tables import Job, Run
+from parenting.server.work.doers import do
 from parenting.server.worker import Worker
 from parenting.weights.estimate import seconds
 from parenting.weights.store import Wanted
@@ -73,6 +74,31 @@ def _network(world: Any) -> Any:
     from parenting.agent.policy import network_for
 
     return network_for(world.height, world.width, len(world.spec.glyphs))
+
+
+def test_a_worker_tells_how_far_it_is_and_leaves_what_is_cancelled(
+    db: Database, client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("parenting.server.work.pretraining.TELL_SECONDS", 0)
+    asked, seen = ask(db), list[Any]()
+    (mine,) = jobs.claim(db, "a", 1)
+
+    def look(_school: Pretrainer, state: Any) -> bool:
+        """Look at each step, and cancel after the third."""
+        seen.append(client.get(f"/api/v1/jobs/{asked.public_id}").json())
+        if len(state.returns) == 3:
+            cancelled = client.post(f"/api/v1/jobs/{asked.public_id}/cancel")
+            assert (cancelled.json()["state"], cancelled.json()["reason"]) == ("failed", "It was cancelled.")
+        return len(state.returns) > 9
+
+    monkeypatch.setattr(Pretrainer, "converged", look)
+    with pytest.raises(LostClaimError):
+        do(db, mine)
+    steps = [one["progress"] and one["progress"]["steps"] for one in seen]
+    assert (steps, {one["result"] for one in seen}) == ([None, 1, 2, 3], {None})
+    assert seen[-1]["progress"]["expected"] == 1750  # 1500 steps at 6 x 8
+    assert client.post(f"/api/v1/jobs/{asked.public_id}/cancel").status_code == 409
+    assert ask(db).id != asked.id  # it may be asked for again
 
 
 def test_a_worker_does_one_at_a_time_and_it_may_take_longer_than_jobs_are_kept(
