@@ -6,12 +6,14 @@ from typing import Annotated
 
 from fastapi import Form
 
-from parenting.server.api.bodies import Choice, ClientId
+from parenting.server.api.bodies import Choice, ClientId, Replays
 from parenting.server.api.names import DatabaseId, PublicId
 
 ClientField = Annotated[ClientId, Form()]
 ChoiceField = Annotated[Choice, Form()]
 DatabaseField = Annotated[DatabaseId, Form()]
+ReplaysField = Annotated[Replays | None, Form()]
+"""Empty where no script counts."""
 QuestionField = Annotated[PublicId, Form()]
 MaybeDatabase = Annotated[DatabaseId | None, Form()]
 MaybeQuestion = Annotated[PublicId | None, Form()]

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from parenting._plural import counted
 from parenting.agent.config import Config
 from parenting.server.origins import ROLLED_BACK
+from parenting.server.pages.numbers import number
 from parenting.server.tables import Run
 
 WATER, PLANT, SUPERVISOR, GOAL = "W", "T", "S", "G"
@@ -65,7 +66,8 @@ def _start_sentences(run: Run, config: Config) -> Iterator[str]:
         yield f"Its X began with {counted(answers['answers'], 'answer')} of {_file(answers)}."
     if ROLLED_BACK in earlier:
         source = earlier[ROLLED_BACK]
-        yield f"Up to tick {source['tick']} its record is that of run {source['number']} ({source['run']})."
+        tick, other = number(source["tick"]), f"{source['number']} ({source['run']})"
+        yield f"Up to tick {tick} its record is that of run {other}."
     if SUPERVISOR in run.legend:
         yield SUPERVISED[config.supervised]
     if PLANT in run.legend:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from parenting.server import notes
 from parenting.server.damage import damage
+from parenting.server.pages.numbers import number
 from parenting.server.tables import OperatorEvent, Run
 
 PROBABILITIES = {
@@ -68,4 +69,4 @@ def machine(versions: Mapping[str, Any]) -> str:
 
 
 def _when(event: OperatorEvent) -> str:
-    return "before the next tick" if event.applied_tick is None else f"at tick {event.applied_tick}"
+    return "before the next tick" if event.applied_tick is None else f"at tick {number(event.applied_tick)}"

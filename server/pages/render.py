@@ -16,6 +16,8 @@ from parenting.envs.people_text import isolated
 from parenting.server.assets import asset
 from parenting.server.errors import ServerError, StoreError
 from parenting.server.languages import language
+from parenting.server.pages.numbers import number
+from parenting.server.pages.texts import world_title
 from parenting.server.public_ids import ALPHABET, LENGTH
 from parenting.server.tables import Run
 
@@ -30,7 +32,7 @@ def tr_markup(sentence: str, **values: object) -> Markup:
 
 
 _templates = environment(WEB / "templates")
-_templates.filters["isolated"] = isolated
+_templates.filters.update(isolated=isolated, number=number, world_title=world_title)
 _templates.globals.update(asset=asset, language=language, _=tr, _n=trn, _h=tr_markup)
 
 

@@ -9,7 +9,7 @@ from fastapi import Request, Response
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import PublicId
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
-from parenting.server.pages.fields import ChoiceField, ClientField, DatabaseField, QuestionField
+from parenting.server.pages.fields import ChoiceField, ClientField, DatabaseField, QuestionField, ReplaysField
 from parenting.server.pages.render import redirect
 from parenting.server.queue.answers import Said
 from parenting.server.queue.names import Names
@@ -46,9 +46,10 @@ async def change(
     client_id: ClientField,
     database: DatabaseField,
     question: QuestionField,
+    replays: ReplaysField = None,
 ) -> Response:
     """Put another answer in the place of one's own, then go on."""
-    names, said = Names(database, run_id, question), Said(choice, client_id, "human")
+    names, said = Names(database, run_id, question), Said(choice, client_id, "human", replays)
     found = await store(request, partial(supersede_in, db=db, query=question, said=said, names=names))
     notify_worker(request)
     return redirect(f"/runs/{found.run_public_id}/parent")

@@ -10,13 +10,12 @@ from urllib.parse import urlencode
 from fastapi import Query
 from pydantic import BaseModel, Field
 
-from parenting.envs.registry import WORLDS
 from parenting.server.damage import sound
 from parenting.server.db import Database
 from parenting.server.keeping import known_tags, split_tags
 from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.labels import metric_labels
-from parenting.server.pages.texts import run_title
+from parenting.server.pages.texts import run_title, world_title
 from parenting.server.reads.listing import Order, Wanted, find_runs
 from parenting.server.reads.metrics import latest_metrics
 from parenting.server.reads.schemas import run_schemas
@@ -111,6 +110,6 @@ def _rows(db: Database, listed: Sequence[Run]) -> list[RunRow]:
 
 def _row(run: Run, state: RunState, size: str, latest: Mapping[int, Metric]) -> RunRow:
     deaths = latest[run.id].values.get("deaths") if run.id in latest else None
-    world = WORLDS[run.world].title if run.world in WORLDS else run.world
+    world = world_title(run.world)
     harm = metric_labels(run.legend).harm
     return RunRow(run, run_title(run), state, size, world, split_tags(sound(run, "tags") or ""), harm, deaths)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from parenting.drawing.sentences import mark
+from parenting.envs.registry import WORLDS
 from parenting.server.tables import Run
 
 LEADS = {
@@ -96,4 +97,9 @@ def run_title(run: Run) -> str:
 
 def parent_title(run: Run) -> str:
     """Return the title of a run on its own pages: its parent may open them, and knows no numbers of runs."""
-    return run.name or f"{run.world.replace('-', ' ').capitalize()}, {run.level}"
+    return run.name or f"{world_title(run.world)}, {run.level}"
+
+
+def world_title(name: str) -> str:
+    """Return the title of a world for people; of one that is not installed here, its name."""
+    return WORLDS[name].title if name in WORLDS else name

@@ -17,6 +17,7 @@ from parenting.server.api.names import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.pages.history import said, who
+from parenting.server.pages.numbers import number
 from parenting.server.pages.parent import COOKIE, QueryShown, question_of
 from parenting.server.pages.question import QuestionView, question_view, side_names
 from parenting.server.pages.render import moved, page, redirect
@@ -47,10 +48,9 @@ class Given(NamedTuple):
     number: int
     text: str
     who: str
-    script: bool
     received: str
     took: str  # how long after it was first shown; "" where that is not known
-    replays: int | None
+    played: str  # how often its clips or forecasts were played; "" where there is nothing to say
     heard: int | None
     standing: bool
     changes: Sequence[Change]  # empty where nothing can be said
@@ -140,10 +140,9 @@ def _given(found: WhySchema, one: GivenSchema, name: str, shown: QuestionView) -
         one.number,
         said(one.choice, shown),
         name,
-        one.parent == "scripted",
         _time(one.received),
         took,
-        one.replays,
+        _played(found, one),
         heard,
         one.standing,
         [] if missing else changes,
@@ -166,13 +165,29 @@ def _missing(found: WhySchema, one: GivenSchema) -> str:
     return "What this answer changed is being measured. Look again in a moment."
 
 
+def _played(found: WhySchema, one: GivenSchema) -> str:
+    """Say how often the parent had the clips of a preference, or forecasts of moves, played."""
+    if found.kind == "guidance":
+        times = _times(one.replays or 0)
+        return f"Forecasts of its moves were played {times}." if one.replays else ""
+    if one.replays is not None:
+        return f"The clips were played again {_times(one.replays)}."
+    if one.parent == "scripted":
+        return "A script plays no clips."
+    return "How often the clips were played again was not recorded."
+
+
+def _times(count: int) -> str:
+    return f"{number(count)} {'time' if count == 1 else 'times'}"
+
+
 def _effect(heard: int, effect: EffectSchema) -> Change:
     moment = _moment(heard + max(0, effect.ticks - 1), effect.ticks == 0)
     return _change(AFTER[effect.ticks], moment, effect.probabilities)
 
 
 def _moment(tick: int, begins: bool) -> str:
-    return f"as tick {tick} began" if begins else f"after tick {tick}"
+    return f"as tick {number(tick)} began" if begins else f"after tick {number(tick)}"
 
 
 def _change(name: str, moment: str, chances: Chances | None) -> Change:

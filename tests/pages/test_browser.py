@@ -51,10 +51,10 @@ def test_arrows_cells_cards_and_buttons_answer_too(
 def test_a_new_question_appears_by_itself(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     page = tabs.open("/runs/1/parent")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
-    expect(page).to_have_title("The agent is exploring on its own. · Unsafe exploration, island")
+    expect(page).to_have_title("The agent is exploring on its own. · Unsafe Exploration, island")
     number = ask()
     shown(page, number)
-    expect(page).to_have_title("● Which move is better here? · Unsafe exploration, island")
+    expect(page).to_have_title("● Which move is better here? · Unsafe Exploration, island")
     expect(page.locator("#said")).to_contain_text("A, left: into the water. B, down: onto land.")
     page.keyboard.press("b")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()

@@ -4,6 +4,7 @@ import { cells } from "./board_cell.js";
 import { boardOf } from "./board_data.js";
 import { paintArrows, paintShares } from "./board_paint.js";
 import { pickers } from "./board_rests.js";
+import { number } from "./numbers.js";
 import { job } from "./worker_job.js";
 
 const $ = (id) => document.getElementById(id);
@@ -17,7 +18,6 @@ let shown = null, sums = null, index = new Map(); // the snapshot, its counts by
 let newest = true, wanted = null, busy = false, looked = -CALM, timer = 0, looking = false, again = false;
 
 const percent = (share) => share > 0 && share < 0.005 ? "under 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
-const number = (value) => Number.isInteger(value) ? value.toLocaleString("en") : String(Number(value.toPrecision(3)));
 const listed = (numbers) => Object.entries(numbers).map(([name, text]) => `${NAMES[name]} ${text}`).join(", ");
 const computed = new Map(); // what a worker has computed of states that are not stored
 const computedKey = (row, column) => `${row} ${column} ${pick.rest} ${form.elements.stage.value}`;

@@ -3,6 +3,7 @@ import { seen } from "./board_panel.js";
 import "./errors.js";
 import { curvesOf } from "./curves.js";
 import { follow } from "./live.js";
+import { number } from "./numbers.js";
 
 const main = document.getElementById("main"), run = main.dataset.run;
 const lineOf = (id) => document.querySelector(`[data-chart=${id}]`)?.dataset.line;
@@ -34,17 +35,15 @@ const largest = (id) => Math.max(...namesOf(id).map((key) => curves.latest(key) 
 async function loadStages() {
   const reply = await fetch(`/runs/${run}/stages`).catch(() => null);
   if (reply?.ok) stages = await reply.json();
-  for (const { number, when, begin, end, value, reference, unsafe, guidance, preference } of stages) {
-    const row = document.querySelector(`tr[data-stage="${number}"]`);
-    const cells = [value, reference, unsafe, guidance, preference, begin === null ? null : `${begin} to ${end}`];
+  for (const { number: stage, when, begin, end, value, reference, unsafe, guidance, preference } of stages) {
+    const row = document.querySelector(`tr[data-stage="${stage}"]`);
+    const cells = [value, reference, unsafe, guidance, preference, begin === null ? null : `${number(begin)} to ${number(end)}`];
     row.className = when;
-    row.querySelectorAll("td").forEach((cell, at) => { cell.textContent = shown(cells[at]); });
+    row.querySelectorAll("td").forEach((cell, at) => { cell.textContent = number(cells[at]); });
   }
 }
 
 const begun = () => stages.filter(({ begin }) => begin !== null);
-
-const shown = (value, digits = 4) => typeof value === "number" && !Number.isInteger(value) ? Number(value.toPrecision(digits)) : value ?? "–";
 
 // ---- charts
 
@@ -135,7 +134,7 @@ function redraw() {
 
 const put = (name, value) => {
   const element = document.getElementById(`now-${name}`);
-  if (element) element.textContent = shown(value, 3);
+  if (element) element.textContent = number(value, 3);
 };
 
 function add(rows) {

@@ -1,5 +1,6 @@
 // Episodes: any of the agent's life, shown again from its moves, and one that the present policy plays by itself. A worker
 // makes the moves; the server draws them. Nothing here is loaded before somebody asks for it.
+import { number as written } from "./numbers.js";
 import { play } from "./play.js";
 import { job, reply } from "./worker_job.js";
 
@@ -64,7 +65,7 @@ async function number(wanted) {
     const [one] = Number.isInteger(wanted) ? await found(1, at) : [newest.at(-1)];
     if (mine !== turn) return;
     dialog.querySelector("[name=number]").value = one.number;
-    dialog.querySelector("[data-of]").textContent = `of ${last}`;
+    dialog.querySelector("[data-of]").textContent = `of ${written(last)}`;
     await show("episode", { tick: one.first });
   } catch ({ message }) { if (mine === turn) say(message); }
 }

@@ -29,8 +29,11 @@ export function remember(question, choice) {
   offer();
 }
 
-// Send the form of an answer that is changed.
-export const change = (question, choice) => question.requestSubmit(question.querySelector(`.answers [value=${choice}]`));
+// Send the form of an answer that is changed, with how often its clips were played.
+export function change(question, choice) {
+  question.elements.replays.value = page.player?.replays ?? "";
+  question.requestSubmit(question.querySelector(`.answers [value=${choice}]`));
+}
 
 const again = (query, more = "") => location.assign(`/runs/${run}/parent?query=${query}${more}`);
 
