@@ -17,6 +17,7 @@ import multiprocessing
 import os
 import random
 import re
+import selectors
 import socket
 import tempfile
 import threading
@@ -26,6 +27,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 from sqlalchemy import select
 
@@ -138,22 +140,28 @@ def _some(web: socket.socket) -> bytes:
     return received
 
 
-def measure(parents: int, thinks: float, seconds: float, store: str) -> Measured:
-    """One crowd before a web process of its own."""
+def measure(parents: int, thinks: float, seconds: float, store: str, streams: int = 0) -> Measured:
+    """One crowd before a web process of its own, perhaps with streams of the run beside it."""
     with tempfile.TemporaryDirectory() as name, database_url(store) as url:
         data, port = Path(name), free_port()
         settings = Settings(data=data, database_url=url)
         db = migrated(settings)
         run = start(db, NewRun(world="unsafe-exploration", config={})).id
         questions = Questions(db, run)
-        with command("web", "--port", str(port), settings=settings) as web:
+        with (
+            patch.dict(os.environ, {"PARENTING_STREAMS": "1000"}),
+            command("web", "--port", str(port), settings=settings) as web,
+        ):
             until_up(f"http://127.0.0.1:{port}")
+            watching = followed(port, run, streams)
             before = commits(data, 1)
             spent = processor_seconds(web.process.pid)
             with questions.kept():
                 times, errors = answered(port, run, parents, thinks, seconds)
             spent = processor_seconds(web.process.pid) - spent
             yardstick = (before + commits(data, 1)) / 2
+            watching.kill()
+            watching.join()
         db.close()
     ranked = sorted(times)
     p99 = ranked[-(-99 * len(ranked) // 100) - 1]
@@ -167,6 +175,29 @@ def measure(parents: int, thinks: float, seconds: float, store: str) -> Measured
         errors,
         1e3 * spent / len(ranked),
     )
+
+
+def followed(port: int, run: int, streams: int) -> Any:
+    """A process with so many open streams of a run, all of which it reads."""
+    one = multiprocessing.get_context("fork").Process(target=_follow, args=(port, run, streams), daemon=True)
+    one.start()
+    time.sleep(2.0 if streams else 0.0)
+    return one
+
+
+def _follow(port: int, run: int, streams: int) -> None:
+    head = f"GET /api/v1/runs/{run}/events HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
+    with selectors.DefaultSelector() as readable:
+        for _ in range(streams):
+            stream = socket.create_connection(("127.0.0.1", port))
+            stream.sendall(head)
+            first = stream.recv(65536)
+            assert first.startswith(b"HTTP/1.1 200"), first[:200]
+            readable.register(stream, selectors.EVENT_READ)
+        while streams:
+            for key, _ in readable.select():
+                key.fileobj.recv(65536)  # type: ignore[union-attr]  # it is a socket
+            time.sleep(0.01)  # many at once: the reader is not what is measured
 
 
 def processor_seconds(process: int) -> float:
