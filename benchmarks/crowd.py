@@ -1,4 +1,4 @@
-"""What a crowd feels, and what it costs, beside the durable commits a second of one connection.
+"""The waits and costs of a crowd, beside the durable commits a second of one connection.
 
     python -m benchmarks.crowd                              every part, both stores, about fifteen minutes
     python -m benchmarks.crowd people flat --quick          two parts, shorter and smaller
@@ -50,7 +50,7 @@ MEGABYTE = 1e6
 
 
 class Size(NamedTuple):
-    """How large each part is."""
+    """The size of each part."""
 
     people: int = 50
     seconds: float = 60.0
@@ -212,7 +212,7 @@ def least(name: str, found: float, bar: float) -> None:
 
 
 def tell(words: str, yardstick: Yardstick) -> None:
-    """Print what no bar is set for."""
+    """Print words without a bar, and the yardstick."""
     found = yardstick.found
     beside = f"{median(found):.0f} ({min(found):.0f} to {max(found):.0f})" if found else "not taken"
     print(f"    {words}; yardstick {beside} commits/s", flush=True)
@@ -229,7 +229,7 @@ PARTS: dict[str, Callable[[str, Size, int], None]] = {
 
 def main() -> None:
     """Measure what is chosen."""
-    parser = argparse.ArgumentParser(description="What a crowd feels, and what it costs.")
+    parser = argparse.ArgumentParser(description="The waits and costs of a crowd.")
     parser.add_argument("parts", nargs="*", help=f"{', '.join(PARTS)} [default: all]")
     parser.add_argument("--store", choices=STORES, action="append", help="repeatable [default: both]")
     parser.add_argument("--workers", type=int, default=2)

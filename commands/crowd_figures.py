@@ -16,7 +16,7 @@ KINDS = ("guidance", "preference")
 
 @dataclass
 class Figures:
-    """What a crowd has met so far."""
+    """The figures of a crowd so far."""
 
     answers: Counter[str] = field(default_factory=Counter)
     """Stored answers, by run."""

@@ -38,6 +38,7 @@ from parenting.server.notify import Notifier
 from parenting.server.pages.render import compile_first
 from parenting.server.requests import RequestMiddleware
 from parenting.server.run_limits import StartedRuns
+from parenting.server.seats import Seats
 from parenting.server.security import SecurityMiddleware
 from parenting.server.settings import Settings
 from parenting.server.static import OthersFiles, OurFiles
@@ -84,6 +85,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     app.state.admission, app.state.health_threads = Admission(), health.health_threads()
     app.state.group_commit = GroupCommit(db) if db.one_writer else None
     notifier = Notifier(settings.data, "web")
+    app.state.seats = Seats(settings.streams_per_browser, settings.streams_per_client)
     app.state.streams = Streams(db, notifier, settings.streams, app.state.admission)
     app.state.meters.watch(db, app.state.streams.number, lambda: app.state.admission)
     return app

@@ -90,6 +90,12 @@ class TooManyRunsError(ServerError):
     status, code = 409, "too_many_runs"
 
 
+class TooManyOfOneError(ServerError):
+    """This browser has too many live streams open. Close another one of its pages and reload this one."""
+
+    status, code = 429, "too_many"
+
+
 class NotReadyError(ServerError):
     """This server is not ready."""
 

@@ -90,7 +90,15 @@ class Settings(BaseSettings):
         description="Sites that may show the pages in a frame, as the header Content-Security-Policy names "
         "them; a notebook needs http://localhost:*.",
     )
-    streams: int = Field(50, ge=1, description="Live streams of events that may be open at once.")
+    streams: int = Field(300, ge=1, description="Live streams of events that may be open at once.")
+    streams_per_browser: int = Field(
+        12, ge=1, description="Live streams of one browser at once, by its cookie."
+    )
+    streams_per_client: int = Field(
+        100,
+        ge=1,
+        description="Live streams of one address at once; loopback, where a proxy stands, has no such limit.",
+    )
     connections: int = Field(
         1000, ge=1, le=60_000, description="Connections that may be open at once; the longest idle make room."
     )

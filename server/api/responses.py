@@ -17,6 +17,7 @@ from parenting.server.errors import (
     NotFound,
     ServerError,
     TooLargeError,
+    TooManyOfOneError,
     UnknownHostError,
 )
 
@@ -30,6 +31,7 @@ ERRORS: dict[int, ServerError] = {
     410: ElsewhereError(),
     413: TooLargeError(),
     422: InvalidFieldsError([("choice", "Input should be 'left', 'right', 'either' or 'neither'")]),
+    429: TooManyOfOneError(),
     500: ServerError(),
     503: BusyError(),
     507: DiskFullError(),

@@ -42,6 +42,7 @@ def known(request: Request, run_id: RunId, db: Db) -> int:
     """Refuse an unknown run before the stream begins: afterwards it is too late for a 404."""
     get_run(db, run_id)
     request.app.state.streams.check_room()
+    request.app.state.seats.check(request)
     return run_id
 
 
@@ -49,7 +50,7 @@ def known(request: Request, run_id: RunId, db: Db) -> int:
     "/runs/{run_id}/events",
     summary="Follow a run",
     response_class=EventSourceResponse,
-    responses=streams("text/event-stream", "Server-sent events, until the client leaves.", 404),
+    responses=streams("text/event-stream", "Server-sent events, until the client leaves.", 404, 429),
 )
 async def follow_run(
     request: Request,
@@ -71,8 +72,9 @@ async def follow_run(
         and len(last_event_id) < 16
     ):
         after = max(after, int(last_event_id))
-    async for event in request.app.state.streams.subscribe(run_id, after):
-        yield event
+    with request.app.state.seats.taken(request):
+        async for event in request.app.state.streams.subscribe(run_id, after):
+            yield event
 
 
 @router.get(

@@ -58,6 +58,7 @@ async def found_runs(request: Request, body: Carried, db: Db) -> list[Run | None
     """Return the runs of the pages, None for one that is not here; refuse one stream too many."""
     streams: Streams = request.app.state.streams
     streams.check_room()
+    request.app.state.seats.check(request)
     return await streams.admission.read(partial(_runs, db, [page.run for page in body.pages]))
 
 
@@ -86,8 +87,9 @@ async def carry(
             asks = _ask(request, db, run, page, settings.lease_seconds, at, events)
             tasks.append(asyncio.create_task(asks))
     try:
-        while (event := await events.get()) is not None:
-            yield event
+        with request.app.state.seats.taken(request):
+            while (event := await events.get()) is not None:
+                yield event
     finally:
         for task in tasks:
             task.cancel()

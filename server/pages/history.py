@@ -17,13 +17,13 @@ from parenting.server.damage import sound
 from parenting.server.deps import Db
 from parenting.server.errors import DamagedRowError
 from parenting.server.new_run import LARGEST_INT
-from parenting.server.pages.parent import COOKIE
 from parenting.server.pages.question import QuestionView, question_view
 from parenting.server.pages.render import moved, page
 from parenting.server.pages.texts import parent_title
 from parenting.server.reads import answers
 from parenting.server.reads.answers import Answered
 from parenting.server.schemas import Said
+from parenting.server.seats import COOKIE
 from parenting.server.statuses import QueryStatus
 from parenting.server.tables import SAID, SKIP, Run
 

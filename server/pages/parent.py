@@ -38,13 +38,13 @@ from parenting.server.queue.presence import holder
 from parenting.server.reads.names import query_number, query_numbers
 from parenting.server.reads.own_answers import changeable, last_of
 from parenting.server.reads.schemas import run_schema
+from parenting.server.seats import COOKIE
 from parenting.server.statuses import RunState
 from parenting.server.streams import Streams
 from parenting.server.tables import Run
 
 router = admitted_router(include_in_schema=False)
 
-COOKIE = "parenting_client"
 YEAR = 365 * 24 * 3600
 NAME = re.compile(r"[A-Za-z0-9_-]{8,64}")
 PATIENCE = 0.5

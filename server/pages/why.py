@@ -18,12 +18,13 @@ from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.pages.history import said, who
 from parenting.server.pages.numbers import number
-from parenting.server.pages.parent import COOKIE, QueryShown, question_of
+from parenting.server.pages.parent import QueryShown, question_of
 from parenting.server.pages.question import QuestionView, question_view, side_names
 from parenting.server.pages.render import moved, page, redirect
 from parenting.server.pages.texts import parent_title
 from parenting.server.reads.why import last_question, neighbours, why
 from parenting.server.schemas import Chances
+from parenting.server.seats import COOKIE
 from parenting.server.tables import SKIP, Answer, Query, Run
 from parenting.server.why_schemas import EffectSchema, GivenSchema, WhySchema
 
