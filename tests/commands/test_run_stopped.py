@@ -9,6 +9,8 @@ import signal
 import subprocess
 import sys
 
+import pytest
+
 STYLE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 """Sequences that a terminal takes as colours and movements."""
 RUN = "from parenting.commands.main import app; app()"
@@ -23,6 +25,7 @@ def read(terminal: int) -> str:
         return ""
 
 
+@pytest.mark.faults
 def test_progress_of_both_processes_then_ctrl_c_leaves_nobody() -> None:
     """It starts three programs that load torch, which takes several seconds."""
     ours, theirs = pty.openpty()

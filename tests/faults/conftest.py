@@ -57,8 +57,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark PostgreSQL's share, which is run apart."""
+    """Mark what is in this folder, and of it PostgreSQL's share, which is run apart."""
+    here = Path(__file__).parent
     for item in items:
+        if item.path.is_relative_to(here):
+            item.add_marker("faults")
         callspec = getattr(item, "callspec", None)
         if callspec is not None and callspec.params.get("store") == "postgresql":
             item.add_marker("postgresql")

@@ -87,6 +87,7 @@ def test_it_goes_on_where_the_other_cpu_was_killed(db: Database, settings: Setti
     assert "Bits are not comparable" in str(found.machine)
 
 
+@pytest.mark.faults
 @needs_two
 @pytest.mark.only("sqlite")
 def test_the_other_way_and_killed_again_within_the_record(db: Database, settings: Settings) -> None:

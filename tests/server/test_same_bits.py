@@ -67,6 +67,7 @@ def check(db: Database, run: int, begun: Begun) -> None:
     assert int(saved.state.maturity) == begun.config.max_clip_length
 
 
+@pytest.mark.faults
 @pytest.mark.timeout(300)
 @pytest.mark.only("sqlite", "tests/faults/test_same_bits.py does the same on PostgreSQL")
 def test_raised_through_http(settings: Settings, db: Database) -> None:
