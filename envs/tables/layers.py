@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from typing import NamedTuple
 
-from parenting.envs.art import SMALLEST
+from parenting.envs.art import LARGEST, SMALLEST
 from parenting.envs.levels.spec import AGENT, GOAL, LAND, WALL
 from parenting.envs.tables.table import Layer, Place
 
@@ -40,9 +40,11 @@ def lay_out(
     """Lay the states of a table out on boards.
 
     Raises:
-        ValueError: tiles of a wrong size, or too many layers to tell apart.
+        ValueError: a shape or tiles of a wrong size, or too many layers to tell apart.
     """
     rows, columns = shape
+    if not (1 <= rows <= LARGEST and 1 <= columns <= LARGEST):
+        raise ValueError(f"shape: {rows} x {columns} is not from 1 x 1 to {LARGEST} x {LARGEST} cells.")
     where = {state: (place or _counted(rows, columns))(state) for state in states}
     names = list(dict.fromkeys(layer for _, _, layer in where.values()))
     drawn = {name: _rows_of(tiles, name, rows, columns) for name in names}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from math import isfinite
 
 from parenting.envs.tables.layers import Boards
 from parenting.envs.tables.table import MOST_STATES, Outcome
@@ -13,6 +14,8 @@ Unsafe = str | Collection[int] | Callable[[int, int, int, float], bool]
 """Glyphs of tiles, states, or a function of (state, move, next state, reward)."""
 LONGEST_CHAIN = 8
 """Actions at most that a table adds to a move by itself."""
+ROUNDING = 1e-6
+"""A probability may exceed 1 by so much, as sums of floats do."""
 
 Step = list[tuple[float, int, float, bool]]
 
@@ -25,6 +28,8 @@ def reached(
     Raises:
         ValueError: an action or a state is missing, there are more actions than moves, or too many states.
     """
+    if start < 0:
+        raise ValueError(f"start: {start} is no state; states are whole numbers from 0.")
     number, steps, fringe = {start: 0}, dict[int, list[Step]](), [start]
     ended: set[int] = set()
     while fringe:
@@ -74,14 +79,36 @@ def _outcomes(
     try:
         told = transitions[state]
         found = told[action]
-    except (KeyError, IndexError):
+    except (KeyError, IndexError, TypeError):
         raise ValueError(f"P[{state}][{action}] is missing.") from None
     if len(told) > 4 and then is None:
         raise ValueError(
             f"P[{state}] has {len(told)} actions, and an agent has four moves. Say by then= which of the"
             " others happen by themselves after a move."
         )
-    return [(float(p), int(to), float(reward), bool(end)) for p, to, reward, end in found if p > 0]
+    outcomes = [_outcome(f"P[{state}][{action}]", one) for one in found]
+    return [one for one in outcomes if one[0] > 0]
+
+
+def _outcome(where: str, told: Sequence[float]) -> tuple[float, int, float, bool]:
+    """Return an outcome of a table.
+
+    Raises:
+        ValueError: it is not made of four parts, or one of them cannot be what it should be.
+    """
+    try:
+        p, after, reward, over = told
+        chance, state, worth = float(p), int(after), float(reward)
+    except (TypeError, ValueError, OverflowError):
+        wanted = "(probability, next state, reward, whether the episode ends)"
+        raise ValueError(f"{where}: {str(told)[:80]} is not {wanted}.") from None
+    if not 0 <= chance <= 1 + ROUNDING:
+        raise ValueError(f"{where}: {chance:g} is not a probability.")
+    if state != after or state < 0:
+        raise ValueError(f"{where} leads to state {after}, and states are whole numbers from 0.")
+    if not isfinite(worth):
+        raise ValueError(f"{where}: {worth} is not a reward; it has to be finite.")
+    return chance, state, worth, bool(over)
 
 
 def _merged(step: Step) -> Step:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 import subprocess
 import sys
 import zlib
@@ -97,6 +98,13 @@ def all_moves(outcome: tuple[float, int, float, bool]) -> Table:
     return {0: {action: [outcome] for action in range(4)}}
 
 
+def moved(*outcomes: Any) -> pt.TableWorld:
+    """A world of two states, as a list, with these outcomes of the first move."""
+    table = [[[(1.0, state, 0.0, False)] for _ in range(4)] for state in range(2)]
+    table[0][0] = list(outcomes)
+    return pt.TableWorld(table, shape=(1, 2))  # type: ignore[arg-type]  # as people write it
+
+
 def sometimes() -> Table:
     return {0: {action: [(1.0, 1, 0.0, action < 2)] for action in range(4)}}
 
@@ -111,6 +119,15 @@ def sometimes() -> Table:
         (lambda: line(start=9), r"P\[9\]\[0\] is missing"),
         (lambda: line(place=lambda state: (0, 0, 0)), "look alike"),
         (lambda: pt.TableWorld(all_moves((0.5, 1, 0.0, True)), (1, 2)), "sum to 0.5, not to 1"),
+        (lambda: moved((math.nan, 0, 0.0, False), (1.0, 1, 0.0, False)), r"P\[0\]\[0\]: nan is not a prob"),
+        (lambda: moved((-0.5, 0, 0.0, False), (1.5, 1, 0.0, False)), "-0.5 is not a probability"),
+        (lambda: moved((1.0, -1, 0.0, False)), "leads to state -1"),
+        (lambda: moved((1.0, 0.5, 0.0, False)), "leads to state 0.5"),
+        (lambda: moved((1.0, 1, math.inf, False)), "inf is not a reward"),
+        (lambda: moved((1.0, 1)), r"\(1.0, 1\) is not \(probability, next state, reward"),
+        (lambda: pt.TableWorld([[[(1.0, 0, 0.0, False)]] * 4], (1, 1), start=-1), "start: -1 is no state"),  # type: ignore[arg-type]  # as people write it
+        (lambda: pt.TableWorld(still(2), (0, 2)), "shape: 0 x 2 is not from 1 x 1 to 64 x 64"),
+        (lambda: pt.TableWorld(still(2), (10**9, 10**9)), "shape: 1000000000 x 1000000000"),
         (lambda: pt.TableWorld({**sometimes(), 1: still(2)[1]}, (1, 2)), "ends an episode by some moves"),
         (lambda: pt.TableWorld({0: {a: [(1, 1, 0, True)] for a in range(6)}}, (1, 2)), "6 actions.*then="),
     ],
