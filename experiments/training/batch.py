@@ -87,6 +87,7 @@ class BatchTrainer:
         self._count(answer, stage)
         self.ticks += 1
         if self.history is not None:
+            self.history.hear(self.trial, answer)
             self.history.note(self.ticks, self.trial, self.state, self.counts)
         self._finish(self.state.info.trained | owed | (self.counts.ticks == 1))
 

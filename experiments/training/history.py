@@ -7,9 +7,10 @@ import time
 from typing import Any
 
 import torch
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
+from parenting.agent.query import Answer, Choice
 from parenting.agent.state import AgentState
 from parenting.evaluation.argmax import Evaluation
 from parenting.experiments.training.counts import Counts
@@ -17,9 +18,18 @@ from parenting.experiments.training.counts import Counts
 ROWS = 200
 """Rows of a trial at most, besides its last. Where they are full, every second one is left out."""
 LEARNT = ("loss", "entropy_global", "entropy_local")
-WHOLE = ("tick", "deaths", "guidance", "preference", "size", "rows", "maturity", "optimal")
+CHOICES = {
+    "left": Choice.LEFT,
+    "right": Choice.RIGHT,
+    "either": Choice.EITHER,
+    "neither": Choice.NEITHER,
+    "skips": Choice.SKIP,
+}
+WHOLE = ("tick", "deaths", "guidance", "preference", *CHOICES, "size", "rows", "maturity", "optimal")
 COLUMNS = (*WHOLE, "return", "seconds", *LEARNT)
 """The columns of a row; "seconds" are those since the batch began."""
+MEASURING = 0.05
+"""The share of the time of a training that goes at most into returns that take episodes to measure."""
 
 Table = Float64[Tensor, "N R K"]
 
@@ -32,7 +42,14 @@ class History:
         self.evaluation, self.began = evaluation, time.monotonic()
         self.table = torch.full((trials, ROWS + 1, len(COLUMNS)), math.nan, dtype=torch.float64)
         self.learnt = torch.full((trials, len(LEARNT)), math.nan, dtype=torch.float64)
+        self.chosen = torch.zeros(trials, len(CHOICES), dtype=torch.float64)
+        self.measured = -math.inf  # from when on a return may be measured
         self.used, self.every = 0, 1
+
+    def hear(self, trial: Int64[Tensor, "n"], answer: Answer) -> None:
+        """Count the answers of a tick by choice."""
+        given = torch.stack([answer.choice == choice for choice in CHOICES.values()], 1)
+        self.chosen[trial] += given.cpu()
 
     def note(self, tick: int, trial: Int64[Tensor, "n"], state: AgentState, counts: Counts) -> None:
         """Keep a row after this tick, if one is due, of the trials that are not done."""
@@ -68,10 +85,8 @@ class History:
             self.learnt[trial[trained]] = now[trained]
 
     def _rows(self, trial: Int64[Tensor, "n"], state: AgentState, counts: Counts) -> Float64[Tensor, "n K"]:
-        """Return the numbers of trials now. The return is left out where it takes episodes to measure it."""
+        """Return the numbers of trials now."""
         live = state.learner.params
-        nothing = torch.full((len(trial),), math.nan)
-        exact = not self.evaluation.refresh_seconds
         found = {
             "tick": counts.ticks,
             "deaths": counts.deaths,
@@ -81,11 +96,23 @@ class History:
             "rows": state.x.rows,
             "maturity": state.maturity,
             "optimal": self.evaluation.optimal(live),
-            "return": self.evaluation.returns(live) if exact else nothing,
+            "return": self._returns(live),
+            **dict(zip(CHOICES, self.chosen[trial].T, strict=True)),
             "seconds": torch.full((len(trial),), time.monotonic() - self.began),
         }
         columns = [found[name].double().cpu() for name in COLUMNS[: -len(LEARNT)]]
         return torch.cat((torch.stack(columns, 1), self.learnt[trial]), 1)
+
+    def _returns(self, live: Float[Tensor, "n P"]) -> Float64[Tensor, "n"]:
+        """Return what the policies earn. Where it takes episodes to measure it, most rows have none."""
+        began = time.monotonic()
+        if began < self.measured:
+            return torch.full((len(live),), math.nan, dtype=torch.float64)
+        found = self.evaluation.returns(live)
+        ended = time.monotonic()
+        if rest := self.evaluation.refresh_seconds:
+            self.measured = ended + max(rest, (ended - began) / MEASURING)
+        return found
 
 
 def no_history(trials: int) -> Table:

@@ -28,7 +28,7 @@ class Trial(NamedTuple):
 def trials_of(plan: TrainPlan, outcomes: Outcomes) -> list[Trial]:
     """Return the trials of a batch whose history was kept.
 
-    In the garden, where a return is a mean over episodes, only the last row has one.
+    In the garden, where a return is a mean over episodes, some of the rows have one; the last one does.
     """
     counts = outcomes.counts
     world = world_of(plan.world, plan.level, plan.config)

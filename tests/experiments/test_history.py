@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from itertools import pairwise
 
 import pytest
@@ -38,6 +39,10 @@ def test_rows_grow_with_the_life_and_end_with_its_counts(monkeypatch: pytest.Mon
             counted = [rows[tick][name] for tick in ticks]
             assert counted == sorted(counted)
             assert last[name] == int(getattr(found.counts, name)[trial])
+        chosen = [last[name] for name in ("left", "right", "either", "neither")]
+        assert sum(chosen) == last["guidance"] + last["preference"] > 0
+        assert max(chosen) < sum(chosen), "of several kinds"
+        assert last["skips"] == 0
         assert last["optimal"] == int(found.counts.optimal[trial])
         assert last["loss"] > 0
         assert [rows[tick]["seconds"] for tick in ticks] == sorted(rows[tick]["seconds"] for tick in ticks)
@@ -54,7 +59,23 @@ def test_a_history_changes_no_trial() -> None:
     )
 
 
-def test_where_a_return_takes_episodes_it_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(TabularEvaluation, "refresh_seconds", 1.0)  # as in the garden
-    rows = metrics(train_in_chunks(plan(2), 1).history[0])
-    assert {row["return"] for row in rows.values()} == {None}
+@pytest.mark.parametrize(("rest", "most"), [(3600.0, 1), (1e-9, 99)])
+def test_where_a_return_takes_episodes_it_is_measured_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, rest: float, most: int
+) -> None:
+    monkeypatch.setattr(TabularEvaluation, "refresh_seconds", rest)  # as in the garden
+    monkeypatch.setattr(history, "MEASURING", 1e9)
+    rows = metrics(train_in_chunks(plan(20), 1).history[0])
+    measured = [row["return"] for _, row in sorted(rows.items()) if row["return"] is not None]
+    assert min(most, len(rows)) == len(measured)
+
+
+def test_a_measurement_that_takes_long_is_seldom_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that takes a second is not made again within twenty."""
+    times = iter((0.0, 100.0, 101.0, 120.0, 122.0, 123.0))
+    monkeypatch.setattr(time, "monotonic", lambda: next(times))
+    monkeypatch.setattr(TabularEvaluation, "refresh_seconds", 3.0)
+    monkeypatch.setattr(TabularEvaluation, "returns", lambda *_: torch.ones(1, dtype=torch.float64))
+    kept = history.History(1, TabularEvaluation.__new__(TabularEvaluation))
+    found = [float(kept._returns(torch.zeros(1, 1))) for _ in range(3)]
+    assert [value == 1 for value in found] == [True, False, True]

@@ -16,6 +16,7 @@ from playwright.sync_api import Page, expect
 
 from parenting.envs import registry
 from parenting.server.db import Database
+from parenting.server.pages.texts import world_title
 from parenting.server.queue.answers import answer
 from parenting.server.settings import Settings
 from scripts.catalogue import compile_language, pseudo
@@ -29,7 +30,7 @@ SHOWN = ("aria-label", "title", "alt", "placeholder", "data-title", "data-spoken
 DATA = {"bdi", "code", "kbd", "time", "script", "style", "text"}
 """Elements whose text is not a sentence: names that people give, keys, times, letters on a board."""
 WORD = re.compile(r"[A-Za-z]{2,}")
-TITLES = [f"{world.replace('-', ' ').capitalize()}, {level}" for world, level in LEVELS]
+TITLES = [f"{world_title(world)}, {level}" for world, level in LEVELS]
 NAMES = re.compile("|".join(["Parenting", "JSON", r"\(me\)", *TITLES]))
 """Names, which stay as they are."""
 PATHS = (
