@@ -38,6 +38,7 @@ COMMANDS = {
     "verify": "Verify a stored run's answers, bits and X.",
     "backup": "Write a checked copy of the database, while everything goes on.",
     "restore": "Put a backup in place of the database.",
+    "copy": "Move a database from SQLite to PostgreSQL, or back.",
     "web": "Serve the pages and the API.",
     "worker": "Train the agents of the runs in the database.",
     "workers": "List the workers that are alive, their runs, load and memory.",

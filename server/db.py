@@ -205,7 +205,7 @@ def connect(
     """
     try:
         url = make_url(settings.url)
-    except ArgumentError:  # its text would repeat the URL, and so its password
+    except (ArgumentError, ValueError):  # its text would repeat the URL, and so its password
         raise _unreadable("this is not a URL") from None
     name = url.get_backend_name()
     if name not in STORES:

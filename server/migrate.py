@@ -41,7 +41,7 @@ def upgrade(db: Database, keep: Keep | None = None) -> bool:
     """
     with db.write() as session:
         connection = _begin(session)
-        before = _revision(connection)
+        before = revision_in(connection)
         if before == newest():
             return False
         if before is None and inspect(connection).has_table("run"):
@@ -50,6 +50,11 @@ def upgrade(db: Database, keep: Keep | None = None) -> bool:
             keep(before)
         _alembic(connection, "upgrade", "head")
         return True
+
+
+def create_tables(connection: Connection) -> None:
+    """Make the tables of this version where there are none, in a transaction that is open."""
+    _alembic(connection, "upgrade", "head")
 
 
 def downgrade(db: Database, to: str, keep: Keep | None = None) -> None:
@@ -96,7 +101,7 @@ def revision(db: Database) -> str | None:
         SetupError: a newer version wrote them.
     """
     with db.read() as session:
-        return _revision(session.connection())
+        return revision_in(session.connection())
 
 
 def newest() -> str:
@@ -134,7 +139,12 @@ def _begin(session: Session) -> Connection:
     return connection
 
 
-def _revision(connection: Connection) -> str | None:
+def revision_in(connection: Connection) -> str | None:
+    """Return the revision of the tables that a connection sees; None if there are none.
+
+    Raises:
+        SetupError: a newer version wrote them.
+    """
     if not inspect(connection).has_table(VERSIONS.name):
         return None
     found = connection.scalars(select(VERSIONS.c.version_num)).one_or_none()

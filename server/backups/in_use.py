@@ -11,12 +11,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import URL, create_engine, text
+from sqlalchemy import URL, Connection, create_engine, text
 from sqlalchemy.exc import DBAPIError
 
 from parenting._plural import counted
 from parenting.server.errors import SetupError
 from parenting.server.notify import Notifier
+from parenting.server.store import postgresql
 from parenting.server.store.sqlite import sqlite_module
 
 CHANNELS = {"web": "pages are served", "worker": "a worker is running"}
@@ -72,10 +73,10 @@ def require_unconnected(url: URL) -> None:
     Raises:
         SetupError: somebody is, or it cannot be reached.
     """
-    engine = create_engine(url)
+    engine = create_engine(postgresql.driven(url))
     try:
         with engine.connect() as connection:
-            others = connection.execute(_OTHERS).scalar_one()
+            others = others_connected(connection)
     except DBAPIError as error:
         reason = str(error.orig).strip().splitlines()[0]
         raise SetupError(f"The database {url.render_as_string()} cannot be reached: {reason}.") from None
@@ -87,6 +88,15 @@ def require_unconnected(url: URL) -> None:
         )
 
 
+def others_connected(connection: Connection) -> int:
+    """Return the number of other connections to a PostgreSQL database, also later in a transaction."""
+    connection.execute(text("SELECT pg_stat_clear_snapshot()"))
+    number: int = connection.execute(_OTHERS).scalar_one()
+    return number
+
+
+# Not those of the server's own processes, such as autovacuum.
 _OTHERS = text(
-    "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND pid <> pg_backend_pid()"
+    "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND pid <> pg_backend_pid() "
+    "AND backend_type = 'client backend'"
 )

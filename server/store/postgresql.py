@@ -42,8 +42,7 @@ def open_engine(url: URL, **options: Any) -> Engine:
     Raises:
         SetupError: the driver is not installed.
     """
-    if url.drivername in ("postgresql", "postgres"):
-        url = url.set(drivername="postgresql+psycopg")  # SQLAlchemy means psycopg2 by the plain name
+    url = driven(url)
     named = url.normalized_query.get("options", ())
     limits = [f"-c {name}={value}" for name, value in LIMITS.items()]
     network = {name: value for name, value in NETWORK.items() if name not in url.query}
@@ -67,6 +66,12 @@ def open_engine(url: URL, **options: Any) -> Engine:
     return engine
 
 
+def driven(url: URL) -> URL:
+    """Return a URL that names the driver: by the plain name SQLAlchemy means psycopg2."""
+    plain = url.drivername in ("postgresql", "postgres")
+    return url.set(drivername="postgresql+psycopg") if plain else url
+
+
 def reading(engine: Engine) -> Engine:
     """Return the same engine for transactions that only read."""
     return engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
@@ -77,10 +82,15 @@ def begin_migration(connection: Connection) -> None:
 
     Locks of tables keep their limit: who waits for one holds up everybody behind it.
     """
-    for name in LIMITS:
-        connection.exec_driver_sql(f"SET LOCAL {name} = 0")
+    lift_limits(connection)
     connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({MIGRATION})")
     connection.exec_driver_sql(f"SET LOCAL lock_timeout = {LIMITS['lock_timeout']}")
+
+
+def lift_limits(connection: Connection) -> None:
+    """Let the statements and rests of this transaction take what they take."""
+    for name in LIMITS:
+        connection.exec_driver_sql(f"SET LOCAL {name} = 0")
 
 
 def watcher(engine: Engine) -> PoolProxiedConnection:
