@@ -22,6 +22,7 @@ from parenting.commands.parents import chosen_parent
 from parenting.commands.printing import say
 from parenting.commands.run_report import page
 from parenting.commands.run_store import open_store, store_trials, title_of
+from parenting.commands.run_trackers import TRACKER, chosen_trackers, tell_trackers
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
 from parenting.envs.names import UnknownNameError, did_you_mean
@@ -72,6 +73,7 @@ def run(
         bool, typer.Option("--store", help="Store each trial as a run of the database, to be compared there.")
     ] = False,
     name: Annotated[str | None, typer.Option(help="With --store, the name of these runs.")] = None,
+    tracker: Annotated[list[str] | None, TRACKER] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
     ] = False,
@@ -81,6 +83,7 @@ def run(
     The last lines report the outcomes of their argmax policies.
 
     With --store the trials stand in the database afterwards, as runs that are over, beside those of people.
+    A --tracker is told of each trial, too.
 
     Example: parenting run unsafe-exploration --preset conservative --trials 100
     """
@@ -97,6 +100,7 @@ def run(
         weights = None
         if origin.policy is None:
             config, weights = _weights(found, config, pretrain, quiet=as_json)
+        trackers = chosen_trackers(tracker)
         if store:
             open_store().close()  # what is wrong with it is told before the work, not after
     from parenting._process import settle
@@ -108,7 +112,7 @@ def run(
     plan = TrainPlan(world, found.text, config, seed, trials, goal, max_ticks, weights, str(spec))
     if origin.about is not None:
         plan = plan._replace(beginning=_beginning(origin, found, config), origin=origin.about)
-    plan = plan._replace(history=store)
+    plan = plan._replace(history=store or bool(trackers))
     began = time.monotonic()
     try:
         with exit_on_interrupt(), _bar(plan) as progress:
@@ -121,6 +125,7 @@ def run(
         try:
             if store:
                 results["runs"] = store_trials(plan, found, preset, outcomes, title)
+            tell_trackers(trackers, plan, found, outcomes, title, results.get("runs"))
         finally:
             say(json.dumps(results) if as_json else page(results))
 

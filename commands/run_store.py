@@ -110,12 +110,13 @@ def _ended(trial: Trial, plan: TrainPlan) -> EndedTrial:
         trial.optimal,
         trial.answers,
         trial.finished,
-        _reason(trial, plan.until, plan.max_ticks),
+        ending(trial, plan.until, plan.max_ticks),
         trial.metrics,
     )
 
 
-def _reason(trial: Trial, until: StopRule, most: int) -> str:
+def ending(trial: Trial, until: StopRule, most: int) -> str:
+    """Say why a trial ended, in a sentence."""
     if trial.stuck:
         return "No action was acceptable."
     if not trial.finished:

@@ -58,6 +58,11 @@ class Feed:
         """Tell that a run has ended, or goes on elsewhere."""
         self._put(False, partial(self.tracker.end, run, reason))
 
+    def drained(self, seconds: float) -> bool:
+        """Wait at most so long until everything is told; return whether it is."""
+        with self._news:
+            return self._news.wait_for(lambda: not self._waiting and not self._busy, seconds)
+
     def close(self, seconds: float) -> bool:
         """Wait at most so long until everything is told; return whether it is. Say what was lost."""
         with self._news:
