@@ -1,0 +1,125 @@
+"""A crowd answers many runs, one of the workers is killed in the middle, and every run goes on to its end.
+
+The long form has fifty people, three workers, and Chromium before the list of runs and a dashboard; its
+pictures at 1280 and 390 pixels lie in PARENTING_PICTURES, if that names a folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page
+
+from parenting.server.db import Database
+from parenting.server.new_run import NewRun, start
+from parenting.server.replay import relive
+from parenting.server.runs import list_runs
+from parenting.server.settings import Settings
+from parenting.server.statuses import OVER, RunStatus
+from tests.faults.auditor import Store, audit
+from tests.faults.figures import Figures
+from tests.faults.ledger import Entries
+from tests.lengths import TORTURE, length
+from tests.pages.browser_tabs import BrowserTabs
+from tests.server.processes import Command, store_of
+from tests.server.serving import free_port, until_up
+from tests.simulated_person import chromium
+
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(120, 1800))]
+PEOPLE, RUNS, WORKERS, ANSWERS = length((3, 2, 2, 4), (50, 50, 3, 12))
+THINK = length("0.05", "1.0")
+CLAIM_SECONDS = 1.0
+PATIENCE = length(60.0, 900.0)
+WIDTHS = (1280, 390)
+SPEED = {
+    "parenting.server.session.CHECKPOINT_SECONDS": 0.2,
+    "parenting.server.session.CHECKPOINT_SPEED": 1e12,
+}
+
+
+def until(holds: Any, said: str) -> None:
+    end = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < end, said
+        time.sleep(0.05)
+
+
+@contextmanager
+def watched(url: str, run: str) -> Iterator[list[Page]]:
+    """The list of runs and a dashboard in two widths, which must show no error and never go blank."""
+    if not TORTURE:
+        yield []
+        return
+    path = os.environ.get("PARENTING_CHROMIUM") or shutil.which("chromium") or "chromium"
+    with chromium(path) as browser:
+        tabs = BrowserTabs(browser, url)
+        views = [(place, width) for place in ("/", f"/runs/{run}") for width in WIDTHS]
+        pages = [tabs.open(place, viewport={"width": width, "height": 900}) for place, width in views]
+        yield pages
+        assert [page.locator("h1").count() for page in pages] == [1] * len(pages)
+        assert tabs.wrong == []
+        tabs.close()
+
+
+def picture(pages: list[Page], name: str) -> None:
+    folder = os.environ.get("PARENTING_PICTURES")
+    for number, page in enumerate(pages if folder else ()):
+        page.screenshot(path=Path(str(folder)) / f"crowd-{name}-{number}.png")
+
+
+def test_a_worker_of_several_is_killed_under_a_crowd(
+    settings: Settings, db: Database, kept: Store, figures: Figures
+) -> None:
+    config = {"max_open_preferences": 0}
+    for seed in range(RUNS):
+        start(db, NewRun(world="unsafe-exploration", seed=seed, config=config, finish=f"goal:{ANSWERS}"))
+    environment = store_of(settings) | {"PARENTING_CLAIM_SECONDS": str(CLAIM_SECONDS)}
+    url = f"http://127.0.0.1:{free_port()}"
+
+    with ExitStack() as stack:
+
+        def begun(*arguments: str) -> Command:
+            one = Command(*arguments, data=settings.data, environment=environment, patches=SPEED)
+            stack.callback(lambda: one.kill() if one.alive else None)
+            return one
+
+        begun("web", "--port", url.rpartition(":")[2])
+        workers = [begun("worker") for _ in range(WORKERS)]
+        until_up(url)
+        pages = stack.enter_context(watched(url, list_runs(db)[0].public_id))
+        bots = begun("answer", "--url", url, "--people", str(PEOPLE), "--think", THINK, "--json")
+        half = RUNS * ANSWERS // 2
+        until(lambda: sum(run.answers for run in list_runs(db)) >= half, "half of the answers")
+        until(lambda: len(raisers(db)) == WORKERS or over(db), "each worker raises a run")
+        picture(pages, "before")
+        workers[0].kill()
+        figures.count("crowd", "workers killed")
+        until(lambda: over(db), f"the end of all runs: {[(run.id, run.status) for run in list_runs(db)]}")
+        picture(pages, "after")
+        assert bots.wait(60) == 0, bots.said()
+        for worker in workers[1:]:
+            assert worker.stop() == 0, worker.said()
+    found = json.loads(bots.said().splitlines()[-1])
+    runs = list_runs(db)
+    assert {run.status for run in runs} == {RunStatus.FINISHED}
+    assert found["answered"] == sum(run.standing for run in runs), "each answer was stored once"
+    assert audit(kept, Entries([], [])) == []
+    different = [run.id for run in runs if not relive(db, run.id).equal]
+    assert different == []
+    figures.count("crowd", "runs replayed equal", len(runs))
+
+
+def over(db: Database) -> bool:
+    return all(run.status in OVER for run in list_runs(db))
+
+
+def raisers(db: Database) -> set[str]:
+    return {run.worker for run in list_runs(db) if run.worker is not None and run.status not in OVER}
