@@ -16,7 +16,7 @@ from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
 from parenting.server.queue.answers import Said, Stored, answer_in
-from parenting.server.queue.leases import is_offered, lease_in, release
+from parenting.server.queue.leases import is_offered, lease_in, release_in
 from parenting.server.queue.names import Names
 from parenting.server.reads import pagination
 from parenting.server.reads.names import run_number, run_number_in
@@ -138,6 +138,6 @@ def _answer(db: Database, query: int | str, said: Said, names: Names, session: S
     status_code=204,
     responses=write_responses(404),
 )
-def release_question(query_id: QueryId, body: LeaseBody, db: Db) -> None:
+async def release_question(request: Request, query_id: QueryId, body: LeaseBody) -> None:
     """Offer a leased question to others at once. Only its holder can; others change nothing."""
-    release(db, query_id, body.client_id)
+    await store(request, partial(release_in, query_id=query_id, client_id=body.client_id))

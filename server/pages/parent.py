@@ -148,7 +148,7 @@ async def question(
     if query is None:
         return Response(status_code=204)
     if await request.is_disconnected():  # it left while the question was looked up
-        await streams.admission.write(leases.release, db, query.id, client_id)
+        await store(request, partial(leases.release_in, query_id=query.id, client_id=client_id))
     return await streams.admission.read(_markup, db, run, query, client_id)
 
 

@@ -168,10 +168,13 @@ def release(db: Database, query_id: int, client_id: str) -> None:
         NotFound: there is no such query.
     """
     with db.write() as session:
-        query = lock_query(session, query_id)
-        if query.leased_by == client_id:
-            query.leased_by = query.leased_until = None
-            query.lease_epoch = query.lease_begin = query.lease_end = None
+        release_in(session, query_id, client_id)
+
+
+def release_in(session: Session, query_id: int, client_id: str) -> None:
+    """Offer a query to others as `release` does, in a transaction that is already open."""
+    lock_query(session, query_id)
+    session.execute(_RELEASED, {"query_id": query_id, "client": client_id})
 
 
 def is_offered(session: Session, db: Database, run_id: int, client_id: str) -> bool:
@@ -234,6 +237,11 @@ _HELD = (
     update(_QUERY)
     .where(_QUERY.c.id == bindparam("query_id"))
     .values(leased=func.coalesce(_QUERY.c.leased, bindparam("leased_at", type_=_QUERY.c.leased.type)))
+)
+_RELEASED = (
+    update(_QUERY)
+    .where(_QUERY.c.id == bindparam("query_id"), _QUERY.c.leased_by == bindparam("client"))
+    .values(leased_by=None, leased_until=None, lease_epoch=None, lease_begin=None, lease_end=None)
 )
 _LEASE = (Query.lease_epoch, Query.lease_begin, Query.lease_end)
 _MINE = and_(Query.leased_by == bindparam("client_id"), holds(*_LEASE))

@@ -78,9 +78,16 @@ def picture(pages: list[Page], name: str) -> None:
 def test_a_worker_of_several_is_killed_under_a_crowd(
     settings: Settings, db: Database, kept: Store, figures: Figures
 ) -> None:
-    config = {"max_open_preferences": 0}
     for seed in range(RUNS):
-        start(db, NewRun(world="unsafe-exploration", seed=seed, config=config, finish=f"goal:{ANSWERS}"))
+        start(
+            db,
+            NewRun(
+                world="unsafe-exploration",
+                seed=seed,
+                config={"max_open_preferences": 0},
+                finish=f"goal:{ANSWERS}",
+            ),
+        )
     environment = store_of(settings) | {"PARENTING_CLAIM_SECONDS": str(CLAIM_SECONDS)}
     url = f"http://127.0.0.1:{free_port()}"
 
