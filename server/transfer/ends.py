@@ -29,7 +29,7 @@ from parenting.server.tables import Table as Root
 from parenting.server.transfer import rows
 
 BESIDE = ("", "-wal", "-shm", "-journal", "-mark")
-"""What a target must not have: the file, and what would be taken for its own."""
+"""Ends of the names of files that must not be there: the target, and files that count as its own."""
 GROWTH = 2
 """A file of SQLite may take so many times the bytes of the tables that are copied into it."""
 
