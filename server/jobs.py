@@ -229,11 +229,25 @@ def fail(db: Database, mine: JobClaim, reason: str) -> None:
     _set(db, mine, state=JobState.FAILED, reason=reason, result=None)
 
 
+def hold(session: Session, mine: JobClaim) -> None:
+    """Lock a job in a transaction that writes what it made.
+
+    Raises:
+        LostClaimError: it was cancelled, or another worker has it.
+    """
+    if session.execute(select(Job.id).where(_of([mine])).with_for_update()).scalar() is None:
+        raise _lost(mine)
+
+
 def _set(db: Database, mine: JobClaim, **values: Any) -> None:
     with db.write(durable=False) as session:
         mine_still = session.execute(update(Job).where(_of([mine])).values(values).returning(Job.id)).all()
         if not mine_still:
-            raise LostClaimError(f"Job {mine.job_id} was cancelled, is another worker's now, or is not kept.")
+            raise _lost(mine)
+
+
+def _lost(mine: JobClaim) -> LostClaimError:
+    return LostClaimError(f"Job {mine.job_id} was cancelled, is another worker's now, or is not kept.")
 
 
 def _of(claims: Sequence[JobClaim]) -> ColumnElement[bool]:

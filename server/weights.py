@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -28,10 +28,16 @@ def put(db: Database, file: Path) -> str:
     return put_bytes(db, file.name, file.read_bytes())
 
 
-def put_bytes(db: Database, name: str, blob: bytes) -> str:
-    """Store what a run begins with under its SHA-256, once, and return that."""
+def put_bytes(
+    db: Database, name: str, blob: bytes, fence: Callable[[Session], None] = lambda session: None
+) -> str:
+    """Store what a run begins with under its SHA-256, once, and return that.
+
+    A `fence` is called first in the same transaction: it raises where the one who writes may not any more.
+    """
     sha256 = digest(blob)
     with db.write() as session:
+        fence(session)
         put_in(session, sha256, name, blob, db.clock())
     return sha256
 

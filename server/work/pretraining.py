@@ -49,6 +49,7 @@ def pretrain(db: Database, mine: JobClaim, asked: PretrainPayload) -> dict[str, 
     exam, steps = school.evaluate(state.params[0]), len(state.returns)
     mean = float(state.returns[-WINDOW:].mean())
     about = {"seed": str(SEED), "steps": str(steps), "return": f"{mean:.2f}", "solved": f"{exam.solved:.3f}"}
-    sha256 = put_bytes(db, f"{wanted.name}{SUFFIX}", packed(wanted, state.params[0], about))
+    blob = packed(wanted, state.params[0], about)
+    sha256 = put_bytes(db, f"{wanted.name}{SUFFIX}", blob, lambda session: jobs.hold(session, mine))
     took = round(time.monotonic() - began, 1)
     return {"sha256": sha256, "steps": steps, "seconds": took, "solved": round(exam.solved, 4)}
