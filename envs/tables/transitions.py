@@ -29,7 +29,7 @@ def reached(
         ValueError: an action or a state is missing, there are more actions than moves, or too many states.
     """
     if start < 0:
-        raise ValueError(f"start: {start} is no state; states are whole numbers from 0.")
+        raise ValueError(f"start: {start} is not a state; states are whole numbers from 0.")
     number, steps, fringe = {start: 0}, dict[int, list[Step]](), [start]
     ended: set[int] = set()
     while fringe:

@@ -125,7 +125,7 @@ def sometimes() -> Table:
         (lambda: moved((1.0, 0.5, 0.0, False)), "leads to state 0.5"),
         (lambda: moved((1.0, 1, math.inf, False)), "inf is not a reward"),
         (lambda: moved((1.0, 1)), r"\(1.0, 1\) is not \(probability, next state, reward"),
-        (lambda: pt.TableWorld([[[(1.0, 0, 0.0, False)]] * 4], (1, 1), start=-1), "start: -1 is no state"),  # type: ignore[arg-type]  # as people write it
+        (lambda: pt.TableWorld([[[(1.0, 0, 0.0, False)]] * 4], (1, 1), start=-1), "start: -1 is not a state"),  # type: ignore[arg-type]  # as people write it
         (lambda: pt.TableWorld(still(2), (0, 2)), "shape: 0 x 2 is not from 1 x 1 to 64 x 64"),
         (lambda: pt.TableWorld(still(2), (10**9, 10**9)), "shape: 1000000000 x 1000000000"),
         (lambda: pt.TableWorld({**sometimes(), 1: still(2)[1]}, (1, 2)), "ends an episode by some moves"),
