@@ -175,14 +175,15 @@ class Worker:
     # A round
 
     def _round(self) -> bool:
-        """Give every run that is due its turn, first those with an answer; return whether any has ticked."""
+        """Give every run that is due its turn, as far as threads are free; return whether any has ticked."""
         self._end_turns()
         self._look()
         self.jobs.begin(self.name)
         for run_id in self.schedule.due():
             if self.stopping or self.patience.doubts:
                 break
-            if self.turns.may_begin(run_id, run_id not in self.sessions):
+            urgent = self.schedule.seen[run_id].urgent
+            if self.turns.may_begin(run_id, run_id not in self.sessions, urgent):
                 self.turns.begin(run_id, partial(self.held.turn, run_id, self.schedule.begin(run_id)))
                 self.jobs.begin(self.name)
         ticked = self._end_turns()

@@ -50,6 +50,13 @@ class Watch:
     pace: float | None  # ticks a second at most
     events: int  # not yet applied
     corrections: int = 0  # of answers that were heard, themselves not yet heard
+    person: bool = False  # its parent is one, who waits for its next question
+
+    @property
+    def urgent(self) -> bool:
+        """Return whether a person waits for the next question, or for an answer to be heard."""
+        asked = self.open_guidance or self.open_preferences
+        return self.person and bool(self.answers or self.corrections or not asked)
 
     @property
     def goal_reached(self) -> bool:
@@ -111,6 +118,7 @@ _WATCH = select(
     .correlate(Run)
     .scalar_subquery()
     .label("corrections"),
+    (Run.parent == "human").label("person"),
 ).where(Run.id.in_(bindparam("run_ids", expanding=True)))
 
 

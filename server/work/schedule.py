@@ -43,10 +43,10 @@ class Schedule:
                 self._set(run_id, NOW)
 
     def due(self) -> Sequence[int]:
-        """Return the runs whose turn is due, first those with an answer."""
+        """Return the runs whose turn is due: those for which a person waits, then the longest due."""
         now = time.monotonic()
         due = [run_id for run_id, at in self._at.items() if at <= now]
-        return sorted(due, key=lambda run_id: not self.seen[run_id].answers)
+        return sorted(due, key=lambda run_id: (not self.seen[run_id].urgent, self._since.get(run_id, now)))
 
     def begin(self, run_id: int) -> Watch:
         """Take note that a run's turn begins; return what was seen of the run."""

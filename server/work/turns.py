@@ -20,8 +20,14 @@ BESIDE_SECONDS = 0.05
 """A turn that takes longer no longer holds up the other runs."""
 HUNG_SECONDS = 300.0
 """A turn that takes longer counts as hung: the run's claim is not renewed, and another worker may take it."""
-LONG_AT_ONCE = (os.cpu_count() or 1) + 2
-"""Long turns at once. More would only take the processor from quick ones."""
+LONG_AT_ONCE = max(2, os.cpu_count() or 1)
+"""Long turns at once. More would only take the processor from quick ones, and one alone may hang."""
+SLOW_SECONDS = 1.0
+"""A run whose last turn took longer is no urgent one: its person waits anyway, and others should not."""
+QUICK_AT_ONCE = 2 * LONG_AT_ONCE
+"""Turns at once, long or not: some that were quick before turn out to be long."""
+URGENT_AT_ONCE = QUICK_AT_ONCE + 8
+"""Turns at once, those included for which a person waits: these find a thread whatever the others do."""
 
 Turn = Callable[[], float]
 """It returns the time of `time.monotonic` from which the run's next turn is due."""
@@ -48,16 +54,25 @@ class Turns:
         self._wake, self.beside_after = wake, beside_after
         self._working: dict[int, Working] = {}
         self._long: set[int] = set()
+        self._slow: set[int] = set()
         self._pool = ThreadPoolExecutor(
-            2 * LONG_AT_ONCE, "turn", initializer=torch.set_num_threads, initargs=(1,)
+            URGENT_AT_ONCE, "turn", initializer=torch.set_num_threads, initargs=(1,)
         )
 
-    def may_begin(self, run_id: int, new: bool) -> bool:
-        """Return whether a turn of a run may begin now. The first one of a `new` run counts as long."""
+    def may_begin(self, run_id: int, new: bool, urgent: bool = False) -> bool:
+        """Return whether a turn of a run may begin now.
+
+        Args:
+            run_id: The run.
+            new: It has no life in memory, so that this turn counts as long.
+            urgent: A person waits for it, so that threads are kept for it, unless its last one took seconds.
+        """
         if run_id in self._working:
             return False
-        most = LONG_AT_ONCE if new or run_id in self._long else 2 * LONG_AT_ONCE
-        return len(self._working) < most
+        going_on = len(self.working())
+        if urgent and run_id not in self._slow:
+            return going_on < URGENT_AT_ONCE
+        return going_on < (LONG_AT_ONCE if new or run_id in self._long else QUICK_AT_ONCE)
 
     def begin(self, run_id: int, turn: Turn) -> None:
         """Begin a turn, and wait for its end unless it takes long, or the run's last one did."""
@@ -80,6 +95,7 @@ class Turns:
             del self._working[run_id]
             took = time.monotonic() - begun.began
             (self._long.add if took > BESIDE_SECONDS else self._long.discard)(run_id)
+            (self._slow.add if took > SLOW_SECONDS else self._slow.discard)(run_id)
         return {run_id: begun.done.result() for run_id, begun in over.items()}
 
     def working(self, longer_than: float = -math.inf) -> set[int]:

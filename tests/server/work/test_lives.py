@@ -92,6 +92,7 @@ def test_runs_that_wait_are_not_taken_up_beyond_what_memory_should_hold(
     """A run whose record goes beyond its last checkpoint is: it has ticks to repeat."""
     runs, worker = begin(db, 4), Worker(db, settings)
     raise_them(db, worker, runs)
+    rounds(worker, lambda: len(worker.schedule.at_rest()) == len(runs))
     worker._close()
     with db.write() as session:
         late = session.scalars(select(Query).where(Query.run_id == runs[3]).order_by(Query.tick)).all()[-1]
