@@ -185,10 +185,8 @@ def streams(store: str, size: Size, _workers: int) -> None:
         for number, rates in found.items():
             one = parents.measure(size.flat, 0.0, size.seconds / 8, store, streams=number)
             rates.append(one.answers)
-            print(
-                f"    {number:4} streams: {one.answers:.0f} answers/s ({one.yardstick:.0f} commits/s)",
-                flush=True,
-            )
+            rate = f"{one.answers:.0f} answers/s ({one.yardstick:.0f} commits/s)"
+            print(f"    {number:4} streams: {rate}, {one.cost:.2f} ms of processor an answer", flush=True)
     without, with_them = median(found[0]), median(found[size.streams])
     line("fewer answers with streams, %", 100 * (1 - with_them / without), 10)
 

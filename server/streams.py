@@ -2,8 +2,8 @@
 
 However many follow however many runs, one task looks at all of them with one read of the database, four times
 a second and after each notification of a worker. Who waits for a question is told at once, everything else at
-most once in 250 ms, and what is told of a run is written once for all of its streams. Streams end at once
-when the server stops.
+most once in 250 ms, and what is told of a run is written once for all of its streams. Where many streams are
+open, each is told less often. Streams end at once when the server stops.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ POLL_SECONDS = 0.25
 REST = 9
 """The watcher rests for so many times the processor's time that a look took, `LONGEST_REST` at most."""
 LONGEST_REST = 0.1
+STREAM_SECONDS, SELDOM_SECONDS = 0.005, 1.0
+"""A run's streams are told at most once in so many seconds for each stream of the process, up to the second:
+each costs the processor a fraction of a millisecond, which answers would have."""
 UNSURE_SECONDS = 1.0
 """Seconds after which a run whose worker is silent is read again: others decide whether one may come."""
 AGAIN_SECONDS = 1.0
@@ -48,6 +51,8 @@ class Subscription:
     seen: Seen | None = None
     run: str = ""  # as JSON
     stale: bool = True  # it has changed since
+    untold: bool = False  # its streams have not been told of the last change
+    told: float = float("-inf")  # when they were, by the monotonic clock
     read: float = float("-inf")  # when it was read, by the monotonic clock
     rows: dict[int, asyncio.Future[Rows]] = field(default_factory=dict)  # its metrics after a tick
     changed: asyncio.Event = field(default_factory=asyncio.Event)
@@ -61,6 +66,7 @@ class Subscription:
 
     def tell(self) -> None:
         """Wake the streams."""
+        self.untold, self.told = False, time.monotonic()
         self.changed.set()
         self.changed = asyncio.Event()
 
@@ -195,6 +201,7 @@ class Streams:
             with suppress(ServerError):  # busy: the next look will tell
                 cost = await self._look()
                 await self._read()
+            self._tell()
             await asyncio.sleep(min(REST * cost, LONGEST_REST))
             await either(news, self._pause())
 
@@ -223,13 +230,23 @@ class Streams:
             subscription.stale = False
             text = texts.get(run_id, subscription.run)
             if text != subscription.run:
-                subscription.run, subscription.rows = text, {}
+                subscription.run, subscription.rows, subscription.untold = text, {}, True
+
+    def _tell(self) -> None:
+        """Wake the streams that have not been told, unless they were told of something just before."""
+        now, seldom = time.monotonic(), self._seldom()
+        for subscription in self.subscriptions.values():
+            if subscription.untold and subscription.told + seldom <= now:
                 subscription.tell()
+
+    def _seldom(self) -> float:
+        return min(STREAM_SECONDS * self.number(), SELDOM_SECONDS)
 
     def _pause(self) -> float:
         now = time.monotonic()
-        ready = (_ready(one) for one in self.subscriptions.values() if one.streams)
-        return min(POLL_SECONDS, self._ends - now, min(ready, default=float("inf")) - now)
+        streamed, seldom = [one for one in self.subscriptions.values() if one.streams], self._seldom()
+        moments = [_ready(one) for one in streamed] + [one.told + seldom for one in streamed if one.untold]
+        return min([POLL_SECONDS, self._ends - now, *(moment - now for moment in moments)])
 
     def _wake_watcher(self) -> None:
         self._news.set()
@@ -275,7 +292,7 @@ def _take(subscription: Subscription, seen: Seen | None, now: float) -> None:
     if before is None or seen.offers != before.offers:
         subscription.offer()
     if before is None or (seen.question, seen.leases) != (before.question, before.leases):
-        subscription.tell()
+        subscription.untold = True
     changed = before is None or (seen.row, seen.signed) != (before.row, before.signed)
     if changed or (not seen.signed and now - subscription.read >= UNSURE_SECONDS):
         subscription.stale = True
