@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import socket
 import threading
+import time
 from collections import Counter
 from collections.abc import Iterator
 
@@ -56,6 +59,12 @@ def answer(*arguments: str) -> Result:
     return CliRunner().invoke(app, ["answer", *arguments])
 
 
+def until_answered(db: Database) -> None:
+    """Wait until somebody has answered something."""
+    while not any(run.answers for run in runs.list_runs(db)):
+        time.sleep(0.05)
+
+
 def test_three_people_answer_two_runs_in_their_own_names(db: Database, url: str) -> None:
     for seed in range(2):
         begin(db, seed=seed)
@@ -78,10 +87,11 @@ def test_a_crowd_starts_a_run_for_each_and_leaves_once_all_are_over(
     monkeypatch.setattr("parenting.commands.crowd.WAIT", 0.2)
 
     def stop() -> None:
+        until_answered(db)
         for run in runs.list_runs(db):
             runs.set_status(db, run.id, RunStatus.STOPPED, "Stopped by the operator.")
 
-    stopper = threading.Timer(1.5, stop)
+    stopper = threading.Thread(target=stop)
     stopper.start()
     said = answer("--url", url, "--people", "2", "--think", "0.05", "--start", "unsafe-exploration")
     stopper.join()
@@ -89,6 +99,22 @@ def test_a_crowd_starts_a_run_for_each_and_leaves_once_all_are_over(
     assert [run.seed for run in runs.list_runs(db)] == [1, 0]
     assert said.stdout.endswith("All runs are over or rest.\n")
     assert "2 people answered" in said.stdout
+
+
+def test_ctrl_c_ends_a_crowd_with_its_summary(db: Database, url: str) -> None:
+    begin(db)
+
+    def stop() -> None:
+        until_answered(db)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    stopper = threading.Thread(target=stop)
+    stopper.start()
+    said = answer("--url", url, "--people", "2", "--think", "0.05")
+    stopper.join()
+    assert said.exit_code == 130, said.output
+    assert said.stdout.startswith("2 people answered ")
+    assert said.stdout.endswith("\nStopped.\n")
 
 
 @pytest.mark.parametrize(
