@@ -198,3 +198,18 @@ def test_news_that_comes_while_the_page_looks_is_not_lost(tabs: BrowserTabs, lif
     (route, old), *_ = late
     route.fulfill(response=old)
     expect(page.locator("#seen-at")).to_contain_text("Tick 18")
+
+
+def test_a_snapshot_that_is_stored_late_is_shown_though_nothing_tells_of_it(
+    tabs: BrowserTabs, life: RunSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    live(life, 12)
+    page = tabs.open("/runs/1")
+    expect(page.locator("#seen-at")).to_contain_text("Tick 12")
+    monkeypatch.setattr(life.board, "go_on", lambda saved: None)  # with the next checkpoint alone
+    with page.expect_response(re.compile(r"/board\?")):
+        life.tick(watch(life.db, [1])[1])
+        report_progress(life.db, life.claim, tick=life.last_tick)
+    page.wait_for_timeout(1500)  # it looks no more than once a second
+    life.save()
+    expect(page.locator("#seen-at")).to_contain_text("Tick 13")

@@ -13,9 +13,9 @@ const { run } = document.getElementById("main").dataset;
 const data = boardOf(run), { known } = data;
 const WAYS = ["up", "down", "left", "right"], COUNTS = ["visits", "deaths", "entries"];
 const NAMES = Object.fromEntries([...panel.querySelectorAll("[data-number]")].map(({ dataset, previousElementSibling }) => [dataset.number, previousElementSibling.textContent]));
-const CALM = 1000; // ms between two looks for new snapshots
+const CALM = 1000, LATER = 3000; // ms between two looks for new snapshots, and until the last one after an event
 let shown = null, sums = null, index = new Map(); // the snapshot, its counts by cell, the states of this rest by cell
-let newest = true, wanted = null, busy = false, looked = -CALM, timer = 0, looking = false, again = false;
+let newest = true, wanted = null, busy = false, looked = -CALM, timer = 0, looking = false, again = false, late = false;
 
 const percent = (share) => share > 0 && share < 0.005 ? "under 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
 const listed = (numbers) => Object.entries(numbers).map(([name, text]) => `${NAMES[name]} ${text}`).join(", ");
@@ -53,10 +53,10 @@ function tell([row, column]) {
 // A state that is not stored, as it is with the present policy: a worker computes it.
 async function ask([row, column]) {
   const mine = computedKey(row, column), stage = Number(form.elements.stage.value);
-  const wait = (said) => { computed.set(mine, { said, numbers: {}, going: true }); showCell(); };
-  wait("A worker computes it.");
+  const told = (said) => { computed.set(mine, { said, numbers: {}, going: true }); showCell(); };
+  told("A worker computes it.");
   try {
-    const waits = (worker) => wait(worker === "silent" ? "No worker is running; it is computed once one is started (parenting worker)." : "A worker computes it.");
+    const waits = (worker) => told(worker === "silent" ? "No worker is running; it is computed once one is started (parenting worker)." : "A worker computes it.");
     const { result } = await job(run, "state", { row, column, rest: pick.rest, stage }, waits, () => true);
     const numbers = Object.fromEntries(WAYS.map((way, at) => [way, percent(result.probabilities[at])]));
     computed.set(mine, { said: `Computed for tick ${number(result.tick)}.`, numbers: { ...numbers, familiarity: number(result.familiarity), ask: percent(result.ask) } });
@@ -145,21 +145,31 @@ function go(place) {
 }
 
 // Ask for new snapshots, at most once in a while; the newest is shown unless the researcher has moved the slider.
-// What is told while the page looks may be newer than what the server has read for it: then it looks again.
+// What is told while the page looks may be newer than what the server has read for it: then it looks again. A snapshot may be
+// stored after what tells of its tick: the page looks once more when nothing has been told for a while.
 export function seen() {
+  late = true;
   if (looking) again = true;
-  else timer ||= setTimeout(look, Math.max(0, looked + CALM - performance.now()));
+  else wait(Math.max(0, looked + CALM - performance.now()));
+}
+
+function wait(ms) {
+  clearTimeout(timer);
+  timer = setTimeout(look, ms);
 }
 
 async function look() {
-  timer = 0;
   looking = true;
   again = false;
   looked = performance.now();
   const had = known.snapshots.length;
-  try { await data.news(); } catch { return; } finally { // where it failed, the next event asks again
+  try { await data.news(); } catch { return; } finally { // where it failed, the next look asks again
     looking = false;
     if (again) seen();
+    else if (late) {
+      late = false;
+      wait(LATER);
+    }
   }
   if (known.snapshots.length === had) return;
   if (!had) begin();

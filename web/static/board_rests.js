@@ -1,5 +1,6 @@
 // The rest of the state: the box, the button, what is dry, the supervisor. One picker for each thing that varies; the server
 // draws the board of each.
+const PLACE = /row \d+,? column \d+/, PLACES = /row (\d+),? column (\d+)/g; // many of them fit into a line in short
 const $ = (id) => document.getElementById(id);
 
 // Calls `turned` once another rest is drawn, and `failed` where its board did not come: then the former one stays picked.
@@ -75,10 +76,11 @@ export function pickers(run, known, turned, failed) {
         if (!offered[name]) {
           const label = Object.assign(document.createElement("label"), { className: "pick" });
           offered[name] = Object.assign(document.createElement("select"), { name });
-          label.append(`${name[0].toUpperCase()}${name.slice(1)} `, offered[name]);
+          const places = [...found].some((value) => PLACE.test(value)) ? " (row/column)" : "";
+          label.append(`${name[0].toUpperCase()}${name.slice(1)}${places} `, offered[name]);
           holder.append(label);
         }
-        offered[name].replaceChildren(...[...found].map((value) => new Option(value)));
+        offered[name].replaceChildren(...[...found].map((value) => new Option(value.replaceAll(PLACES, "$1/$2"), value)));
         offered[name].value = parts(wanted)[name];
       }
     },
