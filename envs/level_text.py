@@ -26,6 +26,9 @@ ENDS = re.compile("\r\n|[\n\r\u2028\u2029]")
 """The ends of lines: of Unix, Windows, old Macs and Unicode."""
 SPACES = {"\u00a0": "non-breaking space"}
 """The words for a space whose name in Unicode few people know."""
+NUMBER = re.compile("[0-9]{1,9}")
+LISTED = 20
+"""Levels at most that a message lists."""
 
 
 class SeveralLevelsError(LevelError):
@@ -34,7 +37,9 @@ class SeveralLevelsError(LevelError):
     def __init__(self, source: str, found: Sequence[Written], said: str) -> None:
         self.names = [one.name for one in found]
         """The names of the levels, in the order of the text; empty where one has none."""
-        listed = ", ".join(f"{number} {name}".strip() for number, name in enumerate(self.names, 1))
+        told = [f"{number} {name}".strip() for number, name in enumerate(self.names[:LISTED], 1)]
+        more = len(self.names) - LISTED
+        listed = ", ".join(told) + (f" and {more} more" if more > 0 else "")
         super().__init__(source, 1, 1, f"{said}: {listed}")
 
 
@@ -119,7 +124,7 @@ def choose(found: Sequence[Written], which: str | None, source: str) -> Written:
     named = [one for one in found if one.name == which]
     if len(named) == 1:
         return named[0]
-    if which.isascii() and which.isdigit() and 1 <= int(which) <= len(found):
+    if NUMBER.fullmatch(which) and 1 <= int(which) <= len(found):
         return found[int(which) - 1]
     count = f"{len(named)} levels are" if named else "no level is"
     raise SeveralLevelsError(source, found, f"{count} called '{which}' here. The levels are")

@@ -78,7 +78,7 @@ def read_answers(blob: bytes) -> Answers:
 def _line(number: int, line: bytes) -> dict[str, Any]:
     try:
         row = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         raise AnswersFileError(f"line {number} is not JSON; `parenting export` writes such files") from None
     if not isinstance(row, dict) or "choice" not in row:
         raise AnswersFileError(f"line {number} is not an answer; `parenting export` writes such files")

@@ -14,6 +14,7 @@ from parenting.agent.config import Config
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, LevelError
 from parenting.envs.names import UnknownNameError
+from parenting.envs.people_text import printable
 from parenting.weights import answers_file, policy_file
 from parenting.weights.answers_file import Answers, AnswersFileError
 from parenting.weights.policy_file import PolicyFileError, StoredPolicy
@@ -21,6 +22,8 @@ from parenting.weights.store import digest
 
 FROM_POLICY, FROM_ANSWERS = "from_policy", "from_answers"
 """The names of the two files as fields, for messages."""
+LONGEST, LARGEST = 100, 2**53
+"""Characters of a name, and the numbers that every reader of JSON keeps."""
 Wrong = list[tuple[str, str]]
 
 
@@ -77,8 +80,8 @@ def read_origin(from_policy: Path | None, from_answers: Path | None) -> Origin:
         about["policy"] = {
             "sha256": digest(blob),
             "stored": digest(blob),
-            "file": from_policy.name,
-            "stage": policy.about.get("stage"),
+            "file": printable(from_policy.name, breaks=False),
+            "stage": _plain(policy.about.get("stage")),
             **_source(policy.about.get("source")),
         }
         blobs.append((from_policy.name, blob))
@@ -92,10 +95,10 @@ def read_origin(from_policy: Path | None, from_answers: Path | None) -> Origin:
         about["answers"] = {
             "sha256": digest(blob),
             "stored": digest(kept),
-            "file": from_answers.name,
+            "file": printable(from_answers.name, breaks=False),
             "answers": len(answers.rows),
-            "run": answers.run,
-            "database": answers.database,
+            "run": _plain(answers.run),
+            "database": _plain(answers.database),
         }
         blobs.append((from_answers.name, kept))
     return Origin(policy, answers, about, tuple(blobs))
@@ -104,7 +107,14 @@ def read_origin(from_policy: Path | None, from_answers: Path | None) -> Origin:
 def _source(source: Any) -> dict[str, Any]:
     """Return the run that a policy was taken from; none of a policy that `pt.train` trained."""
     known = source if isinstance(source, Mapping) else {}
-    return {name: known.get(name) for name in ("run", "database", "tick")}
+    return {name: _plain(known.get(name)) for name in ("run", "database", "tick")}
+
+
+def _plain(told: Any) -> str | int | None:
+    """Return a name or a whole number of a file; None of all else, which a run cannot keep or show."""
+    if isinstance(told, str) and len(told) <= LONGEST and told.isprintable():
+        return told
+    return told if isinstance(told, int) and 0 <= told < LARGEST else None
 
 
 def _bytes(field: str, path: Path) -> bytes:

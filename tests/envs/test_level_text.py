@@ -110,6 +110,13 @@ def test_one_of_several_levels_is_chosen_by_name_or_number(text: str) -> None:
         read(text, "3")
 
 
+def test_a_message_lists_twenty_levels_whatever_was_asked_for() -> None:
+    many = "".join(f"; {number}a\n{POND}\n" for number in range(1, 31))
+    for which in (None, "9" * 5000):
+        with pytest.raises(SeveralLevelsError, match=r": 1 1a, .*, 20 20a and 10 more"):
+            read(many, which)
+
+
 def test_levels_without_names_are_chosen_by_number_and_a_blank_row_of_one_is_kept() -> None:
     assert read(f"{POND}  \n{SECOND}", "2").rows == tuple(SECOND.splitlines())
     with pytest.raises(SeveralLevelsError, match="wanted: 1, 2"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -136,10 +137,26 @@ def _changed(change: Callable[[dict[str, Any]], None]) -> Callable[[str], str]:
     return changed
 
 
+def test_of_an_origin_names_and_numbers_are_kept(files: tuple[Path, Path], tmp_path: Path) -> None:
+    """A number that is none cannot be stored, and other texts have no end."""
+    for told, kept in ((math.nan, None), ("x" * 101, None), ({"a": 1}, None), ("5J3m", "5J3m"), (7, 7)):
+        text = files[1].read_text()
+        files[1].write_text(_changed(lambda row: row.update(database=told, run_public_id=told))(text))  # noqa: B023
+        about = read_origin(None, files[1]).about
+        assert about is not None
+        assert (about["answers"]["database"], about["answers"]["run"]) == (kept, kept)
+    named = tmp_path / "\udcff\x1b.jsonl"
+    named.write_bytes(files[1].read_bytes())
+    about = read_origin(None, named).about
+    assert about is not None
+    assert about["answers"]["file"] == "\\udcff\\x1b.jsonl"
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         (lambda lines: "not JSON\n", "line 1 is not JSON"),
+        (lambda lines: "[" * 100_000, "line 1 is not JSON"),
         (lambda lines: '{"a": 1}\n', "line 1 is not an answer"),
         (lambda lines: "", "no answer stands in it"),
         (_changed(lambda row: row.update(standing=False)), "no answer stands in it"),
