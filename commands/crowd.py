@@ -111,14 +111,14 @@ class Crowd:
 
     async def _watch(self, show: Callable[[int], None]) -> None:
         plan = self.plan
-        while True:
+        while not self._done.is_set():
             now = time.monotonic()
             shown = SHOW_SECONDS if plan.seconds is None else self.began + plan.seconds - now
             await asyncio.sleep(max(0.0, min(SHOW_SECONDS, shown)))
             show(self.here)
             now = time.monotonic()
             if plan.seconds is not None and now - self.began >= plan.seconds:
-                self.end(f"These are the {plan.seconds:g} s that were wanted.")
+                self.end(f"The {plan.seconds:g} s are over.")
             if now - self._answered_at >= plan.timeout:
                 self.end(f"Nobody could answer anything for {plan.timeout:g} s.")
 
