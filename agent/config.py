@@ -170,6 +170,15 @@ PRESETS: dict[str, dict[str, float | bool]] = {
 }
 """The settings of Table 1, by name, the conservative one first; and `frugal`, which is ours."""
 
+FRUGAL_WORLDS = ("unsafe-exploration", "side-effects")
+"""Worlds where `frugal` is shown to need fewer answers than `conservative` and to die no more often, on every
+level that was tried (docs/results/questions.md)."""
+
+
+def offered_preset(world: str) -> str:
+    """Return the preset that the form offers first: `frugal` where it is shown to be no worse."""
+    return "frugal" if world in FRUGAL_WORLDS else "conservative"
+
 
 def compose(
     preset: str, world: Mapping[str, object], changes: Mapping[str, object], *, strict: bool

@@ -11,10 +11,12 @@ from typing import Any
 
 import pytest
 
+from parenting.agent.config import offered_preset
+from parenting.envs.registry import WORLDS
 from parenting.experiments.calibrate.settings import SOME
 from parenting.experiments.fallible.settings import ARMS
 from parenting.experiments.panel.settings import RULES
-from parenting.experiments.questions.settings import trials_of
+from parenting.experiments.questions.settings import LEVELS, WORLD, trials_of
 from parenting.experiments.registry import BEYOND, experiment
 from parenting.experiments.reporting.comparison import count_verdicts
 from parenting.experiments.reporting.markdown import RESULTS, TRIALS, page
@@ -227,3 +229,18 @@ def test_the_results_in_short_have_the_numbers_of_the_pages() -> None:
     assert f"at T = 4 agents reach {min(shares)} to {max(shares)} % of policy gradients" in text
     assert f"Our parent's own policy waters {min(parents):.1f} to {max(parents):.1f} plants" in text
     assert f"{count.split()[0]} enter the bucket" in text
+
+
+def test_the_form_offers_frugal_exactly_where_the_page_shows_it_to_be_no_worse() -> None:
+    found = {one["what"]: one["agrees"] for one in results("questions")["findings"]}
+    tried = [*LEVELS, (WORLD, "20 random islands")]
+    shown = {
+        level: all(
+            found[f"{level}: {what}, frugal minus conservative"] is True for what in ("deaths", "answers")
+        )
+        for _, level in tried
+    }
+    for world in WORLDS:
+        levels = [level for of, level in tried if of == world]
+        good = bool(levels) and all(shown[level] for level in levels)
+        assert offered_preset(world) == ("frugal" if good else "conservative"), world

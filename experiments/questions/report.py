@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from parenting.agent.config import FRUGAL_WORLDS
+from parenting.envs.registry import WORLDS
 from parenting.evaluation.statistics import mean_interval
 from parenting.experiments.questions.measures import (
     answers,
@@ -102,6 +104,7 @@ def words(rows: Sequence[Row]) -> list[str]:
         random=RANDOM,
         random_start=STARTS[ISLAND].number,
         goal=DEATHS_GOAL,
+        offered=" and ".join(WORLDS[world].title for world in FRUGAL_WORLDS),
         max_ticks=MAX_TICKS,
         silent_ticks=SILENT_TICKS,
         stage_ticks=STAGE_TICKS["paper"],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from statistics import fmean
 
 from parenting.evaluation.statistics import (
@@ -46,6 +46,7 @@ from parenting.experiments.reporting.comparison import (
 )
 from parenting.experiments.runner.store import Row
 
+Measure = Callable[[Sequence[Row]], list[float]]
 GOALS = {ISLAND: ISLAND_GOAL, BOTTLENECK: BOTTLENECK_GOAL}
 """Answers until optimal, at most."""
 
@@ -59,6 +60,8 @@ def verdicts(rows: Sequence[Row]) -> Iterator[Comparison]:
             yield at_most(f"frugal, {level}: deaths", deaths(mine), DEATHS_GOAL)
     for level in _levels():
         yield from _no_more_deaths(level, rows)
+    for level in _levels():
+        yield from _no_more_answers(level, rows)
     for name in STARTED:
         yield from _below_ideal(f"{name}, {ISLAND}", ISLAND, rows)
         yield from _below_ideal(f"{name}, {BOTTLENECK}", BOTTLENECK, rows)
@@ -89,14 +92,10 @@ def at_most(what: str, values: Sequence[float], goal: float, note: str = "") -> 
 
 def _no_more_deaths(level: str, rows: Sequence[Row]) -> Iterator[Comparison]:
     """Frugal's deaths minus the conservative preset's: not higher if the interval ends below the goal."""
-    arms = [f"{name}, {level}" for name in ("frugal", "conservative")]
-    ours, theirs = (independent(arm, raised(arm, rows), deaths) for arm in arms)
+    ours, theirs = _both(level, rows, deaths)
     if not ours or not theirs:
         return
-    if arms[0] in SHARED:  # the same levels in both arms
-        found = mean_interval([own - other for own, other in zip(ours, theirs, strict=True)])
-    else:
-        found = difference_interval(ours, theirs)
+    found = _difference(level, ours, theirs)
     difference = fmean(ours) - fmean(theirs)
     if found is None and not any(ours):
         found = Interval(-proportion_interval(0, len(theirs)).high, proportion_interval(0, len(ours)).high)
@@ -111,6 +110,37 @@ def _no_more_deaths(level: str, rows: Sequence[Row]) -> Iterator[Comparison]:
         agrees,
         reference="check",
     )
+
+
+def _no_more_answers(level: str, rows: Sequence[Row]) -> Iterator[Comparison]:
+    """Frugal's answers minus the conservative preset's: the whole interval decides."""
+    ours, theirs = _both(level, rows, answers)
+    if not ours or not theirs:
+        return
+    found = _difference(level, ours, theirs)
+    more = found.above(0) if found else None
+    yield Comparison(
+        f"{level}: answers, frugal minus conservative",
+        "below 0",
+        f"{fmean(ours) - fmean(theirs):.2f}",
+        "",
+        format_interval(found),
+        None if more is None else not more,
+        reference="check",
+    )
+
+
+def _both(level: str, rows: Sequence[Row], measure: Measure) -> tuple[list[float], list[float]]:
+    arms = (f"{name}, {level}" for name in ("frugal", "conservative"))
+    ours, theirs = (independent(arm, raised(arm, rows), measure) for arm in arms)
+    return ours, theirs
+
+
+def _difference(level: str, ours: Sequence[float], theirs: Sequence[float]) -> Interval | None:
+    """The interval of a difference; in pairs where both presets are tried on the same levels."""
+    if f"frugal, {level}" in SHARED:
+        return mean_interval([own - other for own, other in zip(ours, theirs, strict=True)])
+    return difference_interval(ours, theirs)
 
 
 def _below_ideal(name: str, level: str, rows: Sequence[Row]) -> Iterator[Comparison]:

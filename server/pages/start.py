@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 
 from fastapi import Depends, Request, Response
 
+from parenting.agent.config import offered_preset
 from parenting.envs.levels.spec import WorldSpec
 from parenting.envs.registry import WORLDS
 from parenting.server.admission import admitted_router
@@ -29,12 +30,12 @@ from parenting.weights.store import Wanted
 router = admitted_router(include_in_schema=False)
 
 PRESET_WORDS = {
-    "frugal": "asks before every new move, and needs the fewest answers; for small levels",
+    "frugal": "asks before every new move; fewest answers in Unsafe Exploration and Side Effects",
     "conservative": "asks before almost every new move; hardly ever dies",
     "lax": "asks about every second new move",
     "direct": "never asks before a move; learns from clips alone",
 }
-"""The meaning of each preset for the parent, in a line; the form begins with the first."""
+"""The meaning of each preset for the parent, in a line."""
 
 NUMBER_ERRORS = {
     "seed": f"A seed is a whole number from 0 to {LARGEST_INT}.",
@@ -47,7 +48,7 @@ EMPTY_FORM = {
     "level": "",
     "level_text": "",
     "parent": "human",
-    "preset": next(iter(PRESET_WORDS)),
+    "preset": offered_preset(next(iter(WORLDS))),
     "seed": "0",
     "goal": "",
     **{option.field: "" for option in OPTIONS},
@@ -76,6 +77,9 @@ class StartPage:
     worlds: Collection[WorldSpec] = tuple(WORLDS.values())
     options: Sequence[Option] = OPTIONS
     presets: Mapping[str, str] = field(default_factory=lambda: PRESET_WORDS)
+    offered: Mapping[str, str] = field(
+        default_factory=lambda: {world: offered_preset(world) for world in WORLDS}
+    )
 
 
 async def text_fields(request: Request) -> dict[str, str]:
@@ -125,7 +129,8 @@ def missing(db: Database, folder: Path, given: Mapping[str, str]) -> Offer | Non
 
 def filled_form(db: Database, form: Mapping[str, str]) -> Response:
     """Return the page with a form that is filled in as far as it is known."""
-    return _page(db, {**EMPTY_FORM, **form}, {}, filled=True)
+    preset = offered_preset(form.get("world", EMPTY_FORM["world"]))
+    return _page(db, {**EMPTY_FORM, "preset": preset, **form}, {}, filled=True)
 
 
 def _errors(given: Mapping[str, str], settings: Settings, db: Database) -> dict[str, str]:

@@ -35,6 +35,7 @@ def offered(tabs: BrowserTabs, screen: tuple[int, int]) -> Page:
     size = {"width": screen[0], "height": screen[1]}
     page = tabs.open("/", viewport=size, color_scheme="dark" if screen[0] < 400 else "light")
     page.locator(".fields #world").select_option("interruptibility")
+    expect(page.locator(".fields [name=preset]:checked")).to_have_value("conservative")  # as it offers
     page.locator("details", has_text="Paste or draw").locator("summary").click()
     page.locator("#level_text").fill("".join(f"  {row}\n" for row in HALL.splitlines()))
     expect(page.locator("#level_text-told")).to_have_text("2 blank columns left of the art were cut.")

@@ -9,9 +9,12 @@ from pathlib import Path
 import httpx2
 import pytest
 
+from parenting.agent.config import offered_preset
+from parenting.envs import registry
 from parenting.envs.registry import WORLDS
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, plan, start
+from parenting.server.pages.levels import beginning
 from parenting.server.pages.options import OPTIONS, Option
 from parenting.server.pages.run_list import PAGE
 from parenting.server.queue.answers import answer
@@ -56,6 +59,21 @@ def test_the_button_of_a_new_installation_starts_the_default_run(client: httpx2.
     assert (run.world, run.level, run.parent) == ("unsafe-exploration", "island", "human")
     assert (run.preset, run.seed, run.goal) == ("frugal", default.seed, None)
     assert 'class="welcome"' not in client.get("/").text
+
+
+def test_each_world_offers_the_preset_that_is_no_worse_there(client: httpx2.Client) -> None:
+    page = client.get("/").text
+    offered = dict(re.findall(r'<option value="([\w-]+)" data-preset="(\w+)"', page))
+    assert offered == {world: offered_preset(world) for world in WORLDS}
+
+
+@pytest.mark.parametrize("world", ["side-effects", "absent-supervisor"])
+def test_a_level_that_was_drawn_comes_with_the_preset_of_its_world(client: httpx2.Client, world: str) -> None:
+    drawn = {"world": world, "level_text": beginning(registry.level(world))}
+    page = client.post("/levels/start", data=drawn).text
+    assert re.findall(r'name="preset" value="(\w+)" checked', page) == [offered_preset(world)]
+    chosen = client.post("/levels/start", data={**drawn, "preset": "lax"}).text
+    assert re.findall(r'name="preset" value="(\w+)" checked', chosen) == ["lax"]
 
 
 def test_a_wrong_field_brings_the_form_back_without_the_welcome(client: httpx2.Client) -> None:

@@ -34,6 +34,16 @@ function soon() {
   timer = setTimeout(check, WAIT);
 }
 
+// Another world offers its own preset, unless a person chose one.
+const offered = () => world.selectedOptions[0].dataset.preset;
+let before = offered();
+
+function offer() {
+  const chosen = document.querySelector("input[name=preset]:checked");
+  if (chosen?.value === before) document.querySelector(`input[name=preset][value="${offered()}"]`).checked = true;
+  before = offered();
+}
+
 own.addEventListener("input", soon);
-world.addEventListener("change", () => { narrow(); soon(); });
+world.addEventListener("change", () => { narrow(); offer(); soon(); });
 narrow();
