@@ -18,6 +18,7 @@ from parenting.parents.scripted import ScriptedRule
 from parenting.server import checkpoints, metrics, runs
 from parenting.server.begun import inherited
 from parenting.server.board.writer import BoardWriter
+from parenting.server.checkpoint_pace import CheckpointPace
 from parenting.server.checkpoint_parts import sweep_parts
 from parenting.server.codec import encode, kind_name
 from parenting.server.counters import count
@@ -40,13 +41,6 @@ from parenting.server.why import Why
 
 log = structlog.get_logger()
 
-CHECKPOINT_SECONDS, LONGEST_CHECKPOINT_SECONDS = 2.0, 120.0
-"""A restart repeats the ticks of this long. Large checkpoints take `CHECKPOINT_SHARE` of the time and
-`CHECKPOINT_SPEED` bytes a second at most, but come after the second at the latest; there the time counts that
-ticks took, not the wait for a parent."""
-CHECKPOINT_SHARE, CHECKPOINT_SPEED = 0.05, 1e6
-TOLD_SECONDS = 5.0
-"""The log tells of checkpoints that are written at longer intervals."""
 LOOK_SHARE = 0.1
 """The share of time at most that evaluations of the policy take, where one is expensive."""
 METRIC_SECONDS = 1.0
@@ -75,9 +69,9 @@ class RunSession:
         self.why = Why(self.world, db, claim, self.saved, self.growth.lesson)
         self.finish = read_finish(run.finish)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
-        self._saved_tick, self._saved_at, self._measured_at = self.last_tick, time.monotonic(), 0.0
+        self._saved_tick, self._measured_at, self._pace = self.last_tick, 0.0, CheckpointPace()
         self._measured_tick, self._lived_at, self._heard_at, self._look_cost = self.last_tick, 0.0, 0.0, 0.0
-        self._save_every, self._unsaved_work, self._stuck_at, self._news = CHECKPOINT_SECONDS, 0.0, -1, False
+        self._stuck_at, self._news = -1, False
         self.told: Callable[[int, Row], None] = lambda tick, row: None  # trackers take each row of metrics
         self.whole, self._told, self._told_at, self._learnt = True, False, 0.0, NOTHING_LEARNT
         sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
@@ -136,8 +130,8 @@ class RunSession:
     def rests_until(self) -> float:
         """Return when a run that waits has to report again though nothing has happened; `inf` for never."""
         due = min(self.board.next_portion(), self.why.due)
-        if self.unsaved and self._worth_saving:
-            due = min(due, self._saved_at + self._save_every)
+        if self.unsaved:
+            due = min(due, self._pace.next)
         return min(due, self._measured_at + self._look_every) if self._news else due
 
     def delay(self, pace: float | None) -> float:
@@ -164,7 +158,7 @@ class RunSession:
             self.world, self.saved.config, self.saved.state, self.growth.overhear(parent)
         )
         self._lived_at = time.monotonic()
-        self._unsaved_work += self._lived_at - began
+        self._pace.work += self._lived_at - began
         tally = count(self.world, self.saved.tally, answer, state, events)
         self.saved = Snapshot(state, tally, config)
         self.growth.milestones.see(state, tally)
@@ -275,26 +269,22 @@ class RunSession:
 
     def save_if_due(self) -> None:
         """Save a checkpoint if the last one is old and a tick has passed since."""
-        if self.unsaved and self._worth_saving and time.monotonic() - self._saved_at >= self._save_every:
+        if self.unsaved and self._pace.due:
             self.save()
-
-    @property
-    def _worth_saving(self) -> bool:
-        return self._save_every < TOLD_SECONDS or self._unsaved_work >= self._save_every
 
     def save(self, last: bool = False) -> None:
         """Write a checkpoint, with a whole snapshot if it is the `last` for now; large ones seldom."""
+        began = time.monotonic()
         self.lived.write()
         self.board.write(self.saved, last)
         self.why.write()
-        began, blob = time.monotonic(), pack(self.saved)
+        blob = pack(self.saved)
         checkpoints.save_checkpoint(self.db, self.claim, self.last_tick, blob)
-        self._saved_tick, self._saved_at, self._unsaved_work = self.last_tick, time.monotonic(), 0.0
-        by_time, by_size = (self._saved_at - began) / CHECKPOINT_SHARE, len(blob) / CHECKPOINT_SPEED
-        wanted = min(max(CHECKPOINT_SECONDS, by_time, by_size), LONGEST_CHECKPOINT_SECONDS)
-        if wanted >= TOLD_SECONDS and not self._told:
+        self._saved_tick = self.last_tick
+        self._pace.saved(time.monotonic() - began, len(blob))
+        if self._pace.large and not self._told:
             self._told = True
             log.warning(
-                f"checkpoints of {len(blob) / 1e6:.0f} MB: one every {wanted:.0f} s", run=self.claim.run_id
+                f"checkpoints of {len(blob) / 1e6:.0f} MB: one every {self._pace.every:.0f} s",
+                run=self.claim.run_id,
             )
-        self._save_every = wanted

@@ -1,7 +1,7 @@
 """The tables: runs, queries, answers, events, metrics, checkpoints, moves, workers, jobs, and others.
 
 The database enforces the invariants: one query for each run and tick, one standing answer for each query,
-known words only. Times are UTC. JSON is readable by eye; `Query.clips` describes the shape of a clip.
+known words only. Times are UTC. JSON is readable by eye (`server.compact`); `Query.clips` describes a clip.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.columns import Big, OneOf, name_places
+from parenting.server.compact import METRICS, Clips, Figures
 from parenting.server.moves_table import Moves
 from parenting.server.public_ids import public_id
 from parenting.server.statuses import (
@@ -160,7 +161,7 @@ class Query(Table):
     tick: Mapped[int]
     kind: Mapped[str] = mapped_column(OneOf(KINDS))
     maturity: Mapped[int]
-    clips: Mapped[dict[str, Any]]
+    clips: Mapped[dict[str, Any]] = mapped_column(Clips)
     """{"left": CLIP, "right": CLIP}, CLIP = {"actions": ["up", ...], "length": n, "frames": [n + 1 of
     {"ground": [rows], "observed": [rows], "agent": [row, column], "box": [row, column] or null}]}."""
     status: Mapped[QueryStatus] = mapped_column(default=QueryStatus.OPEN)
@@ -232,7 +233,7 @@ class Metric(Table):
 
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
     tick: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    values: Mapped[dict[str, Any]]
+    values: Mapped[dict[str, Any]] = mapped_column(Figures(METRICS))
 
 
 class Checkpoint(Table):

@@ -6,6 +6,7 @@ from typing import Any
 
 from sqlalchemy.orm import Mapped, mapped_column
 
+from parenting.server.compact import REASON, Figures
 from parenting.server.table_root import Table
 
 
@@ -16,7 +17,9 @@ class Reason(Table):
 
     run_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     tick: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)  # of the question
-    why: Mapped[dict[str, Any]]  # `reads.why.GuidanceWhy` or `reads.why.PreferenceWhy`
+    why: Mapped[dict[str, Any]] = mapped_column(
+        Figures(REASON)
+    )  # `reads.why.GuidanceWhy` or `reads.why.PreferenceWhy`
 
 
 class Effect(Table):

@@ -37,7 +37,7 @@ def raised(tmp_path_factory: pytest.TempPathFactory) -> Path:
     db = migrated(settings)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "parenting.server.session.CHECKPOINT_SECONDS", 1e9
+            "parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9
         )  # so that they are written where it says so alone
         with TestClient(create_app(settings, db), base_url="http://localhost") as web:
             assert raise_eventful_run(db, web) == 1

@@ -24,8 +24,9 @@ from tests.server.processes import Command
 from tests.server.serving import free_port
 
 PATCHES = {
-    "parenting.server.session.CHECKPOINT_SECONDS": 0.05,
-    "parenting.server.session.CHECKPOINT_SPEED": 1e12,
+    "parenting.server.checkpoint_pace.CHECKPOINT_SECONDS": 0.05,
+    "parenting.server.checkpoint_pace.QUIET_SECONDS": 0.05,
+    "parenting.server.checkpoint_pace.CHECKPOINT_SPEED": 1e12,
     "parenting.server.session.METRIC_SECONDS": 0.05,
     "parenting.server.checkpoint_parts.PART_BYTES": 200_000,
 }

@@ -39,8 +39,9 @@ KINDS = ["web", "worker", "script"]
 SOON = 0.15
 """A kill comes up to so many seconds after the answer that it was drawn for: at any place between two."""
 PATCHES = {
-    "parenting.server.session.CHECKPOINT_SECONDS": 0.05,
-    "parenting.server.session.CHECKPOINT_SPEED": 1e12,
+    "parenting.server.checkpoint_pace.CHECKPOINT_SECONDS": 0.05,
+    "parenting.server.checkpoint_pace.QUIET_SECONDS": 0.05,
+    "parenting.server.checkpoint_pace.CHECKPOINT_SPEED": 1e12,
     "parenting.server.checkpoint_parts.PART_BYTES": 200_000,
 }
 """Checkpoints are written often, so that kills hit them too."""

@@ -15,7 +15,7 @@ from pathlib import Path
 import torch
 from sqlalchemy import text
 
-from parenting.server import runs, session
+from parenting.server import checkpoint_pace, runs
 from parenting.server.db import Database, connect
 from parenting.server.queue import worker_side
 from parenting.server.session import RunSession
@@ -53,7 +53,7 @@ def raised_elsewhere(settings: Settings, capability: str, checkpoint: int, ticks
 
 def main(data: str, url: str, checkpoint: int, ticks: int) -> None:
     torch.set_num_threads(1)
-    session.CHECKPOINT_SECONDS = 1e9
+    checkpoint_pace.CHECKPOINT_SECONDS = 1e9
     db = connect(Settings(data=Path(data), database_url=url))
     life = taken_up(db)
     if checkpoint:

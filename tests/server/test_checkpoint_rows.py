@@ -1,5 +1,6 @@
 """The last two checkpoints of a run are kept, and a damaged one is recognised."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -8,6 +9,7 @@ import pytest
 from sqlalchemy import event, select, text, update
 
 from parenting.server import checkpoint_parts
+from parenting.server.checkpoint_pace import CHECKPOINT_SPEED
 from parenting.server.checkpoint_parts import sweep_parts
 from parenting.server.checkpoints import ended_with_more, load_checkpoints, save_checkpoint, thin
 from parenting.server.db import Database
@@ -15,7 +17,7 @@ from parenting.server.errors import LostClaimError
 from parenting.server.metrics import write_metrics
 from parenting.server.migrate import downgrade, upgrade
 from parenting.server.runs import Claim, claim, finish, get_run, let_go
-from parenting.server.session import CHECKPOINT_SPEED, RunSession
+from parenting.server.session import RunSession
 from parenting.server.snapshot import pack
 from parenting.server.statuses import RunStatus
 from parenting.server.store.patience import patience
@@ -230,12 +232,12 @@ def test_large_checkpoints_are_seldom_but_bound_what_is_repeated(
     db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch, seconds: float, every: float
 ) -> None:
     """One megabyte a second on average, whatever the time it took; small ones keep to their two seconds."""
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SHARE", 1e9)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SHARE", 1e9)
     session = RunSession(db, mine, get_run(db, mine.run_id), lambda: None)
     size = len(pack(session.saved))
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SPEED", size / seconds)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SPEED", size / seconds)
     session.save()
-    assert session._save_every == pytest.approx(every)
+    assert session._pace.every == pytest.approx(every)
     assert 0 < size < 2 * CHECKPOINT_SPEED, "checkpoints of the built-in levels come every two seconds"
 
 
@@ -247,16 +249,17 @@ def test_a_large_checkpoint_waits_for_ticks_and_not_for_the_clock(
     saved: list[int] = []
     monkeypatch.setattr(session, "save", lambda: saved.append(session.last_tick))
     session.tick()
-    session._saved_at -= 1000.0
-    session._save_every = 100.0
+    session._pace._saved_at -= 1000.0
+    session._pace.every = 100.0
     session.save_if_due()
     assert saved == []
     session._news = False
-    assert session.rests_until() > session._saved_at + session._save_every
-    session._unsaved_work = 101.0
+    assert session._pace.next == math.inf
+    assert session.rests_until() > session._pace._saved_at + session._pace.every
+    session._pace.work = 101.0
     session.save_if_due()
     assert saved == [1]
-    session._save_every, session._unsaved_work = 4.0, 0.0
+    session._pace.every, session._pace.work = 4.0, 0.0
     session.save_if_due()
     assert saved == [1, 1]  # a small one goes by the clock alone
 

@@ -220,7 +220,7 @@ def test_config_is_restored() -> None:
 @pytest.fixture(autouse=True)
 def no_checkpoint_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """Checkpoints are written where a test says so, however long its ticks take."""
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9)
 
 
 @pytest.fixture

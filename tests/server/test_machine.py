@@ -31,7 +31,7 @@ HERE = torch.backends.cpu.get_cpu_capability()
 
 @pytest.fixture(autouse=True)
 def no_checkpoint_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9)
 
 
 @pytest.fixture

@@ -47,7 +47,7 @@ def live_to(life: RunSession, tick: int) -> None:
 def written(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[bytes, str]]:
     """The policy and the answers of a run of thirty ticks."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+        patch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9)
         db = migrated(Settings(data=tmp_path_factory.mktemp("first")))
         first = start(db, ISLAND.new("scripted")).id
         life = taken_up(db, first)

@@ -24,7 +24,7 @@ EMPTY: dict[str, Any] = {}
 
 @pytest.fixture(autouse=True)
 def no_checkpoint_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9)
 
 
 def killed_after_its_checkpoint(db: Database) -> None:

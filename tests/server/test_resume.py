@@ -44,7 +44,7 @@ REASON = "The agent could not go on: for a test."
 
 @pytest.fixture(autouse=True)
 def no_checkpoint_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9)
 
 
 def taken_up(db: Database) -> RunSession:

@@ -33,7 +33,7 @@ from tests.server.test_origin import taken_up
 @pytest.fixture
 def eventful(db: Database, client: httpx2.Client, monkeypatch: pytest.MonkeyPatch) -> int:
     """A run of ninety ticks with every event that can happen."""
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9)
     return raise_eventful_run(db, client)
 
 

@@ -163,7 +163,7 @@ def test_x_is_what_the_standing_answers_make_it(
     """Seven seconds: a killed worker lives its ticks again. Each store has one of the settings."""
     own_stage_only = store == "postgresql"
     more = {"own_stage_only": True} if own_stage_only else {"confirm": 0.95}
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9)
     person = Fickle(db, Begun(WORLD, "island", {**CONFIG, **more}), seed)
     for tick in range(TICKS // 2, TICKS + 1, TICKS // 2):
         person.live_to(tick)

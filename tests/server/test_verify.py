@@ -25,7 +25,7 @@ TICKS = 60
 
 @pytest.fixture
 def run(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9)
     start(db, ISLAND.new("scripted"))
     life = taken_up(db)
     live_to(life, TICKS)

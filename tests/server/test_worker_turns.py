@@ -64,7 +64,8 @@ def test_a_run_that_takes_long_holds_up_no_other(
     db: Database, worker: Worker, monkeypatch: pytest.MonkeyPatch, gate: threading.Event, name: str
 ) -> None:
     """The others come to their questions, and signs of life go on."""
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.QUIET_SECONDS", 0.0)
     held, *others = begin(db, 3)
     slow(monkeypatch, name, held, gate)
     rounds(worker, lambda: all(get_run(db, run).waiting == "guidance" for run in others))
@@ -104,7 +105,7 @@ def test_a_hung_run_loses_its_claim_and_another_worker_takes_it(
 def test_a_run_that_waits_has_no_turn_without_news(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 1e9)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 1e9)
     monkeypatch.setattr("parenting.server.why.WRITE_SECONDS", 1e9)
     worker = Worker(db, settings)
     ids = begin(db, 12)

@@ -31,7 +31,8 @@ ANSWERS = 2
 @pytest.fixture(autouse=True)
 def brisk(monkeypatch: pytest.MonkeyPatch) -> None:
     """Checkpoints follow each tick, so that a run that waits is at rest at once."""
-    monkeypatch.setattr("parenting.server.session.CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.QUIET_SECONDS", 0.0)
     monkeypatch.setattr("parenting.server.why.WRITE_SECONDS", 0.0)
 
 
