@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Row, bindparam, select
+from sqlalchemy import Row, bindparam, func, select
 
 from parenting.server.db import Database
 from parenting.server.queue.presence import holder
@@ -61,38 +61,46 @@ class Rows:
 
 
 def look(db: Database, run_ids: Sequence[int]) -> Look:
-    """Look at runs by three statements, however many they are."""
+    """Look at runs by four statements, however many they are."""
     began = time.thread_time()
     asks = {"runs": list(run_ids)}
     with db.read() as session:
         mark = db.mark(session)
         runs = session.execute(_RUNS, asks).all()
-        asked: dict[int, list[Row[Any]]] = defaultdict(list)
-        for row in session.execute(_ASKED, asks):
-            asked[row.run_id].append(row)
+        counted, leased = defaultdict[int, list[Row[Any]]](list), defaultdict[int, list[Row[Any]]](list)
+        for statement, rows in ((_COUNTED, counted), (_LEASED, leased)):
+            for row in session.execute(statement, asks):
+                rows[row.run_id].append(row)
+        firsts = {row.run_id: row for row in session.execute(_FIRST, asks)}
     found, left = {}, float("inf")
     for row in runs:
         if isinstance(row.deleting, datetime):
             continue
-        found[row.id], soonest = _seen(row, asked[row.id], mark)
+        found[row.id], soonest = _seen(row, firsts.get(row.id), counted[row.id], leased[row.id], mark)
         left = min(left, soonest)
     return Look(found, time.monotonic() + left, time.thread_time() - began)
 
 
-def _seen(run: Row[Any], asked: Sequence[Row[Any]], mark: Mark) -> tuple[Seen, float]:
+def _seen(
+    run: Row[Any], first: Row[Any] | None, counted: Sequence[Row[Any]], leased: Sequence[Row[Any]], mark: Mark
+) -> tuple[Seen, float]:
     """Return what is seen of a run, and the seconds until its first lease ends."""
-    first = asked[0] if asked else None
     question = None if first is None else {"id": first.id, "public_id": first.public_id, "kind": first.kind}
-    held = [row for row in asked if row.leased_by is not None and _holds(row, mark)]
-    held.sort(key=lambda row: row.id)
+    held = [row for row in leased if _holds(row, mark)]
     leases = [{"question": row.public_id, "holder": holder(row.leased_by)} for row in held]
-    free = [(row.id, row.put_back) for row in asked], [(row.id, row.leased_by) for row in held]
-    offers = (run.status, run.goal, run.answers, run.retracted, *free)
+    asked = [tuple(row) for row in counted]
+    offers = (
+        run.status,
+        run.goal,
+        run.answers,
+        run.retracted,
+        asked,
+        [(row.id, row.leased_by) for row in held],
+    )
     *shown, epoch, seconds, its_epoch, its_seconds = tuple(run)
     marks, within = ((epoch, seconds), (its_epoch, its_seconds)), SILENT_AFTER.total_seconds()
     signed = run.status in OVER or any(mark.is_recent(*one, within) for one in marks)
-    opened = tuple(sorted(row.kind for row in asked))
-    seen = Seen(json.dumps(question), json.dumps(leases), offers, (*shown, opened), signed)
+    seen = Seen(json.dumps(question), json.dumps(leases), offers, (*shown, asked), signed)
     return seen, min((row.lease_end - mark.seconds for row in held), default=float("inf"))
 
 
@@ -129,9 +137,25 @@ _RUNS = (
     .where(_NAMED)
 )
 _WHOLE = select(Run).where(_NAMED)
-_ASKED = (
-    select(Query.run_id, Query.id, Query.public_id, Query.kind, Query.put_back)
-    .add_columns(Query.leased_by, Query.lease_epoch, Query.lease_begin, Query.lease_end)
-    .where(Query.run_id.in_(bindparam("runs", expanding=True)), Query.status == QueryStatus.OPEN)
-    .order_by(Query.run_id, *urgency())
+_OPEN = (Query.run_id.in_(bindparam("runs", expanding=True)), Query.status == QueryStatus.OPEN)
+# Hundreds may be open, so they are counted: the sums tell one set of questions from another.
+_COUNTED = (
+    select(Query.run_id, Query.kind, func.count(), func.sum(Query.id), func.max(Query.id))
+    .add_columns(func.count().filter(Query.put_back))
+    .where(*_OPEN)
+    .group_by(Query.run_id, Query.kind)
+    .order_by(Query.run_id, Query.kind)
 )
+_LEASED = (
+    select(Query.run_id, Query.id, Query.public_id)
+    .add_columns(Query.leased_by, Query.lease_epoch, Query.lease_begin, Query.lease_end)
+    .where(*_OPEN, Query.leased_by.is_not(None))
+    .order_by(Query.id)
+)
+_PLACED = (
+    select(Query.run_id, Query.id, Query.public_id, Query.kind)
+    .add_columns(func.row_number().over(partition_by=Query.run_id, order_by=urgency()).label("place"))
+    .where(*_OPEN)
+    .subquery()
+)
+_FIRST = select(_PLACED).where(_PLACED.c.place == 1)
