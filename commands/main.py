@@ -5,6 +5,9 @@ So `parenting web` never loads torch, and `--help` is fast.
 
 from __future__ import annotations
 
+import errno
+import os
+import sys
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import version
@@ -73,14 +76,24 @@ parenting run unsafe-exploration --preset conservative --trials 100
 `parenting COMMAND --help` shows an example of each command.
 """
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""The errors of a disk that takes no more of an output."""
+
 
 class LazyGroup(TyperGroup):
     """A group that imports a command's module when the command is called, not when it is listed."""
 
     def main(self, *args: Any, **named: Any) -> Any:
-        """Run the program; no character of its output can end it."""
+        """Run the program; no character of its output can end it, and a full disk ends it with a sentence."""
         replace_unprintable()
-        return super().main(*args, **named)
+        try:
+            return super().main(*args, **named)
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+            say(f"{error.filename or 'The output'} cannot be written: {error.strerror}.", err=True)
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is buffered has no place
+            sys.exit(2)
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names in the order of `COMMANDS`."""

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from importlib.metadata import version
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -105,3 +106,11 @@ def test_help_loads_no_torch() -> None:
     )
     result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
+
+
+def test_a_full_disk_behind_the_output_has_a_sentence() -> None:
+    command = [sys.executable, "-m", "parenting.commands.main", "parents"]
+    with Path("/dev/full").open("w") as full:
+        result = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert result.returncode == 2
+    assert result.stderr == "The output cannot be written: No space left on device.\n"
