@@ -29,6 +29,7 @@ from parenting.server.errors import (
     TooLargeError,
 )
 from parenting.server.group_commit import GroupCommit
+from parenting.server.inherited import POLICY_BYTES
 from parenting.server.job_kinds import KINDS
 from parenting.server.languages import SHIPPED, LanguageMiddleware, Languages
 from parenting.server.log_limit import LogLimit
@@ -46,6 +47,7 @@ from parenting.server.streams import Streams
 from parenting.server.wrong_fields import messages
 
 LARGEST_BODY = 64 * 1024
+LARGER_BODIES = {"/api/v1/policies": POLICY_BYTES, "/policies": POLICY_BYTES + LARGEST_BODY}
 SMALL_BODY = 1024
 """Bytes below which a reply is sent as it is: it fits into one packet, compressed or not."""
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
@@ -108,7 +110,7 @@ def bare_app() -> FastAPI:
     app.add_middleware(
         CompressMiddleware, minimum_size=SMALL_BODY, zstd=False, brotli_quality=5, gzip_level=6
     )
-    app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY)
+    app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY, larger=LARGER_BODIES)
     app.state.languages = Languages()
     app.add_middleware(LanguageMiddleware)
     app.state.meters, app.state.page_errors = Meters(), LogLimit()

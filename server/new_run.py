@@ -30,7 +30,7 @@ from parenting.server.errors import InvalidFieldsError
 from parenting.server.finishes import PATTERN, never_met, usual
 from parenting.server.identity import unused_number
 from parenting.server.tables import Run
-from parenting.server.weights import needed, put_in
+from parenting.server.weights import INHERITED, needed, put_in
 from parenting.server.weights import put as put_weights
 from parenting.server.whole import WHOLE, whole
 from parenting.server.wrong_fields import messages
@@ -145,7 +145,7 @@ def start(
     hashed = [(digest(blob), name, blob) for name, blob in origin.blobs]
     with db.write() as session:
         for sha256, name, blob in hashed:  # with the run, so that nobody removes them as unused before
-            put_in(session, sha256, name, blob, db.clock())
+            put_in(session, sha256, name + INHERITED, blob, db.clock())
         run = Run(id=unused_number(session, Run), created=db.clock(), **columns)
         session.add(run)
         session.flush()

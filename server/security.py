@@ -7,7 +7,7 @@ on this machine may answer too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
@@ -47,9 +47,16 @@ HEADERS = {
 class SecurityMiddleware:
     """ASGI middleware around the whole application."""
 
-    def __init__(self, app: ASGIApp, largest_body: int, hosts: Sequence[str] = HOSTS) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        largest_body: int,
+        hosts: Sequence[str] = HOSTS,
+        larger: Mapping[str, int] | None = None,
+    ) -> None:
+        """Bound the bytes of a body, for a few paths (`larger`) by a number of their own."""
         self.app = app
-        self.largest_body = largest_body
+        self.largest_body, self.larger = largest_body, larger or {}
         self.hosts = hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -58,12 +65,13 @@ class SecurityMiddleware:
             await self.app(scope, receive, send)
             return
         started, size = False, 0
+        most = self.larger.get(scope["path"], self.largest_body)
 
         async def bounded() -> Message:
             nonlocal size
             message = await receive()
             size += len(message.get("body", b""))
-            if size > self.largest_body:  # a body without a declared length, in chunks
+            if size > most:  # a body without a declared length, in chunks
                 raise HTTPException(413)
             return message
 
@@ -78,7 +86,7 @@ class SecurityMiddleware:
             await send(message)
 
         try:
-            refused = self.refusal(scope["method"], Headers(scope=scope))
+            refused = self.refusal(scope["method"], Headers(scope=scope), most)
             answer = self.app if refused is None else JSONResponse(refused.body(), refused.status)
             await answer(scope, bounded, safely)
         except ClientDisconnect:
@@ -89,13 +97,13 @@ class SecurityMiddleware:
                 raise  # part of the reply has been sent; uvicorn closes the connection
             await JSONResponse(ServerError().body(), 500)(scope, receive, safely)
 
-    def refusal(self, method: str, headers: Headers) -> ServerError | None:
+    def refusal(self, method: str, headers: Headers, most: int) -> ServerError | None:
         """Return the error that refuses this request, or None."""
         host = headers.get("host", "")
         if _without_port(host) not in self.hosts:
             return UnknownHostError()
         length = headers.get("content-length", "0")
-        if not length.isdecimal() or len(length) > 15 or int(length) > self.largest_body:
+        if not length.isdecimal() or len(length) > 15 or int(length) > most:
             return TooLargeError()
         if method in SAFE_METHODS:
             return None

@@ -19,6 +19,8 @@ from parenting.weights.store import SUFFIX, NoWeightsError, Wanted, digest, find
 
 OF_A_SIZE = re.compile(r".+-\d+x\d+-v\d+\.safetensors")
 """The name of pre-trained weights that every later run on levels of their size begins with, too."""
+INHERITED = " (inherited)"
+"""The end of the name of a policy or of answers; pre-trained weights are found by theirs, without it."""
 YOUNG = timedelta(hours=1)
 """Rows as young as this are left alone: the runs that begin with them may be about to be stored."""
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from parenting.agent.architecture import weights_of
 from parenting.agent.config import Config
 from parenting.envs import registry
-from parenting.envs.levels.spec import Level, LevelError
+from parenting.envs.levels.spec import Level, LevelError, maze_legend
 from parenting.envs.names import UnknownNameError
 from parenting.envs.people_text import printable
 from parenting.weights import answers_file, policy_file
@@ -67,40 +68,51 @@ def read_origin(from_policy: Path | None, from_answers: Path | None) -> Origin:
     Raises:
         UnreadableOriginError: one of them cannot be read, or is of something else.
     """
+    policy = None if from_policy is None else (str(from_policy), _bytes(FROM_POLICY, from_policy))
+    answers = None if from_answers is None else (str(from_answers), _bytes(FROM_ANSWERS, from_answers))
+    return origin_of(policy, answers)
+
+
+def origin_of(from_policy: tuple[str, bytes] | None, from_answers: tuple[str, bytes] | None) -> Origin:
+    """Return the origin of a run from the names and the bytes of files.
+
+    Raises:
+        UnreadableOriginError: one of them is damaged, or of something else.
+    """
     if from_policy is None and from_answers is None:
         return NO_ORIGIN
     about, blobs = dict[str, Any](), list[tuple[str, bytes]]()
     policy, answers = None, None
     if from_policy is not None:
-        blob = _bytes(FROM_POLICY, from_policy)
+        name, blob = Path(from_policy[0]).name, from_policy[1]
         try:
             policy = policy_file.unpack(blob)
         except PolicyFileError as error:
-            raise UnreadableOriginError(FROM_POLICY, f"{from_policy}: {error}.") from None
+            raise UnreadableOriginError(FROM_POLICY, f"{from_policy[0]}: {error}.") from None
         about["policy"] = {
             "sha256": digest(blob),
             "stored": digest(blob),
-            "file": printable(from_policy.name, breaks=False),
+            "file": printable(name, breaks=False),
             "stage": _plain(policy.about.get("stage")),
             **_source(policy.about.get("source")),
         }
-        blobs.append((from_policy.name, blob))
+        blobs.append((name, blob))
     if from_answers is not None:
-        blob = _bytes(FROM_ANSWERS, from_answers)
+        name, blob = Path(from_answers[0]).name, from_answers[1]
         try:
             answers = answers_file.read_answers(blob)
         except AnswersFileError as error:
-            raise UnreadableOriginError(FROM_ANSWERS, f"{from_answers}: {error}.") from None
+            raise UnreadableOriginError(FROM_ANSWERS, f"{from_answers[0]}: {error}.") from None
         kept = answers_file.pack_answers(answers)
         about["answers"] = {
             "sha256": digest(blob),
             "stored": digest(kept),
-            "file": printable(from_answers.name, breaks=False),
+            "file": printable(name, breaks=False),
             "answers": len(answers.rows),
             "run": _plain(answers.run),
             "database": _plain(answers.database),
         }
-        blobs.append((from_answers.name, kept))
+        blobs.append((name, kept))
     return Origin(policy, answers, about, tuple(blobs))
 
 
@@ -130,7 +142,7 @@ def _policy_misfits(policy: StoredPolicy, level: Level, config: Config) -> Wrong
         return [("world", f"The policy is of the world {said.get('world')}, not of {level.world}.")]
     try:
         theirs = registry.level(level.world, said["levels"][0])
-    except (KeyError, IndexError, TypeError, LevelError, UnknownNameError):
+    except (KeyError, IndexError, TypeError, AttributeError, LevelError, UnknownNameError):
         return [(FROM_POLICY, "Its header is damaged: it names no level of its world.")]
     if (theirs.height, theirs.width) != (level.height, level.width):
         return [
@@ -140,6 +152,9 @@ def _policy_misfits(policy: StoredPolicy, level: Level, config: Config) -> Wrong
                 f" {level.height} x {level.width}.",
             )
         ]
+    weights = weights_of(level.height, level.width, len(maze_legend(registry.spec(level.world).glyphs)))
+    if len(policy.data) != weights * policy_file.BYTES[policy.dtype]:
+        return [(FROM_POLICY, f"It is damaged: a policy for this level has {weights} parameters.")]
     if policy.dtype != config.dtype:
         return [("config.dtype", f"The policy has numbers of {policy.dtype}, and the run of {config.dtype}.")]
     return []

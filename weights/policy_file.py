@@ -73,6 +73,8 @@ def unpack(blob: bytes) -> StoredPolicy:
         about = dict[str, Any](metadata(blob))
     except (SafetensorError, ValueError, KeyError, TypeError) as error:
         raise PolicyFileError(f"it is not a policy of Parenting, or is damaged: {error}") from None
+    except RecursionError:
+        raise PolicyFileError("it is not a policy of Parenting: its header is nested too deep") from None
     check_header(about, KIND)
     row = tensors.get(PARAMETERS)
     dtype = TYPES.get("" if row is None else row["dtype"])

@@ -12,6 +12,7 @@ from parenting.server.api import (
     levels,
     operator,
     page_errors,
+    policies,
     presence,
     queries,
     revisions,
@@ -22,6 +23,7 @@ from parenting.server.api import (
 router = APIRouter(prefix="/api/v1")
 PARTS = (
     runs,
+    policies,
     keeping,
     episodes,
     board,

@@ -18,7 +18,7 @@ from parenting.server.job_kinds import (
     WalkPayload,
 )
 from parenting.server.level_check import TEXT_CHARACTERS
-from parenting.server.new_run import LARGEST_INT, Goal, Name, Pace, PersonsName
+from parenting.server.new_run import LARGEST_INT, Goal, Name, NewRun, Pace, PersonsName
 from parenting.server.schemas import By
 from parenting.server.whole import WHOLE
 
@@ -107,6 +107,17 @@ class ImportBody(Strict):
         None, description="The maps' format; null: found by its signs."
     )
     world: Name | None = Field(None, description="The world of art of gridworlds; null: found by its signs.")
+
+
+class NewRunBody(NewRun):
+    """The settings of a new run, and what it begins with. `config` changes the preset."""
+
+    from_policy: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")] | None = Field(
+        None, description="Begin with this policy: the `sha256` of one that was uploaded."
+    )
+    from_answers: PublicId | None = Field(
+        None, description="Begin with X of the answers of this stored run, by its `public_id`."
+    )
 
 
 class PageErrorBody(Strict):

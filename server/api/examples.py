@@ -12,7 +12,7 @@ from parenting.envs import registry
 from parenting.server.api.board_examples import BOARD, EPISODE, NUMBERS
 from parenting.server.api.job_examples import of_jobs
 from parenting.server.api.kept_examples import TABLE, kept
-from parenting.server.api.level_examples import CHECKED, IMPORTED, LAKE, OWN_LEVEL, TO_CHECK
+from parenting.server.api.level_examples import CHECKED, IMPORTED, LAKE, OWN_LEVEL, TO_CHECK, UPLOADED
 from parenting.server.api.why_example import EXPORTED as EXPORTED_WHY
 from parenting.server.api.why_example import WHY
 
@@ -245,6 +245,7 @@ class Shown:
 
 SHOWN = {
     "check_level": Shown(CHECKED, {"a level": TO_CHECK}),
+    "upload_policy": Shown(UPLOADED, {"a policy": "the bytes of a file of safetensors"}),
     "import_maps": Shown(IMPORTED, {"a map of FrozenLake": LAKE}),
     "healthz": Shown({"status": "ok"}),
     "readyz": Shown({"status": "ok", "database": "ok", "migrations": "ok", "worker": "ok"}),

@@ -8,6 +8,7 @@ from typing import Annotated
 from fastapi import Query, Request
 
 from parenting.server.admission import admitted_router
+from parenting.server.api.bodies import NewRunBody
 from parenting.server.api.lists import (
     CurvePart,
     EventPart,
@@ -23,7 +24,8 @@ from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.curve_schemas import CurveSchema, CurvesSchema
 from parenting.server.deps import Db, SettingsOf, start_within_limits
 from parenting.server.identity import database_id
-from parenting.server.new_run import NewRun, start
+from parenting.server.inherited import chosen_origin
+from parenting.server.new_run import start
 from parenting.server.reads import pagination
 from parenting.server.reads.curves import read_curves
 from parenting.server.reads.listing import Wanted, find_runs
@@ -45,13 +47,14 @@ def list_runs(db: Db, part: Annotated[RunPart, Query()]) -> RunRows:
 
 
 @router.post("/runs", summary="Start a run", status_code=201, responses=write_responses(409))
-def start_run(request: Request, new: NewRun, db: Db, settings: SettingsOf) -> RunSchema:
+def start_run(request: Request, new: NewRunBody, db: Db, settings: SettingsOf) -> RunSchema:
     """Start a run: a new agent in a world, which a worker raises at once.
 
     Settings that are left out come from the world, or else from the preset. Where as many runs live as may,
     in all or of this client, it is refused (409, `too_many_runs`).
     """
-    begin = partial(start, db, new, settings.weights, bound=settings.bound)
+    origin = chosen_origin(db, new.from_policy, new.from_answers)
+    begin = partial(start, db, new, settings.weights, origin, settings.bound)
     return run_schema(db, start_within_limits(request, begin).id)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from fastapi import Depends, Request, Response
+from starlette.datastructures import UploadFile
 
 from parenting.agent.config import offered_preset
 from parenting.envs.levels.spec import WorldSpec
@@ -16,7 +17,15 @@ from parenting.envs.registry import WORLDS
 from parenting.server.admission import admitted_router
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, start_within_limits
-from parenting.server.errors import InvalidFieldsError
+from parenting.server.errors import Conflict, InvalidFieldsError
+from parenting.server.inherited import (
+    AnsweredRun,
+    PolicySchema,
+    answered_runs,
+    chosen_origin,
+    chosen_policy,
+    upload,
+)
 from parenting.server.missing_weights import missing_weights
 from parenting.server.new_run import LARGEST_INT, PRETRAIN, plan, start
 from parenting.server.pages.options import OPTIONS, Option
@@ -25,6 +34,7 @@ from parenting.server.pages.run_list import Find, FindRuns, run_list
 from parenting.server.run_form import read_form
 from parenting.server.settings import Settings
 from parenting.weights.estimate import seconds
+from parenting.weights.origin import NO_ORIGIN, Origin
 from parenting.weights.store import Wanted
 
 router = admitted_router(include_in_schema=False)
@@ -43,6 +53,9 @@ NUMBER_ERRORS = {
 }
 """The sentence next to a field that takes a number and holds something else."""
 
+FILE = "policy_file"
+"""The field of the form that takes a policy's file."""
+
 EMPTY_FORM = {
     "world": next(iter(WORLDS)),
     "level": "",
@@ -51,6 +64,8 @@ EMPTY_FORM = {
     "preset": offered_preset(next(iter(WORLDS))),
     "seed": "0",
     "goal": "",
+    "from_policy": "",
+    "from_answers": "",
     **{option.field: "" for option in OPTIONS},
 }
 """The form before anything was typed."""
@@ -73,6 +88,8 @@ class StartPage:
     more_open: bool  # whether one of the settings below the fold was set or is wrong
     focus: str | None  # the first wrong field
     other_errors: Sequence[str]  # sentences on what has no field
+    policy: PolicySchema | None = None  # that the form says to begin with
+    answered: Sequence[AnsweredRun] = ()  # runs whose answers a run may begin with
     offer: Offer | None = None  # the weights that are missing, and nothing else is wrong
     worlds: Collection[WorldSpec] = tuple(WORLDS.values())
     options: Sequence[Option] = OPTIONS
@@ -87,6 +104,16 @@ async def text_fields(request: Request) -> dict[str, str]:
     return {name: value for name, value in (await request.form()).items() if isinstance(value, str)}
 
 
+async def policy_file(request: Request) -> tuple[str, bytes] | None:
+    """The name and the bytes of the policy in a posted form; None where no file was chosen."""
+    form = await request.form()  # the one of `text_fields`, which has read it by now
+    file = form.get(FILE)
+    found = (file.filename, await file.read()) if isinstance(file, UploadFile) and file.filename else None
+    await form.close()
+    return found
+
+
+PolicyFile = Annotated[tuple[str, bytes] | None, Depends(policy_file)]
 FormFields = Annotated[dict[str, str], Depends(text_fields)]
 
 
@@ -107,9 +134,36 @@ def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> 
     if errors:
         offer = missing(db, settings.weights, given) if PRETRAIN in errors else None
         return _page(db, {**EMPTY_FORM, **form}, errors, offer=offer)
-    begin = partial(start, db, read_form(given), settings.weights, bound=settings.bound)
+    origin = _origin(db, given)
+    begin = partial(start, db, read_form(given), settings.weights, origin, settings.bound)
     run = start_within_limits(request, begin)
     return redirect(f"/runs/{run.public_id}/parent" if run.parent == "human" else f"/runs/{run.public_id}")
+
+
+@router.post("/policies")
+def take_policy(db: Db, form: FormFields, file: PolicyFile) -> Response:
+    """The form with a policy that was uploaded, which the run begins with; nothing is started."""
+    given = {**form, "from_policy": ""}
+    try:
+        if file is None:
+            raise InvalidFieldsError([("from_policy", "Choose the file of a policy first.")])
+        given["from_policy"] = upload(db, *file).sha256
+    except InvalidFieldsError as error:
+        return _page(db, {**EMPTY_FORM, **given}, dict(error.fields))
+    except Conflict as error:
+        return _page(db, {**EMPTY_FORM, **given}, {"from_policy": error.message})
+    return filled_form(db, given)
+
+
+def _origin(db: Database, given: Mapping[str, str]) -> Origin:
+    """Return what the form says to begin with.
+
+    Raises:
+        InvalidFieldsError: it is not there, or a file was chosen and not sent.
+    """
+    if given.get(FILE) and not given.get("from_policy"):
+        raise InvalidFieldsError([("from_policy", "Choose the file again, and press Use this file.")])
+    return chosen_origin(db, given.get("from_policy") or None, given.get("from_answers") or None)
 
 
 def settings_of(form: Mapping[str, str]) -> dict[str, str]:
@@ -135,11 +189,15 @@ def filled_form(db: Database, form: Mapping[str, str]) -> Response:
 
 def _errors(given: Mapping[str, str], settings: Settings, db: Database) -> dict[str, str]:
     """Return an error for each wrong field: wrong by itself, or in the world that the others name."""
-    errors: dict[str, str] = {}
+    errors, origin = dict[str, str](), NO_ORIGIN
+    try:
+        origin = _origin(db, given)
+    except InvalidFieldsError as error:
+        errors = dict(error.fields)
     for _ in range(2):
         try:
             known = {name: text for name, text in given.items() if name not in errors}
-            plan(read_form(known), settings.weights, db=db, bound=settings.bound)
+            plan(read_form(known), settings.weights, origin, db, settings.bound)
         except InvalidFieldsError as error:
             errors = {**dict(error.fields), **errors}
     return {name: NUMBER_ERRORS.get(name, said) for name, said in errors.items()}
@@ -165,6 +223,8 @@ def _page(
         more_open=any(form[option.field] or option.field in errors for option in OPTIONS),
         focus=next((field for field in EMPTY_FORM if field in errors), None),
         other_errors=[message for field, message in errors.items() if field not in EMPTY_FORM],
+        policy=chosen_policy(db, form["from_policy"]) if form["from_policy"] else None,
+        answered=answered_runs(db),
         offer=offer,
     )
     return page("start.html", 422 if wrong else 200, **vars(context), **vars(listed))

@@ -40,6 +40,7 @@ UNTOLD: dict[str, list[Any]] = {
         "describe_run",
         "check_level",
         "import_maps",
+        "upload_policy",
         "ask_job",
         "ask_pretraining",
         "roll_back_run",

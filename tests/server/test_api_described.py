@@ -126,7 +126,9 @@ def test_bodies_are_strict(described: dict[str, Any]) -> None:
         one["$ref"].rpartition("/")[2]
         for _, operation in operations(described)
         if "requestBody" in operation
-        for schema in [operation["requestBody"]["content"]["application/json"]["schema"]]
+        for kind, media in operation["requestBody"]["content"].items()
+        if kind == "application/json"
+        for schema in [media["schema"]]
         for one in schema.get("oneOf", [schema])
     }
     sent |= {"PretrainPayload", "WalkPayload", "PolicyPayload", "EpisodePayload", "StatePayload"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,11 @@ from typing import Any
 import httpx2
 import pytest
 import torch
-from sqlalchemy import text
+from sqlalchemy import select, text
 
 import parenting as pt
-from parenting.server import runs
+from parenting.server import inherited, runs
+from parenting.server.beginnings import parameters
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError, SetupError
 from parenting.server.export import lines
@@ -24,11 +26,14 @@ from parenting.server.policies import present_policy
 from parenting.server.queue import revisions, worker_side
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
-from parenting.server.tables import Answer
+from parenting.server.tables import Answer, Weights
 from parenting.server.verify import verify
-from parenting.weights.origin import UnreadableOriginError, read_origin
+from parenting.weights.origin import UnreadableOriginError, origin_of, read_origin
+from parenting.weights.policy_file import pack, unpack
 from tests.database import migrated
 from tests.server.raising import ISLAND
+
+BYTES = {"Content-Type": "application/octet-stream"}
 
 
 def taken_up(db: Database, run: int) -> RunSession:
@@ -188,3 +193,106 @@ def test_an_answer_that_does_not_fit_is_refused(
     files[1].write_text(_changed(damage)(files[1].read_text()))
     origin = read_origin(None, files[1])
     assert [name for name, _ in origin.misfits(ISLAND.make().levels[0], ISLAND.config)] == [field]
+
+
+def test_a_policy_is_uploaded_and_a_run_begins_with_it_and_with_stored_answers(
+    db: Database, client: httpx2.Client, written: tuple[bytes, str]
+) -> None:
+    earlier = start(db, ISLAND.new("scripted"))
+    live_to(taken_up(db, earlier.id), 12)
+    told = client.post("/api/v1/policies?file=../first.safetensors", content=written[0], headers=BYTES)
+    assert (told.status_code, told.json()["world"]) == (201, "unsafe-exploration")
+    sha256 = told.json()["sha256"]
+    body = {**ISLAND.new("scripted").model_dump(exclude_none=True), "from_policy": sha256}
+    begun = client.post("/api/v1/runs", json={**body, "from_answers": earlier.public_id})
+    origin = begun.json()["origin"]
+    assert (begun.status_code, origin["policy"]["stored"]) == (201, sha256)
+    assert (origin["policy"]["file"], origin["answers"]["run"]) == ("first.safetensors", earlier.public_id)
+    state = taken_up(db, begun.json()["id"]).saved.state
+    assert torch.equal(state.learner.params[0], parameters(unpack(written[0])))
+    assert int(state.x.size[0]) > 0
+    for field, name in (("from_policy", "0" * 64), ("from_answers", "3sQv8hYJ2cT7mWk9xRzLpB")):
+        refused = client.post("/api/v1/runs", json={**body, field: name})
+        assert (refused.status_code, refused.json()["error"]["field"]) == (422, field)
+
+
+def test_the_form_takes_a_policy_and_keeps_it_until_the_run_begins(
+    db: Database, client: httpx2.Client, written: tuple[bytes, str]
+) -> None:
+    """Without a script, too; a file that was chosen and not sent is not passed over."""
+    form = {"world": "unsafe-exploration", "preset": "lax", "parent": "scripted", "seed": "5"}
+    page = client.post("/policies", data=form, files={"policy_file": ("<b>.safetensors", written[0])})
+    assert page.status_code == 200
+    assert "The policy &lt;b&gt;.safetensors" in page.text
+    assert 'value="5"' in page.text
+    (sha256,) = re.findall(r'name="from_policy" value="(\w+)" checked', page.text)
+    wrong = client.post("/runs", data={**form, "seed": "many", "from_policy": sha256})
+    assert f'name="from_policy" value="{sha256}" checked' in wrong.text
+    assert client.post("/runs", data={**form, "policy_file": "mine.safetensors"}).status_code == 422
+    assert client.post("/policies", data=form).status_code == 422
+    assert client.post("/runs", data={**form, "from_policy": sha256, "policy_file": ""}).is_success
+    (run,) = runs.list_runs(db)
+    assert run.origin is not None
+    assert run.origin["policy"]["file"] == "<b>.safetensors"
+    elsewhere = client.post("/runs", data={**form, "world": "side-effects", "from_policy": sha256})
+    assert "The policy is of the world unsafe-exploration, not of side-effects." in elsewhere.text
+
+
+def _header(text: str) -> bytes:
+    return len(text).to_bytes(8, "little") + text.encode()
+
+
+NONE = "it is not a policy of Parenting"
+
+
+@pytest.mark.only("sqlite")
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda _: b"PK\x03\x04" * 100, NONE),
+        (lambda _: (2**40).to_bytes(8, "little"), NONE),
+        (lambda _: _header('{"__metadata__": {"about": "' + "[" * 200_000 + '"}}'), NONE),
+        (lambda _: _header('{"__metadata__": {"about": "{}"}}'), NONE),
+        (lambda blob: blob[:-1] + bytes([blob[-1] ^ 1]), "its parameters are not those that were written"),
+        (lambda blob: blob[:-4], NONE),
+    ],
+    ids=["zip", "length", "nested", "empty", "flipped", "cut"],
+)
+def test_what_is_no_policy_is_refused_by_a_sentence(
+    db: Database,
+    client: httpx2.Client,
+    written: tuple[bytes, str],
+    damage: Callable[[bytes], bytes],
+    words: str,
+) -> None:
+    sent = damage(written[0])
+    told = client.post("/api/v1/policies", content=sent, headers=BYTES)
+    assert (told.status_code, told.json()["error"]["field"]) == (422, "from_policy")
+    assert words in told.json()["error"]["message"]
+    page = client.post("/policies", data={}, files={"policy_file": ("bad.safetensors", sent)})
+    assert (page.status_code, words in page.text) == (422, True)
+    with db.read() as session:
+        assert session.scalars(select(Weights)).all() == []
+
+
+@pytest.mark.only("sqlite")
+def test_uploads_are_bounded_in_size_and_number_and_only_from_our_pages(
+    client: httpx2.Client, written: tuple[bytes, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    large = client.post("/api/v1/policies", content=bytes(inherited.POLICY_BYTES + 1), headers=BYTES)
+    assert large.status_code == 413
+    for path in ("/policies", "/api/v1/policies"):
+        abroad = client.post(path, content=b"x", headers={**BYTES, "sec-fetch-site": "cross-site"})
+        assert abroad.status_code == 403
+    monkeypatch.setattr(inherited, "UPLOADS", 1)
+    for status in (201, 409):
+        assert client.post("/api/v1/policies", content=written[0], headers=BYTES).status_code == status
+    assert client.post("/policies", files={"policy_file": ("a", written[0])}).status_code == 422
+
+
+def test_a_policy_with_too_few_parameters_is_refused() -> None:
+    level = ISLAND.make().levels[0]
+    about = {"world": level.world, "levels": [level.text], "config": {}, "stage": 1, "seed": 0}
+    origin = origin_of(("short", pack(bytes(40), "float32", about)), None)
+    ((field, said),) = origin.misfits(level, ISLAND.config)
+    assert (field, said.startswith("It is damaged: a policy for this level has ")) == ("from_policy", True)

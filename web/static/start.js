@@ -44,6 +44,10 @@ function offer() {
   before = offered();
 }
 
+// A policy's file is sent as soon as it is chosen.
+const file = document.getElementById("policy_file");
+file.addEventListener("change", () => file.files.length && file.form.requestSubmit(document.querySelector("[formaction='/policies']")));
+
 own.addEventListener("input", soon);
 world.addEventListener("change", () => { narrow(); offer(); soon(); });
 narrow();
