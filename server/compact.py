@@ -29,7 +29,7 @@ Grid = str | list[int | str]
 
 
 def shorten_clips(clips: dict[str, Any]) -> dict[str, Any]:
-    """Return clips in the short form, or as they are where they are no clips of boards of one size."""
+    """Return clips in the short form; anything else, and boards of different sizes, as it is."""
     boards: list[str] = []
     short = {side: _shorten_side(clip, boards) for side, clip in clips.items()}
     shapes = {tuple(map(len, board.split("\n"))) for board in boards}
@@ -99,7 +99,7 @@ class Figures(Json):
 
 
 def _shorten_side(clip: Any, boards: list[str]) -> dict[str, Any] | None:
-    """Return a clip whose frames are lists and name their boards by number; None if it is no clip."""
+    """Return a clip whose frames are lists and name their boards by number; None if it is not a clip."""
     frames = clip.get("frames") if isinstance(clip, dict) else None
     if not isinstance(frames, list) or not all(map(_is_frame, frames)):
         return None

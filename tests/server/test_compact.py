@@ -92,7 +92,7 @@ def test_rows_are_stored_short_and_written_out_for_an_older_version(db: Database
 
 
 def raw(db: Database) -> dict[str, str]:
-    """What the database holds, as text."""
+    """Return the stored text."""
     with db.read() as session:
         clips = session.execute(text("SELECT CAST(clips AS TEXT) FROM query")).scalar_one()
         values = session.execute(
