@@ -163,7 +163,7 @@ async function look() {
   again = false;
   looked = performance.now();
   const had = known.snapshots.length;
-  try { await data.news(); } catch { return; } finally { // where it failed, the next look asks again
+  try { await data.news(); } catch { late = true; return; } finally { // a look that failed is made again
     looking = false;
     if (again) seen();
     else if (late) {
