@@ -23,10 +23,12 @@ HUNG_SECONDS = 300.0
 LONG_AT_ONCE = max(2, os.cpu_count() or 1)
 """Long turns at once. More would only take the processor from quick ones, and one alone may hang."""
 SLOW_SECONDS = 1.0
-"""A run whose last turn took longer is no urgent one: its person waits anyway, and others should not."""
+"""A run whose last turn took longer is a slow one: its person waits anyway, and others should not."""
 QUICK_AT_ONCE = 2 * LONG_AT_ONCE
 """Turns at once, long or not: some that were quick before turn out to be long."""
-URGENT_AT_ONCE = QUICK_AT_ONCE + 8
+SLOW_AT_ONCE = QUICK_AT_ONCE + 4
+"""Turns at once, those of slow runs included for which a person waits."""
+URGENT_AT_ONCE = SLOW_AT_ONCE + 4
 """Turns at once, those included for which a person waits: these find a thread whatever the others do."""
 
 Turn = Callable[[], float]
@@ -65,13 +67,13 @@ class Turns:
         Args:
             run_id: The run.
             new: It has no life in memory, so that this turn counts as long.
-            urgent: A person waits for it, so that threads are kept for it, unless its last one took seconds.
+            urgent: A person waits for it, so that threads are kept for it: fewer if its last one took seconds.
         """
         if run_id in self._working:
             return False
         going_on = len(self.working())
-        if urgent and run_id not in self._slow:
-            return going_on < URGENT_AT_ONCE
+        if urgent:
+            return going_on < (SLOW_AT_ONCE if run_id in self._slow else URGENT_AT_ONCE)
         return going_on < (LONG_AT_ONCE if new or run_id in self._long else QUICK_AT_ONCE)
 
     def begin(self, run_id: int, turn: Turn) -> None:

@@ -1,4 +1,4 @@
-"""The order of turns: a person is never behind a script, and no run is passed over for ever."""
+"""The order of turns: a person is never behind a script, and no run is passed over again and again."""
 
 from __future__ import annotations
 
