@@ -67,7 +67,7 @@ class Turns:
         Args:
             run_id: The run.
             new: It has no life in memory, so that this turn counts as long.
-            urgent: A person waits for it, so that threads are kept for it: fewer if its last one took seconds.
+            urgent: A person waits for it, so that threads are kept for it, fewer if the last took seconds.
         """
         if run_id in self._working:
             return False
