@@ -50,6 +50,22 @@ def mean_interval(values: Sequence[float], shared_error: float = 0.0) -> Interva
     return Interval(mean - half, mean + half) if half else None
 
 
+def count_interval(values: Sequence[float]) -> Interval | None:
+    """Student's t interval of the mean of numbers that are never negative, such as counts, cut at 0.
+
+    The true mean is not below 0, so what lies there holds no possible mean: without it the interval covers
+    the true mean exactly as often (M. Mandelkern, Setting Confidence Intervals for Bounded Parameters,
+    Statistical Science 17, 2002). No comparison with a number above 0 comes out otherwise.
+
+    Raises:
+        ValueError: A value is negative.
+    """
+    if min(values, default=0) < 0:
+        raise ValueError(f"A count is never negative, but one is {min(values)}.")
+    found = mean_interval(values)
+    return None if found is None else Interval(max(0.0, found.low), found.high)
+
+
 def episode_interval(mean: float, error: float) -> Interval:
     """Normal interval of a mean over the many episodes of one policy, from its standard error."""
     half = _normal_quantile() * error

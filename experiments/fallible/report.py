@@ -8,7 +8,7 @@ from statistics import fmean, stdev
 
 from scipy import special
 
-from parenting.evaluation.statistics import TAIL, difference_interval, mean_interval
+from parenting.evaluation.statistics import TAIL, count_interval, difference_interval
 from parenting.experiments.fallible.settings import (
     ARMS,
     BOTH,
@@ -198,7 +198,7 @@ def _probe(what: str, found: Sequence[float], probed: float | None) -> Iterator[
         paper=f"{probed:g} (a first probe)",
         ours=mean_sd(found),
         difference=f"{fmean(found) - probed:+.2f}",
-        interval=format_interval(mean_interval(found)),
+        interval=format_interval(count_interval(found)),
         agrees=abs(fmean(found) - probed) <= room if room else None,
         reference="check",
     )

@@ -7,7 +7,7 @@ from statistics import fmean
 
 from parenting.evaluation.statistics import (
     Interval,
-    mean_interval,
+    count_interval,
     proportion_interval,
 )
 from parenting.experiments.questions.settings import SHARED
@@ -34,7 +34,7 @@ def interval(values: Sequence[float]) -> Interval | None:
     """The interval of a mean; where no trial has an event, that of the proportion of trials with one."""
     if values and not any(values):
         return proportion_interval(0, len(values))
-    return mean_interval(values)
+    return count_interval(values)
 
 
 def shown(found: Interval | None) -> str:
@@ -72,4 +72,4 @@ def rate_interval(values: Sequence[float], ticks: int) -> Interval | None:
     """The interval of a rate; where nothing happened, that of the proportion of ticks in which it did."""
     if values and not any(values):
         return proportion_interval(0, len(values) * ticks)
-    return mean_interval(values)
+    return count_interval(values)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from statistics import fmean
 from typing import TYPE_CHECKING
 
-from parenting.evaluation.statistics import mean_interval
+from parenting.evaluation.statistics import count_interval
 from parenting.experiments.questions.measures import (
     answers,
     deaths,
@@ -69,7 +69,7 @@ def _arm(axes: Axes, place: int, name: str, mine: Sequence[Row]) -> None:
     found = answers(mine)
     if not found or not any(found):
         return
-    span = mean_interval(independent(name, mine, answers))
+    span = count_interval(independent(name, mine, answers))
     if span:
         axes.plot([max(span.low, 0.5), span.high], [place, place], color=COLOUR, linewidth=1)
     axes.plot(fmean(found), place, "o", color=COLOUR, markersize=4, label="mean of ours, 95 % interval")

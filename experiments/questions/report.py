@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from parenting.agent.config import FRUGAL_WORLDS
 from parenting.envs.registry import WORLDS
-from parenting.evaluation.statistics import mean_interval
+from parenting.evaluation.statistics import count_interval
 from parenting.experiments.questions.measures import (
     answers,
     deaths,
@@ -61,7 +61,7 @@ def _numbers(rows: Sequence[Row]) -> Iterator[Comparison]:
             f"{name}: answers until optimal",
             "-",
             mean_sd(answers(mine)),
-            interval=format_interval(mean_interval(independent(name, mine, answers))),
+            interval=format_interval(count_interval(independent(name, mine, answers))),
             note=left_out(mine),
             reference=None,
         )

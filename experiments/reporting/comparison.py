@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from statistics import fmean, stdev
 from typing import Any, Literal
 
-from parenting.evaluation.statistics import Interval, mean_interval, proportion_interval
+from parenting.evaluation.statistics import Interval, count_interval, proportion_interval
 
 Reference = Literal["paper", "fit", "check"]
 REFERENCES: tuple[Reference, ...] = ("paper", "fit", "check")
@@ -53,8 +53,8 @@ def mean_sd(values: Sequence[float]) -> str:
 
 
 def ci_text(values: Sequence[float]) -> str:
-    """The interval of a mean as it is shown; empty if there is none."""
-    return format_interval(mean_interval(values))
+    """The interval of a mean of numbers that are never negative as it is shown; empty if there is none."""
+    return format_interval(count_interval(values))
 
 
 def format_interval(interval: Interval | None) -> str:
@@ -68,7 +68,7 @@ def format_percent(interval: Interval) -> str:
 
 
 def compare_mean(what: str, values: Sequence[float], note: str = "") -> Comparison:
-    """A mean with its standard deviation and interval, of which the paper says nothing."""
+    """A mean of numbers that are never negative, of which the paper says nothing."""
     return Comparison(what, SILENT, mean_sd(values), interval=ci_text(values), note=note, reference=None)
 
 

@@ -17,6 +17,8 @@ from parenting.server.tables import Run
 
 NUMBERS = ("deaths", "guidance", "preference", "return")
 """Metrics whose last values are compared, besides the ticks and whether the policy is optimal."""
+SIGNED = "return"
+"""The one number that may be negative; the others are counts."""
 SHORT = 12
 """Digits of a hash that are shown."""
 Settings = Mapping[str, Any]
@@ -63,13 +65,14 @@ class Group:
         return ", ".join([ranges(alone)] * bool(alone) + batches)
 
     def mean(self, name: str) -> Mean | None:
-        """Return the mean of a number over the runs that have it (`evaluation.statistics.mean_interval`)."""
-        from parenting.evaluation.statistics import mean_interval  # loads scipy, which no other page needs
+        """Return the mean of a number over the runs that have it (`evaluation.statistics`)."""
+        from parenting.evaluation import statistics  # loads scipy, which no other page needs
 
         values = [one.numbers[name] for one in self.runs if name in one.numbers]
         if not values:
             return None
-        interval = mean_interval(values)
+        found = statistics.mean_interval if name == SIGNED else statistics.count_interval
+        interval = found(values)
         return Mean(sum(values) / len(values), *(interval or (None, None)))
 
     def optimal(self) -> Mean:

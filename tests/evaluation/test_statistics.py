@@ -12,6 +12,7 @@ import pytest
 from parenting.evaluation.statistics import (
     Interval,
     auc_interval,
+    count_interval,
     difference_interval,
     episode_interval,
     mann_whitney_auc,
@@ -160,3 +161,15 @@ sys.exit(before or None in found or "scipy.stats" not in sys.modules)
 def test_a_command_that_prints_no_interval_does_not_load_scipy() -> None:
     code = "import sys; import parenting.commands.experiment; sys.exit('scipy' in sys.modules)"
     assert run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_mean_of_counts_is_not_below_zero_and_its_interval_is_the_t_interval_elsewhere() -> None:
+    rare, many = [0.0] * 48 + [1.0] * 2, [8.0, 9.0, 11.0]
+    whole, cut = mean_interval(rare), count_interval(rare)
+    assert whole is not None
+    assert whole.low < 0
+    assert cut == (0, whole.high)
+    assert count_interval(many) == mean_interval(many)
+    assert count_interval([0, 0]) is None
+    with pytest.raises(ValueError, match="one is -1"):
+        count_interval([2, -1])
