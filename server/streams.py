@@ -12,7 +12,6 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
 from functools import partial
 from typing import TypeVar
 
@@ -22,8 +21,9 @@ from parenting.server.admission import Admission
 from parenting.server.db import Database
 from parenting.server.errors import ServerError, StoreError, TooManyStreamsError
 from parenting.server.notify import Notifier
-from parenting.server.reads.watching import Look, Rows, Seen, look, told_metrics, told_runs
+from parenting.server.reads.watching import Look, look, told_metrics, told_runs
 from parenting.server.store.relay import Relay
+from parenting.server.subscriptions import UNSURE_SECONDS, Subscription, either
 
 POLL_SECONDS = 0.25
 """Seconds between looks, and at least between two events of the same run, questions and leases excepted."""
@@ -33,42 +33,10 @@ LONGEST_REST = 0.1
 STREAM_SECONDS, SELDOM_SECONDS = 0.005, 1.0
 """A run's streams are told at most once in so many seconds for each stream of the process, up to the second:
 each costs the processor a fraction of a millisecond, which answers would have."""
-UNSURE_SECONDS = 1.0
-"""Seconds after which a run whose worker is silent is read again: others decide whether one may come."""
 AGAIN_SECONDS = 1.0
 """Seconds after which who waits for a question asks again, whether anything was seen to change or not."""
 
 Found = TypeVar("Found")
-
-
-@dataclass
-class Subscription:
-    """The last known state of one run, shared by all who wait for news of it."""
-
-    streams: int = 0
-    requests: int = 0  # that wait for a question
-    holders: int = 0  # both of them, and who else has it watched
-    seen: Seen | None = None
-    run: str = ""  # as JSON
-    stale: bool = True  # it has changed since
-    untold: bool = False  # its streams have not been told of the last change
-    told: float = float("-inf")  # when they were, by the monotonic clock
-    read: float = float("-inf")  # when it was read, by the monotonic clock
-    rows: dict[int, asyncio.Future[Rows]] = field(default_factory=dict)  # its metrics after a tick
-    changed: asyncio.Event = field(default_factory=asyncio.Event)
-    offered: asyncio.Event = field(default_factory=asyncio.Event)
-    gone: bool = False  # the run was deleted
-
-    def offer(self) -> None:
-        """Wake those who wait for a question."""
-        self.offered.set()
-        self.offered = asyncio.Event()
-
-    def tell(self) -> None:
-        """Wake the streams."""
-        self.untold, self.told = False, time.monotonic()
-        self.changed.set()
-        self.changed = asyncio.Event()
 
 
 class Streams:
@@ -214,7 +182,7 @@ class Streams:
         self._ends = found.ends
         for run_id in ids:
             if run_id in self.subscriptions:
-                _take(self.subscriptions[run_id], found.runs.get(run_id), now)
+                self.subscriptions[run_id].take(found.runs.get(run_id), now)
         return found.cost
 
     async def _read(self) -> None:
@@ -279,26 +247,3 @@ class Streams:
 def _ready(subscription: Subscription) -> float:
     """Return when a run may be read; never where it has not changed."""
     return subscription.read + POLL_SECONDS if subscription.stale else float("inf")
-
-
-def _take(subscription: Subscription, seen: Seen | None, now: float) -> None:
-    """Note what was seen of a run, and wake those whom it concerns."""
-    before, subscription.seen = subscription.seen, seen
-    if seen is None:
-        subscription.gone = True  # its streams end, and whoever opens one again gets 404
-        subscription.offer()
-        subscription.tell()
-        return
-    if before is None or seen.offers != before.offers:
-        subscription.offer()
-    if before is None or (seen.question, seen.leases) != (before.question, before.leases):
-        subscription.untold = True
-    changed = before is None or (seen.row, seen.signed) != (before.row, before.signed)
-    if changed or (not seen.signed and now - subscription.read >= UNSURE_SECONDS):
-        subscription.stale = True
-
-
-async def either(event: asyncio.Event, timeout: float) -> None:
-    """Wait for an event, or for so many seconds."""
-    with suppress(TimeoutError):
-        await asyncio.wait_for(event.wait(), max(timeout, 0.0))

@@ -30,7 +30,8 @@ from parenting.server.pages.question import question_view
 from parenting.server.pages.render import render
 from parenting.server.queue.leases import More
 from parenting.server.reads.names import query_numbers, run_number
-from parenting.server.streams import AGAIN_SECONDS, POLL_SECONDS, Streams, either
+from parenting.server.streams import AGAIN_SECONDS, POLL_SECONDS, Streams
+from parenting.server.subscriptions import either
 from parenting.server.tables import Query, Run
 
 router = admitted_router(include_in_schema=False)

@@ -17,7 +17,7 @@ from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim, set_status
 from parenting.server.statuses import RunStatus
-from parenting.server.streams import Subscription
+from parenting.server.subscriptions import Subscription
 from parenting.server.tables import Run
 from parenting.server.workers import sign
 from tests.server.conftest import CLIPS, Clock
