@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from parenting.agent.config import PRESETS, Config, merge
 from parenting.envs import registry
 from parenting.envs.foreign_import import ForeignMapError, foreign_format, imported
 from parenting.envs.foreign_text import FORMATS
@@ -9,6 +10,7 @@ from parenting.envs.level_text import SeveralLevelsError, Written, choose, writt
 from parenting.envs.levels.spec import LevelError
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.schemas import Schema
+from parenting.weights.cost import estimate
 
 TEXT_CHARACTERS = 50_000
 """Characters of a text that may hold several levels, in a request."""
@@ -45,6 +47,8 @@ class CheckedLevelSchema(Schema):
     levels: list[str]
     """The names of the levels in the text, empty where one has none."""
     error: LevelErrorSchema | None
+    cost: str | None = None
+    """A sentence on the cost of a run on it; null: it is little, or the level is not valid."""
     foreign: str | None = None
     """The format of another collection that the text is in, which /levels/import makes a level of."""
 
@@ -116,7 +120,10 @@ def check(world: str, text: str, which: str | None = None) -> CheckedLevelSchema
         several = isinstance(error, SeveralLevelsError)
         checked = _checked(Written() if several else chosen, names, error=_error(error))
         return checked.model_copy(update={"foreign": foreign_format(text)})
-    return _checked(chosen, names, level.name, level.text)
+    spec = registry.spec(world, level)
+    cost = estimate(spec, level, Config.model_validate(merge(PRESETS["conservative"], spec.defaults)))
+    checked = _checked(chosen, names, level.name, level.text)
+    return checked.model_copy(update={"cost": f"On this level {cost}." if cost.notable else None})
 
 
 def _checked(

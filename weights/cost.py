@@ -13,6 +13,8 @@ from parenting.envs.levels.spec import Level, WorldSpec, maze_legend
 
 TICK_SECONDS, SECONDS_A_WEIGHT = 0.01, 5e-8
 """A tick on one core, measured: of a small board, and for each weight of the policy."""
+LATE = 4.0
+"""A tick after a hundred answers takes so many times as long as one of the first (docs/worlds.md)."""
 RECORDINGS = 2 * 4096
 """Clips of both kinds that a recorder may hold."""
 NOTABLE_SECONDS, NOTABLE_MEGABYTES = 0.1, 10.0
@@ -22,12 +24,21 @@ NOTABLE_SECONDS, NOTABLE_MEGABYTES = 0.1, 10.0
 class Cost(NamedTuple):
     """The estimate for one run."""
 
-    tick_seconds: float
+    tick_seconds: float  # at first
     megabytes: float  # of a checkpoint, once the recorder is full
 
     def __str__(self) -> str:
         """Return the sentence that tells it."""
-        return f"a tick takes about {self.tick_seconds:.2g} s, and a checkpoint has {self.megabytes:.0f} MB"
+        early, late = f"{self.tick_seconds:.2g}", f"{self.late_seconds:.2g}"
+        return (
+            f"a tick takes from {early} s at first to {late} s after a hundred answers, and a checkpoint has"
+            f" up to {self.megabytes:.0f} MB"
+        )
+
+    @property
+    def late_seconds(self) -> float:
+        """The seconds of a tick late in a run: X has grown, and the policy is evaluated between ticks."""
+        return LATE * self.tick_seconds
 
     @property
     def notable(self) -> bool:

@@ -82,6 +82,14 @@ def test_a_wrong_field_brings_the_form_back_without_the_welcome(client: httpx2.C
     assert '<h1 id="new-title">Start a run</h1>' in page
 
 
+def test_the_cost_of_a_large_level_is_told_before_the_start(client: httpx2.Client) -> None:
+    rows = ["W" * 62, "WA" + " " * 58 + "GW", *["W" + " " * 60 + "W"] * 59, "W" * 62]
+    for text, told in (("\n".join(rows), True), ("WWWWW\nWA GW\nWWWWW", False)):
+        found = client.post("/api/v1/levels/check", json={"world": "unsafe-exploration", "text": text}).json()
+        assert found["valid"]
+        assert ("On this level a tick takes from" in (found["cost"] or "")) == told
+
+
 def test_a_run_of_mine_begins_at_the_parents_page(client: httpx2.Client, db: Database) -> None:
     reply = client.post("/runs", data=FORM)
     assert (reply.status_code, reply.headers["location"]) == (303, address(db))

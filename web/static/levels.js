@@ -74,7 +74,7 @@ async function check() {
 }
 
 // The first broken rule, beside its cell, and what was cut.
-function tell({ valid, error, said }) {
+function tell({ valid, error, said, cost }) {
   const cell = error && [error.line - 1 - headerLines(state.header), error.column - 1];
   const onBoard = board.mark(cell), title = world.selectedOptions[0].text;
   beside.hidden = !onBoard;
@@ -82,6 +82,7 @@ function tell({ valid, error, said }) {
   if (onBoard) beside.style.setProperty("--row", cell[0]);
   const lines = [...notes, ...said.map(sentence)].map((text) => line(text, "hint"));
   if (error) lines.push(line(onBoard ? `Row ${cell[0] + 1}, column ${cell[1] + 1}: ${error.rule}.` : error.message, onBoard ? "sr" : "error"));
+  if (cost) lines.push(line(cost, "hint"));
   if (valid) lines.push(line(`This level keeps every rule of ${title}.`, "fine"));
   told.replaceChildren(...lines);
 }

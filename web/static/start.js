@@ -25,7 +25,7 @@ async function check() {
   const reply = text.trim() ? await fetch("/api/v1/levels/check", options).catch(() => null) : null;
   const found = reply?.ok ? await reply.json() : { said: [], error: null };
   if (mine !== asked) return;
-  const lines = [...found.said.map((said) => [`${said[0].toUpperCase()}${said.slice(1)}.`, "hint"]), ...(found.error ? [[found.error.message, "error"]] : [])];
+  const lines = [...found.said.map((said) => [`${said[0].toUpperCase()}${said.slice(1)}.`, "hint"]), ...(found.cost ? [[found.cost, "hint"]] : []), ...(found.error ? [[found.error.message, "error"]] : [])];
   told.replaceChildren(...lines.map(([textContent, className]) => Object.assign(document.createElement("p"), { textContent, className })));
 }
 
