@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, String, and_, cast, func, or_, select
+from sqlalchemy import ColumnElement, Select, String, and_, cast, false, func, or_, select
 from sqlalchemy.orm import Session
 
 from parenting.server.columns import Damaged
@@ -52,6 +52,8 @@ def find_runs(db: Database, wanted: Wanted, before: int | None, limit: int) -> P
 
 
 def _conditions(wanted: Wanted) -> list[ColumnElement[bool]]:
+    if any("\0" in text for text in (wanted.words, wanted.tag or "", wanted.world or "")):
+        return [false()]  # no text holds it, and PostgreSQL refuses to look for it
     found = [_holds(word) for word in wanted.words.split()]
     if wanted.tag is not None:
         found.append(Run.tags.contains(f",{wanted.tag},", autoescape=True))
