@@ -1,4 +1,4 @@
-"""Short forms of JSON that is stored with every answer: clips, metrics and reasons. Nothing is lost.
+"""Short forms of JSON that is stored with every answer: clips, metrics and the like. Nothing is lost.
 
 Clips repeat their boards, which differ in a cell or two. In the short form the boards stand once, the first
 one in full and the others by what differs, and a frame is a list. Figures that always come together are a
@@ -15,13 +15,14 @@ from sqlalchemy import Dialect
 
 from parenting.server.columns import Json
 
-GRIDS, FIGURES = "grids", "figures"
+GRIDS, FIGURES = "grids", "f"
 FRAME = ("ground", "observed", "agent", "box")
 METRICS = (
     *("deaths", "episodes", "guidance", "preference", "left", "right", "either", "neither", "skips"),
     *("return", "optimal_return", "optimal", "size", "rows", "maturity", "stage_queries"),
     *("loss", "entropy_global", "entropy_local", "speed"),
 )
+EFFECT = ("probabilities",)
 REASON = ("pausing", "familiarity", "p_guid", "chance", "draw", "probabilities")
 
 Grid = str | list[int | str]

@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy.orm import Mapped, mapped_column
 
-from parenting.server.compact import REASON, Figures
+from parenting.server.compact import EFFECT, REASON, Figures
 from parenting.server.table_root import Table
 
 
@@ -30,4 +30,6 @@ class Effect(Table):
     run_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     tick: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)  # in which the answer was heard
     ticks: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)  # lived since; 0: before it
-    policy: Mapped[dict[str, Any]]  # {"probabilities": of up, down, left and right}
+    policy: Mapped[dict[str, Any]] = mapped_column(
+        Figures(EFFECT)
+    )  # {"probabilities": of up, down, left and right}

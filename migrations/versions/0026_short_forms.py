@@ -1,4 +1,4 @@
-"""Clips, metrics and reasons are stored in a short form (`server.compact`).
+"""Clips, metrics, reasons and effects are stored in a short form (`server.compact`).
 
 Rows of before stay as they are, and are read as before. On the way back the short ones are written out.
 
@@ -8,7 +8,7 @@ Revision: 0026, after 0025
 import sqlalchemy as sa
 from alembic import op
 
-from parenting.server.compact import METRICS, REASON, whole_clips, whole_figures
+from parenting.server.compact import EFFECT, METRICS, REASON, whole_clips, whole_figures
 
 revision = "0026"
 down_revision = "0025"
@@ -17,8 +17,9 @@ depends_on = None
 
 FORMS = (
     ("query", "clips", ("id",), "grids", whole_clips),
-    ("metric", "values", ("run_id", "tick"), "figures", lambda found: whole_figures(METRICS, found)),
-    ("reason", "why", ("run_id", "tick"), "figures", lambda found: whole_figures(REASON, found)),
+    ("metric", "values", ("run_id", "tick"), "f", lambda found: whole_figures(METRICS, found)),
+    ("effect", "policy", ("run_id", "tick", "ticks"), "f", lambda found: whole_figures(EFFECT, found)),
+    ("reason", "why", ("run_id", "tick"), "f", lambda found: whole_figures(REASON, found)),
 )
 PIECE = 500
 """Rows that are held in memory at a time."""
