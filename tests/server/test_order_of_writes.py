@@ -20,7 +20,7 @@ def test_metrics_come_after_the_next_question(db: Database, monkeypatch: pytest.
     """Also where it is some ticks away, and the last row of metrics is old."""
     monkeypatch.setattr("parenting.server.session.HURRY_SECONDS", 60.0)  # however slow this machine is
     monkeypatch.setattr("parenting.server.session.METRIC_SECONDS", 0.0)
-    config = {"p_guid": 0.9, "p_pref": 0.0}
+    config: dict[str, Any] = {"p_guid": 0.9, "p_pref": 0.0}
     run = start(db, NewRun(world="unsafe-exploration", parent="human", seed=3, config=config))
     (mine,) = claim(db, "test")
     life, written = RunSession(db, mine, run, lambda: None), list[str]()
