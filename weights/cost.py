@@ -69,7 +69,7 @@ BOUND = Bound()
 
 
 def estimate(spec: WorldSpec, level: Level, config: Config) -> Cost:
-    """Return what a tick and a checkpoint of a run cost, within a factor of about two.
+    """Return the cost of a tick and a checkpoint; of small boards' ticks rather too much (docs/worlds.md).
 
     Args:
         spec: The world.

@@ -14,6 +14,7 @@ from parenting.server.errors import LostClaimError
 from parenting.server.runs import get_run, list_runs
 from parenting.server.weights import put_bytes
 from parenting.server.workers import sign
+from parenting.weights.policy_file import pack
 from tests.pages.axe import violated
 from tests.pages.browser_tabs import BrowserTabs
 from tests.server.test_pretraining import HALL
@@ -98,6 +99,25 @@ def test_its_steps_are_shown_survive_a_reload_and_it_is_cancelled(tabs: BrowserT
     with pytest.raises(LostClaimError):
         jobs.tell(db, mine, {"steps": 1800, "expected": 1600, "seconds": 45.0})
     assert not list_runs(db)
+
+
+def test_in_a_browser_a_policy_is_taken_as_soon_as_it_is_chosen(tabs: BrowserTabs) -> None:
+    """The form comes again with what was typed; no run begins with a policy that does not fit."""
+    tabs.expected = ("422",)
+    page = tabs.open("/", viewport={"width": 320, "height": 568}, color_scheme="dark")
+    page.locator(".fields #seed").fill("77")
+    page.locator("summary", has_text="Begin with an earlier policy").click()
+    about = {"world": "side-effects", "levels": [], "config": {}, "stage": 1, "seed": 0}
+    blob = pack(bytes(40), "float32", about)
+    file = {"name": "careful.safetensors", "mimeType": "application/octet-stream", "buffer": blob}
+    page.locator("#policy_file").set_input_files(files=[file])
+    expect(page.get_by_role("checkbox", name="The policy careful.safetensors")).to_be_checked()
+    expect(page.locator(".fields #seed")).to_have_value("77")
+    assert violated(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= 320
+    page.get_by_role("button", name="Start", exact=True).click()
+    expect(page.locator("#world-error")).to_have_text(re.compile("The policy is of the world side-effects"))
+    expect(page.get_by_role("checkbox", name="The policy careful.safetensors")).to_be_checked()
 
 
 def test_in_a_browser_it_begins_without(tabs: BrowserTabs, db: Database) -> None:
