@@ -109,8 +109,9 @@ def test_in_a_browser_a_policy_is_taken_as_soon_as_it_is_chosen(tabs: BrowserTab
     page.locator("summary", has_text="Begin with an earlier policy").click()
     about = {"world": "side-effects", "levels": [], "config": {}, "stage": 1, "seed": 0}
     blob = pack(bytes(40), "float32", about)
-    file = {"name": "careful.safetensors", "mimeType": "application/octet-stream", "buffer": blob}
-    page.locator("#policy_file").set_input_files(files=[file])
+    page.locator("#policy_file").set_input_files(
+        {"name": "careful.safetensors", "mimeType": "application/octet-stream", "buffer": blob}
+    )
     expect(page.get_by_role("checkbox", name="The policy careful.safetensors")).to_be_checked()
     expect(page.locator(".fields #seed")).to_have_value("77")
     assert violated(page) == []
