@@ -46,8 +46,8 @@ QUEUE = [
     Mutant(
         "anybody can let go of a lease",
         "server/queue/leases.py",
-        "if query.leased_by == client_id:",
-        "if query.leased_by is not None:",
+        '_QUERY.c.leased_by == bindparam("client"))',
+        "_QUERY.c.leased_by.is_not(None))",
         f"{ANSWERS}::test_release_offers_it_at_once_and_only_by_its_holder",
     ),
     Mutant(

@@ -71,7 +71,7 @@ def test_pages_of_two_runs_share_one_stream_and_each_gets_its_own_questions(
     for page, number in zip(pages, numbers, strict=True):
         shown(page, number)
     seen(pages[0], lambda: traffic.lying() == ["stream"])
-    until(lambda: site.state.streams.number() == 2)  # one that was opened anew may still be ending
+    until(lambda: site.state.streams.number() == 2)  # a former one may still be ending
 
 
 def crash(page: Page) -> None:

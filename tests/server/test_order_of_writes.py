@@ -1,4 +1,4 @@
-"""What follows an answer is written in an order: the next question first, then what nobody waits for."""
+"""The order of writes after an answer: the next question comes first, then all for which nobody waits."""
 
 from typing import Any
 
