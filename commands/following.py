@@ -8,6 +8,7 @@ from contextlib import suppress
 
 from parenting.commands.crew import Crew
 from parenting.commands.sizing import Sizing
+from parenting.server.damage import sound
 from parenting.server.db import Database
 from parenting.server.errors import StoreError
 from parenting.server.workers import Figures, living
@@ -34,4 +35,4 @@ def _said(crew: Crew, db: Database) -> list[Figures]:
     """Return what the workers of this crew say of themselves."""
     mine = {str(child.process.pid) for child in list(crew.children)}
     rows = [row for row in living(db) if row.name.rpartition(":")[2] in mine]
-    return [Figures(row.runs, row.lives, row.busy, row.memory, row.waited) for row in rows]
+    return [Figures(*(sound(row, name) for name in Figures._fields)) for row in rows]

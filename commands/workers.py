@@ -15,8 +15,9 @@ from rich.text import Text
 from parenting.commands.database import database
 from parenting.commands.errors import friendly_errors
 from parenting.commands.printing import cell, say
+from parenting.server.damage import sound
 from parenting.server.tables import Worker
-from parenting.server.workers import living
+from parenting.server.workers import Figures, living
 
 COLUMNS = ("worker", "since", "runs", "in memory", "load", "memory", "waited")
 WIDE = 120
@@ -49,16 +50,9 @@ def workers(
 
 
 def _fields(row: Worker) -> dict[str, Any]:
-    return {
-        "name": row.name,
-        "started": row.started.isoformat(),
-        "heartbeat": row.heartbeat.isoformat(),
-        "runs": row.runs,
-        "lives": row.lives,
-        "busy": row.busy,
-        "memory": row.memory,
-        "waited": row.waited,
-    }
+    times = {name: sound(row, name) for name in ("started", "heartbeat")}
+    figures = {name: sound(row, name) for name in Figures._fields}
+    return {"name": row.name, **{name: at and at.isoformat() for name, at in times.items()}, **figures}
 
 
 def _table(rows: list[dict[str, Any]]) -> Table:
@@ -68,7 +62,7 @@ def _table(rows: list[dict[str, Any]]) -> Table:
     for row in rows:
         shown = (
             row["name"],
-            row["started"][:19].replace("T", " "),
+            _said(row["started"] and row["started"][:19].replace("T", " "), "{}"),
             _said(row["runs"], "{}"),
             _said(row["lives"], "{}"),
             _said(row["busy"], "{:.0%}"),
@@ -79,6 +73,6 @@ def _table(rows: list[dict[str, Any]]) -> Table:
     return table
 
 
-def _said(value: float | None, form: str) -> str:
-    """Return a figure as text; a worker of an older version says none."""
+def _said(value: float | str | None, form: str) -> str:
+    """Return a figure as text; a worker of an older version says none, and a damaged one counts as none."""
     return "" if value is None else form.format(value)

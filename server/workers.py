@@ -81,4 +81,5 @@ def last_signs(db: Database, names: Collection[str]) -> dict[str, Mark]:
     rows = select(Worker.name, Worker.epoch, Worker.mark).where(Worker.name.in_(names))
     with db.read() as session:
         found = session.execute(rows).all()
-    return {row.name: Mark(row.epoch, row.mark) for row in found if None not in (row.epoch, row.mark)}
+    sound = [row for row in found if isinstance(row.epoch, str) and isinstance(row.mark, float)]
+    return {row.name: Mark(row.epoch, row.mark) for row in sound}

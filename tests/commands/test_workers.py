@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from sqlalchemy import text
 from typer.testing import CliRunner
 
 from parenting.commands.main import app
@@ -33,6 +34,13 @@ def test_each_tells_its_runs_load_and_memory(db: Database) -> None:
     assert here.split()[-7:] == ["12", "3", "25%", "300", "MB", "40", "ms"]
     assert older.startswith("older:2")
     assert json.loads(listed("--json")[0])[0]["waited"] == 0.04
+
+
+def test_a_damaged_figure_costs_itself_alone(db: Database) -> None:
+    sign(db, "here:1", Figures(12, 3, 0.25, 300_000_000, 0.04))
+    with db.write() as session:
+        session.execute(text("UPDATE worker SET busy = 'much', started = 'once'"))
+    assert listed()[1].split() == ["here:1", "12", "3", "300", "MB", "40", "ms"]
 
 
 def test_a_worker_says_how_it_is(db: Database, settings: Settings) -> None:
