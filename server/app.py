@@ -34,7 +34,7 @@ from parenting.server.job_kinds import KINDS
 from parenting.server.languages import SHIPPED, LanguageMiddleware, Languages
 from parenting.server.log_limit import LogLimit
 from parenting.server.meters import Meters
-from parenting.server.migrate import require_current
+from parenting.server.migrate import require_ready
 from parenting.server.notify import Notifier
 from parenting.server.pages.render import compile_first
 from parenting.server.requests import RequestMiddleware
@@ -78,7 +78,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
         SetupError: the database cannot be used as it is; the sentence names the remedy.
     """
     db = connect(settings) if db is None else db
-    require_current(db)
+    require_ready(db)
     app = bare_app()
     app.state.db, app.state.settings = db, settings
     app.state.languages = Languages(settings.languages or SHIPPED)

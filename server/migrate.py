@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.errors import SetupError
-from parenting.server.store.postgresql import begin_migration
+from parenting.server.store.postgresql import PRIMARY, begin_migration, is_standby
 
 FOLDER = Path(__file__).parents[1] / "migrations"
 
@@ -92,6 +92,20 @@ def require_current(db: Database) -> None:
         raise SetupError(f"{_place(db)} has no tables yet. Run: `parenting migrate`")
     if found != newest():
         raise SetupError(f"{_place(db)} is from an older version of Parenting. Run: `parenting migrate`")
+
+
+def require_ready(db: Database) -> None:
+    """Refuse to serve pages from, or to raise runs in, a database that is not up to date or takes no writes.
+
+    Raises:
+        SetupError: the database is a standby of PostgreSQL, or `require_current` refuses it.
+    """
+    with db.read() as session:
+        connection = session.connection()
+        standby = connection.dialect.name == "postgresql" and is_standby(connection)
+    if standby:
+        raise SetupError(f"{_place(db)} is a standby, which takes no answers. {PRIMARY}")
+    require_current(db)
 
 
 def revision(db: Database) -> str | None:

@@ -26,7 +26,7 @@ from parenting.envs import registry
 from parenting.server import runs, workers
 from parenting.server.db import Database, connect
 from parenting.server.errors import StoreError
-from parenting.server.migrate import require_current
+from parenting.server.migrate import require_ready
 from parenting.server.notify import Notifier
 from parenting.server.settings import Settings
 from parenting.server.store.relay import Relay
@@ -258,7 +258,7 @@ def main(settings: Settings) -> int:
     worker = Worker(connect(settings), settings, BESIDE_SECONDS)
     signal.signal(signal.SIGTERM, worker.stop)
     signal.signal(signal.SIGINT, worker.stop)
-    worker.patient(partial(require_current, worker.db))
+    worker.patient(partial(require_ready, worker.db))
     if settings.ballast:
         worker.db.keep_ballast()
     gc.freeze()  # loaded modules stay: searching them for garbage takes a tenth of a second

@@ -10,7 +10,7 @@ from sqlalchemy import URL, NullPool, create_engine, make_url
 
 from parenting.server.columns import loads
 from parenting.server.db import Database, connect
-from parenting.server.doctor import files, machine, rows, store
+from parenting.server.doctor import files, machine, rows, server, store
 from parenting.server.doctor.findings import Finding, error, guarded, ok
 from parenting.server.settings import Settings
 
@@ -57,8 +57,9 @@ def _sqlite(settings: Settings, url: URL) -> Iterator[Finding]:
 def _server(settings: Settings) -> Iterator[Finding]:
     db = connect(settings)
     with db.read() as session:
-        version = session.connection().dialect.server_version_info
-    yield ok("database", f"{db.engine.url.render_as_string()} answers; PostgreSQL {version}")
+        session.connection()
+    yield ok("database", f"{db.engine.url.render_as_string()} answers")
+    yield from guarded("server", partial(server.server, db))
     yield from _tables(db)
 
 

@@ -17,6 +17,10 @@ from parenting.server.store.sqlite import BUSY_SECONDS
 
 WRITERS = 16
 """Transactions of one process that may write at once."""
+KEPT, MORE = WRITERS + 4, 30
+CONNECTIONS = KEPT + MORE + 2
+"""Connections that a process takes at most, with the one that sees what is new and the one that is told."""
+PRIMARY = "Name the primary server in PARENTING_DATABASE_URL, or promote the standby (pg_promote)."
 LIMITS = {
     "lock_timeout": int(BUSY_SECONDS * 1000),
     "statement_timeout": 15_000,
@@ -52,8 +56,8 @@ def open_engine(url: URL, **options: Any) -> Engine:
             connect_args={**network, "options": " ".join([*limits, *named])},
             isolation_level="READ COMMITTED",
             pool_pre_ping=True,
-            pool_size=WRITERS + 4,
-            max_overflow=30,
+            pool_size=KEPT,
+            max_overflow=MORE,
             pool_timeout=BUSY_SECONDS,
             **options,
         )
@@ -85,6 +89,12 @@ def begin_migration(connection: Connection) -> None:
     lift_limits(connection)
     connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({MIGRATION})")
     connection.exec_driver_sql(f"SET LOCAL lock_timeout = {LIMITS['lock_timeout']}")
+
+
+def is_standby(connection: Connection) -> bool:
+    """Return whether a server follows another one, and so takes no writes."""
+    follows: bool = connection.exec_driver_sql("SELECT pg_is_in_recovery()").scalar_one()
+    return follows
 
 
 def lift_limits(connection: Connection) -> None:

@@ -1,0 +1,83 @@
+"""The doctor looks at PostgreSQL itself; pages and workers do not start on a standby."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from parenting.server.app import create_app
+from parenting.server.db import Database, connect
+from parenting.server.doctor.examination import examine
+from parenting.server.doctor.findings import State
+from parenting.server.errors import SetupError
+from parenting.server.settings import Settings
+from parenting.server.worker import main
+from tests.postgres import Cluster, programs
+
+pytestmark = pytest.mark.postgresql
+
+
+@pytest.fixture
+def server() -> Iterator[Cluster]:
+    """A server as an operator has it: the one of the tests keeps nothing through a crash."""
+    programs()
+    own = Cluster(fsync="on", full_page_writes="on", max_connections="60")
+    yield own
+    own.stop()
+
+
+@pytest.fixture
+def settings(server: Cluster, tmp_path: Path) -> Settings:
+    server.create("home")
+    return Settings(data=tmp_path, database_url=server.url("home"))
+
+
+def found(settings: Settings, *names: str) -> dict[str, tuple[State, str]]:
+    return {one.name: (one.state, one.said) for one in examine(settings) if one.name in names}
+
+
+def connections(db: Database, number: int) -> None:
+    """Have a number of connections of the pool open at once."""
+    held = [db.engine.connect() for _ in range(number)]
+    for one in held:
+        one.close()
+
+
+def test_a_server_is_told_with_its_settings_and_connections(server: Cluster, settings: Settings) -> None:
+    asked = ("server", "server settings", "connections")
+    told = found(settings, *asked)
+    assert {name: state for name, (state, _) in told.items()} == dict.fromkeys(asked, State.OK)
+    assert "room for 1 of them" in told["connections"][1]
+    server.admin.execute("ALTER DATABASE home SET synchronous_commit = off")
+    db = connect(settings)
+    connections(db, 15)
+    told = found(settings, *asked)
+    db.close()
+    assert told["server settings"] == (
+        State.ERROR,
+        "synchronous_commit is off: a crash of the server loses answers that were confirmed",
+    )
+    assert told["connections"][0] is State.WARNING
+
+
+def test_a_standby_is_an_error_and_nothing_starts_on_it(server: Cluster, settings: Settings) -> None:
+    server.admin.close()
+    server._run("pg_ctl", "stop", "-m", "fast")
+    signal = server.folder / "standby.signal"
+    signal.touch()
+    if server.user:
+        shutil.chown(signal, "postgres")
+    options = f"-k {server.folder} -c listen_addresses="
+    server._run("pg_ctl", "start", "-w", "-l", str(server.folder / "log"), "-o", options)
+    try:
+        state, said = found(settings, "server")["server"]
+        assert (state, "is a standby" in said) == (State.ERROR, True)
+        with pytest.raises(SetupError, match=r"is a standby, which takes no answers\. Name the primary"):
+            create_app(settings)
+        with pytest.raises(SetupError, match="is a standby"):
+            main(settings)
+    finally:
+        server._run("pg_ctl", "stop", "-m", "immediate")
