@@ -29,7 +29,7 @@ def server(db: Database) -> Iterator[Finding]:
         off = [name for name in ENDANGERED if session.scalar(text(f"SHOW {name}")) == "off"]
         most, reserved, used = session.execute(_CONNECTIONS).one()
     shown = ".".join(map(str, version))
-    if version[0] < OLDEST:
+    if int(version[0]) < OLDEST:
         yield error("server", f"PostgreSQL {shown} is too old", f"Use version {OLDEST} or newer.")
     elif standby:
         yield error("server", f"PostgreSQL {shown} is a standby, which takes no answers", postgresql.PRIMARY)
