@@ -14,7 +14,7 @@ from parenting.server.api.lists import Part, Place
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import read_responses
 from parenting.server.board import store
-from parenting.server.board.columns import text_of, unpack
+from parenting.server.board.columns import known_policies, text_of, unpack
 from parenting.server.columns import UNREADABLE
 from parenting.server.deps import Db
 from parenting.server.errors import DamagedRowError, NotFound
@@ -72,6 +72,10 @@ class NumbersSchema(SnapshotSchema):
     p_guid: float
     stage: int
     """The stage of the policy: `maturity`, or an earlier one."""
+    partial: bool
+    """The policy that acted is computed still; read the same tick again later."""
+    known: int
+    """The states whose policy is here."""
     policy: str
     """Four bytes a state, up, down, left and right: the probability in 255ths; four zeros: not stored."""
     familiarity: str
@@ -132,6 +136,7 @@ def get_snapshot(
         raise NotFound(f"At tick {row.tick} there was no policy of stage {wanted}; the last was {row.stage}.")
     try:
         columns = unpack(row.blob, row.states)
+        now = known_policies(columns["policy"])
         policy = unpack(other.blob, other.states)["policy"][: 4 * row.states].ljust(4 * row.states, b"\0")
         return NumbersSchema(
             tick=row.tick,
@@ -140,6 +145,8 @@ def get_snapshot(
             states=row.states,
             p_guid=row.p_guid,
             stage=wanted,
+            partial=now < row.states,
+            known=known_policies(policy),
             **{name: text_of(column) for name, column in {**columns, "policy": policy}.items()},
         )
     except UNREADABLE as error:

@@ -29,6 +29,8 @@ NUMBERS: dict[str, Any] = {
     "states": 1,
     "p_guid": 0.9,
     "stage": 1,
+    "partial": False,
+    "known": 1,
     "policy": "BeYNBw==",
     "familiarity": "AwA=",
     "visits": "CQAAAA==",

@@ -40,6 +40,11 @@ def unpack(blob: bytes, states: int) -> dict[str, bytes]:
     return found
 
 
+def known_policies(policy: bytes) -> int:
+    """Return in how many states a column has the policy."""
+    return sum(map(bool, memoryview(policy).cast("I")))
+
+
 def text_of(column: bytes) -> str:
     """Return a column as base64."""
     return base64.b64encode(column).decode()

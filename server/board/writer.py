@@ -3,7 +3,8 @@
 A snapshot is stored with every checkpoint, and at ticks that grow by a twentieth, so that a short life has
 some too. It counts, by state, the moves, the unsafe ones, and the answers that entered X. Where the policy in
 all states takes long, it is computed in portions between ticks (`server.board.sweep`), and a checkpoint has
-the counts alone beside it.
+the counts alone beside it. The first snapshot of a run is stored from its first portion on, with what is
+known by then.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
 from parenting.evaluation.argmax import Evaluation, TabularEvaluation
 from parenting.server.board import store
-from parenting.server.board.columns import pack, unpack
+from parenting.server.board.columns import known_policies, pack, unpack
 from parenting.server.board.states import MOST_STATES, KnownStates
 from parenting.server.board.store import COUNTS_ALONE, Numbers
 from parenting.server.board.sweep import Policy, Sweep
@@ -67,7 +68,8 @@ class BoardWriter:
         self._frozen_stored: dict[int, int] = {}  # the states of each that are stored
         self._begun: Begun | None = None
         self._tick = int(saved.state.keys.tick[0])
-        self._written = self._tick if known else -1  # a life of before snapshots has its first at once
+        whole = known is not None and self._has_whole()
+        self._written = self._tick if whole else -1  # a life without a whole one has its first at once
         self._deaths = int(saved.tally.deaths[0])
         self._after: int | None = self._tick if known else -1  # numbers of states that are lost say nothing
         self._due, self._quick = 0.0, True
@@ -150,6 +152,8 @@ class BoardWriter:
         sweep.go_on()
         self._quick = sweep.done and sweep.portions == 1
         if not sweep.done:
+            if self._written == -1 and sweep.portions.bit_count() == 1:  # seldom, as storing takes time too
+                self._store([self._so_far(begun)])
             return
         self._begun, began = None, time.monotonic()
         known = {stage: {"policy": bytes(one.known)} for stage, one in sweep.policies.items()}
@@ -162,6 +166,22 @@ class BoardWriter:
         self._store(found)
         self._written = now.tick
         self._due = time.monotonic() + (sweep.seconds + time.monotonic() - began) / SHARE
+
+    def _so_far(self, begun: Begun) -> Numbers:
+        """Return a snapshot with the policy of the states that are through; the whole one replaces it."""
+        now, policies = begun.numbers, begun.sweep.policies
+        policy = bytes(policies[now.stage].known).ljust(4 * now.states, b"\0")
+        return replace(now, blob=pack(begun.columns | {"policy": policy}))
+
+    def _has_whole(self) -> bool:
+        """Return whether a snapshot with the policy of all its states is stored, or a damaged one."""
+        row = store.read_snapshot(self._db, self._mine.run_id, self._tick)
+        if row is None or damage(row) is not None:
+            return row is not None
+        try:
+            return known_policies(unpack(row.blob, row.states).get("policy", b"")) == row.states
+        except ValueError:
+            return True
 
     def _store(self, found: list[Numbers]) -> None:
         """Store rows, and with them all states that are known by now."""

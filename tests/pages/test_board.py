@@ -8,7 +8,8 @@ import pytest
 from playwright.sync_api import APIResponse, Page, Route, expect
 
 from parenting.drawing.policy import policy_arrows
-from parenting.server.board import store
+from parenting.server.board import states as known_states
+from parenting.server.board import store, sweep
 from parenting.server.board.columns import unpack
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
@@ -90,6 +91,24 @@ def test_the_board_shows_the_stored_policy_and_follows_it(tabs: BrowserTabs, lif
     before = drawn(page)
     pick(page, "Box")
     assert drawn(page) == stored(life, 21, 1) != before
+
+
+def test_a_partial_first_snapshot_says_so_until_it_is_whole(
+    tabs: BrowserTabs, db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in (known_states, sweep):
+        monkeypatch.setattr(module, "GLYPHS_AT_ONCE", 1)
+    life = begin(db, "side-effects")
+    live(life, 1)
+    page = tabs.open("/runs/1")
+    now = page.locator("#seen-at")
+    expect(now).to_contain_text(re.compile(r"Tick 1, .* · so far the policy of \d of \d+ states"))
+    few = len(drawn(page))
+    while life.board.busy:
+        life.report_waiting(watch(life.db, [1])[1])
+    expect(now).to_have_text(re.compile("Tick 1, .* · the newest$"))
+    assert few < len(drawn(page))
+    assert drawn(page) == stored(life, 1, 0)
 
 
 def test_what_is_named_is_what_is_drawn(tabs: BrowserTabs, life: RunSession) -> None:

@@ -32,7 +32,7 @@ export function boardOf(run) {
       if (!kept.has(key)) {
         const found = await get(`/api/v1/runs/${run}/board/${tick}${stage ? `?stage=${stage}` : ""}`);
         const policy = decode(found.policy, Uint8Array), familiarity = decode(found.familiarity, Uint16Array);
-        kept.set(key, {
+        const numbers = {
           ...found,
           policy: (state) => {
             const row = policy.subarray(4 * state, 4 * state + 4);
@@ -43,7 +43,9 @@ export function boardOf(run) {
           visits: decode(found.visits, Uint32Array),
           deaths: decode(found.deaths, Uint32Array),
           entries: decode(found.entries, Uint32Array),
-        });
+        };
+        if (found.partial) return numbers; // the whole one has the same tick
+        kept.set(key, numbers);
         if (kept.size > KEPT) kept.delete(kept.keys().next().value);
       }
       return kept.get(key);

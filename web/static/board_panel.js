@@ -14,8 +14,9 @@ const data = boardOf(run), { known } = data;
 const WAYS = ["up", "down", "left", "right"], COUNTS = ["visits", "deaths", "entries"];
 const NAMES = Object.fromEntries([...panel.querySelectorAll("[data-number]")].map(({ dataset, previousElementSibling }) => [dataset.number, previousElementSibling.textContent]));
 const CALM = 1000, LATER = 3000; // ms between two looks for new snapshots, and until the last one after an event
+const LONGEST = 30_000; // ms at most until a partial snapshot is read again
 let shown = null, sums = null, index = new Map(); // the snapshot, its counts by cell, the states of this rest by cell
-let newest = true, wanted = null, busy = false, looked = -CALM, timer = 0, looking = false, again = false, late = false;
+let newest = true, wanted = null, busy = false, looked = -CALM, timer = 0, looking = false, again = false, late = false, rereading = 0, pause = LATER;
 
 const percent = (share) => share > 0 && share < 0.005 ? "under 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
 const listed = (numbers) => Object.entries(numbers).map(([name, text]) => `${NAMES[name]} ${text}`).join(", ");
@@ -131,9 +132,22 @@ async function show(place) {
       if (shown.states > known.cells.length) await data.news();
       sumUp();
       turned();
-      put("seen-at", wordsOf(one) + (newest && one === known.snapshots.at(-1) ? " · the newest" : ""));
+      put("seen-at", wordsOf(one) + (newest && one === known.snapshots.at(-1) ? " · the newest" : "") + soFar(shown));
     }
-  } catch ({ message }) { put("seen-at", message); } finally { busy = false; }
+  } catch ({ message }) { put("seen-at", message); } finally {
+    busy = false;
+    readAgain();
+  }
+}
+
+// The first snapshot of a large board is stored before all of its policy is computed, and the whole one has the same tick.
+const soFar = ({ partial, known: there, states }) => partial ? ` · so far the policy of ${number(there)} of ${number(states)} states` : "";
+
+function readAgain() {
+  clearTimeout(rereading);
+  if (!shown?.partial) return;
+  rereading = setTimeout(() => show(Number(slider.value)), pause);
+  pause = Math.min(2 * pause, LONGEST);
 }
 
 function go(place) {

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import math
 import random
 
+import httpx2
 import pytest
 from sqlalchemy import delete, select, update
 
@@ -44,7 +46,7 @@ def test_a_snapshot_is_of_the_tick_at_which_it_was_begun(
     parameters = life.saved.state.learner.params.clone()
     states = len(life.board._states.cells)
     while life.board.busy:
-        assert ticks(db, life) == []
+        assert ticks(db, life) == [1]
         live(life, 1)
     assert life.last_tick >= states
     assert not life.saved.state.learner.params.equal(parameters)
@@ -63,7 +65,6 @@ def test_a_checkpoint_amid_a_snapshot_has_its_counts(db: Database, monkeypatch: 
         moves += live(life, 2)
         life.save()
     assert life.board.busy
-    assert ticks(db, life) == []
     live(life, 1)
     again = RunSession(db, life.claim, life.run, lambda: None)
     assert again.last_tick == 10
@@ -141,3 +142,37 @@ def test_all_that_is_stored_of_a_board_stays_within_its_bytes(
     assert states > 3_000
     assert 28_000 < sum(sizes) + states <= 30_000
     assert ticks_of(db, mine.run_id)[-1] == 59
+
+
+def test_a_first_snapshot_is_stored_from_its_first_portion_on(
+    db: Database, client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also after a worker that died amid it; the next snapshots are stored whole."""
+    small_portions(monkeypatch)
+    monkeypatch.setattr(writer, "SHARE", math.inf)
+    life = begin(db, "unsafe-exploration")
+    number = life.claim.run_id
+
+    def told() -> tuple[bool, int]:
+        found = client.get(f"/api/v1/runs/{number}/board/{life.last_tick}").json()
+        policy = base64.b64decode(found["policy"])
+        rows = [any(policy[at : at + 4]) for at in range(0, len(policy), 4)]
+        assert (sum(rows), len(rows)) == (found["known"], found["states"])
+        return found["partial"], found["known"]
+
+    live(life, 1)
+    assert told() == (True, 1)
+    life.save()
+    again = RunSession(db, life.claim, life.run, lambda: None)
+    seen = watch(db, [number])[number]
+    for _ in range(8):
+        again.report_waiting(seen)
+    assert told() == (True, 8)
+    while again.board.busy:
+        again.report_waiting(seen)
+    partial, known = told()
+    assert (partial, known) == (False, len(again.board._states.cells))
+    assert ticks(db, again) == [1]
+    while not again.board.busy:
+        live(again, 1)
+    assert ticks(db, again) == [1]
