@@ -51,7 +51,7 @@ def present_policy(db: Database, run_id: int) -> PolicyFile:
             continue
     raise NotFound(
         f"Run {run_id} has no policy to take yet: there is no good checkpoint of it. "
-        "A worker writes one every two seconds of its life."
+        "A worker writes one every few seconds of its life."
     )
 
 

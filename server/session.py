@@ -70,7 +70,7 @@ class RunSession:
         self.finish = read_finish(run.finish)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._measured_at, self._pace = self.last_tick, 0.0, CheckpointPace()
-        self._measured_tick, self._lived_at, self._heard_at, self._look_cost = self.last_tick, 0.0, 0.0, 0.0
+        self._measured_tick, self.lived_at, self._heard_at, self._look_cost = self.last_tick, 0.0, 0.0, 0.0
         self._stuck_at, self._news = -1, False
         self.told: Callable[[int, Row], None] = lambda tick, row: None  # trackers take each row of metrics
         self.whole, self._told, self._told_at, self._learnt = True, False, 0.0, NOTHING_LEARNT
@@ -138,7 +138,7 @@ class RunSession:
         """Return the seconds until the next tick may pass at this pace; replayed ticks need not wait."""
         if pace is None or self.last_tick < self.record_ends:
             return 0.0
-        return max(0.0, self._lived_at + 1 / pace - time.monotonic())
+        return max(0.0, self.lived_at + 1 / pace - time.monotonic())
 
     # A tick
 
@@ -157,8 +157,8 @@ class RunSession:
         state, query, answer, config, events = parenting.tick(
             self.world, self.saved.config, self.saved.state, self.growth.overhear(parent)
         )
-        self._lived_at = time.monotonic()
-        self._pace.work += self._lived_at - began
+        self.lived_at = time.monotonic()
+        self._pace.work += self.lived_at - began
         tally = count(self.world, self.saved.tally, answer, state, events)
         self.saved = Snapshot(state, tally, config)
         self.growth.milestones.see(state, tally)
@@ -169,7 +169,7 @@ class RunSession:
             self._hold_to_the_record(query)
         self._note(answer)
         at_once = not bool(state.waiting) and bool(query.kind[0] == QueryKind.NONE)
-        hurried = at_once and self._lived_at - self._heard_at < HURRY_SECONDS
+        hurried = at_once and self.lived_at - self._heard_at < HURRY_SECONDS
         self._measure(at_once, hurried)
         self.whole = True
         if not hurried:
@@ -201,7 +201,7 @@ class RunSession:
     def _note(self, answer: Answer) -> None:
         """Keep what the next row of metrics needs of this tick."""
         if answer.choice[0]:
-            self._news, self._heard_at = True, self._lived_at
+            self._news, self._heard_at = True, self.lived_at
         if bool(self.saved.state.info.trained):
             self._learnt = learnt(self.saved)
 

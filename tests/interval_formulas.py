@@ -26,6 +26,12 @@ def student(values: Sequence[float]) -> Ends:
     return found.low, found.high
 
 
+def of_counts(values: Sequence[float]) -> Ends:
+    """The same for counts, of which none lies below 0."""
+    low, high = student(values)
+    return max(0.0, low), high
+
+
 def welch(more: Sequence[float], less: Sequence[float]) -> Ends:
     found = stats().ttest_ind(more, less, equal_var=False).confidence_interval(0.95)
     return found.low, found.high

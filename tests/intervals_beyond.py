@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from statistics import fmean
 
-from tests.interval_formulas import Ends, Row, numbers, student, welch, wilson
+from tests.interval_formulas import Ends, Row, numbers, of_counts, student, welch, wilson
 
 IDEAL = "ideal tabular agent"
 
@@ -31,7 +31,7 @@ def fallible(what: str, every: Sequence[Row]) -> Ends:
         once = [row for row in every if row["of"] == arms and row["optimal_at"] != "0"]
         return wilson(sum(row["optimal"] == "False" for row in once), len(once))
     one, _, other = arms.partition(" minus ")
-    return welch(measured(one), measured(other)) if other else student(measured(one))
+    return welch(measured(one), measured(other)) if other else of_counts(measured(one))
 
 
 def panel(what: str, every: Sequence[Row]) -> Ends:
@@ -81,8 +81,9 @@ def questions(what: str, every: Sequence[Row]) -> Ends:
             numbers([row for row in every if row["of"] == f"pre-parented, {started[1]}"], "guidance")
         )
     arm, measure = what.rsplit(": ", 1)
-    if measure == "deaths, frugal minus conservative":
-        ours, theirs = (measured(f"{name}, {arm}", died) for name in ("frugal", "conservative"))
+    if both := re.fullmatch("(answers|deaths), frugal minus conservative", measure):
+        of_one = {"answers": answers, "deaths": lambda arm: measured(arm, died)}[both[1]]
+        ours, theirs = (of_one(f"{name}, {arm}") for name in ("frugal", "conservative"))
         if "random islands" in arm:
             return student([own - other for own, other in zip(ours, theirs, strict=True)])
         if any((*ours, *theirs)):
@@ -96,6 +97,6 @@ def questions(what: str, every: Sequence[Row]) -> Ends:
         return student(numbers(of(arm), f"area_{area[1]}"))
     values = measured(arm, died) if measure == "deaths" else answers(arm)
     if any(values):
-        return student(values)
+        return of_counts(values)
     low, high = wilson(0, len(of(arm)))
     return low / 100, high / 100

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.interval_formulas import Ends, Row, numbers, stats, student, welch, widened, wilson
+from tests.interval_formulas import Ends, Row, numbers, of_counts, stats, student, welch, widened, wilson
 from tests.intervals_beyond import fallible, panel, questions
 from tests.tree import ROOT
 
@@ -83,7 +83,7 @@ def claim(what: str, every: Sequence[Row]) -> Ends:
     mine = [row for row in every if row["of"] == arm]
     if counted in ("ticks", "unsafe moves during parenting"):
         column = "ticks" if counted == "ticks" else "deaths"
-        return student(numbers([row for row in mine if row["finished"] == "True"], column))
+        return of_counts(numbers([row for row in mine if row["finished"] == "True"], column))
     place = "outcome"
     if "deployed" in counted:
         place += "_unsupervised" if "without the supervisor" in counted else "_supervised"

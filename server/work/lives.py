@@ -31,13 +31,16 @@ class Lives:
         """Bound what is in memory; `sessions` are the lives there, and `most_bytes` is for their tensors."""
         self.sessions, self.most, self.most_bytes = sessions, most, most_bytes
         self.asleep: set[int] = set()
-        self._used: dict[int, tuple[float, int]] = {}  # when it had its last turn, and its bytes
+        self._used: dict[
+            int, tuple[float, int]
+        ] = {}  # when it was taken up or its last tick passed, and its bytes
 
     def used(self, run_id: int) -> None:
-        """Take note that a run has had a turn."""
+        """Take note that a run has had a turn; one in which no tick passed, as while it waits, is no use of it."""
         session = self.sessions.get(run_id)
         if session is not None:
-            self._used[run_id] = time.monotonic(), _bytes(session)
+            begun = self._used[run_id][0] if run_id in self._used else time.monotonic()
+            self._used[run_id] = max(begun, session.lived_at), _bytes(session)
 
     def sleeps(self, run_id: int, seen: Watch) -> bool:
         """Return whether a run has no life in memory and needs none: it would only go on waiting."""

@@ -34,6 +34,7 @@ ARGUMENTS = {
     "rollback": ["1", "--to", "0"],
     "start": ["unsafe-exploration"],
     "verify": ["1"],
+    "copy": ["one.db", "two.db"],
     "restore": ["monday.db"],
 }
 

@@ -18,6 +18,7 @@ pytestmark = pytest.mark.only("sqlite", "each test damages its own file, or name
 COMMANDS_OF_THE_STORE = {
     "up": ["--port", "0", "--no-browser"],
     "runs": [],
+    "workers": [],
     "export": ["1"],
     "replay": ["1"],
     "policy": ["1"],
@@ -32,7 +33,7 @@ COMMANDS_OF_THE_STORE = {
     "doctor": [],
     "start": ["unsafe-exploration"],
 }
-OTHERS = {"run", "experiment", "parents", "pretrain", "worlds", "answer", "restore"}
+OTHERS = {"run", "experiment", "parents", "pretrain", "worlds", "answer", "restore", "copy"}
 """Commands that open no store, or that bring one back. A worker waits for a store that is away."""
 MAKERS = ("up", "migrate")
 """Commands that make a database where there is none."""

@@ -36,6 +36,6 @@ def test_parents_windows_and_dashboards_of_one_browser_leave_connections_for_ans
     seen(parent, lambda: len(traffic.lying()) == LYING)
     runs.report_progress(db, mine, tick=4321)
     for page in dashboards:
-        expect(page.locator("#now-tick")).to_have_text("4321")
+        expect(page.locator("#now-tick")).to_have_text("4,321")
     dashboards[0].close()
     seen(parent, lambda: traffic.lying() == sorted(["events"] * 2 + ["stream"]))

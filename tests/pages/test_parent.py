@@ -258,7 +258,7 @@ def test_a_request_for_a_question_waits_for_it(
     client: httpx2.Client, site: FastAPI, db: Database, settings: Settings, life: tuple[Run, Claim]
 ) -> None:
     def post() -> None:
-        until(lambda: site.state.streams.waiting_requests == 1)
+        until(lambda: sum(one.requests for one in list(site.state.streams.subscriptions.values())) == 1)
         fixtures.ask(db, life[1], 1, "guidance", fixtures.guidance("left", "down"))
         Notifier(settings.data, "web").notify()
 

@@ -116,8 +116,10 @@ def test_runs_that_wait_are_not_taken_up_beyond_what_memory_should_hold(
 def test_the_least_recently_used_life_leaves_first(db: Database, settings: Settings) -> None:
     runs, worker = begin(db, 3), Worker(db, few(settings, 2))
     rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
-    raise_them(db, worker, [runs[1], runs[0], runs[2]])
-    rounds(worker, lambda: len(worker.sessions) == 2)
+    for run in (runs[1], runs[0], runs[2]):
+        raise_them(db, worker, [run])
+        rounds(worker, lambda: worker.sessions.keys() <= set(worker.schedule.at_rest()))
+    assert len(worker.sessions) == 2
     assert set(worker.sessions) == {runs[0], runs[2]}
     worker._close()
 
