@@ -36,7 +36,7 @@ class Lives:
         ] = {}  # when it was taken up or its last tick passed, and its bytes
 
     def used(self, run_id: int) -> None:
-        """Take note that a run has had a turn; one in which no tick passed, as while it waits, is no use of it."""
+        """Take note that a run has had a turn. While it waits no tick passes, and it counts as not used."""
         session = self.sessions.get(run_id)
         if session is not None:
             begun = self._used[run_id][0] if run_id in self._used else time.monotonic()

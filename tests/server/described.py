@@ -51,7 +51,7 @@ UNTOLD: dict[str, list[Any]] = {
 together, the ticks that a run has lived, and the characters of what people write."""
 
 EXAMPLE_OF_POLICY = "the bytes of a file of safetensors"
-"""What the description gives as an example; only a policy's own bytes are one."""
+"""The example in the description; only a policy's own bytes are one."""
 
 
 def description() -> BaseSchema:
