@@ -82,8 +82,8 @@ def questions(what: str, every: Sequence[Row]) -> Ends:
         )
     arm, measure = what.rsplit(": ", 1)
     if both := re.fullmatch("(answers|deaths), frugal minus conservative", measure):
-        of_one = {"answers": answers, "deaths": lambda arm: measured(arm, died)}[both[1]]
-        ours, theirs = (of_one(f"{name}, {arm}") for name in ("frugal", "conservative"))
+        named = [f"{name}, {arm}" for name in ("frugal", "conservative")]
+        ours, theirs = (answers(one) if both[1] == "answers" else measured(one, died) for one in named)
         if "random islands" in arm:
             return student([own - other for own, other in zip(ours, theirs, strict=True)])
         if any((*ours, *theirs)):
