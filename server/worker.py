@@ -139,7 +139,8 @@ class Worker:
         """Sign for this process and all that it raises, and give up the runs whose turn hangs."""
         figures = self.load.figures(len(self.claims), len(self.sessions), self.schedule.waited())
         workers.sign(self.db, self.name, figures)
-        hung = [self.claims[run_id] for run_id in self.turns.working(HUNG_SECONDS) & self.claims.keys()]
+        # Other threads drop claims meanwhile, so each is asked for once.
+        hung = [claim for run_id in self.turns.working(HUNG_SECONDS) if (claim := self.claims.get(run_id))]
         if hung:
             runs.let_go(self.db, hung)
         self.jobs.renew()

@@ -31,9 +31,8 @@ class Lives:
         """Bound what is in memory; `sessions` are the lives there, and `most_bytes` is for their tensors."""
         self.sessions, self.most, self.most_bytes = sessions, most, most_bytes
         self.asleep: set[int] = set()
-        self._used: dict[
-            int, tuple[float, int]
-        ] = {}  # when it was taken up or its last tick passed, and its bytes
+        # When each was taken up or its last tick passed, and its bytes.
+        self._used: dict[int, tuple[float, int]] = {}
 
     def used(self, run_id: int) -> None:
         """Take note that a run has had a turn. While it waits no tick passes, and it counts as not used."""

@@ -224,6 +224,7 @@ def test_the_form_takes_a_policy_and_keeps_it_until_the_run_begins(
     page = client.post("/policies", data=form, files={"policy_file": ("<b>.safetensors", written[0])})
     assert page.status_code == 200
     assert "The policy &lt;b&gt;.safetensors" in page.text
+    assert "Of the world Unsafe Exploration" in page.text
     assert 'value="5"' in page.text
     (sha256,) = re.findall(r'name="from_policy" value="(\w+)" checked', page.text)
     wrong = client.post("/runs", data={**form, "seed": "many", "from_policy": sha256})

@@ -1,5 +1,6 @@
 // Pre-training before a run: the job is looked at each second, and the form goes on once it is over.
 import "./errors.js";
+import { number } from "./numbers.js";
 
 const form = document.querySelector("[data-job]"), told = document.getElementById("told"), bar = document.getElementById("progress");
 const { job } = form.dataset;
@@ -9,7 +10,7 @@ function progressed({ steps, expected, seconds }) {
   bar.value = Math.min(steps / expected, .99);
   const left = Math.ceil((expected - steps) * seconds / steps / 5) * 5;
   const time = left > 90 ? `about ${Math.round(left / 60)} min left` : left > 0 ? `about ${left} s left` : "it takes longer than most";
-  return `${steps} of about ${expected} steps, ${time}.`;
+  return `${number(steps)} of about ${number(expected)} steps, ${time}.`;
 }
 
 async function look() {
