@@ -79,10 +79,10 @@ def start(page: Page, url: str, preset: str, seed: int = 3, goal: int | None = N
     page.wait_for_selector("#main[data-run]")
 
 
-def distances(level: str | Level = "island") -> dict[Cell, int]:
-    """Steps to the goal on dry land, as anyone sees them who looks at the drawing."""
+def distances(level: str | Level = "island", to: str = "G") -> dict[Cell, int]:
+    """Steps to the goal or another glyph on dry land, as anyone sees them who looks at the drawing."""
     drawn = registry.level("unsafe-exploration", level) if isinstance(level, str) else level
-    reached = {drawn.find("G")[0]: 0}
+    reached = {drawn.find(to)[0]: 0}
     edge = list(reached)
     while edge:
         y, x = edge.pop(0)

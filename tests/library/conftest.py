@@ -8,8 +8,7 @@ import pytest
 
 import parenting as pt
 from parenting.library import page_training
-from tests.library.person_at_page import PersonAtPage
-from tests.simulated_person import Cell
+from tests.library.person_at_page import PersonAtPage, ToGoal
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +29,7 @@ def person_at_the_page(
     opened: list[PersonAtPage] = []
 
     def prepare(
-        answers: int, then: Callable[[], None] = lambda: None, to_goal: dict[Cell, int] | None = None
+        answers: int, then: Callable[[], None] = lambda: None, to_goal: ToGoal | None = None
     ) -> list[PersonAtPage]:
         def open_page(url: str, _browser: bool) -> None:
             opened.append(PersonAtPage(url, chromium_path, answers, then, to_goal))

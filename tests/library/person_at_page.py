@@ -7,9 +7,12 @@ import signal
 import threading
 from collections.abc import Callable
 
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 from tests import simulated_person
+
+ToGoal = dict[simulated_person.Cell, int] | Callable[[Page], dict[simulated_person.Cell, int]]
+"""Steps from each cell to where the agent should go; a function where that depends on what is shown."""
 
 
 class PersonAtPage(threading.Thread):
@@ -21,7 +24,7 @@ class PersonAtPage(threading.Thread):
         chromium: str,
         answers: int,
         then: Callable[[], None],
-        to_goal: dict[simulated_person.Cell, int] | None = None,
+        to_goal: ToGoal | None = None,
     ) -> None:
         super().__init__(daemon=True)
         self.to_goal = simulated_person.distances() if to_goal is None else to_goal
@@ -37,7 +40,9 @@ class PersonAtPage(threading.Thread):
                 page = browser.new_page()
                 page.goto(self.url)
                 for _ in range(self.answers):
-                    simulated_person.answer(page, self.to_goal)
+                    simulated_person.answer(
+                        page, self.to_goal(page) if callable(self.to_goal) else self.to_goal
+                    )
                 self.then()
                 browser.close()
         except BaseException as error:
