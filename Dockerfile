@@ -10,7 +10,8 @@ FROM python:3.11-slim
 # A number, so that nobody has to look it up: who mounts a folder of his own gives it to this user.
 RUN groupadd --gid 10001 parenting \
     && useradd --uid 10001 --gid 10001 --no-create-home --home-dir /data --shell /usr/sbin/nologin parenting \
-    && install -d -o 10001 -g 10001 -m 700 /data
+    && install -d -o 10001 -g 10001 -m 700 /data \
+    && install -d -m 1777 /run/postgresql
 
 # The libraries have a layer of their own, which stands until their list changes. pip's plain torch for Linux is the
 # build for CUDA: gigabytes that this program, which computes on the CPU, never uses. PyTorch keeps the build for CPUs
@@ -19,8 +20,8 @@ RUN groupadd --gid 10001 parenting \
 ARG TORCH_INDEX=""
 WORKDIR /libraries
 COPY pyproject.toml constraints.txt ./
-RUN python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies'], sep='\n')" \
-        > requirements.txt \
+RUN python -c "import tomllib; of = tomllib.load(open('pyproject.toml', 'rb'))['project']; \
+print(*of['dependencies'], *of['optional-dependencies']['postgres'], sep='\n')" > requirements.txt \
     && if [ -n "$TORCH_INDEX" ]; then \
         PIP_INDEX_URL="$TORCH_INDEX" pip install --no-cache-dir --no-deps -c constraints.txt torch; fi \
     && pip install --no-cache-dir -c constraints.txt -r requirements.txt

@@ -15,7 +15,9 @@ from tests.services import image_check, image_environment, read_compose, read_do
 from tests.tree import LINKS, ROOT
 
 SERVICES = ("migrate", "web", "worker")
+SOCKETS = "sockets:/run/postgresql"
 LASTING = ("web", "worker")
+DATABASE = "postgres"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
@@ -34,14 +36,15 @@ def seconds(text: str) -> int:
     return int(found[1])
 
 
-def test_there_are_three_services(compose: dict[str, Any]) -> None:
-    assert tuple(compose["services"]) == SERVICES
+def test_there_are_three_services_and_a_database_by_its_profile(compose: dict[str, Any]) -> None:
+    assert tuple(compose["services"]) == (*SERVICES, DATABASE)
+    assert [name for name, one in compose["services"].items() if "profiles" in one] == [DATABASE]
 
 
-@pytest.mark.parametrize("name", SERVICES)
+@pytest.mark.parametrize("name", [*SERVICES, DATABASE])
 def test_service_may_do_no_more_than_it_must(compose: dict[str, Any], name: str) -> None:
     service = compose["services"][name]
-    assert service["user"] == "10001:10001"
+    assert service["user"] == ("999:999" if name == DATABASE else "10001:10001")
     assert service["read_only"] is True
     assert service["tmpfs"] == ["/tmp"]
     assert service["cap_drop"] == ["ALL"]
@@ -50,11 +53,25 @@ def test_service_may_do_no_more_than_it_must(compose: dict[str, Any], name: str)
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_service_shares_one_named_volume_and_nothing_of_the_host(compose: dict[str, Any], name: str) -> None:
+def test_service_shares_named_volumes_and_nothing_of_the_host(compose: dict[str, Any], name: str) -> None:
     service = compose["services"][name]
-    assert service["volumes"] == ["data:/data"]
+    assert service["volumes"] == ["data:/data", SOCKETS]
     assert service["environment"]["PARENTING_DATA"] == "/data"
-    assert list(compose["volumes"]) == ["data"]
+    assert list(compose["volumes"]) == ["data", DATABASE, "sockets"]
+
+
+def test_the_database_is_reached_over_its_socket_alone(compose: dict[str, Any]) -> None:
+    """So it needs neither a network nor a password; and without its profile all go on with SQLite."""
+    service = compose["services"][DATABASE]
+    assert service["network_mode"] == "none"
+    assert "ports" not in service
+    assert service["command"] == ["postgres", "-c", "listen_addresses="]
+    assert service["volumes"] == ["postgres:/var/lib/postgresql/data", SOCKETS]
+    assert not any("PASSWORD" in name for name in service["environment"])
+    needed = {"postgres": {"condition": "service_healthy", "required": False}}
+    assert compose["services"]["migrate"]["depends_on"] == needed
+    assert {compose["services"][name]["environment"]["PARENTING_DATABASE_URL"] for name in SERVICES} == {""}
+    assert any("install -d -m 1777 /run/postgresql" in run for run in values("RUN"))
 
 
 @pytest.mark.parametrize("name", SERVICES)
@@ -102,7 +119,7 @@ def test_only_that_web_listens_beyond_its_loopback(compose: dict[str, Any]) -> N
 
 @pytest.mark.parametrize("name", SERVICES)
 def test_environment_holds_settings_and_no_secret(compose: dict[str, Any], name: str) -> None:
-    known = {f"PARENTING_{field.upper()}" for field in Settings.model_fields} - {"PARENTING_DATABASE_URL"}
+    known = {f"PARENTING_{field.upper()}" for field in Settings.model_fields}
     assert set(compose["services"][name]["environment"]) <= known
     assert set(image_environment()) <= known | {"PYTHONUNBUFFERED"}
 
