@@ -1,4 +1,4 @@
-"""The services of docker-compose.yml on PostgreSQL over a Unix socket, as its profile `postgres` runs them."""
+"""The services of docker-compose.yml on PostgreSQL with a Unix socket, as the profile `postgres` has them."""
 
 from __future__ import annotations
 
