@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import threading
 import time
-from contextlib import suppress
+
+import structlog
 
 from parenting.commands.crew import Crew
 from parenting.commands.sizing import Sizing
 from parenting.server.damage import sound
 from parenting.server.db import Database
 from parenting.server.errors import StoreError
-from parenting.server.workers import Figures, living
+from parenting.server.workers import Figures, living, worker_name
+
+log = structlog.get_logger()
 
 LOOK_SECONDS = 1.0
 """Seconds between two looks at what the workers say of themselves."""
@@ -27,12 +30,16 @@ def follow_load(crew: Crew, db: Database, sizing: Sizing, told: threading.Event)
         told: Ends it.
     """
     while not told.wait(LOOK_SECONDS):
-        with suppress(StoreError):  # it can say nothing now: their number stays
+        try:
             crew.wanted = sizing.look(_said(crew, db), time.monotonic())
+        except StoreError:
+            continue  # it can say nothing now: their number stays
+        except Exception:
+            log.exception("the load of the workers could not be read; their number stays")
 
 
 def _said(crew: Crew, db: Database) -> list[Figures]:
     """Return what the workers of this crew say of themselves."""
-    mine = {str(child.process.pid) for child in list(crew.children)}
-    rows = [row for row in living(db) if row.name.rpartition(":")[2] in mine]
+    mine = {worker_name(child.process.pid) for child in list(crew.children)}
+    rows = [row for row in living(db) if row.name in mine]
     return [Figures(*(sound(row, name) for name in Figures._fields)) for row in rows]

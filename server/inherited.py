@@ -93,8 +93,9 @@ class AnsweredRun(NamedTuple):
 
 def answered_runs(db: Database) -> list[AnsweredRun]:
     """Return the latest runs with answers, the newest first."""
-    columns = (Run.id, Run.public_id, Run.name, Run.world, Run.level, Run.answers)
-    rows = select(*columns).where(Run.answers > 0, Run.deleting.is_(None), Run.batch.is_(None))
+    standing = (Run.answers - Run.retracted).label("answers")
+    columns = (Run.id, Run.public_id, Run.name, Run.world, Run.level, standing)
+    rows = select(*columns).where(standing > 0, Run.deleting.is_(None), Run.batch.is_(None))
     with db.read() as session:
         found = session.execute(rows.order_by(Run.id.desc()).limit(LISTED)).all()
     whole = [row for row in found if not any(isinstance(value, Damaged) for value in row)]

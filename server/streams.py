@@ -11,10 +11,11 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from typing import TypeVar
 
+import structlog
 from fastapi.sse import ServerSentEvent
 
 from parenting.server.admission import Admission
@@ -24,6 +25,8 @@ from parenting.server.notify import Notifier
 from parenting.server.reads.watching import Look, look, told_metrics, told_runs
 from parenting.server.store.relay import Relay
 from parenting.server.subscriptions import UNSURE_SECONDS, Subscription, either
+
+log = structlog.get_logger()
 
 POLL_SECONDS = 0.25
 """Seconds between looks, and at least between two events of the same run, questions and leases excepted."""
@@ -166,9 +169,14 @@ class Streams:
     async def _watch(self) -> None:
         while self.subscriptions and not self.closed:
             news, cost = self._news, 0.0
-            with suppress(ServerError):  # busy: the next look will tell
+            try:
                 cost = await self._look()
                 await self._read()
+            except ServerError:
+                pass  # busy: the next look will tell
+            except Exception:
+                log.exception("the runs that are followed could not be looked at")
+                cost = LONGEST_REST
             self._tell()
             await asyncio.sleep(min(REST * cost, LONGEST_REST))
             await either(news, self._pause())

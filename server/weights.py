@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 from datetime import datetime, timedelta
 from pathlib import Path
 
-from sqlalchemy import delete, select
+from sqlalchemy import delete, select, update
 from sqlalchemy.orm import Session
 
 from parenting.server.columns import Damaged
@@ -49,6 +49,8 @@ def put_in(session: Session, sha256: str, name: str, blob: bytes, now: datetime)
     same = select(Weights.sha256).where(Weights.sha256 == sha256).with_for_update()
     if session.scalar(same) is None:
         session.add(Weights(sha256=sha256, name=name, blob=blob, created=now))
+    elif not OF_A_SIZE.fullmatch(name):  # what is uploaded again is kept as long as if it were new
+        session.execute(update(Weights).where(Weights.sha256 == sha256).values(created=now))
 
 
 def remove_unused(session: Session, hashes: Collection[str]) -> int:

@@ -11,7 +11,6 @@ import gc
 import math
 import os
 import signal
-import socket
 import sys
 import threading
 import time
@@ -68,7 +67,7 @@ class Worker:
             beside_after: Seconds after which a turn goes on beside the others; None waits for its end.
         """
         self.db, self.settings = db, settings
-        self.name = f"{socket.gethostname()}:{os.getpid()}"
+        self.name = workers.worker_name(os.getpid())
         self.notifier, self.web_notifier = Notifier(settings.data, "worker"), Notifier(settings.data, "web")
         self.relay = Relay(db.engine, "worker", self.notifier.wake)
         self.told = threading.Event()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
@@ -17,6 +18,11 @@ DAY = 24 * 3600.0
 SILENT_SECONDS = 10.0
 """A worker counts as alive for this long after a sign of life. Some ticks take seconds, such as the first
 evaluation of a large level."""
+
+
+def worker_name(pid: int) -> str:
+    """Return the name of a worker that is a process of this machine."""
+    return f"{socket.gethostname()}:{pid}"
 
 
 class Figures(NamedTuple):

@@ -11,8 +11,12 @@ import threading
 import time
 from collections.abc import Callable
 
+import structlog
+
 from parenting.server.errors import StoreError
 from parenting.server.work.patience import Patience
+
+log = structlog.get_logger()
 
 CLOSE_SECONDS = 0.5
 """Seconds that an end waits for a sign that is just given."""
@@ -82,3 +86,6 @@ class Signs:
                 self.give()
             except StoreError as error:
                 self._patience.refused(error)
+            except Exception:
+                log.exception("a sign of life could not be given")
+                self._told.wait(self.every)

@@ -40,9 +40,12 @@ export function following(moved) {
     if (busy || document.hidden || !lives()) return;
     busy = true;
     const began = performance.now();
-    await look();
-    busy = false;
-    timer = setTimeout(turn, Math.max(EVERY, SHARE * (performance.now() - began)));
+    try {
+      await look();
+    } finally {
+      busy = false;
+      timer = setTimeout(turn, Math.max(EVERY, SHARE * (performance.now() - began)));
+    }
   }
 
   document.addEventListener("visibilitychange", () => { if (!timer) turn(); });

@@ -102,10 +102,14 @@ async function open(text, which) {
       return await open(text, "1");
     }
     enter(parse(world.value, found.header, found.rows), found.said.map(sentence), found.error?.message);
-  } catch ({ message }) {
-    world.value = state.world;
-    told.replaceChildren(line(`The text was not opened. ${message}`, "error"));
+  } catch (error) {
+    refuse(error);
   }
+}
+
+function refuse({ message }) {
+  world.value = state.world;
+  told.replaceChildren(line(`The text was not opened. ${message}`, "error"));
 }
 
 function enter(next, said, reason = "This is not a level.") {
@@ -124,7 +128,13 @@ async function openMaps(text) {
   };
   at("several").hidden = levels.length < 2;
   at("which").replaceChildren(...levels.map(({ name }, i) => new Option(`${i + 1} ${name}`, String(i))));
-  at("which").onchange = ({ target }) => carried(levels[target.value]);
+  at("which").onchange = ({ target }) => {
+    try {
+      carried(levels[target.value]);
+    } catch (error) {
+      refuse(error);
+    }
+  };
   carried(levels[0]);
 }
 
