@@ -17,7 +17,7 @@ from parenting.commands.crew import Crew
 from parenting.commands.sizing import Sizing
 from parenting.commands.up import _number
 from parenting.server.db import Database
-from parenting.server.workers import Figures, sign
+from parenting.server.workers import Figures, sign, worker_name, worker_name
 
 WAITING, BUSY, IDLE = (
     Figures(waited=0.3, busy=1.0),
@@ -141,8 +141,10 @@ def test_the_crew_follows_what_its_own_workers_say(db: Database, monkeypatch: py
             return 2
 
     try:
-        sign(db, f"here:{crew.children[0].process.pid}", WAITING)
-        sign(db, "elsewhere:1", BUSY)
+        pid = crew.children[0].process.pid
+        sign(db, worker_name(pid), WAITING)
+        sign(db, worker_name(1), BUSY)
+        sign(db, f"elsewhere:{pid}", BUSY)
         following.follow_load(crew, db, Rule(2), ended)
         assert heard == [[WAITING]]
         assert crew.wanted == 2
