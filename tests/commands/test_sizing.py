@@ -17,7 +17,7 @@ from parenting.commands.crew import Crew
 from parenting.commands.sizing import Sizing
 from parenting.commands.up import _number
 from parenting.server.db import Database
-from parenting.server.workers import Figures, sign, worker_name, worker_name
+from parenting.server.workers import Figures, sign, worker_name
 
 WAITING, BUSY, IDLE = (
     Figures(waited=0.3, busy=1.0),
