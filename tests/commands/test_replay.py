@@ -202,6 +202,7 @@ def test_ctrl_c_ends_it_cleanly(data: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert (said.exit_code, said.stdout, said.stderr) == (130, "", "Stopped.\n")
 
 
+@pytest.mark.faults
 def test_a_bar_on_the_terminal_and_ctrl_c(data: Path) -> None:
     """Its standard error is a terminal; the key is pressed as soon as the bar is there."""
     ours, theirs = pty.openpty()

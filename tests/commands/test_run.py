@@ -165,6 +165,7 @@ def test_trials_do_not_depend_on_the_number_of_workers() -> None:
     assert one["trials"] == two["trials"]
 
 
+@pytest.mark.faults
 def test_conservative_parenting_loses_a_tenth_of_the_lives_at_most() -> None:
     """Table 1 in small: "0 or 1" deaths under a conservative parent, many without guidance."""
     conservative = results("--trials", "40")

@@ -41,6 +41,7 @@ def test_ids_are_registered_once_and_load_nothing() -> None:
     assert run(script) == "5 False"
 
 
+@pytest.mark.faults
 def test_many_processes() -> None:
     """Each spawned process finds the worlds by the module. Three processes load torch."""
     script = (

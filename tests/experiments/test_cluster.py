@@ -62,6 +62,7 @@ def cluster() -> Iterator[str]:
             yield two.scheduler_address
 
 
+@pytest.mark.faults
 def test_a_cluster_does_the_same_and_a_death_costs_its_own_piece(cluster: str, tmp_path: Path) -> None:
     store = Store(tmp_path / "pieces", {"seed": 0})
     fatal = Task("fatal", f"{__name__}:die_once", {"mark": str(tmp_path / "mark")})

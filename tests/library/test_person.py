@@ -21,6 +21,7 @@ from tests.library.person_at_page import PersonAtPage
 WORLD = "unsafe-exploration"
 
 
+@pytest.mark.faults
 @pytest.mark.timeout(240)
 def test_a_person_on_the_page_raises_an_agent_and_goes_on_after_an_interruption(
     person_at_the_page: Callable[..., list[PersonAtPage]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -207,6 +208,7 @@ def test_pages_may_be_framed_only_by_whom_the_settings_name(tmp_path: Path) -> N
             assert client.get("/").headers["Content-Security-Policy"].endswith(expected)
 
 
+@pytest.mark.faults
 @pytest.mark.timeout(240)
 def test_a_server_that_runs_already_is_joined_and_left_running(
     person_at_the_page: Callable[..., list[PersonAtPage]], tmp_path: Path

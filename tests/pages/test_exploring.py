@@ -66,6 +66,7 @@ def test_arrows_explore_the_grid_and_answer_outside_of_it(tabs: BrowserTabs, db:
 def test_clips_are_explored_step_by_step(tabs: BrowserTabs, db: Database) -> None:
     clips = preference(registry.make("side-effects"), "dlu", "ldr")
     page = tabs.open(posted(db, "side-effects", "preference", clips, 3))
+    expect(page.locator("#question[data-listening]")).to_be_visible()
     page.locator("[data-explore]").focus()
     press(page, "Enter")
     grid = page.get_by_role("grid")
