@@ -28,6 +28,11 @@ def here(page: Page) -> str:
     return words
 
 
+def listening(page: Page) -> None:
+    """Wait until the page takes keys: it begins a moment after its question is painted."""
+    expect(page.locator("#question[data-listening]")).to_be_visible()
+
+
 def press(page: Page, *keys: str) -> None:
     for key in keys:
         page.keyboard.press(key)
@@ -39,6 +44,7 @@ def test_arrows_explore_the_grid_and_answer_outside_of_it(tabs: BrowserTabs, db:
     for tick in (1, 2):
         worker_side.post_query(db, mine, tick, "guidance", 1, guidance(world, "d", "u"))
     page = tabs.open("/runs/1/parent?query=1")
+    listening(page)
     page.locator(".answers [value=either]").focus()
     press(page, "g")
     until(lambda: here(page).startswith(AGENT))
@@ -66,7 +72,7 @@ def test_arrows_explore_the_grid_and_answer_outside_of_it(tabs: BrowserTabs, db:
 def test_clips_are_explored_step_by_step(tabs: BrowserTabs, db: Database) -> None:
     clips = preference(registry.make("side-effects"), "dlu", "ldr")
     page = tabs.open(posted(db, "side-effects", "preference", clips, 3))
-    expect(page.locator("#question[data-listening]")).to_be_visible()
+    listening(page)
     page.locator("[data-explore]").focus()
     press(page, "Enter")
     grid = page.get_by_role("grid")
@@ -88,7 +94,7 @@ def test_help_tells_of_the_grid_and_its_letter_can_be_switched_off(
 ) -> None:
     ask()
     page = tabs.open("/runs/1/parent")
-    expect(page.locator("#question[data-listening]")).to_be_visible()  # keys are heard from then on
+    listening(page)
     press(page, "?")
     expect(page.get_by_text("explore the board: there the arrow keys go from cell to cell")).to_be_visible()
     page.get_by_label("Letters and digits").uncheck()
@@ -104,7 +110,7 @@ def test_the_focus_stays_where_it_was_left(tabs: BrowserTabs, ask: Callable[...,
     """Also over the page that waits, and what was opened stays open."""
     ask()
     page = tabs.open("/runs/1/parent")
-    expect(page.locator("#question[data-listening]")).to_be_visible()
+    listening(page)
     page.locator(".around summary").click()
     page.locator(part).focus()
     press(page, "b")
@@ -119,7 +125,7 @@ def test_an_error_takes_the_focus(tabs: BrowserTabs, ask: Callable[..., int]) ->
     tabs.expected = ("409",)
     ask()
     page = tabs.open("/runs/1/parent")
-    expect(page.locator("#question[data-listening]")).to_be_visible()
+    listening(page)
     body = '{"error": {"code": "conflict", "message": "Somebody else was first."}}'
     page.route("**/answer", lambda route: route.fulfill(status=409, json=None, body=body))
     page.locator(".answers [value=left]").focus()
