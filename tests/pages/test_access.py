@@ -124,7 +124,7 @@ def test_axe_finds_nothing(tabs: BrowserTabs, lives: None, part: int) -> None:
     page = tabs.open("/")
     for path in PATHS[part::2]:
         page.goto(tabs.address + path)
-        page.wait_for_timeout(200)
+        page.wait_for_timeout(100)
         assert everywhere(page) == [], path
 
 
@@ -176,7 +176,7 @@ def test_nothing_scrolls_sideways(tabs: BrowserTabs, lives: None, width: int) ->
     wide: dict[str, int] = {}
     for path in PATHS:
         page.goto(tabs.address + path)
-        page.wait_for_timeout(300)
+        page.wait_for_timeout(150)
         wide[path] = page.evaluate("document.documentElement.scrollWidth")
     assert {path: found for path, found in wide.items() if found > width} == {}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from playwright.sync_api import Request, expect
 
 from parenting.server.db import Database
@@ -39,6 +40,7 @@ def test_a_question_is_taken_over_and_the_other_page_says_so(
     expect(laptop.get_by_role("heading", name="The agent is exploring")).to_be_visible()
 
 
+@pytest.mark.faults
 def test_a_question_comes_to_who_waits_once_the_last_tab_that_shows_it_is_left(
     tabs: BrowserTabs, ask: Callable[..., int]
 ) -> None:
