@@ -18,7 +18,7 @@ from parenting.server.transfer.rows import Digest
 
 Progress = Callable[[int, int], None]
 """A function that takes the rows that are done, and all that are to be done."""
-SHOWN = ("run", "query", "answer", "checkpoint")
+SHOWN = {"run": "run", "query": "question", "answer": "answer", "checkpoint": "checkpoint"}
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Copied:
 
     def __str__(self) -> str:
         """Return what a person wants to know of it."""
-        counts = ", ".join(counted(self.digests[name].rows, name) for name in SHOWN)
+        counts = ", ".join(counted(self.digests[name].rows, noun) for name, noun in SHOWN.items())
         return f"{counts}; {len(self.digests)} tables, all equal"
 
 
