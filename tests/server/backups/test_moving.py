@@ -104,7 +104,7 @@ def test_a_database_is_equal_after_it_was_moved_there_and_back(
     there, back = place(OTHER[store]), place(store)
     told: list[tuple[int, int]] = []
     done = copy(home, there, tmp_path, progress=lambda *now: told.append(now))
-    assert "2 runs, 1 query, 1 answer, 1 checkpoint" in str(done)
+    assert "2 runs, 1 question, 1 answer, 1 checkpoint" in str(done)
     assert told[-1][0] == told[-1][1] > 0
     copy(there, back, tmp_path)
     first, moved, returned = opened(home), opened(there), opened(back)
