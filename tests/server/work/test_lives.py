@@ -124,6 +124,18 @@ def test_the_least_recently_used_life_leaves_first(db: Database, settings: Setti
     worker._close()
 
 
+def test_lives_leave_before_their_next_checkpoint_is_due(
+    db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a thousand runs that have just asked would all be in memory until each has saved."""
+    for name in ("CHECKPOINT_SECONDS", "QUIET_SECONDS"):
+        monkeypatch.setattr(f"parenting.server.checkpoint_pace.{name}", 3600.0)
+    runs, worker = begin(db, 3), Worker(db, few(settings, 1))
+    rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
+    rounds(worker, lambda: len(worker.sessions) == 1)
+    worker._close()
+
+
 def test_every_deed_of_a_parent_or_an_operator_is_news(db: Database) -> None:
     """The one statement that watches over all runs misses nothing that a look at each would show."""
     (run, other) = begin(db, 2)
