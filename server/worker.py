@@ -199,7 +199,10 @@ class Worker:
 
     def _make_room(self) -> None:
         """Let lives that wait leave memory where there are too many."""
-        for run_id in self.held.lives.too_many({*self.schedule.at_rest(), *self.held.lives.guided()}):
+        guided = self.held.lives.guided() & set(
+            self.schedule.not_due()
+        )  # else an answer would be passed over
+        for run_id in self.held.lives.too_many(guided | set(self.schedule.at_rest())):
             if self.turns.may_begin(run_id, new=True):
                 self.schedule.begin(run_id)
                 self.turns.begin(run_id, partial(self.held.rest, run_id))

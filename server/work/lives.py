@@ -65,13 +65,13 @@ class Lives:
             number, size = number - 1, size - used.get(run_id, (0.0, 0))[1]
         return leaving
 
-    def guided(self) -> list[int]:
+    def guided(self) -> set[int]:
         """Return the runs in memory that have reported that they wait for guidance.
 
         They can leave before their next checkpoint is due: leaving writes one.
         """
         waiting = list(self.sessions.items())
-        return [run_id for run_id, one in waiting if one.whole and one.waiting is Waiting.GUIDANCE]
+        return {run_id for run_id, one in waiting if one.whole and one.waiting is Waiting.GUIDANCE}
 
     def leave(self, run_id: int) -> None:
         """Let a life leave memory; its run still waits."""

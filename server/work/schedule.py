@@ -82,6 +82,11 @@ class Schedule:
         """Return the runs that wait for news."""
         return [run_id for run_id, at in self._at.items() if at == AT_NEWS]
 
+    def not_due(self) -> Sequence[int]:
+        """Return the runs of which nothing is new: they wait for news, or for a time to come."""
+        now = time.monotonic()
+        return [run_id for run_id, at in self._at.items() if at > now]
+
     def waited(self) -> float:
         """Return the longest time that a turn which was due has waited since the last call."""
         now, longest = time.monotonic(), self._longest

@@ -136,6 +136,23 @@ def test_lives_leave_before_their_next_checkpoint_is_due(
     worker._close()
 
 
+def test_a_life_with_an_answer_to_hear_stays(db: Database, settings: Settings) -> None:
+    """It waits for its turn. Put to rest, it would hear the answer only after some other news."""
+    (run,) = begin(db, 1)
+    worker = Worker(db, settings)
+    rounds(worker, lambda: look(db, [run])[run].open_guidance > 0 and worker.held.lives.guided() == {run})
+    found = lease(db, run, "me")
+    assert found is not None
+    answer(db, found.id, "either", "me", "human")
+    worker.held.lives.most = 0
+    worker._look()
+    worker._make_room()
+    worker._end_turns()
+    assert set(worker.sessions) == {run}
+    rounds(worker, lambda: len(asked(db, run)) > 1)
+    worker._close()
+
+
 def test_every_deed_of_a_parent_or_an_operator_is_news(db: Database) -> None:
     """The one statement that watches over all runs misses nothing that a look at each would show."""
     (run, other) = begin(db, 2)
