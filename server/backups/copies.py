@@ -92,7 +92,7 @@ def require_database(file: Path) -> None:
         with file.open("rb") as opened:
             begins = opened.read(len(HEAD))
     except OSError as error:
-        raise SetupError(f"{file} cannot be read: {error.strerror}. Name a backup.") from None
+        raise SetupError(f"{file} cannot be read: {error.strerror}. Name a file that is there.") from None
     if begins[:5] == b"PGDMP":
         raise SetupError(f"{file} is a dump of PostgreSQL; PARENTING_DATABASE_URL names no such database.")
     if begins != HEAD:

@@ -275,3 +275,7 @@ def test_every_world_names_its_glyphs(client: httpx2.Client) -> None:
         for glyph, tile in kind.legend.items():
             assert glyph == " " or f"<code>{glyph}</code> {tile}" in of_world
     assert hint.count("<code>cycle:</code>") == 1
+
+
+def test_hints_keep_the_names_of_worlds(client: httpx2.Client) -> None:
+    assert "fewest answers in Unsafe Exploration and Side Effects." in client.get("/").text
