@@ -42,3 +42,22 @@ def test_a_skip_that_the_stream_tells_first_is_taken_off_once(
     page.wait_for_timeout(500)  # the reply is told together with what the page shows next
     expect(page.locator("#saved")).to_have_text("Saved")
     expect(page.locator("#count")).to_have_text("1")
+
+
+def test_a_part_of_the_page_that_does_not_come_is_asked_for_at_the_next_answer(
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
+) -> None:
+    """A page that is left while it loads one is not at fault either."""
+    ask(), ask()
+    tabs.expected = ("net::ERR_FAILED",)
+    page = tabs.open(address(db))
+    reported: list[str] = []
+    page.on("request", lambda request: reported.extend([request.url] if "page-errors" in request.url else []))
+    page.route("**/static/parent-growth.*.js", lambda route: route.abort(), times=1)
+    page.wait_for_selector("#question[data-listening]")
+    with page.expect_event("requestfailed"):
+        page.keyboard.press("e")
+    page.wait_for_selector("#question[data-listening]")
+    with page.expect_response("**/static/parent-growth.*.js"):
+        page.keyboard.press("e")
+    assert reported == []

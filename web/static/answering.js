@@ -35,7 +35,7 @@ const tell = {
     $("optimal").hidden = !now.optimal || !now.standing || page.state === "over";
     $("resume").hidden = !["stopped", "failed"].includes(now.status);
     count(now.answers, now.answers - now.standing);
-    if (now.answers && (given.size || !page.current)) later(() => import("./growth.js")).then(({ grown }) => grown(now, !page.current));
+    if (now.answers && (given.size || !page.current)) later(() => import("./growth.js")).then(({ grown }) => grown(now, !page.current), () => null); // the next answer asks again
     if (page.current && page.state === "over") page.current = null;
     if (page.current) {
       if (!page.ahead && !page.lookout && now.open.guidance + now.open.preference > 1) prefetch();

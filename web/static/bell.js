@@ -34,7 +34,9 @@ page.bell = (button) => {
   show();
 };
 document.querySelectorAll(".bell").forEach(page.bell);
-new MutationObserver(async () => {
+new MutationObserver(() => {
   if (!waiting.hidden) since = performance.now();
-  else if (on && (document.hidden || performance.now() - since > LONG)) (await import("./sound.js")).ring(`${t("The agent needs you")} · ${name}`);
+  else if (on && (document.hidden || performance.now() - since > LONG)) {
+    import("./sound.js").then(({ ring }) => ring(`${t("The agent needs you")} · ${name}`), () => null); // not without the server
+  }
 }).observe(waiting, { attributeFilter: ["hidden"] });
