@@ -17,7 +17,8 @@ import pytest
 CALLS = "write,pwrite64,fsync,fdatasync,ftruncate,fallocate,unlink,unlinkat,rename,renameat2"
 LONGEST = 1 << 20
 """Bytes of one write that strace prints; a longer one fails."""
-_CALL = re.compile(r"(\d+) +(?:(\w+)\((.*)|<\.\.\. (\w+) resumed>(.*))")
+_CALL = re.compile(r"(\d+) +(?:([\w?]+)\((.*)|<\.\.\. ([\w?]+) resumed>(.*))")
+"""A call, or its end. strace names a call `???` if the process was killed before its registers were read."""
 _FILE = re.compile(r"\d+<([^>]*)>")
 _HEX = re.compile(r'"((?:\\x[0-9a-f]{2})*)"(\.\.\.)?')
 UNFINISHED = " <unfinished ...>"

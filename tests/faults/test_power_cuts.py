@@ -122,3 +122,18 @@ def test_an_image_holds_what_was_synced_and_any_sectors_of_the_rest() -> None:
     overlapping = [written._replace(began=1, ended=3), Call("sync", "f", 2, 4)]
     late = {image.files["f"] for _ in range(50) for image in images({"f": old}, overlapping, [5], rng)}
     assert old in late, "a sync reaches only what was written before it began"
+
+
+def test_a_call_that_strace_could_not_name_is_passed_over(tmp_path: Path) -> None:
+    """A process that is killed leaves such lines."""
+    trace, file = tmp_path / "trace", tmp_path / "ledger"
+    lines = [
+        f'7 write(3<{file}>, "\\x61", 1) = 1',
+        "8 ???( <detached ...>",
+        "9 ???() = ?",
+        f"10 fsync(3<{file}> <unfinished ...>",
+        f'7 write(3<{file}>, "\\x62", 1 <detached ...>',
+        "10 <... ??? resumed>) = ?",
+    ]
+    trace.write_text("\n".join(lines) + "\n")
+    assert [(call.name, call.data) for call in calls(trace, [file])] == [("write", b"a")]
