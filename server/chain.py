@@ -26,6 +26,8 @@ from parenting.server.tables import Answer, Query
 BEGIN = hashlib.sha256(b"parenting: the answers of a run, 1").hexdigest()
 """The link before the first answer."""
 OF_ANSWER = ("run_id", "query_id", "number", "choice", "parent", "client_id", "supersedes", "received")
+IF_MEASURED = "measured"
+"""A column that is part of an answer's content where there is anything in it: rows of before have none."""
 OF_QUERY = ("tick", "kind", "maturity", "clips", "posted", "policy_stage", "policy_steps", "votes")
 UNLESS_ZERO = ("votes",)
 """Columns that are part of a row's content where they are not 0: rows of before them have the same digest."""
@@ -46,6 +48,8 @@ class Checked:
 def content(answer: Mapping[str, Any], query: Mapping[str, Any]) -> str:
     """Return the canonical text of an answer and its question."""
     values = {name: _plain(answer.get(name)) for name in OF_ANSWER}
+    if (measured := _plain(answer.get(IF_MEASURED))) is not None:
+        values[IF_MEASURED] = {name: value for name, value in measured.items() if value is not None}
     asked = {name: _plain(query.get(name)) for name in OF_QUERY}
     values |= {f"query.{name}": asked[name] for name in OF_QUERY if asked[name] or name not in UNLESS_ZERO}
     return json.dumps(values, sort_keys=True, separators=(",", ":"))
@@ -76,7 +80,7 @@ def hashes(answer: Mapping[str, Any], query: Mapping[str, Any], before: str) -> 
 def proves(answer: Answer, query: Mapping[str, Any]) -> bool:
     """Return whether an answer's digest is that of its row and of this content of its question."""
     salt, digest = sound(answer, "salt"), sound(answer, "digest")
-    text = content(_columns(answer, OF_ANSWER), query)
+    text = content(_columns(answer, (*OF_ANSWER, IF_MEASURED)), query)
     return salt is not None and digest_of(salt, text) == digest
 
 
@@ -111,7 +115,7 @@ def _problems(row: Answered, before: str | None) -> Iterator[str]:
         yield f"answer {number} has no hash"
         return
     if salt is not None:
-        text = content(_columns(answer, OF_ANSWER), _columns(row.query, OF_QUERY))
+        text = content(_columns(answer, (*OF_ANSWER, IF_MEASURED)), _columns(row.query, OF_QUERY))
         if row.damage is not None:
             yield f"answer {number} or its question cannot be read: {row.damage}"
         elif digest_of(salt, text) != digest:

@@ -6,11 +6,14 @@ the sentences of pages and server as `parent.mo`, and those of the scripts as `p
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 from gettext import GNUTranslations, NullTranslations
+from io import BytesIO
 from pathlib import Path
 
 from starlette.datastructures import Headers
@@ -20,9 +23,25 @@ from parenting.drawing.sentences import ENGLISH, reading_in
 
 SHIPPED = Path(__file__).parents[1] / "web" / "languages"
 """The languages of this package."""
-COMPILED, OF_SCRIPTS = "parent.mo", "parent.json"
+COMPILED, OF_SCRIPTS, TEMPLATE = "parent.mo", "parent.json", "parent.pot"
 RIGHT_TO_LEFT = frozenset({"ar", "arc", "ckb", "dv", "fa", "he", "ks", "ku", "ps", "sd", "ug", "ur", "yi"})
 """Languages that are written from right to left."""
+
+
+@cache
+def _english() -> str:
+    """Return every English sentence of the catalogue, without its head and without where each is said."""
+    body = (SHIPPED / TEMPLATE).read_text("utf-8").partition("\n\n")[2]
+    return "\n".join(line for line in body.splitlines() if not line.startswith("#"))
+
+
+def wording_of(translated: bytes) -> str:
+    """Return the version of the sentences that people read: it changes with any of them.
+
+    Args:
+        translated: A compiled translation; nothing in English.
+    """
+    return hashlib.sha256(_english().encode() + translated).hexdigest()[:8]
 
 
 @dataclass(frozen=True)
@@ -32,6 +51,7 @@ class Language:
     tag: str = "en"
     sentences: NullTranslations = ENGLISH
     scripts: str = ""  # JSON: the sentences of the scripts; "" in English
+    wording: str = field(default_factory=lambda: wording_of(b""))  # names the version of all sentences
 
     @property
     def direction(self) -> str:
@@ -65,10 +85,10 @@ class Languages:
         self.known = {"en": IN_ENGLISH}
         for compiled in sorted(folder.glob(f"*/{COMPILED}")) if folder else ():
             tag = compiled.parent.name
-            with compiled.open("rb") as file:
-                sentences = GNUTranslations(file)
+            whole = compiled.read_bytes()
             scripts = (compiled.parent / OF_SCRIPTS).read_text("utf-8")
-            self.known[tag.lower()] = Language(tag, sentences, scripts)
+            version = wording_of(tag.encode() + whole + scripts.encode())
+            self.known[tag.lower()] = Language(tag, GNUTranslations(BytesIO(whole)), scripts, version)
 
     def choose(self, accepted: str) -> Language:
         """Return the installed language that a header Accept-Language (RFC 9110) prefers; else English."""

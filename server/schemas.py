@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from parenting.agent.config import GardenParent
+from parenting.server.measures import Measured
 from parenting.server.statuses import QueryStatus, RunState, RunStatus, Waiting
 
 # The words of server.tables, as types: a test holds them equal.
@@ -262,6 +263,8 @@ class AnswerSchema(Schema):
     received: datetime
     applied_tick: int | None
     """The tick at which the agent heard it; null: not yet."""
+    measured: Measured | None
+    """Measures that the page took; null: it was given by a program, or by a page that measured nothing."""
 
 
 class AskedSchema(QuerySchema):

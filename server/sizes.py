@@ -16,6 +16,7 @@ from sqlalchemy.orm import Session
 
 from parenting.server.columns import Blob, Json, Words
 from parenting.server.db import Database
+from parenting.server.measures import Measures
 from parenting.server.tables import Table
 
 
@@ -41,7 +42,7 @@ def sizes_in(session: Session, run_ids: Sequence[int]) -> dict[int, int]:
 
 def _bytes(table: SqlTable, length: Any, run_ids: Sequence[int]) -> Select[Any]:
     """Count the bytes of a table's long columns, by run. No value is read: each row tells its lengths."""
-    long = [column for column in table.c if isinstance(column.type, Words | Json | Blob)]
+    long = [column for column in table.c if isinstance(column.type, Words | Json | Blob | Measures)]
     total = func.sum(reduce(add, (func.coalesce(length(column), 0) for column in long), literal(0)))
     of_runs = select(table.c.run_id, total.label("bytes")).where(table.c.run_id.in_(run_ids))
     return of_runs.group_by(table.c.run_id)

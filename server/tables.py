@@ -12,10 +12,18 @@ from typing import Any
 from sqlalchemy import CheckConstraint, ForeignKey, Index, UniqueConstraint, event, text
 from sqlalchemy.orm import Mapped, mapped_column
 
+from parenting.server.answer_tables import (
+    CHOICES,
+    PARENTS,
+    SAID,
+    SKIP,
+    Answer,
+)
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.columns import Big, OneOf, name_places
 from parenting.server.compact import METRICS, Clips, Figures
 from parenting.server.moves_table import Moves
+from parenting.server.person_tables import Person, PersonClient, PersonName
 from parenting.server.public_ids import public_id
 from parenting.server.statuses import (
     JOB_STATES,
@@ -27,19 +35,16 @@ from parenting.server.statuses import (
     RunStatus,
     Waiting,
 )
-from parenting.server.table_root import Table, one_of, unique_where
+from parenting.server.table_root import Table, one_of
 from parenting.server.tombstone_table import Tombstone
 from parenting.server.triggers import keep_deleted_numbers
 from parenting.server.why_tables import Effect, Reason
 from parenting.server.worker_table import Worker
 
-__all__ = ["BoardSnapshot", "BoardStates", "Effect", "Moves", "Reason", "Table", "Tombstone", "Worker"]
+__all__ = ["CHOICES", "PARENTS", "SAID", "SKIP", "Answer", "BoardSnapshot", "BoardStates", "Effect", "Moves"]
+__all__ += ["Person", "PersonClient", "PersonName", "Reason", "Table", "Tombstone", "Worker"]
 
 KINDS = ("guidance", "preference")
-CHOICES = ("left", "right", "either", "neither")
-SKIP = "skip"  # the parent cannot tell: this counts as no choice
-SAID = (*CHOICES, SKIP)
-PARENTS = ("human", "scripted")
 
 
 def _public_id() -> Mapped[str]:
@@ -177,39 +182,6 @@ class Query(Table):
     lease_begin: Mapped[float | None]
     lease_end: Mapped[float | None]
     withdrawn_tick: Mapped[int | None]  # before which the agent stopped waiting for it; null: with its run
-
-
-class Answer(Table):
-    """A parent's answer or skip. Rows are only ever added; one that supersedes another names its row."""
-
-    __tablename__ = "answer"
-    __table_args__ = (
-        one_of("choice", SAID),
-        UniqueConstraint("run_id", "number"),
-        unique_where("uq_answer_standing", "standing", "query_id"),
-        unique_where("uq_answer_first", "supersedes IS NULL", "query_id", "client_id"),
-        Index(None, "query_id"),
-        Index(None, "supersedes"),  # without it, deleting an answer searches all of them
-        Index(None, "run_id", "applied_tick", unique=True),  # at most one answer is heard in a tick
-    )
-
-    id: Mapped[int] = mapped_column(primary_key=True)
-    query_id: Mapped[int] = mapped_column(ForeignKey("query.id"))
-    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"))
-    number: Mapped[int]
-    choice: Mapped[str] = mapped_column(OneOf(SAID))
-    parent: Mapped[str] = mapped_column(OneOf(PARENTS))
-    client_id: Mapped[str]
-    supersedes: Mapped[int | None] = mapped_column(ForeignKey("answer.id"))
-    standing: Mapped[bool] = mapped_column(default=True)
-    received: Mapped[datetime]
-    replays: Mapped[int | None]  # how often its parent played the clips again; null: the client did not tell
-    applied_tick: Mapped[int | None]
-    # the chain of hashes (server.chain)
-    salt: Mapped[str | None]
-    digest: Mapped[str | None]
-    link: Mapped[str | None]
-    chained: Mapped[str | None]  # when it was hashed: with the answer, or by a migration
 
 
 class OperatorEvent(Table):

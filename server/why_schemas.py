@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import ConfigDict
 
+from parenting.server.measures import Measured
 from parenting.server.schemas import By, Chances, Kind, PolicySchema, Said, Schema
 from parenting.server.statuses import QueryStatus
 
@@ -91,6 +92,8 @@ class GivenSchema(Schema):
     standing: bool
     replays: int | None
     """The number of times that its parent had the clips played again; null: the client did not tell."""
+    measured: Measured | None
+    """Measures that the page took; null: none."""
     effects: list[EffectSchema]
     """Before it and 1, 10 and 100 ticks after; empty for a skip, which changes nothing."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import Query
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
@@ -18,6 +18,7 @@ from parenting.server.job_kinds import (
     WalkPayload,
 )
 from parenting.server.level_check import TEXT_CHARACTERS
+from parenting.server.measures import Measured
 from parenting.server.new_run import LARGEST_INT, Goal, Name, NewRun, Pace, PersonsName
 from parenting.server.schemas import By
 from parenting.server.whole import WHOLE
@@ -73,6 +74,14 @@ class AnswerBody(Strict):
     replays: Replays | None = Field(
         None, description="How often the parent had the clips played again; null: this client does not tell."
     )
+    measured: Measured | None = Field(
+        None, description="What the client measured of this answer; null: it measures nothing."
+    )
+
+    @property
+    def measures(self) -> dict[str, Any] | None:
+        """The measures by name."""
+        return None if self.measured is None else self.measured.model_dump()
 
 
 class NamedBody(LeaseBody):
@@ -87,6 +96,14 @@ class SkipBody(NamedBody):
     """The client that skips, and the names of the question."""
 
     parent: By = Field("human", description="Who skips, a person or a script; stored with the skip.")
+    measured: Measured | None = Field(
+        None, description="What the client measured of this skip; null: it measures nothing."
+    )
+
+    @property
+    def measures(self) -> dict[str, Any] | None:
+        """The measures by name."""
+        return None if self.measured is None else self.measured.model_dump()
 
 
 class LevelBody(Strict):

@@ -14,7 +14,7 @@ from parenting.server.api.job_examples import of_jobs
 from parenting.server.api.kept_examples import TABLE, kept
 from parenting.server.api.level_examples import CHECKED, IMPORTED, LAKE, OWN_LEVEL, TO_CHECK, UPLOADED
 from parenting.server.api.why_example import EXPORTED as EXPORTED_WHY
-from parenting.server.api.why_example import WHY
+from parenting.server.api.why_example import MEASURED, STANDING, WHY
 
 WORLD = "unsafe-exploration"
 SPEC, LEVEL = registry.spec(WORLD), registry.level(WORLD, "island")
@@ -45,8 +45,7 @@ NEW_RUNS = {
         "config": {"p_rec": 0.25, "stages": 2},
         "seed": 7,
         "name": "first",
-        "goal": 50,
-        "pace": 2.5,
+        **{"goal": 50, "pace": 2.5},
     },
     "a level of one's own, raised by a script": {
         "world": WORLD,
@@ -128,7 +127,7 @@ QUERY: dict[str, Any] = {
 ASKED = {
     **QUERY,
     "status": "applied",
-    "answer": {"number": 4, "choice": "left", "parent": "human", "received": NOON, "applied_tick": 6},
+    "answer": STANDING,
 }
 WORLD_OF_QUERY = {
     "name": WORLD,
@@ -155,6 +154,7 @@ ANSWERS = {
         "run": RUN_ID,
         "question": QUESTION_ID,
     },
+    "with what a page measures": {"choice": "left", "client_id": "me", "measured": MEASURED},
     "by a script": {"choice": "neither", "client_id": "script", "parent": "scripted"},
 }
 NAMES = {"database": DATABASE, "run_public_id": RUN_ID, "query_public_id": QUESTION_ID}

@@ -122,7 +122,7 @@ async def answer_question(request: Request, query_id: QueryName, body: AnswerBod
     stands.
     """
     names = Names(body.database, body.run, body.question)
-    said = Said(body.choice, body.client_id, body.parent, body.replays)
+    said = Said(body.choice, body.client_id, body.parent, body.replays, body.measures)
     stored = await store(request, partial(_answer, db, query_id, said, names))
     notify_worker(request)
     return Response(StoredSchema(**vars(stored)).model_dump_json(), media_type="application/json")

@@ -69,7 +69,7 @@ async def change_answer(request: Request, query_id: QueryName, body: AnswerBody,
     A question that has no answer, or another client's, gets 409. Names of another database, run or question
     get 410 (`elsewhere`).
     """
-    said = Said(body.choice, body.client_id, body.parent, body.replays)
+    said = Said(body.choice, body.client_id, body.parent, body.replays, body.measures)
     names = Names(body.database, body.run, body.question)
     found = await store(request, partial(supersede_in, db=db, query=query_id, said=said, names=names))
     notify_worker(request)
@@ -93,7 +93,8 @@ async def skip_question(request: Request, query_id: QueryName, body: SkipBody, d
     A question that was answered, skipped by another client or withdrawn gets 409. Names of another database,
     run or question get 410 (`elsewhere`).
     """
-    said, names = Said(SKIP, body.client_id, body.parent), Names(body.database, body.run, body.question)
+    said = Said(SKIP, body.client_id, body.parent, measured=body.measures)
+    names = Names(body.database, body.run, body.question)
     found = await store(request, partial(skip_in, db=db, query=query_id, said=said, names=names))
     notify_worker(request)
     return SkippedSchema(**vars(found))

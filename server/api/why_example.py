@@ -4,6 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+MEASURED: dict[str, Any] = {
+    **{"shown": 1795348801250, "reacted": 812, "answered": 1450, "queued": 2, "away": 0},
+    **{"layout": "one", "sides": "left-right", "width": 390, "height": 844},
+    **{"input": "touch", "wording": "3f9a12bc"},
+}
+STANDING: dict[str, Any] = {
+    **{"number": 4, "choice": "left", "parent": "human"},
+    **{"received": "2026-11-22T12:00:00Z", "applied_tick": 6, "measured": MEASURED},
+}
 EXPORTED: dict[str, Any] = {
     "leased": "2026-11-22T12:00:01.000000Z",
     "replays": 1,
@@ -53,6 +62,7 @@ WHY: dict[str, Any] = {
             "applied_tick": 42,
             "standing": True,
             "replays": 1,
+            "measured": MEASURED,
             "effects": [
                 {"ticks": 0, "probabilities": [0.31, 0.22, 0.19, 0.28]},
                 {"ticks": 1, "probabilities": [0.33, 0.21, 0.19, 0.27]},

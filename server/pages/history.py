@@ -17,6 +17,7 @@ from parenting.server.damage import sound
 from parenting.server.deps import Db
 from parenting.server.errors import DamagedRowError
 from parenting.server.new_run import LARGEST_INT
+from parenting.server.pages.measures_text import measures_text
 from parenting.server.pages.question import QuestionView, question_view
 from parenting.server.pages.render import moved, page
 from parenting.server.pages.texts import parent_title
@@ -59,6 +60,7 @@ class Entry(NamedTuple):
     change: bool  # whoever looks gave it, and may change it
     who: str
     received: str  # in UTC, to the second
+    measured: str  # what the page measured of it, for researchers; "" where nothing is told
     asked: int  # the tick of the question
     heard: int | None  # the tick at which the agent heard it
     stage: int
@@ -134,6 +136,7 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
         answer.standing and answer.parent == "human" and answer.client_id == mine,
         who(answer.parent, answer.client_id, mine),
         f"{answer.received:%Y-%m-%d %H:%M:%S}",
+        "" if answer.measured is None else measures_text(answer.measured, answer.replays),
         query.tick,
         answer.applied_tick,
         query.maturity if query.policy_stage is None else query.policy_stage,

@@ -25,6 +25,7 @@ from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
 from parenting.server.errors import DamagedRowError, ElsewhereError, NotFound
 from parenting.server.identity import database_id
+from parenting.server.measures import BY_FORM
 from parenting.server.pages.fields import ChoiceField, ClientField, MaybeDatabase, MaybeQuestion
 from parenting.server.pages.practice import PRACTISED, Place
 from parenting.server.pages.question import Former, QuestionView, question_view
@@ -185,7 +186,7 @@ async def answer(
         raise ElsewhereError(BY_NUMBER)
     names = Names(database, run_id, question)
     streams: Streams = request.app.state.streams
-    said = answers.Said(choice, client_id, "human")
+    said = answers.Said(choice, client_id, "human", measured=BY_FORM)
     stored = await store(request, partial(answers.answer_in, db=db, query=question, said=said, names=names))
     notify_worker(request)
     run = await streams.admission.read(runs.get_run, db, stored.run)

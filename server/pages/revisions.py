@@ -9,7 +9,15 @@ from fastapi import Request, Response
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import PublicId
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
-from parenting.server.pages.fields import ChoiceField, ClientField, DatabaseField, QuestionField, ReplaysField
+from parenting.server.measures import BY_FORM
+from parenting.server.pages.fields import (
+    ChoiceField,
+    ClientField,
+    DatabaseField,
+    MeasuredField,
+    QuestionField,
+    ReplaysField,
+)
 from parenting.server.pages.render import redirect
 from parenting.server.queue.answers import Said
 from parenting.server.queue.names import Names
@@ -47,9 +55,11 @@ async def change(
     database: DatabaseField,
     question: QuestionField,
     replays: ReplaysField = None,
+    measured: MeasuredField = None,
 ) -> Response:
     """Put another answer in the place of one's own, then go on."""
-    names, said = Names(database, run_id, question), Said(choice, client_id, "human", replays)
+    names, seen = Names(database, run_id, question), BY_FORM if measured is None else measured.model_dump()
+    said = Said(choice, client_id, "human", replays, seen)
     found = await store(request, partial(supersede_in, db=db, query=question, said=said, names=names))
     notify_worker(request)
     return redirect(f"/runs/{found.run_public_id}/parent")

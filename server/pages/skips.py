@@ -12,6 +12,7 @@ from parenting.server import runs
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import PublicId, RunId
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
+from parenting.server.measures import BY_FORM
 from parenting.server.pages.fields import ClientField, DatabaseField, QuestionField
 from parenting.server.pages.parent import PATIENCE, address, wait_for
 from parenting.server.pages.render import redirect
@@ -43,7 +44,7 @@ async def skip(
     question: QuestionField,
 ) -> Response:
     """Skip a question, then go to the next one."""
-    said, names = Said(SKIP, client_id, "human"), Names(database, run_id, question)
+    said, names = Said(SKIP, client_id, "human", measured=BY_FORM), Names(database, run_id, question)
     found = await store(request, partial(skip_in, db=db, query=question, said=said, names=names))
     notify_worker(request)
     await asyncio.sleep(OTHERS_FIRST)

@@ -16,6 +16,7 @@ from parenting.drawing.sentences import mark
 from parenting.server.chain import BEGIN, OF_QUERY, hashes
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound
+from parenting.server.persons import person_of
 from parenting.server.queue.names import UNSTATED, Names, Place, find_place
 from parenting.server.runs import lock
 from parenting.server.statuses import QueryStatus
@@ -45,6 +46,7 @@ class Said:
     client_id: str
     parent: str
     replays: int | None = None  # how often they had the clips played again
+    measured: dict[str, Any] | None = None  # by the page (`server.measures.Measured`)
 
     @property
     def skips(self) -> bool:
@@ -131,6 +133,8 @@ def add(
     }
     link = asked.last_link if isinstance(asked.last_link, str) else ""
     before = BEGIN if number == 1 else link
+    if said.parent == "human":
+        person_of(session, said.client_id, row["received"])
     session.execute(_INSERTED, row | hashes(row, asked._mapping, before))
     if said.skips:
         session.execute(_SKIPPED, {"run_id": run_id})

@@ -183,7 +183,7 @@ def _query_fields(query: Query, database: str, run_public_id: str) -> dict[str, 
 
 
 def _answer_schema(answer: Answer) -> AnswerSchema:
-    names = ("number", "choice", "parent", "received", "applied_tick")
+    names = ("number", "choice", "parent", "received", "applied_tick", "measured")
     return AnswerSchema(**{name: getattr(answer, name) for name in names})
 
 

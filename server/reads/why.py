@@ -104,7 +104,7 @@ def neighbours(db: Database, query: Query) -> tuple[str | None, str | None]:
 
 
 def _given(answer: Answer, known: dict[tuple[int, int], PolicyThere]) -> GivenSchema:
-    names = ("number", "choice", "parent", "received", "applied_tick", "standing", "replays")
+    names = ("number", "choice", "parent", "received", "applied_tick", "standing", "replays", "measured")
     heard = answer.applied_tick
     effects = []
     if heard is not None and answer.choice != SKIP:

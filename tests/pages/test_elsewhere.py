@@ -76,7 +76,10 @@ def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(
         "client_id": page.locator("#main").get_attribute("data-client"),
         **names,
     }
-    assert json.loads(sent.value.post_data or "") == body
+    told = json.loads(sent.value.post_data or "")
+    measured = told.pop("measured")
+    assert told == body
+    assert (measured["layout"], measured["input"], measured["away"]) == ("one", "key", 0)
     assert body.items() <= kept(page)[0].items()
     said = f"Your answer to “{parent_title(runs.get_run(db, 1))}” of "
     expect(page.locator("#alert")).to_contain_text(said)

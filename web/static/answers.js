@@ -1,6 +1,7 @@
 // Answers: takes one for the question on the stage, keeps it, sends it, and says what became of it.
 import { listens } from "./arming.js";
 import { recordAnswer, timeLeft } from "./eta.js";
+import { measure } from "./measuring.js";
 import { flush, keep } from "./outbox.js";
 import { $, alarm, client, given, name, page, painted, run, waiting } from "./page.js";
 import { next, show } from "./questions.js";
@@ -37,6 +38,7 @@ export function answer(choice) {
   if (!listens(page.current)) return;
   const { database, query, former } = page.current.dataset;
   if (former) return change(page.current, choice);
+  const measured = measure(page.current);
   remember(page.current, choice);
   remark(page.current, choice, performance.now() - page.shown);
   given.add(query);
@@ -47,7 +49,7 @@ export function answer(choice) {
   $("alert").textContent = "";
   performance.mark("answer", { detail: query });
   if (choice !== "skip") recordAnswer();
-  keep({ database, run, question: query, choice, replays: page.player?.replays, client_id: client, title: name, given: Date.now() });
+  keep({ database, run, question: query, choice, replays: page.player?.replays, measured, client_id: client, title: name, given: Date.now() });
   if (page.ahead) {
     painted(() => flush(report));
     return show(page.ahead);

@@ -21,9 +21,17 @@ export function formOf(markup) {
   return given.has(form.dataset.query) ? null : form; // two requests may bring the same question, one of them late
 }
 
+// Take note of when a question is seen: once it is painted, which a page waits for that nobody looks at.
+function see(form) {
+  const now = () => { if (page.put === form) page.seen = { at: Date.now(), by: performance.now() }; };
+  now();
+  requestAnimationFrame(() => setTimeout(now));
+}
+
 export function put(form) {
   if (page.put === form) return;
   page.put = form;
+  see(form);
   if (!form.matches(".one")) form.dataset.side = "left";
   if (!form.isConnected) stage.replaceChildren(form);
   waiting.hidden = true;

@@ -2,6 +2,7 @@
 // An answer names the database, the run and the question that it is meant for. A server that has another database, or a
 // copy with an identity of its own, does not store it; the browser keeps it for the server that does.
 import { elsewhere, key, meant, read, write } from "./kept.js";
+import { sent } from "./measuring.js";
 
 const LATE = 15_000; // ms after which a reply is not waited for any more; the answer is sent again
 let sending = null, delay = 500;
@@ -10,11 +11,11 @@ const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListe
 
 // One attempt: "saved", "refused" (the question has another answer, or was withdrawn), "elsewhere" (it is meant for another
 // database, or the server cannot read it) or "kept" (no connection, or a server in trouble).
-async function send({ database, run, question, choice, replays, client_id }) {
+async function send({ database, run, question, choice, replays, measured, given, client_id }) {
   if (!question) return ["elsewhere"];
   const late = new AbortController(), timer = setTimeout(() => late.abort(), LATE);
   try {
-    const skips = choice === "skip", asked = { client_id, database, run, question };
+    const skips = choice === "skip", asked = { client_id, database, run, question, measured: sent(measured, given) };
     const reply = await fetch(`/api/v1/queries/${question}/${skips ? "skip" : "answer"}`, {
       method: "POST", keepalive: true, signal: late.signal, headers: { "content-type": "application/json" },
       body: JSON.stringify(skips ? asked : { choice, replays, ...asked }),

@@ -8,6 +8,7 @@ export const page = {
   answer: null, // what a choice does: each page with questions sets its own
   current: null, // the form on the stage, until it is answered
   shown: 0, // when it came, by the page's clock
+  seen: { at: 0, by: 0 }, // when it was painted, by the wall clock and by the page's
   player: null,
   put: null, // the form that was put on the stage last
   ahead: null, // the form after it

@@ -4,6 +4,7 @@ import { report } from "./answers.js";
 import { keyName } from "./key_names.js";
 import { letters } from "./keys.js";
 import { kept } from "./kept.js";
+import { measure } from "./measuring.js";
 import { flush } from "./outbox.js";
 import { $, alarm, client, given, inDialog, page, run } from "./page.js";
 import { show } from "./questions.js";
@@ -29,9 +30,10 @@ export function remember(question, choice) {
   offer();
 }
 
-// Send the form of an answer that is changed, with how often its clips were played.
+// Send the form of an answer that is changed, with what was measured of it.
 export function change(question, choice) {
   question.elements.replays.value = page.player?.replays ?? "";
+  question.elements.measured.value = JSON.stringify({ ...measure(question), queued: 0 });
   question.requestSubmit(question.querySelector(`.answers [value=${choice}]`));
 }
 
