@@ -80,7 +80,7 @@ def serve(port: int, folder: Path) -> None:
     chosen = Settings(port=port)
     server = make_server(chosen)
     tracemalloc.start(FRAMES)  # only now: it makes the imports several times as slow
-    server.run(sockets=[bind(chosen.host, port)])
+    server.run(sockets=[bind(chosen)])
 
 
 @contextmanager

@@ -12,6 +12,16 @@ AfterFd = Annotated[
     int | None, typer.Option(hidden=True, help="A pipe that `parenting up` closes once the tables are there.")
 ]
 
+Public = Annotated[
+    bool | None,
+    typer.Option(
+        "--public",
+        help="Others reach the pages, under the names of PARENTING_HOSTS and by way of a proxy that "
+        "terminates TLS (docs/operations.md). Plain http is refused.",
+        show_default=False,
+    ),
+]
+
 
 def whole(least: int, most: int) -> Callable[[str | int], int]:
     """Make a parser of whole numbers from `least` to `most`."""

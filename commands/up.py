@@ -24,6 +24,7 @@ from parenting.commands import children
 from parenting.commands.children import Child
 from parenting.commands.crew import Crew
 from parenting.commands.errors import friendly_errors, settings
+from parenting.commands.options import Public
 from parenting.commands.printing import say
 from parenting.commands.sizing import Sizing, most_workers
 from parenting.server.lifeline import follow
@@ -48,6 +49,7 @@ def up(
             "minute."
         ),
     ] = "auto",
+    public: Public = None,
 ) -> None:
     """Migrate the database, start the pages and the workers, and open a browser. Ctrl-C stops everything.
 
@@ -59,9 +61,9 @@ def up(
     follow()
     make_files_private()
     with friendly_errors():
-        chosen = settings(port=port)
-        listener = bind(chosen.host, chosen.port, chosen.container)
-        with listener, _signals() as told, _children(listener, number or 1) as (web, crew, migrated):
+        chosen = settings(port=port, public=public)
+        listener = bind(chosen)
+        with listener, _signals() as told, _children(chosen, listener, number or 1) as (web, crew, migrated):
             _migrate(chosen)
             migrated()
             with _sized(crew, chosen, number):
@@ -139,7 +141,9 @@ def _signals() -> Iterator[threading.Event]:
 
 
 @contextmanager
-def _children(listener: socket.socket, workers: int) -> Iterator[tuple[Child, Crew, Callable[[], None]]]:
+def _children(
+    chosen: Settings, listener: socket.socket, workers: int
+) -> Iterator[tuple[Child, Crew, Callable[[], None]]]:
     """Start web and workers, and yield them with what lets them begin.
 
     A web process that is started again takes the same listening socket.
@@ -148,7 +152,8 @@ def _children(listener: socket.socket, workers: int) -> Iterator[tuple[Child, Cr
     with children.lifeline() as followed, children.gate() as (gate, opened):
         fd = listener.fileno()
         after = ["--after-fd", str(gate)]
-        web = partial(children.start, ["web", "--fd", str(fd), *after], followed, [fd, gate])
+        serve = ["web", "--fd", str(fd), *after, *(["--public"] if chosen.public else [])]
+        web = partial(children.start, serve, followed, [fd, gate])
         try:
             pages = Child("web", web, _tell)
             started.append(lambda: [pages])

@@ -9,7 +9,7 @@ import typer
 
 from parenting.commands.database import require_file
 from parenting.commands.errors import friendly_errors, settings
-from parenting.commands.options import AfterFd
+from parenting.commands.options import AfterFd, Public
 from parenting.commands.printing import say
 from parenting.server.lifeline import follow, wait_at
 from parenting.server.listener import bind
@@ -21,8 +21,9 @@ Port = Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a fre
 def web(
     port: Port = None,
     host: Annotated[
-        str | None, typer.Option(help="Address to listen on: 127.0.0.1, or in a container 0.0.0.0.")
+        str | None, typer.Option(help="Address to listen on; one that others reach needs --public.")
     ] = None,
+    public: Public = None,
     fd: Annotated[
         int | None, typer.Option(hidden=True, help="A listening socket, from `parenting up`.")
     ] = None,
@@ -35,15 +36,13 @@ def web(
     follow()
     make_files_private()
     with friendly_errors():
-        chosen = settings(port=port, host=host)
+        chosen = settings(port=port, host=host, public=public)
         from parenting.server.serve import make_server  # loads the web's libraries
 
         wait_at(after_fd)
         require_file(chosen)
         server = make_server(chosen)
-        listener = (
-            bind(chosen.host, chosen.port, chosen.container) if fd is None else socket.socket(fileno=fd)
-        )
+        listener = bind(chosen) if fd is None else socket.socket(fileno=fd)
         if fd is None:
             say(f"Parenting's pages: http://localhost:{listener.getsockname()[1]}/  (Ctrl-C stops them)")
         server.run(sockets=[listener])

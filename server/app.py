@@ -20,6 +20,7 @@ from parenting.server import api, health, pages
 from parenting.server.admission import Admission
 from parenting.server.api.openapi import Described
 from parenting.server.db import Database, connect
+from parenting.server.entrance import Entrance
 from parenting.server.errors import (
     InvalidFieldsError,
     MethodNotAllowed,
@@ -80,7 +81,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     db = connect(settings) if db is None else db
     require_ready(db)
     app = bare_app()
-    app.state.db, app.state.settings = db, settings
+    app.state.db, app.state.settings, app.state.entrance = db, settings, Entrance.of(settings)
     app.state.languages = Languages(settings.languages or SHIPPED)
     app.state.worker_notifier = Notifier(settings.data, "worker")
     app.state.started_runs = StartedRuns(settings.runs_per_client)
@@ -110,7 +111,8 @@ def bare_app() -> FastAPI:
     app.add_middleware(
         CompressMiddleware, minimum_size=SMALL_BODY, zstd=False, brotli_quality=5, gzip_level=6
     )
-    app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY, larger=LARGER_BODIES)
+    app.state.entrance = Entrance()
+    app.add_middleware(SecurityMiddleware, largest_body=LARGEST_BODY, reply=_reply, larger=LARGER_BODIES)
     app.state.languages = Languages()
     app.add_middleware(LanguageMiddleware)
     app.state.meters, app.state.page_errors = Meters(), LogLimit()

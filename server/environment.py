@@ -25,6 +25,10 @@ NO_SETTINGS = (
     "PARENTING_KILL_ROUNDS",
 )
 """Variables that are read elsewhere: by the processes that `parenting up` starts, and by the tests."""
+RENAMED = {
+    "PARENTING_CONTAINER": "PARENTING_PUBLISHED_ON_LOOPBACK (docs/deployment.md)",
+}
+"""Settings of earlier versions, and what is used instead."""
 NEAR = 0.85
 """The least likeness of a name without the prefix to that of a setting, so that it counts as misspelt."""
 SAVE_AGAIN = "Save it as UTF-8, in an editor or by: iconv -f"
@@ -87,6 +91,8 @@ def _warning(name: str, where: str, known: Sequence[str]) -> str | None:
     upper = name.upper()
     if upper in known or upper in NO_SETTINGS:
         return None
+    if upper in RENAMED:
+        return f"Warning: {name} {where} is not a setting any more and is ignored. Use {RENAMED[upper]}."
     ours = upper.startswith(PREFIX)
     near = get_close_matches(upper, known, 1, cutoff=NEAR)
     if not near and not ours:

@@ -67,9 +67,21 @@ class Forbidden(ServerError):
 
 
 class UnknownHostError(ServerError):
-    """This server accepts the names localhost and 127.0.0.1 only."""
+    """This server does not answer under this name."""
 
     status, code = 400, "unknown_host"
+
+
+class PlainHttpError(ServerError):
+    """This server takes https only. Use its address that begins with https://."""
+
+    status, code = 403, "plain_http"
+
+
+class ForwardedError(ServerError):
+    """The proxy before this server does not say for whom it asks (X-Forwarded-For)."""
+
+    status, code = 400, "forwarded"
 
 
 class MethodNotAllowed(ServerError):

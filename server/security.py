@@ -1,4 +1,4 @@
-"""The outermost middleware: it checks hosts, refuses cross-site writes, sets safe headers, hides tracebacks.
+"""A middleware: it guards the entrance, refuses cross-site writes, sets safe headers, hides tracebacks.
 
 A cross-site request is recognised by `Sec-Fetch-Site`, which every present browser sends, or by `Origin` in
 older ones (as in Datasette and Go). A request with neither comes from a program and passes, because programs
@@ -7,19 +7,19 @@ on this machine may answer too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
-from starlette.responses import JSONResponse
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from parenting.server.errors import Forbidden, ServerError, TooLargeError, UnknownHostError
+from parenting.server.entrance import Entrance
+from parenting.server.errors import Forbidden, ServerError, TooLargeError
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
-HOSTS = ("localhost", "127.0.0.1", "[::1]")
 
 NOBODY = "frame-ancestors 'none'"
 
@@ -51,16 +51,22 @@ class SecurityMiddleware:
         self,
         app: ASGIApp,
         largest_body: int,
-        hosts: Sequence[str] = HOSTS,
+        reply: Callable[[Request, ServerError], Response],
         larger: Mapping[str, int] | None = None,
     ) -> None:
-        """Bound the bytes of a body, for a few paths (`larger`) by a number of their own."""
-        self.app = app
+        """Bound the bytes of a body, for a few paths (`larger`) by a number of their own.
+
+        Args:
+            app: The rest of the application. Its state has the `entrance`.
+            largest_body: Bytes of a body at most.
+            reply: Makes the reply of an error: JSON for programs, a page for people.
+            larger: Path -> bytes of a body at most.
+        """
+        self.app, self.reply = app, reply
         self.largest_body, self.larger = largest_body, larger or {}
-        self.hosts = hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on, or refuse it with an error in JSON."""
+        """Pass the request on, or refuse it with an error."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -86,8 +92,8 @@ class SecurityMiddleware:
             await send(message)
 
         try:
-            refused = self.refusal(scope["method"], Headers(scope=scope), most)
-            answer = self.app if refused is None else JSONResponse(refused.body(), refused.status)
+            refused = self.refusal(scope, most)
+            answer = self.app if refused is None else self.reply(Request(scope), refused)
             await answer(scope, bounded, safely)
         except ClientDisconnect:
             log.debug("client left", path=scope["path"])
@@ -97,11 +103,13 @@ class SecurityMiddleware:
                 raise  # part of the reply has been sent; uvicorn closes the connection
             await JSONResponse(ServerError().body(), 500)(scope, receive, safely)
 
-    def refusal(self, method: str, headers: Headers, most: int) -> ServerError | None:
+    def refusal(self, scope: Scope, most: int) -> ServerError | None:
         """Return the error that refuses this request, or None."""
-        host = headers.get("host", "")
-        if _without_port(host) not in self.hosts:
-            return UnknownHostError()
+        entrance: Entrance = scope["app"].state.entrance
+        refused = entrance.enter(scope)
+        if refused is not None:
+            return refused
+        headers, method = Headers(scope=scope), scope["method"]
         length = headers.get("content-length", "0")
         if not length.isdecimal() or len(length) > 15 or int(length) > most:
             return TooLargeError()
@@ -111,7 +119,8 @@ class SecurityMiddleware:
         if site is not None:
             return None if site in ("same-origin", "none") else Forbidden()
         if origin is not None:
-            return None if origin.partition("://")[2] == host else Forbidden()
+            own = f"{scope['scheme']}://{headers['host']}"
+            return None if origin == own else Forbidden()
         return None
 
 
@@ -121,8 +130,3 @@ def _let_frame(headers: MutableHeaders, scope: Scope) -> None:
     if settings is not None and settings.frame_ancestors != "none":
         name = "Content-Security-Policy"
         headers[name] = headers[name].replace(NOBODY, f"frame-ancestors {settings.frame_ancestors}")
-
-
-def _without_port(host: str) -> str:
-    name, colon, port = host.lower().rpartition(":")
-    return name if colon and port.isdigit() else host.lower()

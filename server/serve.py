@@ -16,6 +16,7 @@ from parenting.server.connections.limits import Limits
 from parenting.server.connections.protocol import bounded
 from parenting.server.heap import share_heaps
 from parenting.server.log import set_up_log
+from parenting.server.public import trusted_proxies
 from parenting.server.settings import Settings
 
 log = structlog.get_logger()
@@ -61,7 +62,7 @@ def make_server(settings: Settings) -> Server:
         timeout_graceful_shutdown=GRACE,
         timeout_keep_alive=30,
         server_header=False,
-        proxy_headers=False,  # any program of this machine could send X-Forwarded-For
+        proxy_headers=False,  # `server.entrance` reads them
     )
     gc.freeze()  # loaded modules stay: searching them for garbage takes a tenth of a second
     return Server(config)
@@ -72,4 +73,6 @@ def _limits(settings: Settings) -> Limits:
     fit = room_for(settings.connections)
     if fit < settings.connections:
         log.warning("few files may be open", connections=fit, wanted=settings.connections)
-    return Limits(connections=fit, per_client=settings.connections_per_client)
+    return Limits(
+        connections=fit, per_client=settings.connections_per_client, proxies=trusted_proxies(settings)
+    )

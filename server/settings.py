@@ -42,13 +42,23 @@ class Settings(BaseSettings):
         description="Another database, as SQLAlchemy writes it; none is parenting.db in the data folder.",
     )
     host: str = Field(
-        "127.0.0.1", description="Address to listen on: 127.0.0.1, or 0.0.0.0 in a container (`container`)."
+        "127.0.0.1", description="Address to listen on; one that others reach needs `public`, or a container."
     )
     port: int = Field(8765, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
-    container: bool = Field(
+    public: bool = Field(
         False,
-        description="The server runs in a container whose port is published on loopback only, so it may "
-        "listen on 0.0.0.0.",
+        description="Others reach the server, by way of a proxy that terminates TLS; plain http is refused.",
+    )
+    hosts: str = Field("", description="Names under which a public server is reached, joined by commas.")
+    trusted_proxies: str = Field(
+        "127.0.0.1",
+        description="Addresses or networks of a public server's proxies, joined by commas; only these are "
+        "believed what they say of their clients.",
+    )
+    published_on_loopback: bool = Field(
+        False,
+        description="The server runs in a container whose port is published on its host's loopback only, so "
+        "it may listen on 0.0.0.0 without a proxy.",
     )
     lease_seconds: float = Field(
         60.0, gt=0, description="How long a question is held for the parent who was shown it."

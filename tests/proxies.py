@@ -1,7 +1,8 @@
-"""The configurations in deploy/, each run by its program on a port of loopback before another port."""
+"""The configurations of docs/operations.md, each run by its program on a port of loopback before a server."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import ssl
 import subprocess
@@ -32,11 +33,13 @@ http {
 """
 
 
-def configuration(file: str, changes: dict[str, str]) -> str:
-    """A file of deploy/ with other ports and files; each of the changed texts must be there."""
-    text = (ROOT / "deploy" / file).read_text(encoding="utf-8")
+def configuration(language: str, changes: dict[str, str]) -> str:
+    """The block of docs/operations.md in this language, with other ports and files; each must be there."""
+    page = (ROOT / "docs/operations.md").read_text(encoding="utf-8")
+    blocks: list[str] = re.findall(rf"^```{language}\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    (text,) = blocks
     for old, new in changes.items():
-        assert old in text, f"deploy/{file} has no {old}"
+        assert old in text, f"the block {language} of docs/operations.md has no {old}"
         text = text.replace(old, new)
     return text
 
@@ -51,7 +54,7 @@ def nginx(folder: Path, port: int, upstream: int) -> list[str]:
         "/etc/ssl/private/parenting.key": f"{folder}/key.pem",
         "/etc/nginx/parenting.passwords": f"{folder}/passwords",
     }
-    (folder / "site.conf").write_text(configuration("nginx.conf", changes))
+    (folder / "site.conf").write_text(configuration("nginx", changes))
     (folder / "nginx.conf").write_text(NGINX.replace("FOLDER", str(folder)))
     return ["nginx", "-c", f"{folder}/nginx.conf", "-p", str(folder), "-e", "stderr"]
 
@@ -65,7 +68,7 @@ def caddy(folder: Path, port: int, upstream: int) -> list[str]:
         "127.0.0.1:8765": f"127.0.0.1:{upstream}",
         "$2a$14$THE_OUTPUT_OF_caddy_hash-password": HASH,
     }
-    (folder / "Caddyfile").write_text(configuration("Caddyfile", changes))
+    (folder / "Caddyfile").write_text(configuration("caddyfile", changes))
     return ["caddy", "run", "--config", f"{folder}/Caddyfile", "--adapter", "caddyfile"]
 
 
@@ -117,7 +120,8 @@ def _await(found: httpx2.Client, child: subprocess.Popen[bytes], said: Path) -> 
     end = time.monotonic() + 60
     while True:
         try:
-            assert found.get("/healthz").status_code == 200
+            reply = found.get("/healthz")
+            assert reply.status_code == 200, reply.text
             return
         except httpx2.TransportError:
             assert child.poll() is None, said.read_text()

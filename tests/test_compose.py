@@ -108,7 +108,7 @@ def test_only_the_web_is_on_a_network_and_only_on_loopback(compose: dict[str, An
 
 def test_only_that_web_listens_beyond_its_loopback(compose: dict[str, Any]) -> None:
     """The image by itself does not: who publishes its port has to say so."""
-    opening = {"PARENTING_HOST": "0.0.0.0", "PARENTING_CONTAINER": "true"}
+    opening = {"PARENTING_HOST": "0.0.0.0", "PARENTING_PUBLISHED_ON_LOOPBACK": "true"}
     assert compose["services"]["web"]["environment"].items() >= opening.items()
     for environment in (
         image_environment(),

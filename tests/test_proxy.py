@@ -1,4 +1,4 @@
-"""nginx and Caddy before the web process, with the files of deploy/; skipped without these programs."""
+"""nginx and Caddy before a public server, as docs/operations.md has them; skipped without these programs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from tests.pages import island_fixtures as fixtures
 from tests.pages.parent_page import form
 from tests.server.processes import Command
 from tests.server.serving import free_port, until_up
-from tests.tree import ROOT
 
 PARENT = "a-parent-at-a-browser"
 
@@ -42,7 +41,8 @@ class Web:
 def web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Web]:
     settings = Settings(data=tmp_path_factory.mktemp("data"), database_url=None, port=free_port())
     db = migrated(settings)
-    process = Command("web", data=settings.data, environment={"PARENTING_PORT": str(settings.port)})
+    environment = {"PARENTING_PORT": str(settings.port), "PARENTING_HOSTS": proxies.NAME}
+    process = Command("web", "--public", data=settings.data, environment=environment)
     try:
         until_up(f"http://127.0.0.1:{settings.port}")
         yield Web(settings, db)
@@ -84,6 +84,7 @@ def test_a_run_is_started_and_a_question_answered_by_the_forms_of_a_browser(
     query = fixtures.ask(web.db, claim, 1, "guidance", fixtures.guidance("left", "down"))
     page = client.get(f"/runs/{run.id}/parent", follow_redirects=True)
     assert page.status_code == 200
+    assert page.headers["strict-transport-security"] == "max-age=31536000"
     assert "; Secure" in page.headers["set-cookie"]
     answered = client.post(
         f"/runs/{run.public_id}/parent/answer",
@@ -95,13 +96,17 @@ def test_a_run_is_started_and_a_question_answered_by_the_forms_of_a_browser(
     assert get_query(web.db, query).status == "answered"
 
 
-def test_forms_of_other_sites_and_of_browsers_that_do_not_name_the_site_are_refused(
-    client: httpx2.Client,
-) -> None:
-    elsewhere = {"Origin": "https://evil.example", "Sec-Fetch-Site": "cross-site"}
-    unnamed = {"Origin": browser(client)["Origin"]}  # a browser of before 2023, or a page over plain http
-    for headers in (elsewhere, unnamed):
+def test_forms_of_other_sites_are_refused_whatever_the_browser_names(client: httpx2.Client) -> None:
+    own = browser(client)["Origin"]
+    plain, elsewhere = own.replace("https", "http"), "https://evil.example"
+    for headers in (
+        {"Origin": elsewhere, "Sec-Fetch-Site": "cross-site"},
+        {"Origin": elsewhere},
+        {"Origin": plain},
+    ):
         assert client.post("/runs", data={"world": "unsafe-exploration"}, headers=headers).status_code == 403
+    older = {"Origin": own}  # a browser of before 2023 does not send Sec-Fetch-Site
+    assert client.post("/runs", data={"world": "unsafe-exploration"}, headers=older).status_code == 303
 
 
 def test_requests_under_another_name_are_refused(client: httpx2.Client) -> None:
@@ -156,18 +161,23 @@ def test_nginx_gives_one_address_forty_requests_at_once(client: httpx2.Client, w
     assert client.get("/healthz").status_code == 200
 
 
-def test_the_web_process_believes_no_header_that_names_another_client(web: Web) -> None:
+def test_what_a_client_says_of_itself_does_not_pass_the_proxy(client: httpx2.Client, web: Web) -> None:
+    told = {"X-Forwarded-Proto": "http", "X-Forwarded-For": "nobody", "X-Forwarded-Host": "evil.example"}
     run, _ = fixtures.start_run(web.db)
-    told = {"X-Forwarded-Proto": "https", "X-Forwarded-For": "192.0.2.1", "X-Forwarded-Host": "evil.example"}
-    moved = httpx2.get(f"{web.url}/runs/{run.id}/", headers=told)
-    assert moved.headers["location"] == f"{web.url}/runs/{run.id}"
+    moved = client.get(f"/runs/{run.id}/", headers=told)
+    assert moved.headers["location"] == f"https://{client.headers['host']}/runs/{run.id}"
 
 
-def test_the_page_on_deployment_names_both_files() -> None:
-    text = (ROOT / "docs/deployment.md").read_text(encoding="utf-8")
-    files = sorted(path.name for path in (ROOT / "deploy").iterdir())
-    assert files == ["Caddyfile", "nginx.conf"]
-    assert [file for file in files if f"(../deploy/{file})" not in text] == []
+@pytest.mark.parametrize("name", [proxies.NAME, "127.0.0.1"])
+@pytest.mark.parametrize("told", [{}, {"X-Forwarded-Proto": "http", "X-Forwarded-For": "192.0.2.1"}])
+def test_beside_the_proxy_plain_http_is_for_this_machine_alone(
+    web: Web, name: str, told: dict[str, str]
+) -> None:
+    reply = httpx2.get(f"{web.url}/api/v1/runs", headers={"Host": name, **told})
+    if name == "127.0.0.1" and not told:
+        assert reply.status_code == 200
+    else:
+        assert (reply.status_code, reply.json()["error"]["code"]) == (403, "plain_http")
 
 
 def streams(web: Web) -> int:

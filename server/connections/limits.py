@@ -7,6 +7,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Protocol
 
+from parenting.server.public import Network
+
 CODES = ("too_many", "too_large", "too_slow", "invalid")
 """The error codes of what is refused before the application sees it."""
 
@@ -18,8 +20,9 @@ class Limits:
     connections: int = 1000
     """Connections at once. Where all are taken, the one that has been idle longest makes room."""
     per_client: int = 250
-    """Connections of one address at once. Where it has them, its own longest idle one makes room. Loopback,
-    where a proxy stands, has no such bound."""
+    """Connections of one address at once. Where it has them, its own longest idle one makes room. Loopback
+    and the proxies, which stand for many, have no such bound."""
+    proxies: tuple[Network, ...] = ()
     head_bytes: int = 16 * 1024
     """Bytes of a request's head: its first line and its headers."""
     headers: int = 100
@@ -87,9 +90,15 @@ class Connections:
 
     def _has_room(self, client: str) -> bool:
         """Return whether one more fits, once an idle one was ended for it where a bound is reached."""
-        if not is_loopback(client) and self._by_client[client] >= self.limits.per_client:
+        if not self._stands_for_many(client) and self._by_client[client] >= self.limits.per_client:
             return self._make_room(client)  # its place is the new one's, in all as well
         return len(self._open) < self.limits.connections or self._make_room()
+
+    def _stands_for_many(self, client: str) -> bool:
+        if is_loopback(client):
+            return True
+        proxies = self.limits.proxies
+        return bool(proxies) and any(ipaddress.ip_address(client) in network for network in proxies)
 
     def _make_room(self, client: str | None = None) -> bool:
         """End the connection that has been idle longest, of this client if one is named."""

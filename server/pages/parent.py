@@ -29,7 +29,7 @@ from parenting.server.measures import BY_FORM
 from parenting.server.pages.fields import ChoiceField, ClientField, MaybeDatabase, MaybeQuestion
 from parenting.server.pages.practice import PRACTISED, Place
 from parenting.server.pages.question import Former, QuestionView, question_view
-from parenting.server.pages.render import page, redirect
+from parenting.server.pages.render import page, redirect, remember
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, parent_title
 from parenting.server.public_ids import LENGTH
 from parenting.server.queue import answers, leases
@@ -46,7 +46,6 @@ from parenting.server.tables import Run
 
 router = admitted_router(include_in_schema=False)
 
-YEAR = 365 * 24 * 3600
 NAME = re.compile(r"[A-Za-z0-9_-]{8,64}")
 PATIENCE = 0.5
 """Seconds for which a plain form waits for the next question before the page says that the agent explores."""
@@ -111,7 +110,7 @@ def parent_page(
     states = (now, STATE_TEXTS, GOAL_STEP)
     context = ParentPage(run, title, here, client, shown, *states, who, attention, after, refresh, last)
     response = page("parent.html", **vars(context))
-    response.set_cookie(COOKIE, client, max_age=YEAR, httponly=True, samesite="lax")
+    remember(request, response, COOKIE, client)
     return response
 
 

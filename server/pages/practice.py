@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import Query, Response
+from fastapi import Query, Request, Response
 
 from parenting.drawing.sentences import tr
 from parenting.envs import registry
@@ -22,7 +22,7 @@ from parenting.server.deps import Db, SettingsOf
 from parenting.server.pages.fields import ChoiceField
 from parenting.server.pages.lessons import LESSONS, POND, TAKE_BACK, TAKEN_BACK, WORLD, Lesson
 from parenting.server.pages.question import Former, Onward, QuestionView, describe
-from parenting.server.pages.render import page, redirect
+from parenting.server.pages.render import page, redirect, remember
 from parenting.server.public_ids import PATTERN
 from parenting.server.reads.names import run_number
 from parenting.server.schemas import Choice
@@ -31,7 +31,6 @@ router = admitted_router(include_in_schema=False)
 
 PRACTISED = "parenting_practised"
 """The cookie of a browser in which the practice was finished."""
-YEAR = 365 * 24 * 3600
 ADDRESS = "/practice"
 
 At = Annotated[int, Query(ge=1, le=len(LESSONS) + 1)]
@@ -197,8 +196,8 @@ def undo(at: At = 1, run: OfRun = None) -> Response:
 
 
 @router.post(f"{ADDRESS}/done")
-def done(run: OfRun = None) -> Response:
+def done(request: Request, run: OfRun = None) -> Response:
     """For the form at the end: remember in this browser that it has practised, and go back."""
     response = redirect(Place(run=run).back)
-    response.set_cookie(PRACTISED, "1", max_age=YEAR, httponly=True, samesite="lax")
+    remember(request, response, PRACTISED, "1")
     return response

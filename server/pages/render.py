@@ -8,7 +8,7 @@ from pathlib import Path
 from jinja2.meta import find_referenced_templates
 from markupsafe import Markup
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, RedirectResponse
+from starlette.responses import HTMLResponse, RedirectResponse, Response
 
 from parenting.drawing.render import environment
 from parenting.drawing.sentences import tr, trn
@@ -23,6 +23,8 @@ from parenting.server.tables import Run
 
 FIRST = ("start.html", "dashboard.html", "parent.html")
 """The pages that people open first. No request for one of them waits until it is compiled."""
+YEAR = 365 * 24 * 3600
+"""Seconds for which a browser keeps our cookies."""
 WEB = Path(__file__).parent.parent.parent / "web"
 
 
@@ -80,6 +82,12 @@ def moved(request: Request, run: Run) -> RedirectResponse | None:
 def redirect(path: str, status: int = 303) -> RedirectResponse:
     """After a POST: look there (303), so that a reload repeats nothing. 307: an old address of a page."""
     return RedirectResponse(path, status_code=status)
+
+
+def remember(request: Request, response: Response, name: str, value: str) -> None:
+    """Set a cookie for a year that no script reads, and that leaves over https only if it came so."""
+    secure = request.scope["scheme"] == "https"
+    response.set_cookie(name, value, max_age=YEAR, secure=secure, httponly=True, samesite="lax")
 
 
 def error_page(request: Request, error: ServerError) -> HTMLResponse:

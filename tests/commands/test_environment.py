@@ -98,6 +98,15 @@ def test_a_name_that_is_no_setting_is_told_wherever_it_stands(
     assert CliRunner().invoke(app, ["worlds"]).stderr == f"Warning: {name} in the environment{end}"
 
 
+def test_a_setting_of_an_earlier_version_is_told_with_its_successor(folder: Path) -> None:
+    (folder / ".env").write_text("PARENTING_CONTAINER=true\n", encoding="utf-8")
+    end = (
+        "is not a setting any more and is ignored. Use PARENTING_PUBLISHED_ON_LOOPBACK (docs/deployment.md)."
+    )
+    said = CliRunner().invoke(app, ["worlds"]).stderr
+    assert said == f"Warning: PARENTING_CONTAINER in {folder}/.env {end}\n"
+
+
 @pytest.mark.parametrize("name", ["PARENTING_DATA", "parenting_port", "DATABASE_URL", "PARENT", "PATH"])
 def test_settings_and_the_names_of_others_are_not_told(folder: Path, name: str) -> None:
     (folder / ".env").write_text(f"{name}=1\n", encoding="utf-8")

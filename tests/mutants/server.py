@@ -6,6 +6,7 @@ from tests.mutants.mutant import Mutant
 
 ANSWERS, WORKER = "tests/server/test_answers.py", "tests/server/test_worker_side.py"
 RUNS, SECURITY = "tests/server/test_runs.py", "tests/server/test_security.py"
+ENTRANCE = "tests/server/test_entrance.py"
 
 QUEUE = [
     Mutant(
@@ -126,15 +127,29 @@ WEB = [
     Mutant(
         "another site may act (CSRF, by Origin)",
         "server/security.py",
-        'return None if origin.partition("://")[2] == host else Forbidden()',
+        "return None if origin == own else Forbidden()",
         "return None",
         f"{SECURITY}::test_other_sites_may_not",
     ),
     Mutant(
         "any host name is served",
-        "server/security.py",
-        "if _without_port(host) not in self.hosts:",
-        "if not host:",
+        "server/entrance.py",
+        "return None if local else UnknownHostError()",
+        "return None",
         f"{SECURITY}::test_unknown_hosts_are_refused",
+    ),
+    Mutant(
+        "whoever sends forwarded headers is believed",
+        "server/entrance.py",
+        "if self._trusts(peer) and (FOR in headers or PROTO in headers):",
+        "if FOR in headers or PROTO in headers:",
+        f"{ENTRANCE}::test_other_ways_into_a_public_server_are_refused",
+    ),
+    Mutant(
+        "a public server takes plain http",
+        "server/entrance.py",
+        'if headers.getlist(PROTO) != ["https"]:',
+        "if not headers.getlist(PROTO):",
+        f"{ENTRANCE}::test_other_ways_into_a_public_server_are_refused",
     ),
 ]

@@ -79,10 +79,10 @@ def site(settings: Settings, db: Database) -> FastAPI:
 
 
 @pytest.fixture
-def address(site: FastAPI) -> Iterator[str]:
+def address(site: FastAPI, settings: Settings) -> Iterator[str]:
     """The site served at a free port, for a browser."""
     app = site
-    listener = bind("127.0.0.1", 0)
+    listener = bind(settings.model_copy(update={"port": 0}))
     server = Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.only("sqlite", "nothing here asks the store")
 @contextmanager
 def served(settings: Settings) -> Iterator[int]:
     """A server in a thread; the block gets its port."""
-    listener = bind("127.0.0.1", 0)
+    listener = bind(settings.model_copy(update={"port": 0}))
     server = make_server(settings)
     with ThreadPoolExecutor(1) as thread:
         ended = thread.submit(server.run, [listener])
