@@ -89,7 +89,7 @@ def in_pause(state: AgentState, answer: Answer, asked: int) -> Bool[Tensor, "N"]
 
 def amend(config: Config, state: AgentState, event: Amend) -> AgentState:
     """Rebuild X of every trial from the answers that stand. What was skipped counts once it is answered."""
-    state = state.replace(x=_rebuilt(config, state, event.standing))
+    state = state.replace(x=rebuilt(config, state, event.standing))
     guided, reviewed = guidance.counted(event.answer)
     now = guided | (reviewed & (event.answer.query.maturity == state.maturity))
     return state.replace(answered=state.answered + (now & (event.replaced.choice == Choice.SKIP)))
@@ -104,7 +104,7 @@ def reconsider(config: Config, state: AgentState, event: Reconsider) -> AgentSta
     restored = again & ((state.refused & guidance.moves_of(query)).sum(1) == 2)
     state = confirmation.take_back(state, query, vote)
     if config.remembers or bool((event.replaced.mu > 0).any()):
-        state = state.replace(x=_rebuilt(config, state, event.standing))
+        state = state.replace(x=rebuilt(config, state, event.standing))
     return state.replace(
         refused=state.refused & ~(restored[:, None] & guidance.moves_of(query)),
         set_aside=state.set_aside & ~(aside[:, None] & confirmation.pair_of(query)),
@@ -112,7 +112,8 @@ def reconsider(config: Config, state: AgentState, event: Reconsider) -> AgentSta
     )
 
 
-def _rebuilt(config: Config, state: AgentState, standing: Sequence[Answer]) -> Dataset:
+def rebuilt(config: Config, state: AgentState, standing: Sequence[Answer]) -> Dataset:
+    """Return X of every trial from the answers that stand, in the order in which they were heard."""
     x = dataset.blank(state.x)
     for answer in standing:
         x = guidance.store(config, state.replace(x=x), answer)

@@ -32,6 +32,7 @@ COMMANDS = {
     "worlds": "List the worlds and their levels, print random levels, draw pictures.",
     "answer": "Answer a run as a scripted parent, over the HTTP API.",
     "runs": "List the runs, and who waits for whom.",
+    "person": "List the people who answered, by pseudonym; delete one's data.",
     "resume": "Let a paused or failed run go on.",
     "rollback": "Go on from an earlier tick of a run, as a new run.",
     "export": "Write answers, metrics or the log of a run as JSON lines or CSV.",
@@ -61,6 +62,11 @@ SUBCOMMANDS = {
         "archive": "Leave a run out of the list, or take it in again.",
         "delete": "Delete a run for good, after it was asked.",
         "deleted": "List what is left of deleted runs.",
+    },
+    "person": {
+        "list": "List the people who answered.",
+        "name": "Keep a person's name, or an id of another system.",
+        "delete": "Delete one person's data for good, after it was asked.",
     },
 }
 """Commands below a command, each with its help text. `worlds new` is the function `command`

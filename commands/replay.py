@@ -70,6 +70,10 @@ def said(found: Relived) -> str:
     if found.differ:
         names = dict.fromkeys(_piece(name) for name in found.differ)
         return f"{lived} Not equal. After tick {found.tick} these differ: {', '.join(names)}."
+    if found.erased is not None and found.tick < found.checkpoint and found.tick == found.erased - 1:
+        return (
+            f"{lived} Equal questions. The answer of tick {found.erased} was erased: no replay goes further."
+        )
     if found.until is not None and found.tick < found.checkpoint:
         return f"{lived} Equal questions. From tick {found.until + 1} on another machine raised it."
     return f"{lived} Equal bit for bit."

@@ -45,6 +45,7 @@ class Answer(Table):
     replays: Mapped[int | None]  # how often its parent played the clips again; null: the client did not tell
     measured: Mapped[dict[str, Any] | None] = mapped_column(Measures)  # by the page (`server.measures`)
     applied_tick: Mapped[int | None]
+    erased: Mapped[datetime | None]  # when its person's data were deleted (`server.erasing`); a skip since
     # the chain of hashes (server.chain)
     salt: Mapped[str | None]
     digest: Mapped[str | None]

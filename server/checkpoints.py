@@ -6,7 +6,7 @@ A large one is written in parts (`server.checkpoint_parts`), and exists once its
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import ColumnElement, delete, func, select
@@ -36,26 +36,31 @@ class StoredCheckpoint:
     intact: bool
 
 
-def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes) -> None:
+Also = Callable[[Session, Run, int], None]
+"""Does more in the transaction that stores a checkpoint, of the run, locked, and the checkpoint's number."""
+
+
+def save_checkpoint(db: Database, mine: Claim, tick: int, blob: bytes, also: Also | None = None) -> None:
     """Store the state after a tick, with its hash, and delete all but the last two.
 
     A second checkpoint of the same tick replaces the first, and those of later ticks: they were passed over.
+    What is done `also` is done with it or not at all, and is durable.
 
     Raises:
         LostClaimError: another worker trains this run now.
     """
     digest = hashlib.sha256(blob).hexdigest()
     if len(blob) <= checkpoint_parts.PART_BYTES:
-        _store(db, mine, Checkpoint(tick=tick, blob=blob, sha256=digest))
+        _store(db, mine, Checkpoint(tick=tick, blob=blob, sha256=digest), also)
         return
     sweep_parts(db, mine)
     parcel = write_parts(db, mine, blob)
-    _store(db, mine, Checkpoint(tick=tick, blob=b"", sha256=digest, parcel=parcel))
+    _store(db, mine, Checkpoint(tick=tick, blob=b"", sha256=digest, parcel=parcel), also)
     sweep_parts(db, mine)
 
 
-def _store(db: Database, mine: Claim, row: Checkpoint) -> None:
-    with db.write(durable=False) as session:
+def _store(db: Database, mine: Claim, row: Checkpoint, also: Also | None) -> None:
+    with db.write(durable=also is not None) as session:
         run = held(session, mine)
         later = delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.tick >= row.tick)
         session.execute(later)
@@ -70,6 +75,8 @@ def _store(db: Database, mine: Claim, row: Checkpoint) -> None:
         )
         kept = session.scalars(newest).all()
         session.execute(delete(Checkpoint).where(Checkpoint.run_id == run.id, Checkpoint.id.not_in(kept)))
+        if also is not None:
+            also(session, run, row.id)
 
 
 def ended_with_more(db: Database, seconds: float = CLAIM_SECONDS, but: Collection[int] = ()) -> int | None:

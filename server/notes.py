@@ -60,7 +60,15 @@ class MachineChanged(BaseModel):
     until: int
 
 
-Note = Failed | Resumed | CheckpointDamaged | MachineChanged
+class PersonErased(BaseModel):
+    """A person's data were deleted: their answers left X after this tick. Weights had learnt from them."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    kind: Literal["person_erased"] = "person_erased"
+    answers: int
+
+
+Note = Failed | Resumed | CheckpointDamaged | MachineChanged | PersonErased
 Logged = Annotated[Event | Note, Field(discriminator="kind")]
 """An entry of a run's log: an event that the agent hears, or a note."""
 LOGGED: TypeAdapter[Any] = TypeAdapter(Logged)

@@ -18,6 +18,7 @@ class Person(Table):
     id: Mapped[int] = mapped_column(primary_key=True)
     pseudonym: Mapped[str] = mapped_column(unique=True)
     created: Mapped[datetime]  # with the first answer
+    deleting: Mapped[datetime | None]  # when the deletion of their data was confirmed (`server.erasure`)
 
 
 class PersonClient(Table):

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 from parenting.drawing.sentences import mark
 from parenting.server.damage import sound
 from parenting.server.db import Database
-from parenting.server.errors import NotFound
+from parenting.server.errors import Conflict, NotFound
 from parenting.server.person_tables import Person, PersonClient, PersonName
 
 ALPHABET = "23456789abcdefghjkmnpqrstuvwxyz"
@@ -25,7 +25,11 @@ ALPHABET = "23456789abcdefghjkmnpqrstuvwxyz"
 LENGTH = 9
 AT_ONCE = 500
 """Names that one statement looks up."""
-_KNOWN = select(PersonClient.person_id).where(PersonClient.client_id == bindparam("client_id"))
+_KNOWN = (
+    select(PersonClient.person_id, Person.deleting)
+    .join(Person, Person.id == PersonClient.person_id)
+    .where(PersonClient.client_id == bindparam("client_id"))
+)
 
 
 def new_pseudonym() -> str:
@@ -34,10 +38,16 @@ def new_pseudonym() -> str:
 
 
 def person_of(session: Session, client_id: str, now: datetime) -> int:
-    """Return the person who answers under a name, a new one where it is new."""
-    known = session.execute(_KNOWN, {"client_id": client_id}).scalar()
+    """Return the person who answers under a name, a new one where it is new.
+
+    Raises:
+        Conflict: this person's data are being deleted.
+    """
+    known = session.execute(_KNOWN, {"client_id": client_id}).one_or_none()
     if known is not None:
-        return int(known)
+        if known.deleting is not None:
+            raise Conflict(mark("What you said here is being deleted, so nothing more is stored of you."))
+        return int(known.person_id)
     try:
         with session.begin_nested():
             made = insert(Person).values(pseudonym=new_pseudonym(), created=now).returning(Person.id)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import torch
+from sqlalchemy import func, select
 from torch import Tensor
 
 from parenting._plural import counted
@@ -37,7 +38,7 @@ from parenting.server.snapshot import (
     initial_weights,
     versions,
 )
-from parenting.server.tables import Run
+from parenting.server.tables import Answer, Run
 
 Progress = Callable[[int, int], None]
 """A function that is called after each tick with its number and the last one's."""
@@ -59,6 +60,7 @@ class Relived:
     parted: str | None = None  # a sentence: where the agent left its record
     differ: Sequence[str] = field(default_factory=tuple)  # pieces of state that are not equal bit for bit
     until: int | None = None  # the last tick before another machine went on; None: none has
+    erased: int | None = None  # the tick of the first answer that was erased; None: none was
 
     @property
     def equal(self) -> bool:
@@ -83,7 +85,10 @@ def relive(db: Database, run_id: int, progress: Progress = silent) -> Relived:
     weights = initial_weights(db, run, world)
     kept = _checkpoint(db, run, world, config, weights)
     until = comparable_until(db, run)
-    last = kept.tick if until is None else min(until, kept.tick)
+    erased = first_erased(db, run_id)
+    last = min(
+        tick for tick in (kept.tick, until, None if erased is None else erased - 1) if tick is not None
+    )
     rows = StoredRecord(db, run_id, world, config.max_clip_length)
     rows.inherited = inherited(db, run, world, config)
     lived, parent, parted = first_snapshot(db, run, world, config, weights), ReplayParent(rows), None
@@ -94,7 +99,17 @@ def relive(db: Database, run_id: int, progress: Progress = silent) -> Relived:
     except (ReplayMismatchError, UnreadableRecordError) as error:
         parted = _said(error) if isinstance(error, ReplayMismatchError) else str(error)
     differ = () if parted or last < kept.tick else differences(lived, kept.saved)
-    return Relived(run_id, parent.tick, rows.answers, rows.events, kept.tick, parted, differ, until)
+    return Relived(run_id, parent.tick, rows.answers, rows.events, kept.tick, parted, differ, until, erased)
+
+
+def first_erased(db: Database, run_id: int) -> int | None:
+    """Return the tick of the first answer whose person's data were deleted; None if there is none.
+
+    From there on the record does not say what the agent heard, so no replay goes further.
+    """
+    erased = select(func.min(Answer.applied_tick)).where(Answer.run_id == run_id, Answer.erased.is_not(None))
+    with db.read() as session:
+        return session.scalar(erased)
 
 
 def comparable_until(db: Database, run: Run) -> int | None:

@@ -23,9 +23,10 @@ from parenting.server.batches import refuse_if_of_batch
 from parenting.server.begun import inherited
 from parenting.server.chain import Checked, check
 from parenting.server.db import Database
+from parenting.server.queue.taken import standing_at
 from parenting.server.reads.record import StoredRecord, UnreadableRecordError
 from parenting.server.recall import recall
-from parenting.server.replay import Progress, Relived, comparable_until, equal, relive, silent
+from parenting.server.replay import Progress, Relived, comparable_until, equal, first_erased, relive, silent
 from parenting.server.runs import get_run
 from parenting.server.snapshot import DivergedError, Snapshot, first_snapshot, initial_weights
 
@@ -71,7 +72,12 @@ def verify(db: Database, run_id: int, progress: Progress = silent) -> Verified:
     begun = first_snapshot(db, run, world, config, weights)
     record = StoredRecord(db, run_id, world, config.max_clip_length)
     record.inherited = inherited(db, run, world, config)
-    x = _x(begun, recalled.saved, recalled.tick, ReplayParent(record))
+    erased = first_erased(db, run_id) is not None
+    x = (
+        _x_of_rest(db, run_id, recalled.tick, recalled.saved, record)
+        if erased
+        else _x(begun, recalled.saved, recalled.tick, ReplayParent(record))
+    )
     try:
         until = comparable_until(db, run)
     except DivergedError as error:
@@ -113,6 +119,16 @@ def _x(begun: Snapshot, kept: Snapshot, last: int, parent: ReplayParent) -> str 
         if not equal(getattr(heard, name), getattr(kept.state, name)):
             return f"The checkpoint's {name} is not what the answers make it."
     differ = [name for name, ours, theirs in _pairs(heard, kept.state) if not equal(ours, theirs)]
+    return f"X is not what the answers make it: {', '.join(differ)} differ." if differ else None
+
+
+def _x_of_rest(db: Database, run_id: int, last: int, kept: Snapshot, record: StoredRecord) -> str | None:
+    """Hold X to the answers that were left, where others were erased: what X was in between is not known."""
+    with db.read() as session:
+        taken = standing_at(session, run_id, last)
+    heard = [*record.inherited, *(record.in_tensors(one.answer, one.query) for one in taken)]
+    rest = kept.state.replace(x=amendment.rebuilt(kept.config, kept.state, heard))
+    differ = [name for name, ours, theirs in _pairs(rest, kept.state) if not equal(ours, theirs)]
     return f"X is not what the answers make it: {', '.join(differ)} differ." if differ else None
 
 

@@ -14,6 +14,7 @@ from parenting.server.pages.growth import router as growth
 from parenting.server.pages.history import router as history
 from parenting.server.pages.levels import router as levels
 from parenting.server.pages.parent import router as parent
+from parenting.server.pages.persons import router as persons
 from parenting.server.pages.practice import router as practice
 from parenting.server.pages.pretraining import router as pretraining
 from parenting.server.pages.render import error_page
@@ -47,5 +48,6 @@ router.include_router(controls)
 router.include_router(take)
 router.include_router(history)
 router.include_router(settings)
+router.include_router(persons)
 router.include_router(why)
 router.include_router(docs)

@@ -42,6 +42,7 @@ CHOICE_TEXTS = {
     "skip": mark("Skipped: could not tell"),
 }
 """The meaning of a choice, in words."""
+DELETED = mark("Deleted, as all that its person said")
 CHOICE_NAMES = {**CHOICE_TEXTS, "left": mark("A or left is better"), "right": mark("B or right is better")}
 """The same where it is not said of which kind the question is."""
 
@@ -130,7 +131,7 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
         return DamagedEntry(answer.number, error.message)
     return Entry(
         answer.number,
-        said(answer.choice, shown),
+        tr(DELETED) if answer.erased is not None else said(answer.choice, shown),
         ("left", "right") if answer.choice == "either" else (answer.choice,),
         _fallen(answer, query),
         answer.standing and answer.parent == "human" and answer.client_id == mine,

@@ -25,6 +25,7 @@ NOTES = {
     "failed": "The run failed: {reason}",
     "resumed": "Resumed the run from its last good checkpoint",
     "checkpoint_damaged": "A damaged checkpoint was passed over: {reason}",
+    "person_erased": "A person's data were deleted: {answers} answers left X; the weights knew them",
 }
 
 

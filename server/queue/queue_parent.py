@@ -74,13 +74,14 @@ class QueueParent:
 
     def _correction(self, found: corrections.Corrected) -> Correction:
         return Correction(
-            self._answer(found.answer, found.query),
-            self._answer(found.replaced, found.query),
-            [*self.inherited, *(self._answer(taken.answer, taken.query) for taken in found.standing)],
+            self.in_tensors(found.answer, found.query),
+            self.in_tensors(found.replaced, found.query),
+            [*self.inherited, *(self.in_tensors(taken.answer, taken.query) for taken in found.standing)],
             found.query.tick,
         )
 
-    def _answer(self, row: tables.Answer, query: tables.Query) -> Answer:
+    def in_tensors(self, row: tables.Answer, query: tables.Query) -> Answer:
+        """Return a stored answer as the agent hears it."""
         choice = int(CHOICES[readable(row).choice])
         return Answer(query=self.read(query), choice=torch.tensor([choice]))
 
@@ -93,7 +94,7 @@ class QueueParent:
         taken = worker_side.take_answer(self.db, self.mine, self.tick) if asking else None
         if taken is None:
             return queries.silence(queries.empty(1, self.stages, self.world.height, self.world.width))
-        return self._answer(taken.answer, taken.query)
+        return self.in_tensors(taken.answer, taken.query)
 
     def post(self, query: Query) -> None:
         """Store what the agent asks in this tick; a tick that was lived before asks nothing twice."""

@@ -90,9 +90,9 @@ class StoredRecord:
             return None
         self.answers += 1
         return Correction(
-            self._answer(answer, query),
-            self._answer(replaced, query),
-            [*self.inherited, *(self._answer(taken.answer, taken.query) for taken in standing)],
+            self.in_tensors(answer, query),
+            self.in_tensors(replaced, query),
+            [*self.inherited, *(self.in_tensors(taken.answer, taken.query) for taken in standing)],
             query.tick,
         )
 
@@ -100,9 +100,10 @@ class StoredRecord:
         if tick not in self._heard:
             return queries.silence(self.nothing)
         self.answers += 1
-        return self._answer(*self._heard[tick])
+        return self.in_tensors(*self._heard[tick])
 
-    def _answer(self, answer: tables.Answer, query: tables.Query) -> Answer:
+    def in_tensors(self, answer: tables.Answer, query: tables.Query) -> Answer:
+        """Return a stored answer as the agent heard it."""
         choice = torch.tensor([int(CHOICES[answer.choice])])
         return Answer(query=self._decoded(query), choice=choice)
 

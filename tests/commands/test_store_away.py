@@ -18,6 +18,7 @@ pytestmark = pytest.mark.only("sqlite", "each test damages its own file, or name
 COMMANDS_OF_THE_STORE = {
     "up": ["--port", "0", "--no-browser"],
     "runs": [],
+    "person": [],
     "workers": [],
     "export": ["1"],
     "replay": ["1"],

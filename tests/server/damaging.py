@@ -9,7 +9,7 @@ from contextlib import ExitStack, closing, contextmanager
 from itertools import zip_longest
 from typing import Any
 
-from sqlalchemy import Column
+from sqlalchemy import Column, select
 
 from parenting.server import jobs, metrics, operator_events
 from parenting.server.board_tables import BoardSnapshot, BoardStates
@@ -23,7 +23,7 @@ from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query, take_answer, take_operator_events
 from parenting.server.runs import claim, report_progress
 from parenting.server.store.sqlite import sqlite_module
-from parenting.server.tables import Effect, Identity, Moves, Reason, Table
+from parenting.server.tables import Effect, Identity, Moves, Person, PersonName, Reason, Table
 from parenting.server.tombstone_table import Tombstone
 from parenting.server.weights import put as put_weights
 from parenting.server.workers import sign
@@ -78,6 +78,8 @@ def two_runs(db: Database) -> None:
             session.add(BoardSnapshot(run_id=mine.run_id, tick=1, stage=1, **numbers))
     with db.write() as session:
         moment = db.clock()
+        person = session.scalars(select(Person.id).limit(1)).one()  # whoever answered
+        session.add(PersonName(person_id=person, name="A person", external_id="7"))
         session.add(Tombstone(id=99, public_id=public_id(), created=moment, deleted=moment, held={}))
 
 
