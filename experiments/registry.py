@@ -19,7 +19,7 @@ PAPER = (
     "calibrate",
 )
 """Those of the paper, in its order."""
-BEYOND: tuple[str, ...] = ("fallible", "panel", "questions")
+BEYOND: tuple[str, ...] = ("fallible", "long-lives", "panel", "questions")
 """Those that go on from it, and ask what it does not."""
 NAMES = (*PAPER, *BEYOND)
 

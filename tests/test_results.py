@@ -15,6 +15,7 @@ from parenting.agent.config import offered_preset
 from parenting.envs.registry import WORLDS
 from parenting.experiments.calibrate.settings import SOME
 from parenting.experiments.fallible.settings import ARMS
+from parenting.experiments.long_lives.settings import STAGES
 from parenting.experiments.panel.settings import RULES
 from parenting.experiments.questions.settings import LEVELS, WORLD, trials_of
 from parenting.experiments.registry import BEYOND, experiment
@@ -39,6 +40,7 @@ ARM = {
     "value-iteration": ("stage", "level"),
     "panel": ("panel",),
     "questions": ("window",),
+    "long-lives": ("window",),
     "calibrate": ("layout", "p_rec", "lambda_global", "lambda_local", "recompare", "entropy"),
 }
 """Columns that tell the arms of a page apart beside `of`: within one, each trial has one row."""
@@ -50,6 +52,7 @@ KINDS_OF_ROWS = {
     "value-iteration": {kind.world for kind in WORLD_SIZES},
     "figure4": {"rho", "fitted"},
     "panel": set(RULES),
+    "long-lives": set(STAGES),
 }
 """Values of `of`, where the variants of the config do not say it."""
 

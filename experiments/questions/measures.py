@@ -69,7 +69,7 @@ def rates(name: str, column: str, rows: Sequence[Row]) -> list[list[float]]:
 
 
 def rate_interval(values: Sequence[float], ticks: int) -> Interval | None:
-    """The interval of a rate; where nothing happened, that of the proportion of ticks in which it did."""
-    if values and not any(values):
-        return proportion_interval(0, len(values) * ticks)
+    """The interval of a rate; where all trials have the same, or none, that of the proportion of ticks."""
+    if len(values) > 1 and len(set(values)) == 1:
+        return proportion_interval(round(sum(values) * ticks), len(values) * ticks)
     return count_interval(values)

@@ -119,18 +119,20 @@ def _curve(axes: Axes, name: str, what: str, rows: Sequence[Row]) -> None:
     axes.plot(places, means, color=COLOURS[name], label=name)
 
 
-def draw_windows(figure: Figure, rows: Sequence[Row]) -> None:
-    """Rates of answers and deaths a tick in each window of long lives, with intervals."""
+def draw_windows(
+    figure: Figure, rows: Sequence[Row], lives: Sequence[str] = tuple(LONG_LIVES), window: int = WINDOW
+) -> None:
+    """Rates of answers and deaths a tick in each window of three long lives, with intervals."""
     figure.set_size_inches(9, 4)
-    colours = dict(zip(LONG_LIVES, (COLOUR, GREEN, PAPER), strict=True))
+    colours = dict(zip(lives, (COLOUR, GREEN, PAPER), strict=True))
     for axes, (column, label, goal) in zip(figure.subplots(1, 2), RATES, strict=True):
-        for name in LONG_LIVES:
+        for name in lives:
             each = rates(name, column, rows)
             if not each:
                 continue
             ticks = next(row["ticks"] for row in raised(name, rows))
-            ends = [rate_interval(window, ticks) for window in each]
-            places, means = range(1, len(each) + 1), [100 * fmean(window) for window in each]
+            ends = [rate_interval(one, ticks) for one in each]
+            places, means = range(1, len(each) + 1), [100 * fmean(one) for one in each]
             axes.plot(places, means, "o-", color=colours[name], markersize=3, label=name)
             low = [mean if end is None else 100 * end.low for mean, end in zip(means, ends, strict=True)]
             high = [mean if end is None else 100 * end.high for mean, end in zip(means, ends, strict=True)]
@@ -138,7 +140,7 @@ def draw_windows(figure: Figure, rows: Sequence[Row]) -> None:
         axes.axhline(100 * goal, color=GREY, linestyle=":", label="the goal of the last window")
         axes.set_yscale("symlog", linthresh=goal)
         axes.set_ylim(bottom=0)
-        axes.set_xlabel(f"window of {WINDOW} ticks")
+        axes.set_xlabel(f"window of {window} ticks")
         axes.set_ylabel(label)
         axes.grid(alpha=0.3)
     _legend(figure)

@@ -68,7 +68,7 @@ def verdicts(rows: Sequence[Row]) -> Iterator[Comparison]:
     yield from _below_ideal(f"frugal, {ISLAND}", ISLAND, rows)
     yield from _below_ideal(f"frugal, {BOTTLENECK}", BOTTLENECK, rows)
     for name in LONG_LIVES:
-        yield from _falling(name, rows)
+        yield from falling(name, rows)
     for name in LASTING_LIVES:
         yield from _kept(name, rows)
 
@@ -161,7 +161,7 @@ def _below_ideal(name: str, level: str, rows: Sequence[Row]) -> Iterator[Compari
     )
 
 
-def _falling(name: str, rows: Sequence[Row]) -> Iterator[Comparison]:
+def falling(name: str, rows: Sequence[Row]) -> Iterator[Comparison]:
     """Each later window below the first, and the last one's upper end below the goal."""
     for column, what, goal in (("answered", "answers", ASKS_AT_LAST), ("deaths", "deaths", DIES_AT_LAST)):
         each = rates(name, column, rows)

@@ -1,0 +1,17 @@
+"""Settings of the experiment on long lives: stages, ticks and windows."""
+
+from __future__ import annotations
+
+from parenting.experiments.spec import Scale
+
+WORLD, LEVEL, PRESET = "unsafe-exploration", "island", "frugal"
+STAGES = {f"frugal, T = {last}": last for last in (1, 2, 3)}
+"""The last stage of each life, by the name of its rows."""
+TICKS: dict[Scale, int] = {"quick": 40, "paper": 2000}
+"""Ticks of the last stage."""
+WINDOW: dict[Scale, int] = {"quick": 20, "paper": 1000}
+"""Ticks of a window."""
+STAGE_TICKS: dict[Scale, int] = {"quick": 20, "paper": 200}
+"""Ticks of each stage before the last, of which nothing is kept."""
+TOGETHER = 5
+"""Trials of a task: a few, so that a run that is stopped loses little."""
