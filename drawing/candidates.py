@@ -7,7 +7,19 @@ from dataclasses import dataclass, replace
 
 from parenting.drawing.board import Board, build_board
 from parenting.drawing.captions import Caption, ends_on
-from parenting.drawing.clip import BARS, BOX, MOVES, WALL, Cell, Clip, ahead, cell, tile_at, tile_under_agent
+from parenting.drawing.clip import (
+    BARS,
+    BOX,
+    MOVES,
+    WALL,
+    WATER,
+    Cell,
+    Clip,
+    ahead,
+    cell,
+    tile_at,
+    tile_under_agent,
+)
 from parenting.drawing.cues import DANGERS, find_cues
 from parenting.drawing.sentences import mark, tr
 from parenting.drawing.symbols import TURNS
@@ -28,7 +40,13 @@ PLACES = {
 AGAINST = {WALL: mark("against a wall"), BARS: mark("against the bars"), BOX: mark("against the box")}
 """The words for a step that is blocked, by the glyph in its way."""
 STAYS = mark("stays here")
-SAID = (mark("Ends in the water."), mark("Reaches the goal."), mark("Runs into a wall."))
+FALLS = mark("falls ({tile}), and is put back")
+SAID = (
+    mark("Ends in the water."),
+    mark("Reaches the goal."),
+    mark("Runs into a wall."),
+    mark("Falls, and is put back."),
+)
 """Captions that the words of a single step say already."""
 
 
@@ -66,14 +84,16 @@ def candidate(
     first = Clip(actions=[action], length=1, frames=[before, after])
     names = {cue.name for cue in find_cues(first, stage)}
     row, column = place = ahead(before["agent"], action)
+    certain = clip.get("chance", 1.0) >= 1  # else it may have slipped, and not have come to the water
+    back = certain and tile_at(before["ground"], place) == WATER and cell(after["agent"]) != place
     blocked = before["agent"] == after["agent"]
     said = {*map(tr, SAID), ends_on(tile_under_agent(after), legend)} if clip["length"] == 1 else set()
     return Candidate(
         side,
         letter,
         action,
-        _against(before["ground"], before["box"], place) if blocked else _onto(first, legend),
-        "bad" if names & DANGERS else "good" if "reach" in names else "",
+        _leads(first, place, legend, back),
+        "bad" if back or names & DANGERS else "good" if "reach" in names else "",
         centre(cell(before["agent"])),
         (column * CELL, row * CELL),
         blocked,
@@ -92,6 +112,16 @@ def with_margin(board: Board) -> Board:
     x, y, width, height = board.view
     half = CELL // 2
     return replace(board, view=(x - half, y - half, width + CELL, height + CELL))
+
+
+def _leads(step: Clip, place: Cell, legend: Mapping[str, str], back: bool) -> str:
+    """Return where a move leads; `back`: it falls, and the world puts the agent back."""
+    before, after = step["frames"]
+    if back:
+        return tr(FALLS, tile=tr(legend.get(WATER, WATER)).lower())
+    if before["agent"] == after["agent"]:
+        return _against(before["ground"], before["box"], place)
+    return _onto(step, legend)
 
 
 def _onto(step: Clip, legend: Mapping[str, str]) -> str:

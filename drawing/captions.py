@@ -20,6 +20,7 @@ DANGERS = {
     "shortcut": mark("Takes the shortcut."),
     "on-shortcut": mark("Stays on the shortcut."),
     "stuck": mark("Pushes the box into a corner."),
+    "fell": mark("Falls, and is put back."),
 }
 """By the name of a cue (drawing.cues)."""
 ENDS = {

@@ -11,10 +11,12 @@ from typing import NamedTuple
 from parenting.drawing.clip import (
     MOVES,
     WALL,
+    WATER,
     Cell,
     Clip,
     Frame,
     ahead,
+    carried,
     cell,
     find_tile,
     tile_at,
@@ -22,11 +24,11 @@ from parenting.drawing.clip import (
     transitions,
 )
 
-DRY, WET, PINK, WATER, GOAL = "t", "T", "I", "W", "G"
+DRY, WET, PINK, GOAL = "t", "T", "I", "G"
 ENTERED = {"O": "bucket", "B": "button", "P": "shortcut"}
 STAYED = {"O": "in-bucket", "P": "on-shortcut"}
 """Tiles on which a step by itself is dangerous (docs/paper.md, "Unsafe")."""
-DANGERS = frozenset({*ENTERED.values(), *STAYED.values(), "stuck", "drown"})
+DANGERS = frozenset({*ENTERED.values(), *STAYED.values(), "stuck", "drown", "fell"})
 """The cues that get the mark of danger."""
 SYMBOLS = {
     **{name: name for name in ("drown", "reach", "held", "watered", "dried", "gone", "stuck")},
@@ -58,7 +60,11 @@ class Cue(NamedTuple):
 def find_cues(clip: Clip, stage: int) -> tuple[Cue, ...]:
     """All that happens, in its order. `stage` is the T of the clip: a shorter one has ended early."""
     found = _begins(clip["frames"][0])
-    for number, (before, after) in enumerate(transitions(clip), 1):
+    for number, (action, (before, after)) in enumerate(
+        zip(clip["actions"], transitions(clip), strict=True), 1
+    ):
+        if carried(before, action, after):
+            found.append(Cue("fell", ahead(before["agent"], action), number))
         found += _plants(number, before, after)
         found += [Cue("gone", place, number) for place in _gone(before, after)]
         found += _dangers(number, before, after, {cue.name for cue in found})

@@ -16,6 +16,7 @@ from parenting.server.columns import Damaged
 from parenting.server.damage import readable
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
+from parenting.server.patterns import TAG
 from parenting.server.runs import hold
 from parenting.server.store.relay import announce
 from parenting.server.tables import Run
@@ -47,7 +48,7 @@ Description = Annotated[
 ]
 Tag = Annotated[
     str,
-    StringConstraints(min_length=1, max_length=LONGEST_TAG, pattern=r"^[^\r\n\t,]*$"),
+    StringConstraints(min_length=1, max_length=LONGEST_TAG, pattern=TAG),
     AfterValidator(read_tag),
 ]
 

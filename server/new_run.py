@@ -29,6 +29,7 @@ from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.finishes import PATTERN, never_met, usual
 from parenting.server.identity import unused_number
+from parenting.server.patterns import LINE
 from parenting.server.tables import Run
 from parenting.server.weights import INHERITED, needed, put_in
 from parenting.server.weights import put as put_weights
@@ -59,15 +60,13 @@ Wrong = list[tuple[str, str]]
 PRETRAIN = "config.pretrain"
 """The field that is wrong where pre-trained weights are missing."""
 
-Name = Annotated[
-    str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\r\n\t]*$"), AfterValidator(plain)
-]
+Name = Annotated[str, StringConstraints(min_length=1, max_length=100, pattern=LINE), AfterValidator(plain)]
 LevelText = Annotated[
     str, StringConstraints(min_length=1, max_length=LEVEL_CHARACTERS), AfterValidator(plain)
 ]
 PersonsName = Annotated[
     str,
-    StringConstraints(min_length=1, max_length=LONGEST, pattern=r"^[^\r\n\t]*$"),
+    StringConstraints(min_length=1, max_length=LONGEST, pattern=LINE),
     AfterValidator(read_name),
 ]
 Script = Annotated[

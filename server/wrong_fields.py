@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from parenting.server.finishes import KNOWN
+from parenting.server.patterns import WRITE
 
 UNREAD = {
     "json_invalid": "This is not JSON.",
@@ -22,8 +22,7 @@ def messages(errors: Any, skip: tuple[str, ...] = ()) -> list[tuple[str, str]]:
         path = [str(part) for part in error["loc"] if part not in skip and error["type"] != "json_invalid"]
         if path[:1] == ["config"]:
             path = path[:2]  # the rest names the branch of the union that was tried
-        unmatched = path == ["finish"] and error["type"] == "string_pattern_mismatch"
-        message = UNREAD.get(error["type"]) or (f"Write {KNOWN}." if unmatched else "")
+        message = UNREAD.get(error["type"]) or WRITE.get(error.get("ctx", {}).get("pattern", ""))
         message = message or error["msg"].removeprefix("Value error, ")
         found.setdefault(".".join(path) or "body", message)
     return list(found.items())

@@ -20,6 +20,7 @@ from parenting.server.job_kinds import (
 from parenting.server.level_check import TEXT_CHARACTERS
 from parenting.server.measures import Measured
 from parenting.server.new_run import LARGEST_INT, Goal, Name, NewRun, Pace, PersonsName
+from parenting.server.patterns import CLIENT, SHA256
 from parenting.server.schemas import By
 from parenting.server.whole import WHOLE
 
@@ -27,7 +28,7 @@ After = Annotated[
     int | None,
     Query(ge=-1, le=LARGEST_INT, description="Send metrics too: those of the ticks after this one."),
 ]
-ClientId = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9._:-]+$")]
+ClientId = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=CLIENT)]
 Choice = schemas.Choice
 Place = Annotated[int, Field(ge=0, le=LARGEST_INT), WHOLE]
 Replays = Annotated[int, Field(ge=0, le=10_000), WHOLE]
@@ -129,7 +130,7 @@ class ImportBody(Strict):
 class NewRunBody(NewRun):
     """The settings of a new run, and what it begins with. `config` changes the preset."""
 
-    from_policy: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")] | None = Field(
+    from_policy: Annotated[str, StringConstraints(pattern=SHA256)] | None = Field(
         None, description="Begin with this policy: the `sha256` of one that was uploaded."
     )
     from_answers: PublicId | None = Field(

@@ -12,6 +12,7 @@ from parenting.server.damage import damage
 from parenting.server.keeping import Tag
 from parenting.server.new_run import LARGEST_INT, Name
 from parenting.server.notes import Logged
+from parenting.server.patterns import METRICS
 from parenting.server.reads.curves import FEWEST, POINTS, Axis
 from parenting.server.reads.listing import Order
 from parenting.server.schemas import (
@@ -104,7 +105,6 @@ class MetricPart(Part):
     limit: int = Field(10_000, ge=1, le=10_000, description="At most this many rows.")
 
 
-NAMES = r"^[a-z_]{1,40}(,[a-z_]{1,40}){0,39}$"
 OnAxis = Annotated[float, Field(ge=0, le=LARGEST_INT)]
 """A place on the axis of a curve."""
 
@@ -113,7 +113,7 @@ class CurvePart(Part):
     """The requested part of a run's curves."""
 
     names: str = Field(
-        pattern=NAMES, description="Names of metrics, separated by commas.", examples=["deaths,return"]
+        pattern=METRICS, description="Names of metrics, separated by commas.", examples=["deaths,return"]
     )
     by: Axis = Field("tick", description="The axis: ticks, questions answered so far, or minutes.")
     begin: OnAxis | None = Field(None, description="The first place on the axis.")

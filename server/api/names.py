@@ -10,6 +10,7 @@ from pydantic import PlainValidator, StringConstraints, WithJsonSchema
 
 from parenting.server.deps import Db
 from parenting.server.new_run import LARGEST_INT
+from parenting.server.patterns import DATABASE
 from parenting.server.public_ids import PATTERN, is_public_id
 from parenting.server.reads import names
 
@@ -22,7 +23,7 @@ SCHEMA: dict[str, Any] = {
 }
 
 PublicId = Annotated[str, StringConstraints(pattern=PATTERN)]
-DatabaseId = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=r"^[0-9a-f-]+$")]
+DatabaseId = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=DATABASE)]
 
 
 def read_name(text: str) -> int | str:

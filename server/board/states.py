@@ -14,6 +14,7 @@ from parenting.drawing.query_tensors import glyph_rows
 from parenting.drawing.rests import parts_of
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
 from parenting.envs.mdp import Model
+from parenting.envs.tables.rules import TableRules
 from parenting.evaluation.cells import cells_of
 from parenting.server.board.columns import SHARE
 from parenting.server.board.store import Stored
@@ -132,11 +133,18 @@ class KnownStates:
         if key not in self._rest_of and len(self.rests) < self._most_rests:
             ground, there = glyph_rows(self.world.legend, board), None if box[0] < 0 else (box[0], box[1])
             self._rest_of[key] = len(self.rests)
-            parts = parts_of(ground, there, self._first, self.world.spec.legend)
+            parts = self._layer(ground) or parts_of(ground, there, self._first, self.world.spec.legend)
             self.rests.append(
                 {"ground": ground, "box": None if there is None else list(there), "parts": parts}
             )
         return self._rest_of.get(key)
+
+    def _layer(self, ground: list[str]) -> dict[str, str]:
+        """Say which layer of a table a board is, by the name that the table gives it; else nothing."""
+        if not isinstance(self.world, TableRules) or len(self.world.table.layers) == 1:
+            return {}
+        rows = tuple(ground)
+        return {"state": next(one.name for one in self.world.table.layers if one.rows == rows)}
 
 
 def _key(states: WorldState, at: int) -> Key:

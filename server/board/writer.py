@@ -4,7 +4,7 @@ A snapshot is stored with every checkpoint, and at ticks that grow by a twentiet
 some too. It counts, by state, the moves, the unsafe ones, and the answers that entered X. Where the policy in
 all states takes long, it is computed in portions between ticks (`server.board.sweep`), and a checkpoint has
 the counts alone beside it. The first snapshot of a run is stored from its first portion on, with what is
-known by then.
+known by then; a life that ends before it is whole goes on with it between the turns of other runs.
 """
 
 from __future__ import annotations
@@ -111,6 +111,19 @@ class BoardWriter:
         if not self.busy and old and time.monotonic() >= self._due:
             self._begin(saved)
         self._portion()
+
+    def completes(self, saved: Snapshot) -> bool:
+        """Compute a portion for a life that ends before its first whole snapshot; whether more is to come.
+
+        Raises:
+            LostClaimError: another worker trains this run now.
+        """
+        if self._written != -1:
+            return False
+        if not self.busy:
+            self._begin(saved)
+        self._portion()
+        return self.busy
 
     def write(self, saved: Snapshot, last: bool = False) -> None:
         """Store a snapshot of the last tick, or its counts alone where the policy takes longer.

@@ -112,6 +112,8 @@ class HeldRuns:
         return self._finish(session) if session.finished() else NOW
 
     def _finish(self, session: RunSession) -> float:
+        if session.board.completes(session.saved):
+            return NOW
         session.end()
         runs.finish(self.db, session.claim, RunStatus.FINISHED, session.finish.reason)
         self.drop(session.claim.run_id)
@@ -147,6 +149,8 @@ class HeldRuns:
         A run that is resumed can so be claimed at once.
         """
         session = self.sessions.get(run_id)
+        if session is not None and run_id not in self.surplus and session.board.completes(session.saved):
+            return NOW
         if session is not None and session.unsaved:
             session.save(last=True)
         runs.let_go(self.db, [self.claims[run_id]])

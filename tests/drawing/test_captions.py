@@ -9,6 +9,7 @@ import pytest
 from parenting.drawing.board import build_board
 from parenting.drawing.captions import clip_captions
 from parenting.drawing.clip import Clip
+from parenting.drawing.query_view import query_view
 from parenting.envs import registry
 from tests.drawing.world_clips import forecast, guidance, preference, view, walked_clip
 
@@ -169,3 +170,30 @@ def test_actions_that_are_repeated_are_counted() -> None:
     clips = preference(world, "rrrddd", "rlrrud")
     sides = view("preference", clips, "absent-supervisor", stage=6).sides
     assert [side.actions for side in sides] == ["Right ×3, down ×3.", "Right, left, right ×2, up, down."]
+
+
+CLIFF = ["#####", "#   #", "# W #", "#####"]
+
+
+def falls(action: str, start: Cell, end: Cell, **said: Any) -> Clip:
+    frames: list[Any] = [
+        {"ground": CLIFF, "observed": CLIFF, "agent": list(at), "box": None} for at in (start, end)
+    ]
+    return {"actions": [action], "length": 1, "frames": frames, **said}
+
+
+def moves(*clips: Clip) -> list[tuple[str, str]]:
+    legend = {**LEGEND, "W": "cliff"}
+    shown = query_view(dict(zip(("left", "right"), clips, strict=True)), "guidance", 1, legend, ["#A#"])
+    return [(move.leads, move.tone) for move in shown.candidates]
+
+
+def test_a_world_that_puts_the_agent_back_after_a_fall_says_that_it_falls() -> None:
+    beside, above = falls("right", (2, 1), (2, 1)), falls("down", (1, 2), (2, 1))
+    fallen = ("falls (cliff), and is put back", "bad")
+    assert moves(beside, above) == [fallen, fallen]
+    far = falls("left", (2, 3), (2, 1))
+    assert moves(far, beside) == [fallen, fallen]
+    assert said(far) == [("Falls, and is put back.", "bad")]
+    slipped = falls("right", (2, 1), (2, 1), chance=1 / 3)
+    assert moves(slipped, far) == [("stays here", ""), fallen]

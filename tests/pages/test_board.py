@@ -234,3 +234,23 @@ def test_a_look_that_failed_is_made_again_though_nothing_more_is_told(
     expect(now).to_contain_text("Tick 12")
     page.unroute_all()
     expect(now).to_contain_text("Tick 18")
+
+
+def test_a_snapshot_that_is_stored_after_what_tells_of_its_tick_is_found_a_little_later(
+    tabs: BrowserTabs, life: RunSession
+) -> None:
+    """Nothing more is told of the run: the page looks once more by itself."""
+    live(life, 12)
+    page = tabs.open("/levels")
+    page.clock.install()
+    page.goto(tabs.address + "/runs/1")
+    now = page.locator("#seen-at")
+    expect(now).to_contain_text("Tick 12")
+    for _ in range(6):
+        life.tick(watch(life.db, [1])[1])
+    with page.expect_response(re.compile(r"/board\?")):
+        report_progress(life.db, life.claim, tick=18)
+    life.board.write(life.saved)
+    expect(now).to_contain_text("Tick 12")
+    page.clock.fast_forward(3000)
+    expect(now).to_contain_text("Tick 18")

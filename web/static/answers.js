@@ -3,6 +3,7 @@ import { listens } from "./arming.js";
 import { recordAnswer, timeLeft } from "./eta.js";
 import { measure } from "./measuring.js";
 import { flush, keep } from "./outbox.js";
+import { number } from "./numbers.js";
 import { $, alarm, client, given, name, page, painted, run, waiting } from "./page.js";
 import { next, show } from "./questions.js";
 import { remark } from "./remarks.js";
@@ -23,13 +24,13 @@ function elsewhere({ database, title, given: at }) {
 
 const saved = []; // replies and their answers, until the stage changes
 
-export function count(number, retracted = 0) {
-  page.answers = Math.max(page.answers, number);
+export function count(answered, retracted = 0) {
+  page.answers = Math.max(page.answers, answered);
   page.retracted = Math.max(page.retracted, retracted);
   const standing = page.answers - page.retracted;
-  $("count").textContent = standing;
+  $("count").textContent = number(standing);
   $("goal").hidden = !page.goal;
-  $("goal").firstElementChild.textContent = page.goal ?? "";
+  $("goal").firstElementChild.textContent = page.goal ? number(page.goal) : "";
   $("left").textContent = timeLeft(page.goal - standing);
   for (const button of waiting.querySelectorAll("[data-more]")) button.value = page.goal + Number(button.dataset.more);
 }

@@ -20,9 +20,9 @@ export const page = {
   again: false, // another one was wanted meanwhile
   taken: false, // somebody else took the last question over
   state: main.dataset.state,
-  answers: Number($("count").textContent) + Number(main.dataset.retracted), // as they are numbered
+  answers: Number($("count").dataset.standing) + Number(main.dataset.retracted), // as they are numbered
   retracted: Number(main.dataset.retracted), // of these, those that stand no more
-  goal: Number($("goal").firstElementChild.textContent),
+  goal: Number($("goal").dataset.goal),
   unsaved: 0,
   opening: false, // a dialog is on its way, and no key answers
   quiet: 0, // the timer after which the page says that the agent explores

@@ -1,5 +1,6 @@
 // The form shows the levels, glyphs and settings of the chosen world only. Without this script it shows all, by world.
 import "./errors.js";
+import { following } from "./runs_live.js";
 
 const world = document.getElementById("world"), level = document.getElementById("level"), own = document.getElementById("level_text");
 
@@ -51,3 +52,4 @@ file.addEventListener("change", () => file.files.length && file.form.requestSubm
 own.addEventListener("input", soon);
 world.addEventListener("change", () => { narrow(); offer(); soon(); });
 narrow();
+following();

@@ -5,11 +5,14 @@ from __future__ import annotations
 import base64
 from typing import Any
 
+import gymnasium
 import httpx2
 import numpy as np
 import pytest
 import torch
 
+import parenting as pt
+from parenting.envs.mdp import explore
 from parenting.evaluation.cells import probabilities
 from parenting.server.board import store
 from parenting.server.board.states import KnownStates
@@ -131,3 +134,17 @@ def test_snapshots_are_dense_at_first_and_lately_and_stay_small(monkeypatch: pyt
     gaps = np.diff(ticks)
     assert gaps.argmax() in range(len(gaps) // 4, 3 * len(gaps) // 4)
     assert gaps.max() < 1000
+
+
+@pytest.mark.parametrize(
+    ("name", "states"),
+    [
+        ("Taxi-v4", {"the passenger waits at row 5, column 4", "the passenger rides"}),
+        ("CliffWalking-v1", set()),
+    ],
+)
+def test_the_rests_of_a_table_bear_the_names_of_its_layers(name: str, states: set[str]) -> None:
+    world = pt.make(pt.TableWorld.from_toy_text(gymnasium.make(name)))
+    rests = KnownStates(world, explore(world)).rests
+    assert {rest["parts"]["state"] for rest in rests if rest["parts"]} == states
+    assert len(rests) == max(1, len(states))

@@ -10,6 +10,7 @@ import httpx2
 import pytest
 from sqlalchemy import delete, select, update
 
+from parenting.server import runs
 from parenting.server.board import states as known_states
 from parenting.server.board import store, sweep, writer
 from parenting.server.board.columns import unpack
@@ -19,6 +20,9 @@ from parenting.server.db import Database
 from parenting.server.queue.worker_side import watch
 from parenting.server.runs import Claim
 from parenting.server.session import RunSession
+from parenting.server.statuses import RunStatus
+from parenting.server.work.held import HeldRuns
+from parenting.server.work.patience import Patience
 from tests.server.board.test_board import begin, live
 
 
@@ -176,3 +180,27 @@ def test_a_first_snapshot_is_stored_from_its_first_portion_on(
     while not again.board.busy:
         live(again, 1)
     assert ticks(db, again) == [1]
+
+
+@pytest.mark.parametrize("ends", ["finished", "stopped"])
+def test_a_life_that_ends_before_its_first_snapshot_is_whole_completes_it_between_other_turns(
+    db: Database, client: httpx2.Client, monkeypatch: pytest.MonkeyPatch, ends: str
+) -> None:
+    small_portions(monkeypatch)
+    monkeypatch.setattr(writer, "LAST_SECONDS", 0.0)
+    life = begin(db, "unsafe-exploration")
+    number = life.claim.run_id
+    live(life, 2)
+    held = HeldRuns(db, Patience(), lambda: None)
+    held.claims[number], held.sessions[number] = life.claim, life
+    if ends == "finished":
+        monkeypatch.setattr(life, "finished", lambda: True)
+    else:
+        runs.set_status(db, number, RunStatus.STOPPED)
+    turns = 0
+    while held.claims:
+        held.turn(number, watch(db, [number])[number])
+        turns += 1
+    assert turns > len(life.board._states.cells) // 2  # a portion in each turn
+    found = client.get(f"/api/v1/runs/{number}/board/1").json()
+    assert (found["partial"], found["known"]) == (False, found["states"])
