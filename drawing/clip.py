@@ -11,7 +11,7 @@ Cell = tuple[int, int]
 
 WALL, LAND, AGENT, BOX = "#", " ", "A", "X"
 WATER = "W"
-"""What a safe agent never enters; in a world from a table it may be a hole or a cliff."""
+"""Water, which a safe agent never enters; in a world from a table it may be a hole or a cliff."""
 BARS = "S"
 """The supervisor's bars stop the agent as walls do; they are land while nobody watches."""
 

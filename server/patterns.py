@@ -15,12 +15,14 @@ TAG = r"^[^\r\n\t,]*$"
 
 WRITE = {
     FINISH: f"Write {KNOWN}.",
-    PUBLIC_ID: "This is no public id. Write the 22 letters and digits in the address of the run or question.",
+    PUBLIC_ID: (
+        "This is not a public id. Write the 22 letters and digits in its address, of a run or question."
+    ),
     CLIENT: "Write letters, digits and . _ : - only, such as tab-1.",
-    DATABASE: "This is no id of a database. Write what `database` says in the run or question.",
-    SHA256: "This is no sha256. Write the 64 digits, 0 to f, that the upload of the policy returned.",
+    DATABASE: "This is not the id of a database. Write what `database` says in the run or question.",
+    SHA256: "This is not a sha256. Write the 64 digits, 0 to f, that the upload of the policy returned.",
     METRICS: "Write names of metrics, with a comma and no blank between them, such as deaths,return.",
     LINE: "Write one line, without tabs.",
     TAG: "Write one line, without commas and tabs.",
 }
-"""What to write where a text does not match, by the pattern."""
+"""The sentence for a text that does not match, by the pattern."""

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import httpx2
 import pytest
-from playwright.sync_api import expect
 
 from parenting.agent.config import offered_preset
 from parenting.envs import registry
@@ -23,7 +22,6 @@ from parenting.server.run_form import read_form
 from parenting.server.runs import get_run, let_go, list_runs, report_progress, set_goal, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
-from tests.pages.browser_tabs import BrowserTabs
 from tests.pages.parent_page import address
 
 FORM = {
@@ -281,38 +279,3 @@ def test_every_world_names_its_glyphs(client: httpx2.Client) -> None:
 
 def test_hints_keep_the_names_of_worlds(client: httpx2.Client) -> None:
     assert "fewest answers in Unsafe Exploration and Side Effects." in client.get("/").text
-
-
-def test_the_list_follows_its_runs_and_the_form_tells_the_cost_while_it_is_typed(
-    tabs: BrowserTabs, db: Database
-) -> None:
-    _, mine = fixtures.start_run(db)
-    fixtures.start_run(db)
-    page = tabs.open("/")
-    row = page.locator("li[data-run='1']")
-    row.get_by_role("checkbox").check()
-    row.get_by_role("link", name="Dashboard").focus()
-    rows = ["W" * 62, "WA" + " " * 58 + "GW", *["W" + " " * 60 + "W"] * 59, "W" * 62]
-    page.evaluate(
-        "text => { own = document.getElementById('level_text'); own.value = text; "
-        "own.dispatchEvent(new Event('input')); }",
-        "\n".join(rows),
-    )
-    expect(page.locator("#level_text-told")).to_contain_text("On this level a tick takes from")
-    report_progress(db, mine, tick=1234)
-    fixtures.start_run(db)
-    expect(row.locator(".numbers")).to_contain_text("1,234")
-    expect(page.locator("li[data-run='3']")).to_be_visible()
-    expect(row.get_by_role("checkbox")).to_be_checked()
-    for number in (1, 2, 3):
-        set_status(db, number, RunStatus.STOPPED)
-    expect(page.locator("ul.runs li.run:not(.over)")).to_have_count(0)
-    expect(row.get_by_role("checkbox")).to_be_checked()
-
-
-def test_the_rows_of_a_later_page_are_asked_for_at_its_address(client: httpx2.Client, db: Database) -> None:
-    fixtures.start_run(db)
-    told = r'<ul class="runs" data-address="([^"]*)"'
-    assert re.findall(told, client.get("/?q=Run").text) == ["/?q=Run"]
-    assert re.findall(told, client.get("/?before=9&sort=oldest").text) == ["/?sort=oldest&amp;before=9"]
-    assert re.findall(told, client.get("/").text) == ["/"]
