@@ -43,6 +43,7 @@ COMMANDS = {
     "backup": "Write a checked copy of the database, while everything goes on.",
     "restore": "Put a backup in place of the database.",
     "copy": "Move a database from SQLite to PostgreSQL, or back.",
+    "access": "List who may come in; open, create or revoke.",
     "web": "Serve the pages and the API.",
     "worker": "Train the agents of the runs in the database.",
     "workers": "List the workers that are alive, their runs, load and memory.",
@@ -51,6 +52,12 @@ COMMANDS = {
 """Each command with its help text. The command `up` is the function `up` in commands/up.py, and so on."""
 
 SUBCOMMANDS = {
+    "access": {
+        "open": "Print an address that lets a browser in.",
+        "create": "Make a link for a person, or a token for a program.",
+        "list": "List tokens, links and sessions.",
+        "revoke": "End tokens, links and sessions.",
+    },
     "worlds": {
         "new": "Write the skeleton of a package with a world of your own.",
         "import": "Make levels of maps of other collections.",

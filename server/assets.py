@@ -56,6 +56,7 @@ SCRIPTS = (
     "docs.js",
     "levels.js",
     "pretraining.js",
+    "open.js",
 )
 PICTURES = ("icon.svg", "query.svg", "question.svg")
 MEDIA = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}

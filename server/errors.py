@@ -66,6 +66,29 @@ class Forbidden(ServerError):
     status, code = 403, "cross_site"
 
 
+class UnauthenticatedError(ServerError):
+    """This server does not know you.
+
+    A browser enters by an address that `parenting access open` prints, or by the link that you were given.
+    A program sends `Authorization: Bearer` and a token of `parenting access create token`; commands of
+    Parenting send PARENTING_TOKEN, or use the key file of the data folder.
+    """
+
+    status, code = 401, "unauthenticated"
+
+
+class NotAllowedError(ServerError):
+    """You may not do this here."""
+
+    status, code = 403, "not_allowed"
+
+
+class UsedUpError(ServerError):
+    """This address was used already, or is no longer valid. `parenting access open` prints a new one."""
+
+    status, code = 410, "used_up"
+
+
 class UnknownHostError(ServerError):
     """This server does not answer under this name."""
 

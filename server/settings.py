@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, SecretStr
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 from sqlalchemy import URL
 
@@ -59,6 +59,15 @@ class Settings(BaseSettings):
         False,
         description="The server runs in a container whose port is published on its host's loopback only, so "
         "it may listen on 0.0.0.0 without a proxy.",
+    )
+    session_days: float = Field(
+        30.0, gt=0, le=3660, description="Days after which whoever entered by a browser has to enter again."
+    )
+    session_idle_days: float = Field(
+        7.0, gt=0, le=3660, description="Days without use after which they have to."
+    )
+    token: SecretStr | None = Field(
+        None, description="Token that commands send to a server (`parenting access create token`)."
     )
     lease_seconds: float = Field(
         60.0, gt=0, description="How long a question is held for the parent who was shown it."

@@ -9,9 +9,10 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import CheckConstraint, ForeignKey, Index, UniqueConstraint, event, text
+from sqlalchemy import ForeignKey, Index, UniqueConstraint, event, text
 from sqlalchemy.orm import Mapped, mapped_column
 
+from parenting.server.access.tables import AccessSession, AccessToken
 from parenting.server.answer_tables import (
     CHOICES,
     PARENTS,
@@ -22,6 +23,7 @@ from parenting.server.answer_tables import (
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.columns import Big, OneOf, name_places
 from parenting.server.compact import METRICS, Clips, Figures
+from parenting.server.identity_table import Identity
 from parenting.server.moves_table import Moves
 from parenting.server.person_tables import Person, PersonClient, PersonName
 from parenting.server.public_ids import public_id
@@ -41,8 +43,9 @@ from parenting.server.triggers import keep_deleted_numbers
 from parenting.server.why_tables import Effect, Reason
 from parenting.server.worker_table import Worker
 
-__all__ = ["CHOICES", "PARENTS", "SAID", "SKIP", "Answer", "BoardSnapshot", "BoardStates", "Effect", "Moves"]
-__all__ += ["Person", "PersonClient", "PersonName", "Reason", "Table", "Tombstone", "Worker"]
+__all__ = ["CHOICES", "PARENTS", "SAID", "SKIP", "AccessSession", "AccessToken", "Answer", "BoardSnapshot"]
+__all__ += ["BoardStates", "Effect", "Identity", "Moves", "Person", "PersonClient", "PersonName", "Reason"]
+__all__ += ["Table", "Tombstone", "Worker"]
 
 KINDS = ("guidance", "preference")
 
@@ -50,20 +53,6 @@ KINDS = ("guidance", "preference")
 def _public_id() -> Mapped[str]:
     """Return the column of a name that means the same forever, in whatever copy of the database."""
     return mapped_column(default=public_id, server_default=text("''"), unique=True, index=True)
-
-
-class Identity(Table):
-    """The identity of this database, in its only row (`server.identity`)."""
-
-    __tablename__ = "database_identity"
-    __table_args__ = (CheckConstraint("id = 1", name="one_row"),)
-
-    id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    uuid: Mapped[str]
-    since: Mapped[datetime]
-    copied_from: Mapped[str | None]  # the UUID that it had before it was given this one
-    last_run: Mapped[int] = mapped_column(default=0, server_default=text("0"))  # the largest deleted number
-    last_query: Mapped[int] = mapped_column(default=0, server_default=text("0"))
 
 
 class Run(Table):

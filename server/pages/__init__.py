@@ -8,6 +8,7 @@ from parenting.server.pages.comparison import router as comparison
 from parenting.server.pages.controls import router as controls
 from parenting.server.pages.dashboard import router as dashboard
 from parenting.server.pages.docs import router as docs
+from parenting.server.pages.entry import router as entry
 from parenting.server.pages.episodes import router as episodes
 from parenting.server.pages.grid import router as grid
 from parenting.server.pages.growth import router as growth
@@ -29,6 +30,7 @@ from parenting.server.pages.why import router as why
 __all__ = ["error_page", "router"]
 
 router = APIRouter(include_in_schema=False)
+router.include_router(entry)
 router.include_router(start)
 router.include_router(levels)
 router.include_router(pretraining)

@@ -33,6 +33,11 @@ COMMANDS_OF_THE_STORE = {
     "backup": [],
     "doctor": [],
     "start": ["unsafe-exploration"],
+    "access": [],
+    "access open": [],
+    "access create": ["token"],
+    "access list": [],
+    "access revoke": ["nobody"],
 }
 OTHERS = {"run", "experiment", "parents", "pretrain", "worlds", "answer", "restore", "copy"}
 """Commands that open no store, or that bring one back. A worker waits for a store that is away."""

@@ -1,0 +1,1 @@
+"""Access: who calls (sessions, tokens, the local key), and what each role may do (the matrix)."""

@@ -1,0 +1,120 @@
+"""The guard of every route: whoever calls it is known, and the matrix lets them, before anything is read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from sqlalchemy import exists, select
+from sqlalchemy.orm import Session
+
+from parenting.server.access.current import current
+from parenting.server.access.door import Door
+from parenting.server.access.matrix import Rule, rule_of
+from parenting.server.access.roles import Principal
+from parenting.server.db import Database
+from parenting.server.errors import NotAllowedError, UnauthenticatedError
+from parenting.server.public_ids import is_public_id
+from parenting.server.requests import route_of
+from parenting.server.tables import Answer, Job, Query
+
+Handler = Callable[[Request], Coroutine[Any, Any, Response]]
+
+
+class GuardedRoute(APIRoute):
+    """A route that asks the matrix first. Its request has a `principal` from then on (`principal_of`)."""
+
+    def get_route_handler(self) -> Handler:
+        """Return the handler, behind the guard."""
+        handle: Handler = super().get_route_handler()
+
+        async def guarded(request: Request) -> Response:
+            await admit(request)
+            return await handle(request)
+
+        return guarded
+
+
+async def admit(request: Request) -> None:
+    """Let a request in, and note whose it is.
+
+    Raises:
+        UnauthenticatedError: nobody knows who it is from.
+        NotAllowedError: the matrix does not let them.
+        StoreError: the database cannot be read now.
+    """
+    rule = rule_of(request.method, route_of(request.scope))
+    if rule is None:
+        raise NotAllowedError
+    if rule.roles is None:
+        return
+    door: Door = request.app.state.door
+    who = await door.principal(request)
+    if who is None:
+        raise UnauthenticatedError
+    if who.role not in rule.roles:
+        raise NotAllowedError
+    if who.run is not None:
+        await _require_within(request, rule, who)
+    request.state.principal = who
+    current.set(who)
+
+
+def principal_of(request: Request) -> Principal:
+    """Return whose a request is, behind the guard."""
+    who: Principal = request.state.principal
+    return who
+
+
+async def _require_within(request: Request, rule: Rule, who: Principal) -> None:
+    """Refuse what lies outside the run that somebody is confined to; it is not said whether it exists."""
+    named = request.path_params
+    if rule.where == "everything" or (rule.where == "run" and not who.reaches_run(named["run_id"])):
+        raise NotAllowedError
+    if rule.where == "question":
+        await require_own(request, is_own_question, who, named["query_id"])
+    elif rule.where == "job":
+        await require_own(request, is_own_job, who, named["job_id"])
+
+
+async def require_own(
+    request: Request, is_own: Callable[[Session, Principal, str], bool], who: Principal, name: str
+) -> None:
+    """Ask the database whether something that a request names is the caller's own.
+
+    Raises:
+        NotAllowedError: it is not, or is not there.
+    """
+    db: Database = request.app.state.db
+
+    def look() -> bool:
+        with db.read() as session:
+            return is_own(session, who, name)
+
+    if not await request.app.state.admission.read(look):
+        raise NotAllowedError
+
+
+def is_own_question(session: Session, who: Principal, name: str) -> bool:
+    """Return whether a question is of the run that somebody is confined to, and was offered to them.
+
+    A parent's own are those that it holds, held last, or answered.
+    """
+    if not is_public_id(name) and not (name.isascii() and name.isdecimal() and len(name) <= 16):
+        return False
+    named = Query.public_id == name if is_public_id(name) else Query.id == int(name)
+    rows = select(Query.id).where(named, Query.run_id == who.run)
+    if who.client is not None:
+        answered = exists().where(Answer.query_id == Query.id, Answer.client_id == who.client)
+        rows = rows.where((Query.leased_by == who.client) | answered)
+    return session.execute(rows).first() is not None
+
+
+def is_own_job(session: Session, who: Principal, name: str) -> bool:
+    """Return whether a job is of the run that somebody is confined to, and asked for by them."""
+    rows = select(Job.id).where(Job.public_id == name, Job.run_id == who.run)
+    if who.client is not None:
+        rows = rows.where(Job.client_id == who.client)
+    return session.execute(rows).first() is not None
