@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import cache
@@ -11,6 +12,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from fastapi.routing import APIRoute
+from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.routing import BaseRoute, Match
 from starlette_compress import CompressMiddleware, remove_compress_type
@@ -19,6 +21,8 @@ from parenting.drawing.sentences import mark
 from parenting.server import api, health, pages
 from parenting.server.admission import Admission
 from parenting.server.api.openapi import Described
+from parenting.server.audit.acting import acting
+from parenting.server.audit.refusals import Refusals
 from parenting.server.db import Database, connect
 from parenting.server.entrance import Entrance
 from parenting.server.errors import (
@@ -55,7 +59,8 @@ METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 ABOUT = """Start a run, lease its questions, answer them, watch how the agent learns, export what was said.
 
 Bodies are JSON and strict: an unknown field is refused. Every error has one shape. Lists come in pages, and
-what a page says under *next* is the cursor of the following one. No GET changes anything."""
+what a page says under *next* is the cursor of the following one. No GET changes anything; an export is
+entered in the audit log."""
 TAGS = [
     {"name": "runs", "description": "Start them, look at them, read what they did."},
     {"name": "operator", "description": "What whoever runs the experiment may do to a living agent."},
@@ -64,6 +69,9 @@ TAGS = [
     {"name": "pages", "description": "What our own pages tell of themselves."},
     {"name": "health", "description": "For whoever watches over the processes."},
 ]
+
+REFUSED = ("unknown_host", "plain_http", "forwarded", "cross_site", "unauthenticated", "not_allowed")
+"""Codes of errors that the audit log tells of."""
 
 log = structlog.get_logger()
 
@@ -81,6 +89,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     db = connect(settings) if db is None else db
     require_ready(db)
     app = bare_app()
+    app.state.refusals = Refusals(db)
     app.state.db, app.state.settings, app.state.entrance = db, settings, Entrance.of(settings)
     app.state.languages = Languages(settings.languages or SHIPPED)
     app.state.worker_notifier = Notifier(settings.data, "worker")
@@ -146,7 +155,10 @@ def _route_name(route: APIRoute) -> str:
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     _warm(app)
     app.state.streams.open()
+    writing = asyncio.create_task(app.state.refusals.keep_writing())
     yield
+    writing.cancel()
+    await run_in_threadpool(app.state.refusals.write)
     app.state.streams.end()
     if app.state.group_commit is not None:
         app.state.group_commit.close()
@@ -221,6 +233,9 @@ def _allowed(request: Request) -> str:
 
 
 def _reply(request: Request, error: ServerError, headers: dict[str, str] | None = None) -> Response:
+    if error.code in REFUSED and hasattr(request.app.state, "refusals"):
+        actor = acting()
+        request.app.state.refusals.note(error.code, actor.who, actor.client or "")
     programs = ("/api/", "/static/", "/healthz", "/readyz", "/metrics")
     if request.url.path.startswith(programs):
         return JSONResponse(error.body(), error.status, headers)

@@ -42,6 +42,7 @@ SHEETS = {
         *EVERY_PAGE,
         "parent.css",
     ),
+    "audit.css": (*EVERY_PAGE, "forms.css", "audit.css"),
     "docs.css": ("docs.css",),
     "walk.css": ("walk.css", "growth.css"),
 }

@@ -18,6 +18,8 @@ from sqlalchemy import delete, func, select, tuple_
 from sqlalchemy.orm import Session
 
 from parenting.drawing.sentences import mark
+from parenting.server.audit.recording import record
+from parenting.server.audit.table import Kind
 from parenting.server.chain import BEGIN
 from parenting.server.checkpoint_parts import LONGEST_REST, REST
 from parenting.server.columns import Blob
@@ -99,6 +101,7 @@ def begin(db: Database, run_id: int) -> None:
         run.fencing_token = (sound(run, "fencing_token") or 0) + 1
         run.worker = run.heartbeat = run.claim_epoch = run.claim_mark = None
         run.deleting = db.clock()
+        record(db, session, Kind.DELETION, f"run {run_id}", sound(run, "public_id"))
         announce(session, "worker")
         announce(session, "web")
 

@@ -7,6 +7,8 @@ from typing import Any
 
 from sqlalchemy import select
 
+from parenting.server.audit.recording import record
+from parenting.server.audit.table import Kind
 from parenting.server.damage import readable
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
@@ -32,8 +34,13 @@ def add_operator_event(db: Database, run_id: int, kind: str, payload: dict[str, 
         event = OperatorEvent(run_id=run_id, kind=kind, payload=payload, created=db.clock())
         session.add(event)
         session.flush()
+        record(db, session, Kind.OPERATOR, _told(kind, payload), run)
         announce(session, "worker")
         return event
+
+
+def _told(kind: str, payload: dict[str, Any]) -> str:
+    return " ".join([kind.replace("_", " "), *(f"{value}" for value in payload.values())])
 
 
 def list_operator_events(db: Database, run_id: int) -> Sequence[OperatorEvent]:

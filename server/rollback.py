@@ -14,6 +14,8 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from parenting.server import chain
+from parenting.server.audit.recording import record
+from parenting.server.audit.table import Kind
 from parenting.server.batches import refuse_if_of_batch
 from parenting.server.damage import readable
 from parenting.server.db import Database
@@ -90,6 +92,7 @@ def roll_back(db: Database, run_id: int, tick: int, name: str | None = None) -> 
         for metric in _rows(session, select(Metric).where(Metric.run_id == old.id, Metric.tick <= tick)):
             session.add(Metric(run_id=new.id, tick=metric.tick, values=metric.values))
         session.flush()
+        record(db, session, Kind.OPERATOR, f"roll back to tick {tick}, as run {new.id}", old)
         announce(session, "worker")
         return new
 

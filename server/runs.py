@@ -15,12 +15,13 @@ from sqlalchemy import ColumnElement, and_, bindparam, exists, or_, select, tupl
 from sqlalchemy.orm import Session
 
 from parenting.drawing.sentences import mark
+from parenting.server.audit.recording import operated
 from parenting.server.damage import readable, sound
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.failures import fail_if_damaged, note_failure, resume_in
 from parenting.server.queue.queries import withdraw_in
-from parenting.server.statuses import LIVING, OVER, RESUMABLE, RunStatus
+from parenting.server.statuses import LIVING, OVER, RESUMABLE, VERBS, RunStatus
 from parenting.server.store.clock import holds, is_over
 from parenting.server.tables import Run, Worker
 
@@ -85,8 +86,8 @@ def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None 
         DamagedRowError: it was stopped or has failed, and its row cannot be read.
     """
     with db.write() as session:
-        run = hold(session, run_id)
-        if run.status in RESUMABLE and status is RunStatus.ACTIVE:
+        before = (run := hold(session, run_id)).status
+        if before in RESUMABLE and status is RunStatus.ACTIVE:
             resume_in(session, db, run)
         if run.status in OVER and run.status != status:
             raise Conflict(
@@ -94,6 +95,8 @@ def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None 
             )
         if run.status != status:
             become(session, run, status, reason)
+        if before != status:
+            operated(db, session, VERBS.get(status, status), run)
         return run
 
 
@@ -107,6 +110,7 @@ def set_goal(db: Database, run_id: int, goal: int | None) -> Run:
     with db.write() as session:
         run = living(session, run_id)
         run.goal = goal
+        operated(db, session, f"goal {goal or 'none'}", run)
         return run
 
 
@@ -120,6 +124,7 @@ def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
     with db.write() as session:
         run = living(session, run_id)
         run.pace = pace
+        operated(db, session, f"pace {pace or 'none'}", run)
         return run
 
 

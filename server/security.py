@@ -16,6 +16,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from parenting.server.audit.acting import a_request
 from parenting.server.entrance import Entrance
 from parenting.server.errors import Forbidden, ServerError, TooLargeError
 
@@ -93,8 +94,9 @@ class SecurityMiddleware:
 
         try:
             refused = self.refusal(scope, most)
-            answer = self.app if refused is None else self.reply(Request(scope), refused)
-            await answer(scope, bounded, safely)
+            with a_request((scope.get("client") or ("",))[0]):
+                answer = self.app if refused is None else self.reply(Request(scope), refused)
+                await answer(scope, bounded, safely)
         except ClientDisconnect:
             log.debug("client left", path=scope["path"])
         except Exception:

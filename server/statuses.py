@@ -115,5 +115,7 @@ LIVING = (RunStatus.ACTIVE, RunStatus.PAUSED)
 """The statuses of runs that a worker raises."""
 OVER = (RunStatus.STOPPED, RunStatus.FINISHED, RunStatus.FAILED)
 """The statuses in which a run stays, unless it is resumed."""
+VERBS = {RunStatus.ACTIVE: "resume", RunStatus.PAUSED: "pause", RunStatus.STOPPED: "stop"}
+"""The operator's verb that leads to a status."""
 RESUMABLE = (RunStatus.STOPPED, RunStatus.FAILED)
 """The statuses from which the operator lets a run go on."""

@@ -20,6 +20,7 @@ from parenting.server.answer_tables import (
     SKIP,
     Answer,
 )
+from parenting.server.audit.table import AuditEntry
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.columns import Big, OneOf, name_places
 from parenting.server.compact import METRICS, Clips, Figures
@@ -43,9 +44,9 @@ from parenting.server.triggers import keep_deleted_numbers
 from parenting.server.why_tables import Effect, Reason
 from parenting.server.worker_table import Worker
 
-__all__ = ["CHOICES", "PARENTS", "SAID", "SKIP", "AccessSession", "AccessToken", "Answer", "BoardSnapshot"]
-__all__ += ["BoardStates", "Effect", "Identity", "Moves", "Person", "PersonClient", "PersonName", "Reason"]
-__all__ += ["Table", "Tombstone", "Worker"]
+__all__ = ["CHOICES", "PARENTS", "SAID", "SKIP", "AccessSession", "AccessToken", "Answer", "AuditEntry"]
+__all__ += ["BoardSnapshot", "BoardStates", "Effect", "Identity", "Moves", "Person", "PersonClient"]
+__all__ += ["PersonName", "Reason", "Table", "Tombstone", "Worker"]
 
 KINDS = ("guidance", "preference")
 

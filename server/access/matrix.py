@@ -52,6 +52,9 @@ POST /runs
 POST /api/v1/policies
 POST /policies
 GET /api/v1/tombstones
+GET /api/v1/audit
+GET /api/v1/audit/export
+GET /audit
 POST /api/v1/jobs
 POST /pretraining
 POST /api/v1/levels/check

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from parenting.server.api import (
+    audit,
     board,
     episodes,
     jobs,
@@ -28,6 +29,7 @@ PARTS = (
     episodes,
     board,
     operator,
+    audit,
     queries,
     presence,
     revisions,

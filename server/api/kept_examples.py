@@ -6,6 +6,14 @@ from typing import Any
 
 HELD = {"answers": 51, "questions": 52, "checkpoints": 1, "metrics": 80, "events": 0, "bytes": 512_345}
 
+AUDIT = {
+    "id": 7,
+    "kind": "operator",
+    "what": "pause",
+    "who": "session k3v9ab2c",
+    "client": "192.0.2.7",
+    "count": 1,
+}
 TABLE = {"text/csv": "run,number\r\n1,4\r\n"}
 
 
@@ -25,5 +33,10 @@ def kept(run: dict[str, Any]) -> dict[str, tuple[Any, ...]]:
         "archive_run": ({**run, "archived": noon}, {"archive": {"archived": True}}),
         "see_holds": ({"run": 1, "public_id": name, **HELD},),
         "delete_run": (tombstone, {"this one": {"confirm": name}}),
+        "read_audit_log": ({"rows": [{**AUDIT, "created": noon, "run": name}], "next": None},),
+        "export_audit_log": (
+            "id,created,kind,what,who,client,run,count\r\n"
+            f"7,{noon},operator,pause,session k3v9ab2c,192.0.2.7,{name},1\r\n",
+        ),
         "list_tombstones": ({"rows": [tombstone], "next": None},),
     }

@@ -14,6 +14,7 @@ from parenting.server.api.bodies import After
 from parenting.server.api.lists import ExportPart
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import streams
+from parenting.server.audit.recording import note_export
 from parenting.server.deps import Db
 from parenting.server.exports import MEDIA, exported, file_name
 from parenting.server.policies import present_policy
@@ -92,6 +93,7 @@ def export_run(run_id: RunId, db: Db, part: Annotated[ExportPart, Query()]) -> S
     """
     file = f'attachment; filename="{file_name(run_id, part.of, part.format)}"'
     lines = exported(db, run_id, part.of, part.format)
+    note_export(db, run_id, f"{part.of} as {part.format}")
     return StreamingResponse(lines, media_type=MEDIA[part.format], headers={"Content-Disposition": file})
 
 

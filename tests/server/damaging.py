@@ -12,6 +12,8 @@ from typing import Any
 from sqlalchemy import Column, select
 
 from parenting.server import jobs, metrics, operator_events
+from parenting.server.audit.recording import record
+from parenting.server.audit.table import Kind
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.checkpoint_parts import PART_BYTES
 from parenting.server.checkpoints import save_checkpoint
@@ -80,6 +82,7 @@ def two_runs(db: Database) -> None:
         moment = db.clock()
         person = session.scalars(select(Person.id).limit(1)).one()  # whoever answered
         session.add(PersonName(person_id=person, name="A person", external_id="7"))
+        record(db, session, Kind.OPERATOR, "pause", public_id())
         session.add(Tombstone(id=99, public_id=public_id(), created=moment, deleted=moment, held={}))
 
 
