@@ -1,7 +1,7 @@
 """The waits and costs of a crowd, beside the durable commits a second of one connection.
 
     python -m benchmarks.crowd                              every part, both stores, about fifteen minutes
-    python -m benchmarks.crowd people flat --quick          two parts, shorter and smaller
+    python -m benchmarks.crowd people flat --quick          two parts, shorter
     python -m benchmarks.crowd --store sqlite --workers 3
 
 | part | what it does | bars |
@@ -61,7 +61,8 @@ class Size(NamedTuple):
     waiting: int = 1000
 
 
-QUICK = Size(people=12, seconds=12, fair=4, streams=50, turns=1, waiting=60)
+QUICK = Size(seconds=25, turns=1, waiting=60)
+"""As many people and streams, but for a shorter time: all parts of both stores in less than four minutes."""
 
 
 class Yardstick:
@@ -99,8 +100,22 @@ class Yardstick:
             self.found.append(self.take(FOR))
 
 
+class Served(NamedTuple):
+    """A crowd's server: the database, its settings, the address, and the processes of web and workers."""
+
+    db: Database
+    settings: Settings
+    url: str
+    pids: list[int]
+
+    def spent(self) -> tuple[float, float]:
+        """Return the processor seconds so far of the web, and of all workers."""
+        web, *workers = [parents.processor_seconds(pid) for pid in self.pids]
+        return web, sum(workers)
+
+
 @contextmanager
-def served(store: str, runs: int, workers: int) -> Iterator[tuple[Database, Settings, str]]:
+def served(store: str, runs: int, workers: int) -> Iterator[Served]:
     """So many runs, each of which has asked, a web process and some workers."""
     with ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
@@ -112,12 +127,12 @@ def served(store: str, runs: int, workers: int) -> Iterator[tuple[Database, Sett
         port = free_port()
         environment = store_of(settings) | {"PARENTING_CLAIM_SECONDS": "5"}
         commands = [("web", "--port", str(port)), *[("worker",)] * workers]
-        for arguments in commands:
-            process = Command(*arguments, data=settings.data, environment=environment)
+        processes = [Command(*told, data=settings.data, environment=environment) for told in commands]
+        for process in processes:
             stack.callback(process.kill)
         until_up(url := f"http://127.0.0.1:{port}")
         waiting_runs.until_all_wait(db, runs)
-        yield db, settings, url
+        yield Served(db, settings, url, [process.process.pid for process in processes])
 
 
 def crowd(settings: Settings, url: str, people: int, think: float, seconds: float) -> dict[str, Any]:
@@ -145,25 +160,28 @@ def stored(db: Database, store: str) -> float:
 
 def people(store: str, size: Size, workers: int) -> None:
     """Fifty people who think."""
-    with served(store, size.people, workers) as (db, settings, url):
-        yardstick, before = Yardstick(settings), stored(db, store)
+    with served(store, size.people, workers) as up:
+        yardstick, before, spent = Yardstick(up.settings), stored(up.db, store), up.spent()
         with yardstick.beside():
-            found = crowd(settings, url, size.people, 1.0, size.seconds)
-        grown = stored(db, store) - before
+            found = crowd(up.settings, up.url, size.people, 1.0, size.seconds)
+        answered, after = max(found["answered"], 1), up.spent()
+        grown = stored(up.db, store) - before
     guidance, answer = found["next_guidance_ms"], found["answer_ms"]
     line("next guidance p50, ms", guidance["p50"], 250)
     line("next guidance p99, ms", guidance["p99"], 1000)
     line("answer p99, ms", answer["p99"], 100)
-    line("growth, MB in 1,000 answers", 1000 * grown / max(found["answered"], 1), 1.5)
+    line("growth, MB in 1,000 answers", 1000 * grown / answered, 1.5)
+    web, raised = (1e3 * (after[place] - spent[place]) / answered for place in (0, 1))
+    print(f"    processor ms an answer: web {web:.1f}, workers {raised:.1f}", flush=True)
     tell(f"{found['per_second']} answers/s, {len(found['errors'])} kinds of errors", yardstick)
 
 
 def fair(store: str, size: Size, workers: int) -> None:
     """People who do not think, and equal runs."""
-    with served(store, size.fair, workers) as (_, settings, url):
-        yardstick = Yardstick(settings)
+    with served(store, size.fair, workers) as up:
+        yardstick = Yardstick(up.settings)
         with yardstick.beside():
-            found = crowd(settings, url, size.fair, 0.0, size.seconds / 2)
+            found = crowd(up.settings, up.url, size.fair, 0.0, size.seconds / 2)
     most, least = found["most_of_a_run"], found["least_of_a_run"]
     line("most to least answers of a run", most / max(least, 1), 1.5)
     tell(f"{least} to {most} answers a run, {found['per_second']} answers/s", yardstick)
@@ -175,7 +193,9 @@ def flat(store: str, size: Size, _workers: int) -> None:
     least("answers to commits", found.answers / found.yardstick, 0.25)
     rates = f"{found.answers:.0f} answers/s, yardstick {found.yardstick:.0f} commits/s"
     cost = f"{found.cost:.2f} ms of the web's processor an answer"
-    print(f"    {rates}, p99 {found.p99:.0f} ms, {found.errors} errors, {cost}", flush=True)
+    replies = ", ".join(f"{number} of {status}" for status, number in found.errors.items())
+    errors = f"replies other than 200: {replies or 'none'}"
+    print(f"    {rates}, p99 {found.p99:.0f} ms, {errors}, {cost}", flush=True)
 
 
 def streams(store: str, size: Size, _workers: int) -> None:
@@ -231,7 +251,7 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", help=f"{', '.join(PARTS)} [default: all]")
     parser.add_argument("--store", choices=STORES, action="append", help="repeatable [default: both]")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--quick", action="store_true", help="fewer people, and shorter")
+    parser.add_argument("--quick", action="store_true", help="shorter, and fewer runs that wait")
     said = parser.parse_args()
     unknown = set(said.parts) - set(PARTS)
     if unknown:

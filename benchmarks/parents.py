@@ -22,6 +22,7 @@ import socket
 import tempfile
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -56,13 +57,13 @@ class Measured(NamedTuple):
     yardstick: float  # commits a second
     p50: float  # milliseconds from a lease to the reply to its answer
     p99: float
-    errors: int
+    errors: Counter[int]  # the statuses of replies other than 200; 204: no question waited
     cost: float  # milliseconds of a processor that the web process spends on an answer
 
     def __str__(self) -> str:
         """A row of the table."""
         ratio = f"{self.answers / self.yardstick:8.3f}"
-        times = f"{self.p50:8.0f}{self.p99:8.0f}{self.errors:8}{self.cost:8.2f}"
+        times = f"{self.p50:8.0f}{self.p99:8.0f}{self.errors.total():8}{self.cost:8.2f}"
         return f"{self.parents:8}{self.thinks:8.0f}{self.answers:10.0f}{self.yardstick:11.0f}{ratio}{times}"
 
 
@@ -81,7 +82,7 @@ def commits(folder: Path, seconds: float) -> float:
 
 
 def crowd(port: int, run: int, names: list[str], thinks: float, end: float, out: Any) -> None:
-    """Parents in one process: put their times and the number of their errors into `out`."""
+    """Parents in one process: put their times and the statuses of their errors into `out`."""
     times, errors = list[float](), list[int]()
     threads = [
         threading.Thread(target=parent, args=(port, run, name, thinks, end, times, errors)) for name in names
@@ -90,7 +91,7 @@ def crowd(port: int, run: int, names: list[str], thinks: float, end: float, out:
         thread.start()
     for thread in threads:
         thread.join()
-    out.put((times, len(errors)))
+    out.put((times, Counter(errors)))
 
 
 def parent(
@@ -246,8 +247,10 @@ class Questions:
         self.posted += number
 
 
-def answered(port: int, run: int, parents: int, thinks: float, seconds: float) -> tuple[list[float], int]:
-    """The milliseconds of each answer of a crowd, and how many requests got something else than 200."""
+def answered(
+    port: int, run: int, parents: int, thinks: float, seconds: float
+) -> tuple[list[float], Counter[int]]:
+    """The milliseconds of each answer of a crowd, and the statuses of requests that got another than 200."""
     context = multiprocessing.get_context("fork")
     out, end = context.Queue(), time.monotonic() + seconds
     names = [f"parent-{number}" for number in range(parents)]
@@ -260,7 +263,7 @@ def answered(port: int, run: int, parents: int, thinks: float, seconds: float) -
     found = [out.get() for _ in crowds]
     for one in crowds:
         one.join()
-    return [time_ for times, _ in found for time_ in times], sum(errors for _, errors in found)
+    return [time_ for times, _ in found for time_ in times], sum((errors for _, errors in found), Counter())
 
 
 def main() -> None:

@@ -31,6 +31,7 @@ from parenting.server.store.guard import confirm
 from parenting.server.store.patience import remaining
 from parenting.server.store.refusals import translated
 from parenting.server.store.sqlite import BUSY_SECONDS
+from parenting.server.store.turn import Turn
 
 REFUSED_SECONDS = 10.0
 """A refused write counts for this long, unless another one succeeds: a full disk lets a transaction begin."""
@@ -64,6 +65,7 @@ class Database:
         self._reading = engine if self._sqlite else postgresql.reading(engine)
         # One writer of this process at a time: fairer than many threads that sleep on SQLite's lock.
         self._turn = threading.BoundedSemaphore(1 if self._sqlite else postgresql.WRITERS)
+        self._among = Turn(Path(str(engine.url.database)).parent if self._sqlite else None)
         self._cache_lock = threading.Lock()
         self._watcher: PoolProxiedConnection | None = None
         self._last: tuple[int | str, Hashable, Any] | None = None
@@ -135,12 +137,14 @@ class Database:
         if not self._turn.acquire(timeout=remaining(BUSY_SECONDS)):
             raise BusyError
         try:
+            self._among.take()
             with translated(), Session(engine, expire_on_commit=False) as session:
                 with session.begin():
                     info = session.connection().info  # BEGIN IMMEDIATE now, not at the first statement
                     yield session
                 confirm(info)  # before anybody is told
         finally:
+            self._among.give_back()
             self._turn.release()
 
     def cached(self, key: Hashable, look: Callable[[], Seen]) -> Seen:
@@ -182,6 +186,7 @@ class Database:
         if self._watcher is not None:
             self._watcher.close()
             self._watcher = None
+        self._among.close()
         self.engine.dispose()
 
 

@@ -109,7 +109,7 @@ def begin(db: Database, run_id: int) -> None:
 def under_way(db: Database) -> Sequence[int]:
     """Return the runs that are being deleted."""
     with db.read() as session:
-        return session.scalars(select(Run.id).where(Run.deleting.is_not(None)).order_by(Run.id)).all()
+        return session.scalars(_UNDER_WAY).all()
 
 
 def go_on(db: Database, run_id: int, seconds: float = math.inf) -> bool:
@@ -212,3 +212,6 @@ def _end(session: Session, now: datetime, run_id: int) -> bool:
     stone = session.get_one(Tombstone, run_id)
     stone.gone = stone.gone or now
     return True
+
+
+_UNDER_WAY = select(Run.id).where(Run.deleting.is_not(None)).order_by(Run.id)

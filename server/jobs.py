@@ -11,9 +11,23 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, bindparam, delete, exists, func, or_, select, true, tuple_, update
+from sqlalchemy import (
+    ColumnElement,
+    Select,
+    and_,
+    bindparam,
+    delete,
+    exists,
+    func,
+    or_,
+    select,
+    true,
+    tuple_,
+    update,
+)
 from sqlalchemy.orm import Session
 
 from parenting.drawing.sentences import mark
@@ -123,8 +137,13 @@ def get(db: Database, public_id: str) -> Job:
 def waits(db: Database, seconds: float = CLAIM_SECONDS, long: bool = True) -> bool:
     """Return whether there is a job to claim, of a run or, if `long`, of none. This takes no lock."""
     with db.read() as session:
-        found = select(exists().where(_free(seconds), true() if long else Job.run_id != NO_RUN))
-        return bool(session.scalar(found, db.mark(session).bound()))
+        return bool(session.scalar(_any_free(seconds, long), db.mark(session).bound()))
+
+
+@cache
+def _any_free(seconds: float, long: bool) -> Select[tuple[bool]]:
+    """Return the statement of `waits`, which a worker asks many times a second."""
+    return select(exists().where(_free(seconds), true() if long else Job.run_id != NO_RUN))
 
 
 def claim(

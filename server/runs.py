@@ -7,7 +7,7 @@ write.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -203,15 +203,19 @@ def report_progress(db: Database, mine: Claim, **fields: Any) -> Run:
     Raises:
         LostClaimError: another worker trains this run now.
     """
-    unknown = set(fields) - PROGRESS_FIELDS
-    if unknown:
-        raise TypeError(f"report_progress takes {sorted(PROGRESS_FIELDS)}, not {sorted(unknown)}")
     with db.write(durable=False) as session:
-        run = held(session, mine)
-        run.heartbeat, (run.claim_epoch, run.claim_mark) = db.clock(), db.mark(session)
-        for name, value in fields.items():
-            setattr(run, name, value)
-        return run
+        return report_in(session, db, mine, fields)
+
+
+def report_in(session: Session, db: Database, mine: Claim, fields: Mapping[str, Any]) -> Run:
+    """Store progress as `report_progress` does, in a transaction that is already open."""
+    if unknown := set(fields) - PROGRESS_FIELDS:
+        raise TypeError(f"report_progress takes {sorted(PROGRESS_FIELDS)}, not {sorted(unknown)}")
+    run = held(session, mine)
+    run.heartbeat, (run.claim_epoch, run.claim_mark) = db.clock(), db.mark(session)
+    for name, value in fields.items():
+        setattr(run, name, value)
+    return run
 
 
 def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str | None = None) -> Run:

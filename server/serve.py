@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import sys
 from types import FrameType
 
 import structlog
@@ -25,6 +26,11 @@ GRACE = 1
 """Seconds that open requests may still take after the signal to stop (whole ones: uvicorn's rule)."""
 
 
+SWITCH_SECONDS = 0.001
+"""A thread that waits for Python's lock gets it after so long: one that stores takes it after each statement,
+and with Python's 5 ms it would hold the store's lock for that long each time the event loop is busy."""
+
+
 class Server(uvicorn.Server):
     """A uvicorn server that ends open streams first; uvicorn alone would wait for their browsers."""
 
@@ -42,6 +48,7 @@ def make_server(settings: Settings) -> Server:
     Raises:
         SetupError: the database cannot be used as it is.
     """
+    sys.setswitchinterval(SWITCH_SECONDS)
     share_heaps()
     set_up_log(settings, "web")
     for broken in registry.INSTALLED.broken().values():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import structlog
 
@@ -44,8 +45,9 @@ log = structlog.get_logger()
 LOOK_SHARE = 0.1
 """The share of time at most that evaluations of the policy take, where one is expensive."""
 METRIC_SECONDS = 1.0
-HURRY_SECONDS = 0.25
-"""For this long after an answer, no metrics and no checkpoint delay the next question."""
+HURRY_SECONDS = 1.0
+"""For this long after an answer, no metrics and no checkpoint delay the next question. An agent that walks
+farther than this asks seldom, and what it does is to be seen."""
 
 
 class RunSession:
@@ -223,14 +225,20 @@ class RunSession:
         grown = self.growth.row(self.saved.state)
         row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed, **grown}
         optimal = bool(row["optimal"])
-        metrics.write_metrics(self.db, self.claim, {self.last_tick: row})
+        shown: dict[str, Any] = {"maturity": row["maturity"], "speed": speed, "optimal": optimal}
+        reason = self._awaited()
+        shown |= {"tick": self.last_tick, "waiting": reason, **self.growth.news(self.saved.state)}
+        metrics.write_metrics(self.db, self.claim, {self.last_tick: row}, shown)
         self.told(self.last_tick, row)
-        shown = {"maturity": row["maturity"], "speed": speed, "optimal": optimal}
-        shown |= self.growth.news(self.saved.state)
-        runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None, **shown)
-        self.optimal, self.waiting, self.stage, self._news = optimal, None, stage, False
+        self.optimal, self.waiting, self.stage, self._news = optimal, reason, stage, False
         self._measured_at, self._measured_tick = time.monotonic(), self.last_tick
         self._look_cost = self._measured_at - began
+
+    def _awaited(self) -> Waiting | None:
+        """Return whom the agent waits for, where that is sure before a look at the mailbox."""
+        state = self.saved.state
+        asks = bool(state.waiting) and not bool(state.all_refused) and not bool(state.unsure)
+        return Waiting.GUIDANCE if asks and self.run.parent == "human" else None
 
     def _report_tick(self) -> None:
         """Report the tick alone, once a second, where the next look at the policy is far off."""

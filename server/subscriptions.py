@@ -11,6 +11,8 @@ from parenting.server.reads.watching import Rows, Seen
 
 UNSURE_SECONDS = 1.0
 """Seconds after which a run whose worker is silent is read again: others decide whether one may come."""
+NOTHING = "null"
+"""The most urgent question, as it is seen where none is open."""
 
 
 @dataclass
@@ -50,8 +52,8 @@ class Subscription:
             self.offer()
             self.tell()
             return
-        if before is None or seen.offers != before.offers:
-            self.offer()
+        if before is None or (seen.offers != before.offers and seen.question != NOTHING):
+            self.offer()  # after an answer there is nothing to lease until the agent asks again
         if before is None or (seen.question, seen.leases) != (before.question, before.leases):
             self.untold = True
         changed = before is None or (seen.row, seen.signed) != (before.row, before.signed)

@@ -14,8 +14,7 @@ from parenting.server.api.responses import write_responses
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, store
 from parenting.server.queue.presence import Renewed, leave_in, renew_in
-from parenting.server.reads.names import run_number_in
-from parenting.server.runs import find
+from parenting.server.reads.names import require_run, run_number_in
 from parenting.server.schemas import RenewedSchema
 
 router = admitted_router(tags=["questions"])
@@ -47,10 +46,12 @@ async def leave_questions(request: Request, run_id: RunName, body: LeaseBody, db
 
 
 def _renew(db: Database, name: int | str, body: RenewBody, seconds: float, session: Session) -> Renewed:
-    run_id = find(session, run_number_in(session, name)).id
+    run_id = run_number_in(session, name)
+    require_run(session, run_id)
     return renew_in(session, db, run_id, body.client_id, body.questions, seconds)
 
 
 def _leave(db: Database, name: int | str, client_id: str, session: Session) -> None:
-    run_id = find(session, run_number_in(session, name)).id
+    run_id = run_number_in(session, name)
+    require_run(session, run_id)
     leave_in(session, db, run_id, client_id)

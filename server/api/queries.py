@@ -19,14 +19,12 @@ from parenting.server.queue.answers import Said, Stored, answer_in
 from parenting.server.queue.leases import is_offered, lease_in, release_in
 from parenting.server.queue.names import Names
 from parenting.server.reads import pagination
-from parenting.server.reads.names import run_number, run_number_in
+from parenting.server.reads.names import is_there, require_run, run_number, run_number_in
 from parenting.server.reads.schemas import asked_schema, asked_schemas, leased_schema
 from parenting.server.reads.why import why
 from parenting.server.receipts import StoredSchema
-from parenting.server.runs import find
 from parenting.server.schemas import AskedSchema, LeasedSchema
 from parenting.server.streams import Streams
-from parenting.server.tables import Run
 from parenting.server.why_schemas import WhySchema
 
 router = admitted_router(tags=["questions"])
@@ -76,7 +74,7 @@ def _lease(
     run_id = run_number_in(session, name)
     query = lease_in(session, db, run_id, client_id, seconds)
     if query is None:
-        find(session, run_id)
+        require_run(session, run_id)
         return None
     return leased_schema(session, query)
 
@@ -84,7 +82,7 @@ def _lease(
 def _is_worth_it(db: Database, name: int | str, client_id: str, session: Session) -> bool:
     """Return whether a question can be leased, or the run is not there, which the verb says."""
     run_id = run_number_in(session, name)
-    return is_offered(session, db, run_id, client_id) or session.get(Run, run_id) is None
+    return is_offered(session, db, run_id, client_id) or not is_there(session, run_id)
 
 
 @router.get("/queries/{query_id}", summary="Look at a question", responses=read_responses(404))

@@ -82,7 +82,7 @@ class Wish:
     def is_offered(self, session: Session) -> bool:
         """Return whether there is such a query; this locks nothing."""
         seen = {**self.asks, **self.db.mark(session).bound()}
-        return session.execute(self.offer.with_only_columns(Query.id), seen).first() is not None
+        return session.execute(_IDS[self.offer], seen).first() is not None
 
     def hold(self, session: Session) -> Query | None:
         """Hold it, and return it; None if there is none. Not durable by itself."""
@@ -283,3 +283,5 @@ _FIRST = (
     .order_by(*urgency())
     .limit(1)
 )
+_IDS = {offer: offer.with_only_columns(Query.id) for offer in (_OFFER, _TAKEN, _AHEAD)}
+"""The same for whoever asks only whether there is one."""

@@ -55,6 +55,11 @@ FORGIVEN = timedelta(minutes=5)
 PROBE_SECONDS = 0.1
 """The wait of a look at a run for whether the store takes signs of life at all."""
 
+Shown = tuple[WorldSchema, ParentSchema, bool]
+_SHOWN: dict[str, Shown] = {}
+SHOWN_RUNS = 1000
+"""Runs of which a process keeps what their questions show."""
+
 
 def run_schema(db: Database, run_id: int) -> RunSchema:
     """Return the schema of a run.
@@ -125,14 +130,14 @@ def leased_schema(session: Session, query: Query) -> LeasedSchema:
     Raises:
         DamagedRowError: it or its run cannot be read, or it does not fit the run's legend.
     """
-    world, parent, run_public_id, guide = _shown_run(session, query.run_id)
+    now = session.execute(_PROGRESS, {"run_id": query.run_id}).one()
+    world, parent, guide = _shown_run(session, query.run_id, now.public_id)
     with reading(query):
         sentences = surroundings(query.clips, world.legend, guide=guide)
         if query.votes:
             sentences = (tr(TO_BE_SURE), *sentences)
-    now = session.execute(_PROGRESS, {"run_id": query.run_id}).one()
     return LeasedSchema(
-        **_query_fields(query, stated(now.database), run_public_id),
+        **_query_fields(query, stated(now.database), now.public_id),
         world=world,
         parent=parent,
         progress=ProgressSchema(answered=now.answers - now.retracted, open=now.open),
@@ -140,18 +145,21 @@ def leased_schema(session: Session, query: Query) -> LeasedSchema:
     )
 
 
-def _shown_run(session: Session, run_id: int) -> tuple[WorldSchema, ParentSchema, str, bool]:
-    """Return what a leased query shows of its run, which never changes; a transaction reads it once."""
-    kept: dict[int, tuple[WorldSchema, ParentSchema, str, bool]] = session.info.setdefault("shown runs", {})
-    if run_id not in kept:
+def _shown_run(session: Session, run_id: int, public_id: str) -> Shown:
+    """Return what a leased query shows of its run, which never changes: a process keeps that of many runs."""
+    shown = _SHOWN.get(public_id)
+    if shown is None:
         run = readable(find(session, run_id))
         config = Config.model_validate(run.config)
         world = WorldSchema(
             name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
         )
         settings = ParentSchema(gamma=config.gamma, inside=config.garden_parent)
-        kept[run_id] = world, settings, run.public_id, run.words == "guide"
-    return kept[run_id]
+        shown = world, settings, run.words == "guide"
+        if len(_SHOWN) >= SHOWN_RUNS:
+            _SHOWN.clear()
+        _SHOWN[public_id] = shown
+    return shown
 
 
 def metric_schemas(rows: Sequence[Metric]) -> list[MetricSchema | DamagedMetricSchema]:
@@ -248,6 +256,7 @@ def _signed(run: Run, now: Mark, within: timedelta, last: Mapping[str, Mark]) ->
 
 # What every leased question needs is built once.
 _PROGRESS = select(
+    Run.public_id,
     Run.answers,
     Run.retracted,
     select(func.count())
