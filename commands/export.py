@@ -1,97 +1,146 @@
-"""`parenting export`: write answers, metrics or the log of a run, as JSON lines or CSV."""
+"""`parenting export`: write whole runs with all that belongs to them, or one table of a run."""
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, TextIO
+from typing import Annotated, NoReturn
 
 import typer
 
-from parenting._plural import counted
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors
+from parenting.commands.export_table import export_table
 from parenting.commands.printing import say
 from parenting.commands.progress import bar
-from parenting.server.damage import sound
-from parenting.server.exports import Format, Part, exported
-from parenting.server.runs import stored_run
+from parenting.server.exports import Format, Part
 
-NOUNS = {Part.ANSWERS: "answer", Part.METRICS: "row", Part.EVENTS: "event"}
+
+class Form(StrEnum):
+    """The formats of exports."""
+
+    WHOLE = "2"
+    FIRST = "1"
+    JSONL = "jsonl"
+    CSV = "csv"
+
+
+TABLE = {Form.FIRST: Format.JSONL, Form.JSONL: Format.JSONL, Form.CSV: Format.CSV}
+"""The formats of one table."""
 
 
 def export(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    run: Annotated[
+        list[int] | None,
+        typer.Argument(min=1, help="Numbers of runs; `parenting runs` lists them.", show_default=False),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="FILE", help="Write to this file.", show_default="standard output"
+            "--out",
+            "-o",
+            metavar="FOLDER|FILE",
+            help="A new folder, or a file: with .zip at its end for whole runs, else for one table.",
+            show_default="standard output",
         ),
     ] = None,
-    of: Annotated[Part, typer.Option(help="What to write; events are the log.")] = Part.ANSWERS,
+    of: Annotated[
+        Part | None, typer.Option(help="One table alone; events are the log.", show_default="whole runs")
+    ] = None,
     format_: Annotated[
-        Format, typer.Option("--format", help="jsonl holds everything; csv is for spreadsheets.")
-    ] = Format.JSONL,
-    force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
+        Form | None,
+        typer.Option(
+            "--format",
+            help="2: whole runs; 1 or jsonl: one table of one run as JSON lines; csv: as CSV.",
+            show_default="2, or one table by the name of the file",
+        ),
+    ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER|ZIP",
+            help="Check an export from its files alone, without a database, and write nothing.",
+            show_default=False,
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
 ) -> None:
-    """Write the answers of a run as JSON lines: the question, the choice, who answered and when.
+    """Write whole runs into a folder or a zip: answers, questions, log, metrics, a codebook and a manifest.
 
-    Or its metrics or its log (--of), or as CSV (--format). The file is written completely or not at all. It
-    holds what there is up to now; the run may go on meanwhile.
+    An export holds what there is up to now; the runs may go on meanwhile. It is written completely or not at
+    all. `parenting import` reads it into another database, where it is replayed to the same bits.
 
-    Exit codes: 0 written; 2 the run or the database does not exist, or the file cannot be written; 130
-    stopped by Ctrl-C.
+    With --of, with --format jsonl or csv, or without --out, one table of one run is written.
 
-    Example: parenting export 3 --of metrics --format csv -o run-3.csv
+    --check recomputes hashes, counts, chains, corrections and X of an export from its files. It shares no
+    code with what wrote them, and needs no database.
+
+    Exit codes: 0 written, or nothing found; 1 --check found something; 2 a run or the database does not
+    exist, or the file cannot be written; 130 stopped by Ctrl-C.
+
+    Example: parenting export 1 2 3 --out study.zip
     """
-    with exit_on_interrupt(), friendly_errors(), database() as db:
-        total = sound(stored_run(db, run), "answers") if of is Part.ANSWERS else None
-        found = exported(db, run, of, format_)
-        if out is None:
-            _copy(found, sys.stdout, total, of)
+    with exit_on_interrupt(), friendly_errors():
+        if check is not None:
+            _check(check, run or out)
+        runs = run or []
+        if not runs:
+            raise UsageError("Name a run; `parenting runs` lists them.")
+        form = format_ or _form(out, of)
+        if form is not Form.WHOLE:
+            if len(runs) > 1:
+                raise UsageError(
+                    "One table is of one run. Name one, or export whole runs into a folder or a zip."
+                )
+            export_table(runs[0], out, of or Part.ANSWERS, TABLE[form], force)
             return
-        with _whole(out, force) as file:
-            written = _copy(found, file, total, of) - (format_ is Format.CSV)  # its head does not count
-    say(f"{counted(written, NOUNS[of])} of run {run} written to {out}.")
+        if out is None or of is not None:
+            raise UsageError(
+                "--of: one table has the format jsonl or csv."
+                if of is not None
+                else "--out: name a new folder, or a file that ends with .zip."
+            )
+        _whole(runs, out, force)
 
 
-def _copy(found: Iterator[str], file: TextIO, total: int | None, of: Part) -> int:
-    """Copy line by line, and return the number of lines."""
-    number = 0
-    # On a terminal the lines themselves show the progress, and a bar would break them.
-    with nullcontext(_quiet) if file.isatty() else bar(of.value) as show:
-        for number, line in enumerate(found, start=1):
-            file.write(line)
-            show(number, total)
-    file.flush()
-    return number
-
-
-def _quiet(done: int, total: int | None = None) -> None:
-    """Show nothing."""
-
-
-@contextmanager
-def _whole(target: Path, force: bool) -> Iterator[TextIO]:
-    """Open a file that takes its name once it is complete and safely stored.
+def _check(path: Path, others: object) -> NoReturn:
+    """Print the report of an audit, and exit.
 
     Raises:
-        UsageError: the file exists, or its folder cannot be written to.
+        UsageError: something else was asked for as well, or there is nothing at the path.
     """
-    if target.exists() and not force:
-        raise UsageError(f"-o: {target} exists already. Name another file, or give --force to replace it.")
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with part.open("x", encoding="utf-8", newline="\n") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(target)
-    except OSError as error:
-        raise UsageError(f"-o: {target} cannot be written: {error.strerror}.") from None
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
+    from parenting.audit import audit
+
+    if others:
+        raise UsageError("--check reads an export and writes none: give it alone.")
+    if not path.exists():
+        raise UsageError(f"--check: {path} is not there.")
+    found = audit(path)
+    say(str(found))
+    raise typer.Exit(0 if found.sound else 1)
+
+
+def _form(out: Path | None, of: Part | None) -> Form:
+    """Return the format that the other options mean."""
+    if out is None or of is not None or out.suffix.lower() in (".jsonl", ".ndjson", ".json"):
+        return Form.JSONL
+    return Form.CSV if out.suffix.lower() == ".csv" else Form.WHOLE
+
+
+def _whole(runs: list[int], out: Path, force: bool) -> None:
+    from parenting.server.archive.target import MANIFEST, target
+    from parenting.server.archive.writing import write_export
+
+    with database() as db, target(out, force) as files, bar("rows") as show:
+        written = write_export(db, runs, files, show)
+    counts = [run["counts"] for run in written["runs"]]
+    told = ", ".join(
+        f"{sum(one[name] for one in counts)} {name}" for name in ("answers", "questions", "events")
+    )
+    say(
+        f"{told} of run{'s' * (len(counts) > 1)} {', '.join(str(one['number']) for one in written['runs'])} "
+        f"written to {out}."
+    )
+    for left in written["left_out"]:
+        say(f"{left['file']} is left out: {left['why']}. To have it: {left['remedy']}")
+    say(f"SHA-256 of {MANIFEST}: {files.written[MANIFEST].sha256}. Publish it with the data.")

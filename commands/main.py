@@ -36,6 +36,7 @@ COMMANDS = {
     "resume": "Let a paused or failed run go on.",
     "rollback": "Go on from an earlier tick of a run, as a new run.",
     "export": "Write answers, metrics or the log of a run as JSON lines or CSV.",
+    "import": "Add the runs of an export to the database.",
     "policy": "Write the present policy of a run to a file.",
     "replay": "Replay a stored run and compare it bit for bit.",
     "doctor": "Examine the installation, the data folder and the database.",
@@ -50,6 +51,9 @@ COMMANDS = {
     "migrate": "Bring the database's tables up to date.",
 }
 """Each command with its help text. The command `up` is the function `up` in commands/up.py, and so on."""
+
+MODULES = {"import": "import_runs"}
+"""Commands whose names Python does not take for functions, and their functions."""
 
 SUBCOMMANDS = {
     "access": {
@@ -126,7 +130,8 @@ class LazyGroup(TyperGroup):
             ctx.fail(f"No such command '{printable(name)}'.{hint} `parenting --help` lists the commands.")
         if args[1:] and args[1] in SUBCOMMANDS.get(name, {}):
             return _below(name, args[1], args[2:])
-        function = getattr(import_module(f"parenting.commands.{name}"), name)
+        module = MODULES.get(name, name)
+        function = getattr(import_module(f"parenting.commands.{module}"), module)
         return name, _command(name, function), modern(name, args[1:])
 
 

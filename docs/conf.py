@@ -34,15 +34,18 @@ extensions = [
     "sphinx.ext.viewcode",
 ]
 exclude_patterns = ["pictures"]
-NO_LIBRARY = ("commands", "experiments", "migrations", "server", "web", "weights")
-"""Folders without a page of reference; docs/commands.md and docs/api.md describe the first and the fourth."""
+NO_LIBRARY = ("commands", "experiments", "migrations", "server", "web", "weights", "audit")
+"""Folders without a page of reference.
+
+docs/commands.md and docs/api.md describe the first and the fourth, docs/export.md the last.
+"""
 apidoc_modules = [
     {
         "path": "../parenting",
         "destination": "reference",
         "exclude_patterns": [
             f"../parenting/{name}"
-            for name in ("commands", "experiments", "migrations", "server", "web", "weights")
+            for name in ("commands", "experiments", "migrations", "server", "web", "weights", "audit")
         ],
         "follow_links": True,
         "separate_modules": False,

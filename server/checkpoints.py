@@ -144,15 +144,28 @@ def newest_first(db: Database, run_id: int) -> Iterator[StoredCheckpoint]:
     The caller takes the first one that is intact and can be read (`server.recall`), and the one before it has
     as many bytes.
     """
-    rows = select(Checkpoint).where(Checkpoint.run_id == run_id).order_by(Checkpoint.id.desc()).limit(1)
-    before: tuple[ColumnElement[bool], ...] = ()
+    last: int | None = None
     while True:
         with db.read() as session:
-            row = session.scalars(rows.where(*before)).first()
-            if row is None:
-                return
-            found, before = _stored(session, row), (Checkpoint.id < row.id,)
-        yield found
+            found = _newest_before(session, run_id, last)
+        if found is None:
+            return
+        last, stored = found
+        yield stored
+
+
+def stored_in(session: Session, run_id: int) -> Iterator[StoredCheckpoint]:
+    """Yield what `newest_first` does, in an open transaction."""
+    last: int | None = None
+    while (found := _newest_before(session, run_id, last)) is not None:
+        last, stored = found
+        yield stored
+
+
+def _newest_before(session: Session, run_id: int, last: int | None) -> tuple[int, StoredCheckpoint] | None:
+    rows = select(Checkpoint).where(Checkpoint.run_id == run_id).order_by(Checkpoint.id.desc()).limit(1)
+    row = session.scalars(rows if last is None else rows.where(Checkpoint.id < last)).first()
+    return None if row is None else (row.id, _stored(session, row))
 
 
 def _stored(session: Session, row: Checkpoint) -> StoredCheckpoint:

@@ -13,6 +13,7 @@ import zlib
 from dataclasses import dataclass
 
 from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
 
 from parenting.server.damage import sound
 from parenting.server.db import Database
@@ -89,15 +90,19 @@ class MovesWriter:
 
 def read_moves(db: Database, run_id: int) -> bytes:
     """Return the moves of a run from tick 1 on; parts that are missing or damaged are unknown."""
-    rows = select(Moves).where(Moves.run_id == run_id).order_by(Moves.part)
-    found = bytearray()
     with db.read() as session:
-        for row in session.scalars(rows):
-            part = sound(row, "part")
-            if part is None:
-                continue
-            found += bytes([UNKNOWN]) * (part * PART - len(found))
-            found += _unpacked(row)
+        return moves_in(session, run_id)
+
+
+def moves_in(session: Session, run_id: int) -> bytes:
+    """Return what `read_moves` does, in an open transaction."""
+    found = bytearray()
+    for row in session.scalars(select(Moves).where(Moves.run_id == run_id).order_by(Moves.part)):
+        part = sound(row, "part")
+        if part is None:
+            continue
+        found += bytes([UNKNOWN]) * (part * PART - len(found))
+        found += _unpacked(row)
     return bytes(found)
 
 

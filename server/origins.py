@@ -8,6 +8,8 @@ from parenting.server.columns import Damaged
 
 ROLLED_BACK = "rolled_back"
 """The part that names the run whose record was copied, and the last tick of the copy."""
+IMPORTED = "imported"
+"""The part that names the run of another database that was imported, and the hash of its manifest."""
 
 
 def rolled_back_to(origin: dict[str, Any] | Damaged | None) -> int:

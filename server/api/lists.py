@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Generic, TypeVar
+from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -125,7 +125,9 @@ class ExportPart(Part):
     """The part of a run that is exported, and the format."""
 
     of: exports.Part = Field(exports.Part.ANSWERS, description="answers, metrics or events (the log).")
-    format: exports.Format = Field(exports.Format.JSONL, description="jsonl or csv.")
+    format: Literal["jsonl", "csv", "zip"] = Field(
+        "jsonl", description="jsonl or csv: one table; zip: the whole run, whatever `of` is."
+    )
 
 
 class EventPart(Part):

@@ -14,9 +14,10 @@ from parenting.server.api.bodies import After
 from parenting.server.api.lists import ExportPart
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import streams
+from parenting.server.archive.zipped import zipped
 from parenting.server.audit.recording import note_export
-from parenting.server.deps import Db
-from parenting.server.exports import MEDIA, exported, file_name
+from parenting.server.deps import Db, SettingsOf
+from parenting.server.exports import MEDIA, Format, exported, file_name
 from parenting.server.policies import present_policy
 from parenting.server.runs import get_run
 
@@ -24,7 +25,7 @@ router = admitted_router(tags=["runs"])
 
 LINES = "application/x-ndjson"
 EXPORTED = streams(LINES, "A line for each answer, tick or event; CSV has a head.", 404)
-EXPORTED[200]["content"]["text/csv"] = {}
+EXPORTED[200]["content"] |= {"text/csv": {}, "application/zip": {}}
 
 
 class PolicyResponse(Response):
@@ -84,17 +85,26 @@ async def follow_run(
     response_class=LinesResponse,
     responses=EXPORTED,
 )
-def export_run(run_id: RunId, db: Db, part: Annotated[ExportPart, Query()]) -> StreamingResponse:
+def export_run(
+    run_id: RunId, db: Db, settings: SettingsOf, part: Annotated[ExportPart, Query()]
+) -> StreamingResponse:
     """Export all answers up to now as JSON lines, oldest first; or the metrics or the log; or as CSV.
 
     A line of the answers holds the question, the choice, who answered and when, the tick at which the agent
     heard it, and the policy that asked. docs/api.md lists the fields. CSV has one head, of clips the actions
-    alone, and an apostrophe before text that a spreadsheet would take for a formula.
+    alone, and an apostrophe before text that a spreadsheet would take for a formula. The zip holds the whole
+    run, as `parenting export RUN --out FILE.zip` writes it.
     """
-    file = f'attachment; filename="{file_name(run_id, part.of, part.format)}"'
-    lines = exported(db, run_id, part.of, part.format)
-    note_export(db, run_id, f"{part.of} as {part.format}")
-    return StreamingResponse(lines, media_type=MEDIA[part.format], headers={"Content-Disposition": file})
+    if part.format == "zip":
+        name = {"Content-Disposition": f'attachment; filename="run-{run_id}.zip"'}
+        pieces = zipped(db, [run_id], settings.data)
+        note_export(db, run_id, "the whole run as zip")
+        return StreamingResponse(pieces, media_type="application/zip", headers=name)
+    form = Format(part.format)
+    file = f'attachment; filename="{file_name(run_id, part.of, form)}"'
+    lines = exported(db, run_id, part.of, form)
+    note_export(db, run_id, f"{part.of} as {form}")
+    return StreamingResponse(lines, media_type=MEDIA[form], headers={"Content-Disposition": file})
 
 
 @router.get(

@@ -28,6 +28,7 @@ ARGUMENTS = {
     "experiment": ["table1"],
     "answer": ["--run", "1"],
     "export": ["1"],
+    "import": ["study.zip"],
     "replay": ["1"],
     "resume": ["1"],
     "policy": ["1"],

@@ -73,7 +73,7 @@ def test_a_run_without_answers(db: Database, tmp_path: Path) -> None:
 
 
 def test_a_file_is_replaced_only_by_force(db: Database, tmp_path: Path) -> None:
-    file = tmp_path / "mine"
+    file = tmp_path / "mine.jsonl"
     file.write_text("precious")
     said = export("1", "-o", str(file))
     assert (said.exit_code, said.stdout) == (2, "")
@@ -91,19 +91,19 @@ def test_nothing_half_done_stays(
         yield "{}\n"
         raise error
 
-    monkeypatch.setattr("parenting.commands.export.exported", breaking)
-    (tmp_path / "old").write_text("as it was")
-    assert export("1", "-o", str(tmp_path / "old"), "--force").exit_code == code
-    assert export("1", "-o", str(tmp_path / "new")).exit_code == code
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["data", "old"]
-    assert (tmp_path / "old").read_text() == "as it was"
+    monkeypatch.setattr("parenting.commands.export_table.exported", breaking)
+    (tmp_path / "old.jsonl").write_text("as it was")
+    assert export("1", "-o", str(tmp_path / "old.jsonl"), "--force").exit_code == code
+    assert export("1", "-o", str(tmp_path / "new.jsonl")).exit_code == code
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["data", "old.jsonl"]
+    assert (tmp_path / "old.jsonl").read_text() == "as it was"
 
 
 def test_what_is_wrong_is_said_in_a_sentence(db: Database, tmp_path: Path) -> None:
     assert (export("9").exit_code, export("9").stderr) == (2, "There is no run 9.\n")
-    said = export("1", "-o", str(tmp_path / "no" / "folder"))
+    said = export("1", "-o", str(tmp_path / "no" / "folder.jsonl"))
     assert said.exit_code == 2
-    assert said.stderr.endswith("folder cannot be written: No such file or directory.\n")
+    assert said.stderr.endswith("folder.jsonl cannot be written: No such file or directory.\n")
     assert export("1", "-o", str(tmp_path), "--force").exit_code == 2
 
 
@@ -149,3 +149,39 @@ def test_it_loads_no_torch(db: Database, command: list[str]) -> None:
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (found.returncode, found.stderr) == (0, "")
     assert found.stdout
+
+
+def test_whole_runs(db: Database, tmp_path: Path) -> None:
+    for place in (tmp_path / "study", tmp_path / "study.zip"):
+        said = export("1", "2", "-o", str(place))
+        assert (said.exit_code, said.stderr) == (0, "")
+        assert said.stdout.startswith(f"4 answers, 3 questions, 0 events of runs 1, 2 written to {place}.\n")
+        assert "SHA-256 of manifest.json: " in said.stdout
+    assert len((tmp_path / "study" / "answers.jsonl").read_text().splitlines()) == 4
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ([], "Name a run"),
+        (["1", "--format", "2"], "--out: name a new folder"),
+        (["1", "2"], "One table is of one run"),
+        (["1", "--of", "metrics", "--format", "2", "-o", "x"], "--of: one table has the format jsonl or csv"),
+        (["1", "99", "-o", "new"], "There is no run 99"),
+    ],
+)
+def test_whole_runs_that_cannot_be_written(given: list[str], told: str) -> None:
+    said = export(*given)
+    assert (said.exit_code, said.stdout) == (2, "")
+    assert said.stderr.startswith(told)
+
+
+def test_an_export_is_checked(db: Database, tmp_path: Path) -> None:
+    export("1", "-o", str(tmp_path / "out"))
+    said = export("--check", str(tmp_path / "out"))
+    assert said.exit_code == 1
+    assert "the manifest counts" not in said.stdout
+    (tmp_path / "out" / "events.csv").write_text("")
+    assert "events.csv is not the file that was written" in export("--check", str(tmp_path / "out")).stdout
+    assert export("--check", str(tmp_path / "nowhere")).exit_code == 2
+    assert export("1", "--check", str(tmp_path / "out")).exit_code == 2

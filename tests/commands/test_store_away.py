@@ -21,6 +21,7 @@ COMMANDS_OF_THE_STORE = {
     "person": [],
     "workers": [],
     "export": ["1"],
+    "import": ["study.zip"],
     "replay": ["1"],
     "policy": ["1"],
     "rollback": ["1", "--to", "1"],

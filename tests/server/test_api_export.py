@@ -2,7 +2,8 @@
 
 import csv
 import json
-from io import StringIO
+from io import BytesIO, StringIO
+from zipfile import ZipFile
 
 import httpx2
 import pytest
@@ -119,7 +120,7 @@ def test_what_people_wrote_is_no_formula(client: httpx2.Client, db: Database, he
 
 
 @pytest.mark.parametrize(
-    ("name", "known"), [("format", ("jsonl", "csv")), ("of", ("answers", "metrics", "events"))]
+    ("name", "known"), [("format", ("jsonl", "csv", "zip")), ("of", ("answers", "metrics", "events"))]
 )
 def test_an_unknown_format_is_an_error_that_names_the_known_ones(
     client: httpx2.Client, run: Run, name: str, known: tuple[str, ...]
@@ -128,3 +129,15 @@ def test_an_unknown_format_is_an_error_that_names_the_known_ones(
     assert (refused.status_code, refused.json()["error"]["field"]) == (422, name)
     assert all(f"'{word}'" in refused.json()["error"]["message"] for word in known)
     assert client.get(f"/api/v1/runs/{run.id}/export?fromat=csv").status_code == 422
+
+
+def test_the_whole_run_as_a_zip(client: httpx2.Client, heard: Claim) -> None:
+    reply = client.get(f"/api/v1/runs/{heard.run_id}/export?format=zip")
+    assert (reply.status_code, reply.headers["content-type"]) == (200, "application/zip")
+    assert reply.headers["content-disposition"] == f'attachment; filename="run-{heard.run_id}.zip"'
+    with ZipFile(BytesIO(reply.content)) as zipped:
+        assert zipped.testzip() is None
+        told = json.loads(zipped.read("manifest.json"))
+        assert len(zipped.read("answers.jsonl").splitlines()) == len(CHOICES)
+    assert [run["counts"]["answers"] for run in told["runs"]] == [len(CHOICES)]
+    assert client.get("/api/v1/runs/99/export?format=zip").status_code == 404

@@ -1,0 +1,85 @@
+"""The files of an export, from a folder or a zip: their hashes, and their rows one by one."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import IO, Any
+from zipfile import BadZipFile, ZipFile
+
+PIECE = 2**20
+BROKEN = (BadZipFile, EOFError, KeyError, OSError, RuntimeError, ValueError)
+
+
+class Files:
+    """The files of an export."""
+
+    def __init__(self, path: Path) -> None:
+        """Open an export.
+
+        Raises:
+            ValueError: there is none.
+        """
+        self._zip: ZipFile | None = None
+        self._folder = path
+        if not path.is_dir():
+            try:
+                self._zip = ZipFile(path)
+            except (BadZipFile, OSError):
+                raise ValueError(f"{path} is neither a folder nor a zip that can be read") from None
+
+    def close(self) -> None:
+        """Close it."""
+        if self._zip is not None:
+            self._zip.close()
+
+    def open(self, name: str) -> IO[bytes]:
+        """Open a file by its name in the manifest."""
+        if self._zip is not None:
+            return self._zip.open(name)
+        file = (self._folder / name).resolve()
+        if not file.is_relative_to(self._folder.resolve()):
+            raise ValueError(f"{name} is outside of the folder")
+        return file.open("rb")
+
+    def manifest(self) -> dict[str, Any]:
+        """Return the manifest.
+
+        Raises:
+            ValueError: it is missing, or not of an export of format 2.
+        """
+        try:
+            with self.open("manifest.json") as file:
+                found = json.load(file)
+        except BROKEN:
+            raise ValueError("manifest.json is missing or cannot be read") from None
+        if not isinstance(found, dict) or (found.get("format"), found.get("version")) != (
+            "parenting-export",
+            2,
+        ):
+            raise ValueError("it is not an export of Parenting of format 2")
+        return found
+
+    def digest(self, name: str) -> tuple[str, int]:
+        """Return the SHA-256 and the bytes of a file."""
+        hashed, size = hashlib.sha256(), 0
+        with closing(self.open(name)) as file:
+            while piece := file.read(PIECE):
+                hashed.update(piece)
+                size += len(piece)
+        return hashed.hexdigest(), size
+
+    def lines(self, name: str) -> Iterator[dict[str, Any]]:
+        """Yield the objects of a file of JSON lines."""
+        with closing(self.open(name)) as file:
+            yield from map(json.loads, file)
+
+    def cells(self, name: str) -> Iterator[dict[str, str]]:
+        """Yield the rows of a CSV file as text."""
+        with io.TextIOWrapper(self.open(name), encoding="utf-8", newline="") as text:
+            yield from csv.DictReader(text)

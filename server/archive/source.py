@@ -1,0 +1,166 @@
+"""Read an export of format 2 from a folder or a zip; every file is held against its hash before."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+from zipfile import BadZipFile, ZipFile
+
+from pydantic import TypeAdapter, ValidationError
+
+from parenting.server.archive.columns import Column, Row
+from parenting.server.archive.manifest import Manifest
+from parenting.server.archive.target import MANIFEST
+from parenting.server.errors import SetupError
+
+LARGEST_MANIFEST = 64 * 2**20
+"""Bytes of a manifest that are read at most."""
+LARGEST_BLOB = 2 * 2**30
+"""Bytes of a checkpoint, or of what a run began with, that are read at most."""
+PIECE = 2**20
+UNREADABLE = (BadZipFile, EOFError, KeyError, NotImplementedError, OSError, RuntimeError)
+Progress = Callable[[int, int], None]
+
+
+class Source:
+    """An export that is being read; its files are sound once `verify` has returned."""
+
+    def __init__(self, path: Path, opened: Callable[[str], IO[bytes]]) -> None:
+        self._path, self._opened = path, opened
+        with self.open(MANIFEST) as file:
+            blob = file.read(LARGEST_MANIFEST + 1)
+        self.manifest = self._read_manifest(blob)
+        self.sha256 = hashlib.sha256(blob).hexdigest()
+
+    @contextmanager
+    def open(self, name: str) -> Iterator[IO[bytes]]:
+        """Open a file of the export.
+
+        Raises:
+            SetupError: it is missing, or cannot be read.
+        """
+        try:
+            with self._opened(name) as file:
+                yield file
+        except UNREADABLE:
+            raise SetupError(f"{self._path}: {name} is missing or cannot be read.") from None
+
+    def verify(self, progress: Progress = lambda done, total: None) -> None:
+        """Compare every file with its hash in the manifest.
+
+        Raises:
+            SetupError: one differs or is missing.
+        """
+        done, total = 0, sum(entry.bytes for entry in self.manifest.files.values())
+        for name, entry in self.manifest.files.items():
+            digest, size = hashlib.sha256(), 0
+            with self.open(name) as file:
+                while size <= entry.bytes and (piece := file.read(PIECE)):
+                    digest.update(piece)
+                    size += len(piece)
+                    progress(done + size, total)
+            done += size
+            if (digest.hexdigest(), size) != (entry.sha256, entry.bytes):
+                raise SetupError(
+                    f"{self._path}: {name} is not the file that was written: its hash differs from the "
+                    "manifest's. Nothing was imported. Take another copy of the export."
+                )
+
+    def blob(self, name: str) -> bytes:
+        """Return the bytes of a file.
+
+        Raises:
+            SetupError: the manifest does not name it, or it is too large.
+        """
+        entry = self.manifest.files.get(name)
+        if entry is None or entry.bytes > LARGEST_BLOB:
+            raise SetupError(f"{self._path}: {name} is not in the manifest, or too large.")
+        with self.open(name) as file:
+            return file.read(entry.bytes)
+
+    def rows(self, name: str, model: type[Row], columns: list[Column]) -> Iterator[Any]:
+        """Yield the rows of a table.
+
+        Raises:
+            SetupError: one is not as its columns say, or was damaged in the database that it is of.
+        """
+        with self.open(name) as file:
+            read = _csv_rows(file, columns) if name.endswith(".csv") else map(json.loads, file)
+            try:
+                for number, found in enumerate(read, start=1):
+                    row: Any = model.model_validate_json(json.dumps(found))
+                    if row.damaged is not None:
+                        raise SetupError(
+                            f"{self._path}: row {number} of {name} was damaged in its database: "
+                            f"{row.damaged}. Nothing was imported."
+                        )
+                    yield row
+            except (ValidationError, ValueError, TypeError, RecursionError) as error:
+                raise SetupError(f"{self._path}: {name}: a row cannot be read: {_said(error)}.") from None
+
+    def _read_manifest(self, blob: bytes) -> Manifest:
+        try:
+            found = json.loads(blob) if len(blob) <= LARGEST_MANIFEST else None
+            if not isinstance(found, dict) or found.get("format") != "parenting-export":
+                raise SetupError(f"{self._path} is not an export of Parenting of format 2.")
+            if found.get("version") != 2:
+                raise SetupError(
+                    f"{self._path} is an export of format {found.get('version')}, which is newer than this "
+                    "version of Parenting. Install a newer one."
+                )
+            return Manifest.model_validate(found)
+        except (ValueError, RecursionError) as error:
+            raise SetupError(f"{self._path}: {MANIFEST} cannot be read: {_said(error)}.") from None
+
+
+@contextmanager
+def source(path: Path) -> Iterator[Source]:
+    """Open an export.
+
+    Raises:
+        SetupError: it is none, or damaged.
+    """
+    if path.is_dir():
+        yield Source(path, lambda name: _inside(path, name))
+        return
+    try:
+        with ZipFile(path) as zipped:
+            yield Source(path, lambda name: zipped.open(name))
+    except (BadZipFile, OSError):
+        raise SetupError(f"{path} is neither a folder nor a zip of an export, or is damaged.") from None
+
+
+def _inside(folder: Path, name: str) -> IO[bytes]:
+    file = (folder / name).resolve()
+    if not file.is_relative_to(folder.resolve()):
+        raise KeyError(name)
+    return file.open("rb")
+
+
+def _csv_rows(file: IO[bytes], columns: list[Column]) -> Iterator[dict[str, Any]]:
+    kinds = {column.name: column.type for column in columns}
+    with io.TextIOWrapper(file, encoding="utf-8", newline="") as text:
+        for cells in csv.DictReader(text):
+            yield {name: _value(kinds.get(name, str), cell) for name, cell in cells.items()}
+
+
+def _value(kind: type, cell: str) -> Any:
+    if cell == "":
+        return None
+    return cell if kind is str else _JSON.validate_json(cell)
+
+
+def _said(error: Exception) -> str:
+    if isinstance(error, ValidationError):
+        first = error.errors(include_input=False, include_url=False)[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return f"{type(error).__name__}"
+
+
+_JSON: TypeAdapter[Any] = TypeAdapter(int | float | bool)
