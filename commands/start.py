@@ -25,7 +25,6 @@ from parenting.server.missing_weights import missing_weights
 from parenting.server.notify import Notifier
 from parenting.server.reads.schemas import run_schema
 from parenting.server.run_form import FORM_FIELDS, read_form
-from parenting.server.run_limits import require_room
 from parenting.server.tables import Run
 from parenting.weights.cost import estimate
 from parenting.weights.origin import Origin
@@ -94,8 +93,7 @@ def start(
         with database() as db:
             try:
                 given |= _weights(db, given, chosen.weights, pretrain, origin, quiet=as_json)
-                require_room(db, chosen.runs)
-                run = new_run.start(db, read_form(given), chosen.weights, origin, chosen.bound)
+                run = new_run.start(db, read_form(given), chosen.weights, origin, chosen.bound, chosen.runs)
             except InvalidFieldsError as error:
                 raise UsageError(
                     "\n".join(_said(field, given, rule) for field, rule in error.fields)

@@ -26,7 +26,6 @@ from parenting.server.new_run import NewRun
 from parenting.server.notes import AGENT_KINDS
 from parenting.server.queue import leases
 from parenting.server.reads import answers
-from parenting.server.run_limits import require_room
 from parenting.server.settings import Settings
 from parenting.server.snapshot import Snapshot, first_snapshot, initial_weights, unpack
 from parenting.server.statuses import QueryStatus
@@ -58,8 +57,8 @@ def begin(db: Database, settings: Settings, task: Task, rule: StopRule, seed: in
         goal=rule.number if rule.kind == "queries" else None,
     )
     try:
-        require_room(db, settings.runs)
-        return new_run.start(db, new, settings.weights, task.origin, settings.bound).id
+        bound = settings.bound
+        return new_run.start(db, new, settings.weights, task.origin, bound, settings.runs).id
     except (InvalidFieldsError, TooManyRunsError) as error:
         raise ValueError(str(error)) from None
 

@@ -26,7 +26,7 @@ from sqlalchemy.orm import Session
 from parenting.server.admission import Admission
 from parenting.server.db import Database
 from parenting.server.group_commit import GroupCommit
-from parenting.server.run_limits import StartedRuns, require_room
+from parenting.server.run_limits import StartedRuns
 from parenting.server.settings import Settings
 from parenting.server.tables import Run
 
@@ -83,21 +83,20 @@ def _alone(
 
 
 def start_within_limits(request: Request, begin: Callable[[], Run]) -> Run:
-    """Start a run if another one may live (`server.run_limits`), and wake a worker.
+    """Start a run if another one of this client may live (`server.run_limits`), and wake a worker.
 
     Args:
         request: The request, whose client has started it.
-        begin: Starts it.
+        begin: Starts it, if another one may live at all.
 
     Raises:
         TooManyRunsError: as many live as may, in all or of this client.
     """
     started: StartedRuns = request.app.state.started_runs
     db, client = request.app.state.db, request.client.host if request.client else ""
-    require_room(db, request.app.state.settings.runs)
-    started.require_room(db, client)
-    run = begin()
-    started.note(client, run.id)
+    with started.room(db, client) as begun:
+        run = begin()
+        begun.append(run.id)
     notify_worker(request)
     return run
 

@@ -30,13 +30,14 @@ from parenting.server.errors import InvalidFieldsError
 from parenting.server.finishes import PATTERN, never_met, usual
 from parenting.server.identity import unused_number
 from parenting.server.patterns import LINE
+from parenting.server.run_limits import require_room
 from parenting.server.tables import Run
 from parenting.server.weights import INHERITED, needed, put_in
 from parenting.server.weights import put as put_weights
 from parenting.server.whole import WHOLE, whole
 from parenting.server.wrong_fields import messages
 from parenting.weights.cost import BOUND, Bound, estimate
-from parenting.weights.estimate import seconds
+from parenting.weights.estimate import MOST_SECONDS, seconds
 from parenting.weights.origin import NO_ORIGIN, Origin
 from parenting.weights.store import NoWeightsError, Wanted, digest
 
@@ -129,20 +130,24 @@ def start(
     folder: Path | None = None,
     origin: Origin = NO_ORIGIN,
     bound: Bound = BOUND,
+    most: int | None = None,
 ) -> Run:
     """Check a new run against worlds and hyperparameters, and add it, with all that it begins with.
 
     `folder` holds weights of one's own; those of the built-in levels are shipped, and others may be stored.
-    `bound` is the most that it may cost.
+    `bound` is the most that it may cost, `most` the number of runs that may live (None: any).
 
     Raises:
         InvalidFieldsError: names every wrong field, with a message each.
+        TooManyRunsError: as many live as may.
     """
     columns = plan(new, folder, origin, db, bound)
     if isinstance(columns["weights"], Path):
         columns["weights"] = put_weights(db, columns["weights"])
     hashed = [(digest(blob), name, blob) for name, blob in origin.blobs]
     with db.write() as session:
+        if most is not None:
+            require_room(session, most)
         for sha256, name, blob in hashed:  # with the run, so that nobody removes them as unused before
             put_in(session, sha256, name + INHERITED, blob, db.clock())
         run = Run(id=unused_number(session, Run), created=db.clock(), **columns)
@@ -249,6 +254,7 @@ def _weights(
     try:
         return needed(wanted, folder, db)
     except NoWeightsError as error:
-        by_worker = f"A worker makes them, too (POST /api/v1/jobs, about {seconds(wanted)} s)."
-        wrong.append((PRETRAIN, f"{error} {by_worker}"))
+        needs = seconds(wanted)
+        by_worker = f" A worker makes them, too (POST /api/v1/jobs, about {needs} s)."
+        wrong.append((PRETRAIN, f"{error}{by_worker if needs <= MOST_SECONDS else ''}"))
         return None

@@ -7,13 +7,17 @@ and counts as long as it is not over.
 from __future__ import annotations
 
 import threading
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from sqlalchemy import func, select
+from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.errors import TooManyRunsError
 from parenting.server.statuses import LIVING
-from parenting.server.tables import Run
+from parenting.server.tables import Identity, Run
 
 IN_ALL = (
     "{number} runs live, and no more may: nothing was started. Stop some of them, or let whoever runs this "
@@ -25,14 +29,17 @@ OF_CLIENT = (
 )
 
 
-def require_room(db: Database, most: int) -> None:
-    """Refuse one more run where as many live as may.
+def require_room(session: Session, most: int) -> None:
+    """Refuse one more run where as many live as may, in the transaction that adds it.
+
+    Those who add runs within a limit do it one after another: SQLite has one writer, and on PostgreSQL they
+    lock the only row of the database's identity. So no two take the last place.
 
     Raises:
         TooManyRunsError: as many live.
     """
-    with db.read() as session:
-        living = session.scalar(select(func.count()).where(Run.status.in_(LIVING))) or 0
+    session.execute(select(Identity.id).with_for_update()).all()
+    living = session.scalar(select(func.count()).where(Run.status.in_(LIVING))) or 0
     if living >= most:
         raise TooManyRunsError(IN_ALL, number=living)
 
@@ -45,13 +52,31 @@ class StartedRuns:
         self.most = most
         self._lock = threading.Lock()
         self._of: dict[str, set[int]] = {}
+        self._beginning = Counter[str]()
 
-    def require_room(self, db: Database, client: str) -> None:
-        """Refuse one more run of a client where as many of it live as may.
+    @contextmanager
+    def room(self, db: Database, client: str) -> Iterator[list[int]]:
+        """Keep a place for one more run of a client while it begins; its number goes into the list.
 
         Raises:
-            TooManyRunsError: as many live.
+            TooManyRunsError: as many of this client live or begin as may.
         """
+        self._forget_ended(db, client)
+        with self._lock:
+            taken = len(self._of.get(client, ())) + self._beginning[client]
+            if taken >= self.most:
+                raise TooManyRunsError(OF_CLIENT, number=taken)
+            self._beginning[client] += 1
+        begun: list[int] = []
+        try:
+            yield begun
+        finally:
+            with self._lock:
+                self._beginning -= Counter([client])
+                self._of.setdefault(client, set()).update(begun)
+
+    def _forget_ended(self, db: Database, client: str) -> None:
+        """Forget the runs of a client that are over, if it has as many as may live."""
         with self._lock:
             started = set(self._of.get(client, ()))
         if len(started) < self.most:
@@ -60,10 +85,3 @@ class StartedRuns:
             living = set(session.scalars(select(Run.id).where(Run.id.in_(started), Run.status.in_(LIVING))))
         with self._lock:
             self._of[client] = self._of.get(client, set()) - (started - living)
-        if len(living) >= self.most:
-            raise TooManyRunsError(OF_CLIENT, number=len(living))
-
-    def note(self, client: str, run_id: int) -> None:
-        """Take note that a client has started a run."""
-        with self._lock:
-            self._of.setdefault(client, set()).add(run_id)

@@ -10,6 +10,9 @@ from statistics import median
 
 from parenting.weights.store import SHIPPED, SUFFIX, Wanted, metadata
 
+MOST_SECONDS = 2 * 3600
+"""Weights that are expected to take longer are made by `parenting pretrain` alone. A worker does one such
+job at a time, and others wait for theirs."""
 STEP_SECONDS = 2.4e-4
 """Seconds of a step for each cell of the board, measured: 2350 steps at 7 x 8 took 31 s on one of two cores
 that others used as well."""

@@ -13,10 +13,17 @@ from parenting.server.api.bodies import JobBody, PretrainBody
 from parenting.server.api.names import PublicId, RunId
 from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.deps import Db, notify_worker
-from parenting.server.errors import NotFound
+from parenting.server.errors import InvalidFieldsError, NotFound
 from parenting.server.reads.jobs import JobSchema, job_schema
+from parenting.weights.estimate import MOST_SECONDS, seconds
+from parenting.weights.store import Wanted
 
 router = admitted_router(tags=["jobs"])
+
+TOO_LARGE = (
+    "Weights of this size are expected to take {expected} s, and a worker may take {most} s. Name a smaller"
+    " size, or make them by parenting pretrain."
+)
 
 JobId = Annotated[PublicId, Path(description="The `id` of the job.", examples=["3sQv8hYJ2cT7mWk9xRzLpB"])]
 
@@ -41,10 +48,14 @@ def ask_pretraining(request: Request, body: PretrainBody, db: Db) -> JobSchema:
     """Ask any worker to pre-train weights for a world and a size of levels, which new runs then begin with.
 
     It takes the worker a minute or more. Whoever asks for what is open or done gets the same job. An unknown
-    world is 404.
+    world is 404, and a size whose weights are expected to take more than two hours is 422.
     """
     if body.payload.world not in registry.WORLDS:
         raise NotFound(f"There is no such world. There is: {', '.join(registry.WORLDS)}.")
+    asked = body.payload
+    expected = seconds(Wanted(registry.spec(asked.world), asked.height, asked.width))
+    if expected > MOST_SECONDS:
+        raise InvalidFieldsError([("payload", TOO_LARGE.format(expected=expected, most=MOST_SECONDS))])
     job = jobs.ask_of_no_run(db, body.kind, body.payload.model_dump(), body.client_id)
     notify_worker(request)
     return job_schema(db, job)

@@ -54,7 +54,7 @@ def start_run(request: Request, new: NewRunBody, db: Db, settings: SettingsOf) -
     in all or of this client, it is refused (409, `too_many_runs`).
     """
     origin = chosen_origin(db, new.from_policy, new.from_answers)
-    begin = partial(start, db, new, settings.weights, origin, settings.bound)
+    begin = partial(start, db, new, settings.weights, origin, settings.bound, settings.runs)
     return run_schema(db, start_within_limits(request, begin).id)
 
 

@@ -10,8 +10,8 @@ from parenting.server.db import Database
 from parenting.server.doctor.findings import Finding, error, ok, warning
 from parenting.server.store import postgresql
 
-OLDEST = 13
-"""The first version that names its snapshots, by which pages and workers see that something is new."""
+OLDEST = 15
+"""The oldest version that the tests run on."""
 ENDANGERED = {
     "fsync": "a crash of the machine can destroy the whole database",
     "full_page_writes": "a crash of the machine can destroy the whole database",

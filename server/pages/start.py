@@ -24,6 +24,7 @@ from parenting.server.inherited import (
     answered_runs,
     chosen_origin,
     chosen_policy,
+    schema,
     upload,
 )
 from parenting.server.missing_weights import missing_weights
@@ -33,7 +34,7 @@ from parenting.server.pages.render import page, redirect
 from parenting.server.pages.run_list import Find, FindRuns, run_list
 from parenting.server.run_form import read_form
 from parenting.server.settings import Settings
-from parenting.weights.estimate import seconds
+from parenting.weights.estimate import MOST_SECONDS, seconds
 from parenting.weights.origin import NO_ORIGIN, Origin
 from parenting.weights.store import Wanted
 
@@ -130,12 +131,12 @@ def create(request: Request, db: Db, settings: SettingsOf, form: FormFields) -> 
     Where only weights made beforehand are missing, the form offers to make them now or to begin without.
     """
     given = settings_of(form)
-    errors = _errors(given, settings, db)
+    errors, origin = _checked(given, settings, db)
     if errors:
         offer = missing(db, settings.weights, given) if PRETRAIN in errors else None
-        return _page(db, {**EMPTY_FORM, **form}, errors, offer=offer)
-    origin = _origin(db, given)
-    begin = partial(start, db, read_form(given), settings.weights, origin, settings.bound)
+        policy = schema(form["from_policy"], origin) if origin.policy is not None else None
+        return _page(db, {**EMPTY_FORM, **form}, errors, offer=offer, policy=policy)
+    begin = partial(start, db, read_form(given), settings.weights, origin, settings.bound, settings.runs)
     run = start_within_limits(request, begin)
     return redirect(f"/runs/{run.public_id}/parent" if run.parent == "human" else f"/runs/{run.public_id}")
 
@@ -147,12 +148,12 @@ def take_policy(db: Db, form: FormFields, file: PolicyFile) -> Response:
     try:
         if file is None:
             raise InvalidFieldsError([("from_policy", "Choose the file of a policy first.")])
-        given["from_policy"] = upload(db, *file).sha256
+        policy = upload(db, *file)
     except InvalidFieldsError as error:
         return _page(db, {**EMPTY_FORM, **given}, dict(error.fields))
     except Conflict as error:
         return _page(db, {**EMPTY_FORM, **given}, {"from_policy": error.message})
-    return filled_form(db, given)
+    return filled_form(db, {**given, "from_policy": policy.sha256}, policy)
 
 
 def _origin(db: Database, given: Mapping[str, str]) -> Origin:
@@ -173,22 +174,26 @@ def settings_of(form: Mapping[str, str]) -> dict[str, str]:
 
 
 def missing(db: Database, folder: Path, given: Mapping[str, str]) -> Offer | None:
-    """Return the weights that alone a run lacks; None if it lacks none, or more than these."""
+    """Return the weights that alone a run lacks; None if it lacks none or more, or they take too long."""
     try:
         wanted = missing_weights(read_form(given), folder, db)
     except InvalidFieldsError:
         return None
-    return None if wanted is None else Offer(wanted, seconds(wanted))
+    needs = 0 if wanted is None else seconds(wanted)
+    return None if wanted is None or needs > MOST_SECONDS else Offer(wanted, needs)
 
 
-def filled_form(db: Database, form: Mapping[str, str]) -> Response:
-    """Return the page with a form that is filled in as far as it is known."""
+def filled_form(db: Database, form: Mapping[str, str], policy: PolicySchema | None = None) -> Response:
+    """Return the page with a form that is filled in as far as it is known.
+
+    `policy` is the one that the form names, where its file was just read.
+    """
     preset = offered_preset(form.get("world", EMPTY_FORM["world"]))
-    return _page(db, {**EMPTY_FORM, "preset": preset, **form}, {}, filled=True)
+    return _page(db, {**EMPTY_FORM, "preset": preset, **form}, {}, filled=True, policy=policy)
 
 
-def _errors(given: Mapping[str, str], settings: Settings, db: Database) -> dict[str, str]:
-    """Return an error for each wrong field: wrong by itself, or in the world that the others name."""
+def _checked(given: Mapping[str, str], settings: Settings, db: Database) -> tuple[dict[str, str], Origin]:
+    """Return an error for each wrong field, alone or in the world that the others name, and the origin."""
     errors, origin = dict[str, str](), NO_ORIGIN
     try:
         origin = _origin(db, given)
@@ -200,7 +205,7 @@ def _errors(given: Mapping[str, str], settings: Settings, db: Database) -> dict[
             plan(read_form(known), settings.weights, origin, db, settings.bound)
         except InvalidFieldsError as error:
             errors = {**dict(error.fields), **errors}
-    return {name: NUMBER_ERRORS.get(name, said) for name, said in errors.items()}
+    return {name: NUMBER_ERRORS.get(name, said) for name, said in errors.items()}, origin
 
 
 def _page(
@@ -210,6 +215,7 @@ def _page(
     find: Find | None = None,
     filled: bool = False,
     offer: Offer | None = None,
+    policy: PolicySchema | None = None,
 ) -> Response:
     listed = run_list(db, find or Find())
     wrong = bool(errors)
@@ -223,7 +229,7 @@ def _page(
         more_open=any(form[option.field] or option.field in errors for option in OPTIONS),
         focus=next((field for field in EMPTY_FORM if field in errors), None),
         other_errors=[message for field, message in errors.items() if field not in EMPTY_FORM],
-        policy=chosen_policy(db, form["from_policy"]) if form["from_policy"] else None,
+        policy=policy or (chosen_policy(db, form["from_policy"]) if form["from_policy"] else None),
         answered=answered_runs(db),
         offer=offer,
     )

@@ -92,6 +92,28 @@ def test_rows_are_stored_short_and_written_out_for_an_older_version(db: Database
         assert same(session.query(Query).one().clips, CLIPS)
 
 
+DAMAGED = ('{"f": [1', '{"f": 3}', '{"f": [1, 2]}', '{"grids": []}')
+"""Figures that no short form is: cut off, of another shape, too few, and with the mark of clips."""
+MANY = 1_100
+"""Rows beyond two pieces of the migration."""
+
+
+def test_damaged_rows_stay_as_they_are_on_the_way_back(db: Database, mine: Claim) -> None:
+    short = json.dumps(shorten_figures(METRICS, ROW))
+    stored = DAMAGED if db.one_writer else DAMAGED[1:]  # PostgreSQL stores JSON alone
+    damaged = dict(enumerate(stored, MANY - 2))
+    with db.write() as session:
+        insert = text('INSERT INTO metric (run_id, tick, "values") VALUES (:run, :tick, :values)')
+        rows = {tick: damaged.get(tick, short) for tick in range(MANY + 3)}
+        session.execute(insert, [{"run": mine.run_id, "tick": t, "values": v} for t, v in rows.items()])
+    downgrade(db, "0025")
+    with db.read() as session:
+        found = dict(map(tuple, session.execute(text('SELECT tick, CAST("values" AS TEXT) FROM metric'))))
+    assert {tick: found.pop(tick) for tick in damaged} == damaged
+    assert len(found) == MANY + 3 - len(damaged)
+    assert all(same(json.loads(values), ROW) for values in found.values())
+
+
 def raw(db: Database) -> dict[str, str]:
     """Return the stored text."""
     with db.read() as session:

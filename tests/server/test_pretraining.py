@@ -40,6 +40,14 @@ ASKED = {"client_id": "me", "kind": "pretrain", "payload": SIZE}
 RUN = NewRun(world="interruptibility", level_text=HALL, parent="scripted")
 
 
+def vast() -> str:
+    """A level of 60 x 60 cells."""
+    rows = [["#" if 0 in (r, c) or 59 in (r, c) else " " for c in range(60)] for r in range(60)]
+    for place, glyph in enumerate("AGIB", 2):
+        rows[place][2] = glyph
+    return "\n".join(map("".join, rows))
+
+
 def ask(db: Database, **size: Any) -> Job:
     return jobs.ask_of_no_run(db, "pretrain", SIZE | size, "me")
 
@@ -133,6 +141,12 @@ def test_its_route(client: httpx2.Client, db: Database) -> None:
     unknown = ASKED | {"payload": SIZE | {"world": "moon"}}
     assert client.post("/api/v1/jobs", json=unknown).status_code == 404
     assert client.post("/api/v1/jobs", json=ASKED | {"payload": SIZE | {"width": 65}}).status_code == 422
+    large = client.post("/api/v1/jobs", json=ASKED | {"payload": SIZE | {"height": 64, "width": 64}})
+    assert (large.status_code, large.json()["error"]["fields"][0]["field"]) == (422, "payload")
+    assert "expected to take 125830 s, and a worker may take 7200 s" in large.json()["error"]["message"]
+    with pytest.raises(InvalidFieldsError, match="parenting pretrain") as caught:
+        start(db, NewRun(world="interruptibility", level_text=vast()))
+    assert "A worker makes them" not in str(caught.value), "it would be refused"
     for height in (8, 9, 10):
         assert client.post("/api/v1/jobs", json=ASKED | {"payload": SIZE | {"height": height}}).is_success
     refused = client.post("/api/v1/jobs", json=ASKED | {"payload": SIZE | {"height": 11}})

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+
 import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
 from parenting.server.app import create_app
-from parenting.server.db import Database
+from parenting.server.db import Database, connect
 from parenting.server.runs import list_runs, set_status
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 
 RUN = {"world": "unsafe-exploration"}
+AT_ONCE = 8
 
 
 def client(db: Database, settings: Settings, **limits: int) -> TestClient:
@@ -51,3 +55,24 @@ def test_the_runs_of_others_count_for_nobody_else(db: Database, settings: Settin
     for one in (web, other, web, other):
         assert one.post("/api/v1/runs", json=RUN).status_code == 201
     refused(other.post("/api/v1/runs", json=RUN), "PARENTING_RUNS_PER_CLIENT")
+
+
+def begun(person: TestClient) -> int:
+    """Ask for a run, again and again while the store has no turn for it."""
+    while (code := person.post("/api/v1/runs", json=RUN).status_code) == 503:
+        pass
+    return code
+
+
+@pytest.mark.parametrize("limits", [{"runs": 3}, {"runs_per_client": 3}])
+def test_two_at_once_cannot_both_take_the_last_place(
+    db: Database, settings: Settings, limits: dict[str, int]
+) -> None:
+    """The limit of all holds over two web processes as well; that of a client is each one's own."""
+    with closing(connect(settings)) as other, ThreadPoolExecutor(AT_ONCE) as pool:
+        apps = [client(one, settings, **limits).app for one in (db, other)]
+        webs = apps if "runs" in limits else apps[:1]
+        people = [TestClient(webs[n % len(webs)], base_url="http://localhost") for n in range(AT_ONCE)]
+        found = list(pool.map(begun, people))
+    assert sorted(found) == [201] * 3 + [409] * (AT_ONCE - 3)
+    assert len(list_runs(db)) == 3

@@ -12,10 +12,12 @@ from parenting.server.app import create_app
 from parenting.server.db import Database, connect
 from parenting.server.doctor.examination import examine
 from parenting.server.doctor.findings import State
+from parenting.server.doctor.server import OLDEST
 from parenting.server.errors import SetupError
 from parenting.server.settings import Settings
 from parenting.server.worker import main
 from tests.postgres import Cluster, programs
+from tests.tree import ROOT
 
 pytestmark = pytest.mark.postgresql
 
@@ -81,3 +83,7 @@ def test_a_standby_is_an_error_and_nothing_starts_on_it(server: Cluster, setting
             main(settings)
     finally:
         server._run("pg_ctl", "stop", "-m", "immediate")
+
+
+def test_the_oldest_version_is_the_one_that_the_documentation_asks_for() -> None:
+    assert f"Install PostgreSQL {OLDEST} or newer" in (ROOT / "docs" / "operations.md").read_text("utf-8")
