@@ -11,6 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine
 from parenting.server.errors import Conflict
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import Stored, answer
+from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim, claim, set_status
 from parenting.server.statuses import RunStatus
 from tests.faults.ledger import Told
@@ -35,6 +36,8 @@ class State(RuleBasedStateMachine):
         self.status, self.answers, self.retracted = "active", 0, 0
         self.corrections: dict[int, tuple[int, bool]] = {}  # by tick: its query, and whether it ended a pause
         self.claims: list[Claim] = []
+        self.seen: dict[int, Watch] = {}  # what the worker saw last
+        self.high_seen = -1
         self._claim_it()
 
     def teardown(self) -> None:

@@ -50,8 +50,20 @@ def clock() -> Clocks:
 @pytest.fixture
 def db(settings: Settings, clock: Clocks) -> Iterator[Database]:
     database = migrated(settings, clock)
+    quickened(database)
     yield database
     database.close()
+
+
+def quickened(db: Database) -> None:
+    """Spare the machine three of four words with PostgreSQL's server: nobody else writes while it reads.
+
+    A connection is not asked whether it lives before each use, and a transaction that reads begins and ends
+    with its only statement.
+    """
+    if not db.one_writer:
+        db._writing.pool._pre_ping = False
+        db._reading = db._reading.execution_options(isolation_level="AUTOCOMMIT", postgresql_readonly=False)
 
 
 @pytest.mark.torture
@@ -64,7 +76,7 @@ def test_queue_does_what_its_model_says(
 
     examples, wanted = EXAMPLES[store], RARE if store == "sqlite" else set[str]()
     for number in (examples, *(4 * [examples // 5])):  # a rare step may need more examples
-        if not Shared.shared.steps or not wanted <= Shared.shared.steps.keys():
+        if not Shared.shared.steps or wanted - Shared.shared.steps.keys():
             drawn = seed(rng.randrange(2**32))(Shared)
             run_state_machine_as_test(drawn, settings=_settings(number))
     assert audit(kept, Entries(Shared.shared.told, [])) == []
