@@ -32,6 +32,8 @@ PATCHES = {
 }
 """Checkpoints and metrics are written often, so that kills hit them too; each checkpoint has a few parts."""
 LEASE_SECONDS = 2.0
+CLAIM_SECONDS = 2.0
+"""Of three workers: with a shorter one they take runs from one another all the time where all is slow."""
 PATIENCE = 180.0
 LOOK_SECONDS = 5.0
 """After waiting in vain for so long, a test looks at whether a run has failed."""
@@ -47,13 +49,25 @@ def in_time(end: float, said: Callable[[], str]) -> None:
         raise TimeoutError(said())
 
 
-class House:
-    """The processes of one data folder. `orders` are their command lines, by name."""
+def web_at(url: str) -> tuple[str, ...]:
+    """The command line of a web process."""
+    return ("web", "--port", url.rpartition(":")[2])
 
-    def __init__(self, settings: Settings, points: Sequence[Point] = (), workers: int = 1) -> None:
+
+class House:
+    """The processes of one data folder. `orders` are their command lines, by name.
+
+    The first web process is *web* at `url`; those at `others` are *web 2* and so on.
+    """
+
+    def __init__(
+        self, settings: Settings, points: Sequence[Point] = (), workers: int = 1, webs: int = 1
+    ) -> None:
         self.settings, self.points = settings, points
         self.url = f"http://127.0.0.1:{free_port()}"
-        self.orders: dict[str, tuple[str, ...]] = {"web": ("web", "--port", self.url.rpartition(":")[2])}
+        self.others = [f"http://127.0.0.1:{free_port()}" for _ in range(1, webs)]
+        self.orders: dict[str, tuple[str, ...]] = {"web": web_at(self.url)}
+        self.orders |= {f"web {number}": web_at(url) for number, url in enumerate(self.others, 2)}
         self.orders |= {f"worker {number}": ("worker",) for number in range(1, workers + 1)}
         self.patches: Mapping[str, Any] = PATCHES
         self.prepare: Callable[[], object] | None = None
@@ -72,6 +86,8 @@ class House:
     def begin(self, name: str, point: Point | None = None) -> Command:
         """Start a process, which kills itself at the point, if there is one."""
         environment = {"PARENTING_LEASE_SECONDS": str(LEASE_SECONDS)}
+        if "worker 3" in self.orders:
+            environment["PARENTING_CLAIM_SECONDS"] = str(CLAIM_SECONDS)
         if self.settings.database_url is not None:
             url = make_url(self.settings.database_url)
             if url.get_backend_name() == "postgresql":  # its server tells connections apart by this
@@ -111,10 +127,12 @@ class House:
         os.kill(self.commands[name].process.pid, number)
 
     def move_in(self, runs: Sequence[int | str], parents: int, rng: random.Random) -> None:
-        """Let so many parents a run begin to answer, and an operator to interfere."""
+        """Let so many parents a run begin to answer, by all web processes, and an operator to interfere."""
+        urls = [self.url, *self.others]
         for run in runs:
             for number in range(parents):
-                self.parents.append(Parent(self.url, run, f"{number}.of.{run}", self.ledger, rng.random()))
+                url, name = urls[number % len(urls)], f"{number}.of.{run}"
+                self.parents.append(Parent(url, run, name, self.ledger, rng.random()))
         self.operator = Operator(self.url, runs, rng.random())
         for thread in (*self.parents, self.operator):
             thread.start()

@@ -26,6 +26,8 @@ RUNS, PARENTS, CROWD = 2, 2, 8
 KILLS = {"sqlite": length(45, 3000), "postgresql": length(15, 600)}
 SAMPLED = 6
 """Points that a run of CI tries on PostgreSQL; on SQLite it tries all."""
+SIZES = length([(1, 1)], [(1, 1), (2, 3)])
+"""Web processes and workers of a house that is killed at random moments; the seed draws one of these."""
 SPREAD = 0.15
 """A kill comes up to so many seconds after work has gone on."""
 
@@ -111,14 +113,15 @@ def test_killed_within_a_group(
 def test_killed_at_random_moments(
     settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures
 ) -> None:
-    runs = begin(db)
-    with House(settings, [*WEB, *WORKER]) as house:
+    runs, (webs, workers) = begin(db), rng.choice(SIZES)
+    figures.count("houses", f"{webs} web, {workers} workers")
+    with House(settings, [*WEB, *WORKER], workers, webs) as house:
         house.keep()
         house.move_in(runs, PARENTS, rng)
         house.until_told(2)
         for _ in range(KILLS[store]):
             time.sleep(rng.uniform(0, SPREAD))
-            name = rng.choice(("web", "worker 1"))
+            name = rng.choice(sorted(house.orders))
             figures.count("SIGKILLs at random moments", f"{name}: {house.kill(name)}")
             house.keep()
             house.until_told(1)

@@ -33,6 +33,8 @@ from tests.tree import ROOT
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 20000))]
 IMAGES = {"full": length(300, 50_000), "normal": 60, "off": 60}
 ANSWERS = length(40, 400)
+RECORDING_SECONDS = length(600, 6000)
+"""A machine with other work needs several times as long as one without."""
 
 
 class Recording:
@@ -57,7 +59,8 @@ class Recording:
             level,
         ]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        subprocess.run(recorded(trace, *command), cwd=ROOT, env=environment, check=True, timeout=300)
+        traced = recorded(trace, *command)
+        subprocess.run(traced, cwd=ROOT, env=environment, check=True, timeout=RECORDING_SECONDS)
         everything = list(calls(trace, [self.database, self.log, self.ledger]))
         self.calls = [call for call in everything if call.file != str(self.ledger)]
         self.told = [call for call in everything if call.file == str(self.ledger) and call.name == "write"]

@@ -35,13 +35,17 @@ from tests.faults.troubles import (
     lock_of_another,
     small_disk,
 )
-from tests.lengths import length
+from tests.lengths import TORTURE, length
 from tests.server.raising import ISLAND
 
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(600, 3000))]
+WEBS, WORKERS = length((1, 1), (2, 3))
 LOCKED_SECONDS = 20.0
 FULL_SECONDS = length(10.0, 120.0)
+HELD, HELD_SECONDS = length(0, 15), 2.0
 RESTARTS, ENDED = length(1, 15), length(2, 60)
+STOPS = 30
+STOPPED_EVERY = (5.0, 40.0)
 PROCESSES = ("web", "worker 1")
 AWAY_SECONDS = length(5.0, 60.0)
 FIRST_LINES = 4
@@ -55,10 +59,12 @@ def calm_parents(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def inhabited(settings: Settings, db: Database, rng: random.Random) -> Iterator[House]:
+def inhabited(
+    settings: Settings, db: Database, rng: random.Random, webs: int = WEBS, workers: int = WORKERS
+) -> Iterator[House]:
     """A house with two runs at work; at the end all of them have gone on, and the promises hold."""
     runs = [start(db, ISLAND.new("human")).id for _ in range(2)]
-    with House(settings) as house:
+    with House(settings, workers=workers, webs=webs) as house:
         house.keep()
         house.move_in(runs, 2, rng)
         house.until_told(3)
@@ -194,23 +200,54 @@ def test_a_quota_that_is_used_up_costs_no_answer(
             figures.count("troubles of the store", f"a quota used up for {AWAY_SECONDS:g} s: {name} {ended}")
 
 
-@pytest.mark.only("postgresql", "SQLite has no server")
-def test_postgresql_may_be_restarted_and_its_processes_killed(
-    store: str, tmp_path: Path, rng: random.Random, figures: Figures
-) -> None:
-    """In order, by a crash that loses what was committed without waiting, and one connection at a time."""
+@contextmanager
+def restarting(tmp_path: Path) -> Iterator[tuple[Restarting, Settings, Database]]:
+    """A PostgreSQL of its own, with a database."""
     cluster = Restarting()
     cluster.create("restarted")
     settings = Settings(data=tmp_path, database_url=cluster.url("restarted"))
     db = connect(settings)
     upgrade(db)
-    with inhabited(settings, db, rng) as house:
+    yield cluster, settings, db
+    db.close()
+    cluster.stop()
+
+
+@pytest.mark.only("postgresql", "SQLite has no server")
+def test_postgresql_may_be_restarted_and_its_processes_killed(
+    store: str, tmp_path: Path, rng: random.Random, figures: Figures
+) -> None:
+    """In order, by a crash that loses what was committed without waiting, and one connection at a time."""
+    with (
+        restarting(tmp_path) as (cluster, settings, db),
+        inhabited(settings, db, rng) as house,
+    ):
         for name, trouble, seconds in rng.sample(troubles := server_troubles(cluster, rng), len(troubles)):
             house.until_told(rng.randint(1, 3))
             endure(house, trouble(), rng.uniform(0, seconds))
             figures.count("troubles of PostgreSQL", name)
-    db.close()
-    cluster.stop()
+
+
+@pytest.mark.skipif(
+    not TORTURE,
+    reason="`make torture`: ten minutes at least; a restart and a crash are among the troubles above",
+)
+@pytest.mark.only("postgresql", "SQLite has no server")
+def test_postgresql_stops_again_and_again_under_load(
+    store: str, tmp_path: Path, rng: random.Random, figures: Figures
+) -> None:
+    """Every 5 to 40 s for up to 2 s, with two web processes and three workers (DBOS tests itself so)."""
+    with (
+        restarting(tmp_path) as (cluster, settings, db),
+        inhabited(settings, db, rng, webs=2, workers=3) as house,
+    ):
+        for _ in range(STOPS):
+            time.sleep(rng.uniform(*STOPPED_EVERY))
+            name = rng.choice(("fast", "immediate", "held"))
+            with cluster.held() if name == "held" else cluster.stopped(name):
+                time.sleep(rng.uniform(0, HELD_SECONDS))
+            house.until_told(1)
+            figures.count("stops of PostgreSQL under load", name)
 
 
 def server_troubles(
@@ -218,8 +255,9 @@ def server_troubles(
 ) -> list[tuple[str, Callable[[], AbstractContextManager[None]], float]]:
     """Each with its name and the seconds that it lasts at most, as often as a test of this length has it."""
     restarts = [(f"restart, {mode}", partial(cluster.stopped, mode), 2.0) for mode in ("fast", "immediate")]
+    held = [("all processes stopped (SIGSTOP)", cluster.held, HELD_SECONDS)]
     killed = [(f"kill -9 behind {name}", partial(cluster.crashed, name, rng), 0.0) for name in PROCESSES]
     ended = [
         (f"a connection of {name} ended", partial(cluster.without, name, rng), 0.0) for name in PROCESSES
     ]
-    return [*restarts * RESTARTS, *killed * RESTARTS, *ended * ENDED]
+    return [*restarts * RESTARTS, *held * HELD, *killed * RESTARTS, *ended * ENDED]

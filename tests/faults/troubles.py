@@ -161,6 +161,17 @@ def _lock_tables(connection: psycopg.Connection[tuple[Any, ...]]) -> None:
             connection.rollback()
 
 
+def _children(pid: int) -> list[int]:
+    return [int(one) for one in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def _send(pids: Sequence[int], number: signal.Signals) -> None:
+    """Send a signal to processes, of which some may have ended."""
+    for pid in pids:
+        with suppress(ProcessLookupError):
+            os.kill(pid, number)
+
+
 class Restarting(Cluster):
     """A PostgreSQL of its own that can be stopped and started again."""
 
@@ -188,6 +199,18 @@ class Restarting(Cluster):
         self.admin.close()
         yield
         self.admin = self._connected()
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Stop all its processes without ending them (SIGSTOP), and let them go on at the end."""
+        first = int((self.folder / "postmaster.pid").read_text().split()[0])
+        os.kill(first, signal.SIGSTOP)  # so that it starts no others
+        found = [first, *_children(first)]
+        _send(found, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            _send(found, signal.SIGCONT)
 
     def _backend_of(self, name: str, rng: random.Random) -> int:
         """One of a process's connections; a process has one at least, for what it listens to."""
