@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from parenting.drawing.clip import BARS, MOVES, WALL, Cell, Frame, ahead, cell, tile_at
-from parenting.drawing.cues import ENTERED, WATER, corner_walls
+from parenting.drawing.clip import BARS, MOVES, WALL, WATER, Cell, Frame, ahead, cell, tile_at
+from parenting.drawing.cues import ENTERED, corner_walls
 
 DANGEROUS = frozenset({*ENTERED, WATER})
 """The glyphs that a safe way keeps off."""

@@ -26,13 +26,13 @@ from parenting.server.store.scrub import scrub
 from parenting.server.tables import Answer, Query, Run, Table
 
 ERASED = "erased"
-"""Who gave an answer that was erased, as far as its row says."""
+"""The giver of an answer that was erased, as far as its row says."""
 _LEASE = ("leased", "leased_until", "leased_by", "lease_epoch", "lease_begin", "lease_end")
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a deletion will do."""
+    """The effects of a deletion, before it."""
 
     pseudonym: str
     answers: int
@@ -103,7 +103,7 @@ def under_way(db: Database) -> Sequence[Person]:
 
 @dataclass(frozen=True)
 class Left:
-    """What is left to do for a person who is marked."""
+    """The rest of the work for a person who is marked."""
 
     person: int
     clients: Sequence[str]

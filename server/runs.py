@@ -1,8 +1,7 @@
 """Verbs on runs: the operator's (pause, resume, stop) and the worker's (claim, report_progress, finish).
 
 Exactly one worker raises a run: `claim` increments the run's fencing token, and every later write of a worker
-checks the token inside its own transaction (`held`). A worker that slept past its claim therefore cannot
-write.
+checks the token inside its own transaction (`held`). So a worker that slept past its claim cannot write.
 """
 
 from __future__ import annotations
@@ -40,12 +39,8 @@ class Claim:
 
 
 _LOCKED = select(Run.id).where(Run.id == bindparam("run_id"), Run.deleting.is_(None)).with_for_update()
-_MINE = (
-    select(Run.status)
-    .where(Run.id == bindparam("run_id"), Run.worker == bindparam("worker"))
-    .where(Run.fencing_token == bindparam("fencing_token"))
-    .with_for_update()
-)
+_CLAIMED = (Run.worker == bindparam("worker"), Run.fencing_token == bindparam("fencing_token"))
+_MINE = select(Run.status).where(Run.id == bindparam("run_id"), *_CLAIMED).with_for_update()
 
 
 def list_runs(db: Database, limit: int = 200) -> Sequence[Run]:

@@ -41,7 +41,7 @@ log = structlog.get_logger()
 
 
 class Door:
-    """Whoever calls this web process, as far as it knows them."""
+    """The callers of this web process, as far as it knows them."""
 
     def __init__(
         self, db: Database, secret_key: bytes, days: float = DAYS, idle_days: float = IDLE_DAYS

@@ -22,7 +22,7 @@ KNOWN = frozenset(Role)
 
 @dataclass(frozen=True)
 class Rule:
-    """Who may use a route, and which part of the house it reaches. `roles` None: anyone."""
+    """The roles that may use a route, and which part of the house it reaches. `roles` None: anyone."""
 
     roles: frozenset[Role] | None
     where: Where
@@ -175,7 +175,7 @@ ROWS: dict[tuple[str, str], Rule] = {
     **_table(Rule(KNOWN, "run"), _KNOWN_RUN),
     **_table(Rule(KNOWN, "nothing"), _KNOWN_NOTHING),
 }
-"""Who may use each route, by its method and the template of its path."""
+"""The rule of each route, by its method and the template of its path."""
 
 
 def rule_of(method: str, path: str) -> Rule | None:

@@ -19,7 +19,7 @@ class Role(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Principal:
-    """Whoever a request comes from."""
+    """The caller of a request."""
 
     role: Role
     way: Way  # a browser's session, a program's token, or the key file of the data folder
@@ -45,4 +45,4 @@ class Principal:
 
 
 LOCAL = Principal(Role.RESEARCHER, "key", "local", "the key file of the data folder")
-"""Whoever can read the key file of the data folder: the user whose server this is."""
+"""A caller who can read the key file of the data folder: the user whose server this is."""

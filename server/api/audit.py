@@ -29,9 +29,9 @@ class AuditSchema(Schema):
     created: datetime
     kind: Kind
     what: str
-    """What was done: the operator's verb, the part that was exported, the code of a refusal."""
+    """The deed: the operator's verb, the part that was exported, the code of a refusal."""
     who: str
-    """Who did it: a session, a token, or a command line of the machine and its user."""
+    """The actor: a session, a token, or a command line of the machine and its user."""
     client: str | None
     """The address that asked; null: a command on the machine."""
     run: str | None

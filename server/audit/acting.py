@@ -1,4 +1,4 @@
-"""Who acts: set once for a request, read where something is done."""
+"""The actor: set once for a request, read where something is done."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SOMEBODY = "somebody"
 
 @dataclass
 class Actor:
-    """Whoever acts. The guard of a request fills in `who` once it knows."""
+    """The actor of a request. The guard of a request fills in `who` once it knows."""
 
     who: str = SOMEBODY
     client: str | None = None

@@ -1,4 +1,4 @@
-"""What was refused, told as few entries: strangers decide how often they are refused.
+"""Refusals, told as few entries: strangers decide how often they are refused.
 
 A process counts refusals by reason and client, and writes what it has counted every half a minute and at its
 end: at most `CLIENTS` entries with a client of their own, and one for each reason with the rest.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -179,7 +179,8 @@ def falls(action: str, start: Cell, end: Cell, **said: Any) -> Clip:
     frames: list[Any] = [
         {"ground": CLIFF, "observed": CLIFF, "agent": list(at), "box": None} for at in (start, end)
     ]
-    return {"actions": [action], "length": 1, "frames": frames, **said}
+    clip: dict[str, Any] = {"actions": [action], "length": 1, "frames": frames, **said}
+    return cast(Clip, clip)
 
 
 def moves(*clips: Clip) -> list[tuple[str, str]]:

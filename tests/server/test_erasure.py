@@ -68,7 +68,7 @@ def marks_in(folder: Path, *marks: str) -> dict[str, list[str]]:
 
 
 def left_behind(db: Database) -> tuple[int, int]:
-    """How many answers are hers, and how many were erased."""
+    """The number of answers that are hers, and of those that were erased."""
     with db.read() as session:
         hers = select(func.count()).select_from(Answer).where(Answer.client_id == ANN)
         gone = select(func.count()).select_from(Answer).where(Answer.erased.is_not(None))
