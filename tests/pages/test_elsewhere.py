@@ -41,6 +41,9 @@ def other(tmp_path: Path) -> Iterator[Database]:
     database.close()
 
 
+STREAM = "**/runs/parent/stream"
+
+
 def serve(site: FastAPI, database: Database) -> None:
     """Let another database come to the address, for reads and for the group of writes."""
     site.state.group_commit.close()
@@ -60,9 +63,11 @@ def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(
     number = ask()
     page = tabs.open("/")
     page.context.route("**/events*", lambda route: route.abort())  # as if the server had been started again
+    page.context.route(STREAM, lambda route: route.abort())  # one that is open would go on with the old one
     page.goto(tabs.address + address(db))
     shown(page, number)
     serve(site, other)
+    page.context.unroute(STREAM)
     with page.expect_request("**/answer") as sent:
         page.keyboard.press("b")
     expect(page.locator("#alert")).to_contain_text(KEPT)
