@@ -12,6 +12,7 @@ from typing import Any
 from sqlalchemy import Column, select
 
 from parenting.server import jobs, metrics, operator_events
+from parenting.server.access.tables import AccessSession, AccessToken
 from parenting.server.audit.recording import record
 from parenting.server.audit.table import Kind
 from parenting.server.board_tables import BoardSnapshot, BoardStates
@@ -83,6 +84,9 @@ def two_runs(db: Database) -> None:
         person = session.scalars(select(Person.id).limit(1)).one()  # whoever answered
         session.add(PersonName(person_id=person, name="A person", external_id="7"))
         record(db, session, Kind.OPERATOR, "pause", public_id())
+        given = {"role": "researcher", "digest": "0" * 64, "created": moment, "expires": moment}
+        session.add(AccessToken(kind="program", made_by="somebody", **given))
+        session.add(AccessSession(last_used=moment, **given))
         session.add(Tombstone(id=99, public_id=public_id(), created=moment, deleted=moment, held={}))
 
 
