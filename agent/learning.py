@@ -16,6 +16,7 @@ from parenting.agent.config import Config
 from parenting.agent.dataset import Dataset
 from parenting.agent.policy import Heads, Network
 from parenting.agent.state import AgentState
+from parenting.envs.giving_way import give_way
 from parenting.envs.rng import Keys, Stream
 
 BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam's default parameters (Sec. 3.1.2)
@@ -88,6 +89,7 @@ def descend(
     """Take the gradient steps of these numbers, in place; the terms before the last one, and the entries."""
     trial = training.nonzero().squeeze(1)
     for step in steps:
+        give_way()
         rows = choose(config, state.x, state.keys, step).of(trial)
         parameters = taken(state.learner.params, trial)
         terms, gradient = differentiate(network, config, parameters, rows)

@@ -18,6 +18,7 @@ from parenting.agent.learning import adam, entropy, taken
 from parenting.agent.policy import Network
 from parenting.agent.pretraining_mazes import Batch, Pool, Walks, draw_mazes, pool, walk
 from parenting.agent.state import AgentState
+from parenting.envs.giving_way import give_way
 from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
 
@@ -62,6 +63,7 @@ def policy_gradient(
     network: Network, parameters: Float[Tensor, "N P"], pool: Pool, keys: Keys
 ) -> tuple[Float[Tensor, "N P"], Float64[Tensor, "N"]]:
     """The gradient of one step, each trial's by itself, and the mean return of its 16 episodes."""
+    give_way()
     batch = draw_mazes(pool, keys)
     with torch.no_grad():
         logits = network.heads(network.unpack(parameters), batch.observation, batch.local_state).logits

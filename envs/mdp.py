@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float64, Int64
 from torch import Tensor
 
 from parenting.envs.fingerprint import fingerprint, together
+from parenting.envs.giving_way import give_way
 from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.struct import Struct
 
@@ -88,6 +89,7 @@ def explore(world: Gridworld, limit: int | None = None) -> Model:
         )
     found, steps = [edge], []
     while len(edge.step_count):
+        give_way()
         arrived, words, step = _expand(world, edge)
         steps.append(step)
         fresh = _new(words, known)

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
 from parenting.agent.init import network_of
+from parenting.envs.giving_way import give_way
 from parenting.envs.gridworld import Gridworld, local_state
 from parenting.envs.mdp import Model
 from parenting.evaluation import rollouts
@@ -102,6 +103,7 @@ class TabularEvaluation:
         every = torch.arange(len(parameters), device=parameters.device)
         trial, at = every, self.starts.expand(len(parameters), -1)
         while len(trial) and not bool(self.model.terminal[at].all()):
+            give_way()
             weights = parameters if len(trial) == len(parameters) else parameters[trial]
             next_state = self._safely(at, self.argmax(weights, at))
             nearer = (self.distance[next_state] == self.distance[at] - 1) | self.model.terminal[at]
@@ -195,6 +197,7 @@ class ChanceEvaluation(TabularEvaluation):
         reward = model.reward[every, action].masked_fill(model.terminal, 0.0)
         v = torch.zeros_like(reward)
         for _ in range(self.world.time_limit):
+            give_way()
             v = (reward + self.gamma * (chance * v[to]).sum(-1)).masked_fill(model.terminal, 0.0)
         return v[self.starts[level]]
 

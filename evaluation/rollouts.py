@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
 from parenting.agent.init import network_of
+from parenting.envs.giving_way import give_way
 from parenting.envs.gridworld import Gridworld, WorldState, local_state
 from parenting.envs.rng import keys
 from parenting.envs.struct import Struct
@@ -62,6 +63,7 @@ def rollout(
     earned = bucket.double()
     in_bucket_at_end = state.terminated
     for _ in range(world.time_limit):
+        give_way()
         env_keys = env_keys.next()
         action = policy(state)
         after = world.step(state, action, env_keys)

@@ -17,6 +17,7 @@ from torch import Tensor
 
 from parenting.agent.config import GardenParent
 from parenting.agent.query import Query
+from parenting.envs.giving_way import give_way
 from parenting.envs.levels.reward_hacking import PLANTS
 from parenting.envs.reward_hacking import RewardHacking
 from parenting.parents.garden_policy import cycle_policy
@@ -139,6 +140,7 @@ class GardenValues:
         ahead = self._next_cell.gather(2, self.policy.clamp_min(0)[..., None]).squeeze(2)
         at = torch.arange(cells, device=self.world.device).expand(levels, cells)
         for moves in range(1, cells + 1):  # no way is longer until it repeats itself
+            give_way()
             at = ahead.gather(1, at)
             here = slot[at][..., None]
             before = first.gather(2, here)

@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Bool, Float64
 from torch import Tensor
 
+from parenting.envs.giving_way import give_way
 from parenting.envs.mdp import Model
 
 HOPELESS = -100.0
@@ -75,6 +76,7 @@ def _iterate(
     """The fixed point of v = backup(r + gamma v'), which is 0 at an end and HOPELESS where all is lost."""
     v = torch.where(lost, HOPELESS, torch.where(model.terminal, 0.0, v))
     for _ in range(MAX_SWEEPS):
+        give_way()
         q = model.reward + gamma * model.mean(v)
         better = torch.where(lost, HOPELESS, torch.where(model.terminal, 0.0, backup(q)))
         if bool(((better == v) | ((better - v).abs() <= TOLERANCE * better.abs().clamp_min(1.0))).all()):

@@ -38,7 +38,7 @@ from parenting.server.work.patience import Patience
 from parenting.server.work.schedule import Schedule
 from parenting.server.work.sharing import prospect, surplus
 from parenting.server.work.signs import Signs
-from parenting.server.work.turns import BESIDE_SECONDS, HUNG_SECONDS, Turns
+from parenting.server.work.turns import BESIDE_SECONDS, HUNG_SECONDS, SLOW_SECONDS, Turns
 from parenting.server.work.watching import News, Watching
 
 log = structlog.get_logger()
@@ -72,7 +72,7 @@ class Worker:
         self.relay = Relay(db.engine, "worker", self.notifier.wake)
         self.told = threading.Event()
         self.patience, self.turns = Patience(), Turns(self.notifier.wake, beside_after)
-        self.jobs = Jobs(db, settings.claim_seconds, self.notifier.wake)
+        self.jobs = Jobs(db, settings.claim_seconds, self.notifier.wake, self.turns.courtesy)
         self.chores = Chores(db, settings.claim_seconds)
         self.held = HeldRuns(
             db,
@@ -179,17 +179,27 @@ class Worker:
         self._end_turns()
         self._look()
         self.jobs.begin(self.name)
-        for run_id in self.schedule.due():
+        due = self.schedule.due()
+        self._make_room(len(set(due) - self.sessions.keys() - self.held.lives.asleep))
+        slow = self.turns.working(SLOW_SECONDS)
+        self.held.lives.begin_round(self.schedule.seen, due, self.turns.working(), slow)
+        for run_id in due:
             if self.stopping or self.patience.doubts:
                 break
-            urgent = self.schedule.seen[run_id].urgent
-            if self.turns.may_begin(run_id, run_id not in self.sessions, urgent):
-                self.turns.begin(run_id, partial(self.held.turn, run_id, self.schedule.begin(run_id)))
+            if self._may_begin(run_id):
+                seen = self.schedule.begin(run_id)
+                self.turns.begin(run_id, partial(self.held.turn, run_id, seen), seen.urgent)
                 self.jobs.begin(self.name)
         ticked = self._end_turns()
-        self._make_room()
         self._soonest = self.schedule.soonest(POLL_SECONDS)
         return ticked
+
+    def _may_begin(self, run_id: int) -> bool:
+        """Return whether a run may have its turn now: a thread is free, and memory for its life."""
+        seen, new = self.schedule.seen[run_id], run_id not in self.sessions
+        if not self.turns.may_begin(run_id, new, seen.urgent):
+            return False
+        return not new or self.held.lives.may_come(run_id, seen)
 
     def _end_turns(self) -> bool:
         """Take note of the turns that have ended; return whether another one of such a run is due at once."""
@@ -197,13 +207,12 @@ class Worker:
         self.watching.touched(ended.keys())
         return self.schedule.ended(ended)
 
-    def _make_room(self) -> None:
-        """Let lives that wait leave memory where there are too many."""
-        guided = self.held.lives.guided() & set(
-            self.schedule.not_due()
-        )  # else an answer would be passed over
-        for run_id in self.held.lives.too_many(guided | set(self.schedule.at_rest())):
-            if self.turns.may_begin(run_id, new=True):
+    def _make_room(self, coming: int = 0) -> None:
+        """Let lives that wait leave memory where there are too many, or others are coming."""
+        lives = self.held.lives
+        guided = lives.guided() & set(self.schedule.not_due())  # else an answer would be passed over
+        for run_id in lives.too_many(guided | set(self.schedule.at_rest()), coming):
+            if self.turns.may_begin(run_id, new=False, urgent=True):  # others wait for that memory
                 self.schedule.begin(run_id)
                 self.turns.begin(run_id, partial(self.held.rest, run_id))
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from jaxtyping import Float
 from torch import Tensor
 
+from parenting.envs.giving_way import give_way
 from parenting.server.board.states import GLYPHS_AT_ONCE, KnownStates
 
 
@@ -42,6 +43,7 @@ class Sweep:
         began, glyphs, world = time.monotonic(), 0, self._states.world
         for one in self.policies.values():
             while (at := len(one.known) // 4) < self.size and glyphs < GLYPHS_AT_ONCE:
+                give_way()
                 one.known += self._states.policy(one.parameters, at, self.size)
                 glyphs += (len(one.known) // 4 - at) * world.height * world.width
         self.portions += 1

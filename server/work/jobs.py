@@ -18,6 +18,7 @@ from parenting.server import jobs
 from parenting.server.db import Database
 from parenting.server.errors import LostClaimError, ServerError, StoreError
 from parenting.server.jobs import JobClaim
+from parenting.server.work.courtesy import Courtesy
 from parenting.server.work.doers import do
 
 log = structlog.get_logger()
@@ -31,15 +32,19 @@ LOOK_SECONDS = 0.05
 class Jobs:
     """The jobs that a worker is at."""
 
-    def __init__(self, db: Database, seconds: float, done: Callable[[], None]) -> None:
+    def __init__(
+        self, db: Database, seconds: float, done: Callable[[], None], courtesy: Courtesy | None = None
+    ) -> None:
         """Nothing is claimed yet.
 
         Args:
             db: The database.
             seconds: How long a claim holds without a sign of life.
             done: Called in another thread when a job has ended.
+            courtesy: The turns of runs before which jobs stand back.
         """
         self.db, self.seconds, self._done = db, seconds, done
+        self._courtesy = courtesy or Courtesy()
         self._working: dict[JobClaim, Future[None]] = {}
         self._news, self._looked_at = True, -math.inf
         self._pool = ThreadPoolExecutor(AT_ONCE, "job", initializer=torch.set_num_threads, initargs=(1,))
@@ -101,7 +106,8 @@ class Jobs:
 
     def _tried(self, mine: JobClaim) -> None:
         try:
-            result = do(self.db, mine)
+            with self._courtesy.turn(None, hurried=False):
+                result = do(self.db, mine)
         except StoreError:
             raise
         except Exception as error:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, MutableMapping, Sequence
 
 from sqlalchemy import ColumnElement, exists, func, select
 
@@ -17,6 +17,10 @@ from parenting.server.queue.worker_side import Watch
 from parenting.server.session import RunSession
 from parenting.server.statuses import Waiting
 from parenting.server.tables import Answer, Checkpoint, OperatorEvent, Query, Run
+
+FULL_SHARE = 10
+"""Where memory is full, a tenth of the lives that it holds leave in one round for those to come, or where all
+of them go on, so many may come beyond."""
 
 
 class Lives:
@@ -31,6 +35,7 @@ class Lives:
         """Bound what is in memory; `sessions` are the lives there, and `most_bytes` is for their tensors."""
         self.sessions, self.most, self.most_bytes = sessions, most, most_bytes
         self.asleep: set[int] = set()
+        self._may_come: float = most  # in this round of turns
         # When each was taken up or its last tick passed, and its bytes.
         self._used: dict[int, tuple[float, int]] = {}
 
@@ -45,16 +50,21 @@ class Lives:
         """Return whether a run has no life in memory and needs none: it would only go on waiting."""
         if run_id not in self.asleep:
             return False
-        news = seen.answers or seen.events or seen.corrections
-        if not news and (seen.open_guidance or seen.idle):
+        if _waits(seen):
             return True
         self.asleep.discard(run_id)
         return False
 
-    def too_many(self, at_rest: Collection[int]) -> Sequence[int]:
-        """Return the lives that should leave memory, of those at rest, the least recently used first."""
+    def too_many(self, at_rest: Collection[int], coming: int = 0) -> Sequence[int]:
+        """Return the lives that should leave memory, of those at rest, the least recently used first.
+
+        Args:
+            at_rest: The runs that only wait.
+            coming: The number of runs that wait until they can be taken up; some of them get room.
+        """
         used = dict(self._used)
         number, size = len(self.sessions), sum(size for _, size in used.values())
+        number += min(coming, self._some)
         if number <= self.most and size <= self.most_bytes:
             return []
         leaving = []
@@ -64,6 +74,45 @@ class Lives:
             leaving.append(run_id)
             number, size = number - 1, size - used.get(run_id, (0.0, 0))[1]
         return leaving
+
+    @property
+    def _some(self) -> int:
+        return 1 if math.isinf(self.most) else max(1, int(self.most) // FULL_SHARE)
+
+    def begin_round(
+        self,
+        seen: Mapping[int, Watch],
+        due: Collection[int],
+        working: Collection[int],
+        slow: Collection[int] = (),
+    ) -> None:
+        """Count how many lives may come in a round of turns.
+
+        Where memory is full none does, as long as some life is about to leave, and else a few: a thousand
+        runs that begin at once would otherwise all be in memory for a moment, and the C library gives back
+        none of it.
+
+        Args:
+            seen: What was seen of each run.
+            due: The runs whose turn is due.
+            working: The runs whose turn goes on; some of them are being taken up.
+            slow: Those of them whose turn takes long: nobody waits until these leave.
+        """
+        here, guided = set(self.sessions), self.guided()
+        self._may_come = self.most - len(here | set(working))
+        if self._may_come <= 0:
+            leaving = here.intersection(guided.union(due, working), seen).difference(slow)
+            self._may_come = 0 if any(_waits(seen[one]) for one in leaving) else self._some
+
+    def may_come(self, run_id: int, seen: Watch) -> bool:
+        """Return whether a run without a life in memory may have its turn now, and so be taken up.
+
+        A run to which somebody has said something does not wait for that, nor one that sleeps on.
+        """
+        if seen.answers or seen.corrections or (run_id in self.asleep and _waits(seen)):
+            return True
+        self._may_come -= 1
+        return self._may_come >= 0
 
     def guided(self) -> set[int]:
         """Return the runs in memory that have reported that they wait for guidance.
@@ -97,6 +146,12 @@ class Lives:
         if beyond:
             with db.read() as session:
                 self.asleep.update(session.scalars(select(Run.id).where(Run.id.in_(beyond), *_WAITS)))
+
+
+def _waits(seen: Watch) -> bool:
+    """Return whether an agent would only go on waiting."""
+    news = seen.answers or seen.events or seen.corrections
+    return not news and bool(seen.open_guidance or seen.idle)
 
 
 def _bytes(session: RunSession) -> int:

@@ -2,7 +2,8 @@
 
 Threads suffice: torch works without Python's lock, and a step on a large network spends its time there. All
 turns of a run come one after another, each with the state that the one before left, so bits do not depend on
-what goes on beside them.
+what goes on beside them. Steps on small networks take the lock again and again: long turns of such runs stand
+back while a person waits for a quick one (`server.work.courtesy`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import torch
+
+from parenting.server.work.courtesy import Courtesy
 
 BESIDE_SECONDS = 0.05
 """A turn that takes longer no longer holds up the other runs."""
@@ -53,7 +56,7 @@ class Turns:
             wake: Called in another thread when a long turn has ended.
             beside_after: Seconds for which a turn is waited for; None waits for each to its end.
         """
-        self._wake, self.beside_after = wake, beside_after
+        self._wake, self.beside_after, self.courtesy = wake, beside_after, Courtesy()
         self._working: dict[int, Working] = {}
         self._long: set[int] = set()
         self._slow: set[int] = set()
@@ -76,15 +79,26 @@ class Turns:
             return going_on < (SLOW_AT_ONCE if run_id in self._slow else URGENT_AT_ONCE)
         return going_on < (LONG_AT_ONCE if new or run_id in self._long else QUICK_AT_ONCE)
 
-    def begin(self, run_id: int, turn: Turn) -> None:
-        """Begin a turn, and wait for its end unless it takes long, or the run's last one did."""
-        begun = Working(time.monotonic(), self._pool.submit(turn))
+    def begin(self, run_id: int, turn: Turn, urgent: bool = False) -> None:
+        """Begin a turn, and wait for its end unless it takes long, or the run's last one did.
+
+        Args:
+            run_id: The run.
+            turn: Its turn.
+            urgent: A person waits for it, so that long turns stand back, unless its own last took seconds.
+        """
+        hurried = urgent and run_id not in self._slow
+        begun = Working(time.monotonic(), self._pool.submit(self._courteous, run_id, turn, hurried))
         self._working[run_id] = begun
         quick = run_id not in self._long
         if self.beside_after is None or quick:
             wait([begun.done], self.beside_after)
         if not begun.done.done():
             begun.done.add_done_callback(lambda _: self._wake())
+
+    def _courteous(self, run_id: int, turn: Turn, hurried: bool) -> float:
+        with self.courtesy.turn(run_id, hurried):
+            return turn()
 
     def ended(self) -> dict[int, float]:
         """Return when the next turn is due, for each run whose turn has ended since the last call.

@@ -21,6 +21,7 @@ from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Query
+from parenting.server.work.lives import Lives
 from parenting.server.work.watching import Watching
 from parenting.server.worker import Worker
 from tests.server.conftest import CLIPS
@@ -133,6 +134,33 @@ def test_lives_leave_before_their_next_checkpoint_is_due(
     runs, worker = begin(db, 3), Worker(db, few(settings, 1))
     rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
     rounds(worker, lambda: len(worker.sessions) == 1)
+    worker._close()
+
+
+@pytest.mark.only("sqlite", "no statement of the store is new in it")
+def test_runs_that_begin_wait_until_others_have_left_memory(db: Database, settings: Settings) -> None:
+    """Else all would be there for a moment, and that memory is not given back."""
+    runs, worker, most = begin(db, 7), Worker(db, few(settings, 2)), 0
+
+    def all_asked() -> bool:
+        nonlocal most
+        most = max(most, len(worker.sessions))
+        return all(look(db, [run])[run].open_guidance for run in runs)
+
+    rounds(worker, all_asked)
+    assert 2 <= most <= 4
+    worker._close()
+
+
+@pytest.mark.only("sqlite", "no statement of the store is new in it")
+def test_runs_that_cannot_leave_hold_up_no_other(
+    db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Lives, "guided", lambda lives: set())
+    monkeypatch.setattr("parenting.server.work.schedule.Schedule.at_rest", lambda schedule: [])
+    runs, worker = begin(db, 4), Worker(db, few(settings, 1))
+    rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
+    assert set(worker.sessions) == set(runs)
     worker._close()
 
 
