@@ -1,13 +1,13 @@
 """The audit log: who did what, and what was refused.
 
-Revision: 0028, after 0030
+Revision: 0028, after 0027
 """
 
 import sqlalchemy as sa
 from alembic import op
 
 revision = "0028"
-down_revision = "0030"
+down_revision = "0027"
 branch_labels = None
 depends_on = None
 

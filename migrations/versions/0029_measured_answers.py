@@ -2,7 +2,7 @@
 
 Whoever has answered up to now gets a pseudonym, one for each browser or program. Nothing was measured then.
 
-Revision: 0029, after 0027
+Revision: 0029, after 0028
 """
 
 import sqlalchemy as sa
@@ -12,7 +12,7 @@ from parenting.server.errors import SetupError
 from parenting.server.persons import new_pseudonym
 
 revision = "0029"
-down_revision = "0027"
+down_revision = "0028"
 branch_labels = None
 depends_on = None
 
