@@ -171,7 +171,7 @@ def test_a_name_that_the_server_does_not_go_by(db: Database, web: httpx2.Client)
     begin(db)
     said = answer("--url", "http://elsewhere.example")
     assert said.exit_code == 2
-    assert said.stderr == "--url: This server accepts the names localhost and 127.0.0.1 only.\n"
+    assert said.stderr == "--url: This server does not answer under this name.\n"
 
 
 def test_wrong_names_and_files(db: Database, web: httpx2.Client, tmp_path: Path) -> None:

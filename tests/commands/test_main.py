@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from parenting.commands.main import COMMANDS, app
+from parenting.commands.main import COMMANDS, MODULES, app
 from tests.tree import ROOT
 
 run = CliRunner().invoke
@@ -36,7 +36,7 @@ def test_each_command_shows_an_example(name: str) -> None:
 @pytest.mark.parametrize("name", COMMANDS)
 def test_what_stands_in_brackets_is_shown(name: str) -> None:
     """Brackets in a help text are markup to rich, and vanish: `show_default` names a default in words."""
-    source = (ROOT / "commands" / f"{name}.py").read_text(encoding="utf-8")
+    source = (ROOT / "commands" / f"{MODULES.get(name, name)}.py").read_text(encoding="utf-8")
     assert "[default:" not in source
 
 
