@@ -4,6 +4,7 @@ import { number } from "./numbers.js";
 
 const form = document.querySelector("[data-job]"), told = document.getElementById("told"), bar = document.getElementById("progress");
 const { job } = form.dataset;
+let sent = false; // the form was sent, to cancel for example: what is heard of the job now must not send it again
 
 // Steps done of all, and the time left by the pace so far; how many there will be is known only once it has converged.
 function progressed({ steps, expected, seconds }) {
@@ -16,9 +17,14 @@ function progressed({ steps, expected, seconds }) {
 async function look() {
   const reply = await fetch(`/api/v1/jobs/${job}`).catch(() => null);
   const found = reply?.ok ? await reply.json() : null;
+  if (sent) return;
   if (reply?.status === 404 || found?.state === "done" || found?.state === "failed") return form.requestSubmit(form.querySelector("button"));
   told.textContent = !found ? "The server does not answer." : found.worker === "silent" ? "No worker is running. It begins once one is started (parenting worker)." : found.state === "waiting" ? "It waits for a worker." : found.progress ? progressed(found.progress) : "A worker is at it.";
   setTimeout(look, 1000);
 }
 
+form.addEventListener("submit", () => { sent = true; });
+addEventListener("pageshow", ({ persisted }) => {
+  if (persisted && sent) { sent = false; look(); }
+});
 if (job) setTimeout(look, 1000);
