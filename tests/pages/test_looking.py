@@ -47,7 +47,8 @@ def test_no_get_changes_anything(client: httpx2.Client, db: Database) -> None:
         for run in (1, 2):
             for query_string in ("", *QUERIES.get(path, [])):
                 reply = client.get(
-                    path.format(run_id=run, job_id=1, rest=0, pseudonym="p0") + query_string, follow_redirects=True
+                    path.format(run_id=run, job_id=1, rest=0, pseudonym="p0") + query_string,
+                    follow_redirects=True,
                 )
                 looked += reply.status_code == 200
     assert looked >= 12

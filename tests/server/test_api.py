@@ -91,7 +91,7 @@ def test_level_of_ones_own(client: httpx2.Client, db: Database, text: str) -> No
         ({"seed": "1"}, {"seed": "valid integer"}),
         ({"seed": 1.5}, {"seed": "valid integer"}),
         ({"name": "a\u0007b"}, {"name": "control character U+0007"}),
-        ({"name": "a\nb"}, {"name": "match pattern"}),
+        ({"name": "a\nb"}, {"name": "Write one line"}),
         ({"name": "x" * 101}, {"name": "at most 100"}),
         ({"level_text": OWN + "\u0000"}, {"level_text": "control character U+0000"}),
         ({"level_text": "W" * 9000}, {"level_text": "at most 8192"}),

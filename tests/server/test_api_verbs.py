@@ -162,6 +162,7 @@ def test_who_decided_is_kept(client: httpx2.Client, guidance: int) -> None:
         "parent": "scripted",
         "received": "2026-11-22T12:00:00Z",
         "applied_tick": None,
+        "measured": None,
     }
 
 
