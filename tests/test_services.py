@@ -72,7 +72,7 @@ def until_raised(run: str, answers: int) -> dict[str, Any]:
 
 
 @pytest.mark.faults
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_the_services_raise_an_agent_and_stop(
     stack: Stack, running: dict[str, subprocess.Popen[bytes]]
 ) -> None:

@@ -142,7 +142,7 @@ def test_rates_that_do_not_fall_are_told() -> None:
 
 
 @pytest.mark.torture
-@pytest.mark.timeout(length(120, 7200))
+@pytest.mark.timeout(length(1800, 7200))
 @pytest.mark.parametrize("last", length([1], [1, 3]))
 def test_questions_and_deaths_fall_towards_zero(last: int) -> None:
     """In CI an agent lives 160 ticks a stage; at night a hundred live 10,000 in the last one."""

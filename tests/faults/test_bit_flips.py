@@ -28,7 +28,7 @@ from tests.server.raising import ISLAND
 
 pytestmark = [
     pytest.mark.torture,
-    pytest.mark.timeout(length(900, 20000)),
+    pytest.mark.timeout(length(1800, 20000)),
     pytest.mark.only("sqlite", "PostgreSQL has checksums of its own for its pages"),
 ]
 FLIPS = length(80, 20_000)

@@ -34,7 +34,7 @@ from tests.postgres import cluster
 from tests.server.processes import Command
 from tests.server.raising import ISLAND
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(600, 6000))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 6000))]
 KILLS = length(2, 100)
 TICKS = 15
 SECONDS = 120.0

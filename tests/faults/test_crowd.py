@@ -33,7 +33,7 @@ from tests.server.processes import Command, store_of
 from tests.server.serving import free_port, until_up
 from tests.simulated_person import chromium
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(120, 1800))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 3600))]
 PEOPLE, RUNS, WORKERS, ANSWERS = length((3, 2, 2, 4), (50, 50, 3, 12))
 THINK = length("0.05", "1.0")
 CLAIM_SECONDS = 1.0

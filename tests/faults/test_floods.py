@@ -149,7 +149,7 @@ def test_more_idle_connections_than_files_keep_nobody_out(web: Web) -> None:
 
 
 @pytest.mark.torture
-@pytest.mark.timeout(length(120, 3600))
+@pytest.mark.timeout(length(1800, 3600))
 def test_mutated_bytes_get_no_5xx_and_hurt_nobody(web: Web) -> None:
     """It takes half a minute: 20,000 mutations, each on a connection of its own."""
     draw = draws("mutated bytes")

@@ -125,7 +125,7 @@ def disturb(db: Database, house: House, moments: Iterator[float], rng: random.Ra
 
 
 @pytest.mark.torture
-@pytest.mark.timeout(500)
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize(("store", "stages"), KILLED, indirect=["store"])
 @pytest.mark.parametrize("seed", range(ROUNDS))
 def test_killed_at_random_moments(settings: Settings, db: Database, seed: int, stages: int) -> None:

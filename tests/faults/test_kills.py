@@ -21,7 +21,7 @@ from tests.faults.rebuilt import entries_of_x, rebuild
 from tests.lengths import length
 from tests.server.raising import ISLAND
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 6000))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 6000))]
 RUNS, PARENTS, CROWD = 2, 2, 8
 KILLS = {"sqlite": length(45, 3000), "postgresql": length(15, 600)}
 SAMPLED = 6

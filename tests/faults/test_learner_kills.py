@@ -27,7 +27,7 @@ from tests.lengths import length
 from tests.server.processes import Command, store_of
 from tests.server.raising import CONFIG, ISLAND, Inline, last
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 20000))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 20000))]
 KILLS = {"sqlite": length(25, 5000), "postgresql": length(5, 500)}
 SURE = ISLAND._replace(preset="frugal", changes={**CONFIG, "confirm": 0.95})
 """Remembers answers and refusals, trains on nine batches an answer, and asks again to be sure."""

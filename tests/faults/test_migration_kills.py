@@ -33,7 +33,7 @@ from tests.lengths import length
 from tests.server.processes import Command, store_of
 from tests.server.raising import ISLAND
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 20000))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 20000))]
 OLD = "0003"
 """The revision to which the database is taken back; older ones know no fencing tokens."""
 GROUP = "SIGKILLs inside a migration"

@@ -30,7 +30,7 @@ from tests.lengths import length
 from tests.server.raising import ISLAND
 from tests.tree import ROOT
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 20000))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 20000))]
 IMAGES = {"full": length(300, 50_000), "normal": 60, "off": 60}
 ANSWERS = length(40, 400)
 RECORDING_SECONDS = length(600, 6000)

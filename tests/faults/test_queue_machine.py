@@ -67,7 +67,7 @@ def quickened(db: Database) -> None:
 
 
 @pytest.mark.torture
-@pytest.mark.timeout(length(900, 100_000))
+@pytest.mark.timeout(length(1800, 100_000))
 def test_queue_does_what_its_model_says(
     store: str, db: Database, clock: Clocks, kept: Store, rng: random.Random, figures: Figures
 ) -> None:

@@ -17,7 +17,7 @@ PLACES = [("sqlite", 1), ("postgresql", 2), *length([], [("postgresql", 1)])]
 
 
 @pytest.mark.torture
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize(("store", "stages"), PLACES, indirect=["store"])
 def test_raised_through_http(settings: Settings, db: Database, stages: int) -> None:
     raise_through_http(settings, db, stages)

@@ -60,7 +60,7 @@ def app(settings: Settings, db: Database) -> Iterator[FastAPI]:
 
 
 @pytest.mark.torture
-@pytest.mark.timeout(length(600, 7200))
+@pytest.mark.timeout(length(1800, 7200))
 @pytest.mark.parametrize("part", range(PARTS))
 def test_no_request_gets_a_5xx_and_every_reply_is_foreseen(
     app: FastAPI, store: str, part: int, figures: Figures

@@ -19,7 +19,7 @@ from tests.faults.rebuilt import rebuild
 from tests.lengths import length
 from tests.server.raising import ISLAND
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 3000))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 3000))]
 INSIDE = Point("inside a write", "after", r'INSERT INTO "?query"?', signal=signal.SIGSTOP)
 BETWEEN = Point("between two", "after", r'INSERT INTO "?query"?', commit=True, signal=signal.SIGSTOP)
 STOPPED_SECONDS = 7.0

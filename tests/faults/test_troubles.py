@@ -38,7 +38,7 @@ from tests.faults.troubles import (
 from tests.lengths import TORTURE, length
 from tests.server.raising import ISLAND
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(600, 3000))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 3000))]
 WEBS, WORKERS = length((1, 1), (2, 3))
 LOCKED_SECONDS = 20.0
 FULL_SECONDS = length(10.0, 120.0)

@@ -27,7 +27,7 @@ from tests.faults.refusals import REFUSALS, Refuse, error_of
 from tests.lengths import length
 from tests.server.conftest import CLIPS
 
-pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(900, 3000))]
+pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 3000))]
 KINDS = length(3, 9)
 """Kinds of refusals at each statement; the torture tries all."""
 CLIENT = "client"

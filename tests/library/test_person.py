@@ -22,7 +22,7 @@ WORLD = "unsafe-exploration"
 
 
 @pytest.mark.faults
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(900)
 def test_a_person_on_the_page_raises_an_agent_and_goes_on_after_an_interruption(
     person_at_the_page: Callable[..., list[PersonAtPage]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -209,7 +209,7 @@ def test_pages_may_be_framed_only_by_whom_the_settings_name(tmp_path: Path) -> N
 
 
 @pytest.mark.faults
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(900)
 def test_a_server_that_runs_already_is_joined_and_left_running(
     person_at_the_page: Callable[..., list[PersonAtPage]], tmp_path: Path
 ) -> None:

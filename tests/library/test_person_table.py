@@ -20,7 +20,7 @@ ANSWERS = 40
 
 @pytest.mark.torture
 @pytest.mark.skipif(not TORTURE, reason="it starts web, worker and Chromium; make torture does")
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(900)
 def test_frozen_lake_is_raised_by_keys_in_four_lines(
     tmp_path: Path, person_at_the_page: Callable[..., list[PersonAtPage]]
 ) -> None:
@@ -35,7 +35,7 @@ def test_frozen_lake_is_raised_by_keys_in_four_lines(
 
 @pytest.mark.torture
 @pytest.mark.skipif(not TORTURE, reason="it starts web, worker and Chromium; make torture does")
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", ["CliffWalking-v1", "Taxi-v4"])
 def test_cliff_walking_and_taxi_are_raised_by_keys(
     tmp_path: Path, person_at_the_page: Callable[..., list[PersonAtPage]], name: str

@@ -95,7 +95,7 @@ def raised(tabs: BrowserTabs, world: str, stage: int) -> dict[str, Any]:
 
 
 @pytest.mark.torture
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize(("world", "stage"), PLACES)
 def test_answers_in_every_world_and_stage(browser: Browser, url: str, world: str, stage: int) -> None:
     tabs = BrowserTabs(browser, url)

@@ -16,7 +16,7 @@ ENOUGH = 10
 
 
 @pytest.mark.faults
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_the_first_agent_is_raised_by_at_most_ten_answers(browser: Browser, tmp_path: Path) -> None:
     with up(tmp_path) as url:
         tabs = BrowserTabs(browser, url)

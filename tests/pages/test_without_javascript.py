@@ -46,7 +46,7 @@ def answer(page: Page, choice: str) -> None:
 
 
 @pytest.mark.faults
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(300)
 def test_from_start_to_stop(tabs: BrowserTabs, db: Database, worker: Worker) -> None:
     tabs.expected = ("422",)
     page = tabs.open("/", java_script_enabled=False)

@@ -9,8 +9,9 @@ from sqlalchemy import select
 
 from parenting.server.db import Database
 from parenting.server.new_run import start
-from parenting.server.runs import get_run
+from parenting.server.runs import get_run, set_status
 from parenting.server.settings import Settings
+from parenting.server.statuses import RunStatus
 from parenting.server.store.sqlite import sqlite_module
 from parenting.server.tables import Answer, Query
 from parenting.server.work import patience
@@ -97,10 +98,11 @@ def record(db: Database, run: int) -> Record:
 
 
 def hold(db: Database, run: int, found: Record, undisturbed: Record) -> None:
-    """Hold a run against the undisturbed one: the same record, the same bits, nothing failed."""
+    """Hold a run against the undisturbed one: the same record, the same bits, nothing failed; end it."""
     kept = get_run(db, run)
     assert (kept.status, kept.reason, kept.answers) == ("active", None, GOAL)
     assert found == undisturbed
     saved = last(db, run, BEGUN)
     differ = same_bits(saved, inline(int(saved.state.keys.tick), BEGUN))
     assert not differ, differ
+    set_status(db, run, RunStatus.STOPPED)  # no later worker takes it up

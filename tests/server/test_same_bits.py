@@ -74,7 +74,7 @@ def check(db: Database, run: int, begun: Begun) -> None:
 
 
 @pytest.mark.faults
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 @pytest.mark.only("sqlite", "tests/faults/test_same_bits.py does the same on PostgreSQL")
 def test_raised_through_http(settings: Settings, db: Database) -> None:
     """It takes long because five runs are raised by processes, and relived twice."""
