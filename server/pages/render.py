@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 
 from jinja2.meta import find_referenced_templates
@@ -50,8 +51,9 @@ def render(template: str, **context: object) -> str:
     return _templates.get_template(template).render(**context)
 
 
+@cache
 def compile_first() -> None:
-    """Compile the templates that `FIRST` names, with the parts that they hold."""
+    """Compile the templates that `FIRST` names, with the parts that they hold: once a process."""
     known: set[str] = set()
     names = [*FIRST]
     while names:
