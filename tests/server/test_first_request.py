@@ -22,6 +22,7 @@ def test_no_request_waits_for_a_template_or_for_what_a_route_needs(
     app._routes.cache_clear()  # as in a process that has just started
     assert render._templates.cache is not None
     render._templates.cache.clear()
+    render.compile_first.cache_clear()
     late: list[str] = []
     with TestClient(app.create_app(settings, db), base_url="http://localhost") as client:
         for place, name in ((fastapi.routing, "get_dependant"), (Environment, "compile")):
