@@ -38,7 +38,8 @@ class Report:
     def __str__(self) -> str:
         """Return the report as text."""
         lines = [
-            f"{self.path}: {self.files} files, {self.runs} runs, {self.answers} answers.",
+            f"{self.path}: {_counted(self.files, 'file')}, {_counted(self.runs, 'run')}, "
+            f"{_counted(self.answers, 'answer')}.",
             f"SHA-256 of {MANIFEST}: {self.manifest_sha256}",
         ]
         if self.sound:
@@ -59,6 +60,10 @@ def audit(path: Path) -> Report:
     except (*BROKEN, sqlite3.Error, TypeError, AttributeError) as error:
         report.problems.append(f"it cannot be read to its end: {error}")
     return report
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def _hashes(files: Files, told: dict[str, Any], report: Report) -> Iterator[str]:

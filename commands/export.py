@@ -8,6 +8,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from parenting._plural import counted
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors
 from parenting.commands.export_table import export_table
@@ -63,6 +64,14 @@ def export(
             show_default=False,
         ),
     ] = None,
+    minari: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Write the episodes of one run as a local dataset of Minari with this name.",
+            show_default=False,
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
 ) -> None:
     """Write whole runs into a folder or a zip: answers, questions, log, metrics, a codebook and a manifest.
@@ -71,6 +80,9 @@ def export(
     all. `parenting import` reads it into another database, where it is replayed to the same bits.
 
     With --of, with --format jsonl or csv, or without --out, one table of one run is written.
+
+    --minari writes the agent's steps for programs of offline reinforcement learning, into the folder of
+    Minari's local datasets; `pip install 'parenting[minari]'` adds what it needs.
 
     --check recomputes hashes, counts, chains, corrections and X of an export from its files. It shares no
     code with what wrote them, and needs no database.
@@ -86,6 +98,9 @@ def export(
         runs = run or []
         if not runs:
             raise UsageError("Name a run; `parenting runs` lists them.")
+        if minari is not None:
+            _episodes(runs, minari, out or of or format_)
+            return
         form = format_ or _form(out, of)
         if form is not Form.WHOLE:
             if len(runs) > 1:
@@ -120,6 +135,28 @@ def _check(path: Path, others: object) -> NoReturn:
     raise typer.Exit(0 if found.sound else 1)
 
 
+def _episodes(runs: list[int], name: str, others: object) -> None:
+    """Write the episodes of a run as a dataset of Minari.
+
+    Raises:
+        UsageError: several runs, or something else was asked for as well.
+    """
+    if others or len(runs) > 1:
+        raise UsageError(
+            "--minari writes the episodes of one run, and takes neither --out, --of nor --format."
+        )
+    from parenting.server.archive.minari_dataset import lived_run, write_minari
+
+    with database() as db, bar("episodes") as show:
+        written = write_minari(lived_run(db, runs[0]), name, show)
+    say(
+        f"{counted(written.episodes, 'episode')} with {counted(written.steps, 'step')} of run {runs[0]} "
+        f"written to {written.folder}. Read them: minari.load_dataset({name!r})"
+    )
+    if written.left_out:
+        say(f"{counted(written.left_out, 'episode')} left out, since not all of their moves are known.")
+
+
 def _form(out: Path | None, of: Part | None) -> Form:
     """Return the format that the other options mean."""
     if out is None or of is not None or out.suffix.lower() in (".jsonl", ".ndjson", ".json"):
@@ -135,7 +172,7 @@ def _whole(runs: list[int], out: Path, force: bool) -> None:
         written = write_export(db, runs, files, show)
     counts = [run["counts"] for run in written["runs"]]
     told = ", ".join(
-        f"{sum(one[name] for one in counts)} {name}" for name in ("answers", "questions", "events")
+        counted(sum(one[f"{name}s"] for one in counts), name) for name in ("answer", "question", "event")
     )
     say(
         f"{told} of run{'s' * (len(counts) > 1)} {', '.join(str(one['number']) for one in written['runs'])} "

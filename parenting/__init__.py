@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from parenting.library.show import show
     from parenting.library.training import train
     from parenting.library.worlds import World, make, register, worlds
+    from parenting.server.archive.minari_dataset import to_minari
     from parenting.server.trackers.services import WandbTracker
     from parenting.server.trackers.tracker import TrackedRun, Tracker
 
@@ -75,6 +76,7 @@ _MODULES = {
     "show": "library.show",
     "step": "library.loop",
     "tick": "library.loop",
+    "to_minari": "server.archive.minari_dataset",
     "train": "library.training",
     "worlds": "library.worlds",
 }
@@ -120,6 +122,7 @@ __all__ = [
     "step",
     "testing",
     "tick",
+    "to_minari",
     "train",
     "worlds",
 ]

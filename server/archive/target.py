@@ -7,8 +7,9 @@ import io
 import os
 import re
 import shutil
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -26,7 +27,7 @@ class Written(NamedTuple):
     bytes: int
 
 
-class Files:
+class Files(ABC):
     """The files of an export that is being written."""
 
     def __init__(self) -> None:
@@ -40,8 +41,9 @@ class Files:
             yield cast(IO[bytes], hashing)
         self.written[name] = Written(hashing.hash.hexdigest(), hashing.size)
 
-    def _raw(self, name: str) -> Any:
-        raise NotImplementedError
+    @abstractmethod
+    def _raw(self, name: str) -> AbstractContextManager[IO[bytes]]:
+        """Open a file of this name for writing."""
 
 
 class FolderFiles(Files):
@@ -104,12 +106,12 @@ def target(path: Path, force: bool = False) -> Iterator[Files]:
     Raises:
         SetupError: it exists and `force` is not given, is something else, or cannot be written.
     """
-    _sweep(path)
     if path.suffix.lower() == ".zip":
+        _sweep(path)
         with whole(path, force) as part, ZipFile(part, "w", ZIP_DEFLATED) as zipped:
             yield ZipFiles(zipped)
         return
-    with _folder(path, force) as part:
+    with folder_target(path, force) as part:
         yield FolderFiles(part)
 
 
@@ -121,7 +123,13 @@ def zip_in(file: IO[bytes]) -> Iterator[Files]:
 
 
 @contextmanager
-def _folder(path: Path, force: bool) -> Iterator[Path]:
+def folder_target(path: Path, force: bool = False) -> Iterator[Path]:
+    """Begin a folder under a hidden name; it gets its own once it is whole.
+
+    Raises:
+        SetupError: as `target`.
+    """
+    _sweep(path)
     _refuse(path, force)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

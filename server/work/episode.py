@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import torch
 
 from parenting.agent.config import Config
 from parenting.agent.init import world_of
-from parenting.envs.gridworld import Gridworld
+from parenting.envs.gridworld import Gridworld, WorldState
 from parenting.envs.rng import keys
 from parenting.evaluation.episode import Episode as Played
 from parenting.server import moves
@@ -60,22 +61,49 @@ def episode_at(lived: bytes, tick: int) -> Episode:
     raise NotFound(f"No episode of tick {tick} is recorded. Choose a tick from 1 to {len(lived)}.")
 
 
-def _again(world: Gridworld, run: Run, found: Episode, lived: bytes) -> tuple[Played, bool]:
-    """Make the moves of an episode again; a long one is cut off, as walks are."""
-    start = keys(run.seed, 1)
-    begun = start.replace(tick=torch.tensor([found.first if found.first > 1 else 0]))
-    state = world.reset(begun, torch.zeros(1, dtype=torch.int64))
-    states, actions, unsafe = [state], list[int](), list[int]()
-    most = most_steps(world)
+class Step(NamedTuple):
+    """A step of an episode, made again."""
+
+    tick: int
+    action: int
+    unsafe: bool
+    after: WorldState
+
+
+def start_of(world: Gridworld, seed: int, found: Episode) -> WorldState:
+    """Return the state in which an episode of a life began."""
+    begun = keys(seed, 1).replace(tick=torch.tensor([found.first if found.first > 1 else 0]))
+    return world.reset(begun, torch.zeros(1, dtype=torch.int64))
+
+
+def steps(world: Gridworld, seed: int, found: Episode, lived: bytes) -> Iterator[Step]:
+    """Make the moves of an episode again; ticks in which the agent waited are left out.
+
+    Args:
+        world: The world of the run.
+        seed: The run's seed.
+        found: The episode, every tick of which is known.
+        lived: The moves of the whole life (`server.moves`).
+    """
+    start, state = keys(seed, 1), start_of(world, seed, found)
     for tick in range(found.first, found.last + 1):
         move = lived[tick - 1]
         if move & moves.WAY == moves.PAUSE:
             continue
+        action = move & moves.WAY
+        state = world.step(state, torch.tensor([action]), start.replace(tick=torch.tensor([tick])))
+        yield Step(tick, action, bool(move & moves.UNSAFE), state)
+
+
+def _again(world: Gridworld, run: Run, found: Episode, lived: bytes) -> tuple[Played, bool]:
+    """Make the moves of an episode again; a long one is cut off, as walks are."""
+    states, actions, unsafe = [start_of(world, run.seed, found)], list[int](), list[int]()
+    most = most_steps(world)
+    for step in steps(world, run.seed, found, lived):
         if len(actions) == most:
             return Played(states, actions, unsafe), True
-        state = world.step(state, torch.tensor([move & moves.WAY]), start.replace(tick=torch.tensor([tick])))
-        states.append(state)
-        actions.append(move & moves.WAY)
-        if move & moves.UNSAFE:
+        states.append(step.after)
+        actions.append(step.action)
+        if step.unsafe:
             unsafe.append(len(actions))
     return Played(states, actions, unsafe), False
