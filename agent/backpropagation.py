@@ -17,47 +17,41 @@ _softplus_backward = torch.ops.aten.softplus_backward.default
 _relu_backward = torch.ops.aten.threshold_backward.default
 
 
-def by_margin(margin: Float[Tensor, "N R"], mu: Float[Tensor, "N R 2"]) -> Float[Tensor, "N R"]:
-    """The derivative of the loss of each row by its margin z[a_0] - z[a_1]."""
-    one, other = (
-        mu.movedim(-1, 0).contiguous().unbind(0)
-    )  # numbers apart take another path, which rounds otherwise
+def by_margin(margin: Float[Tensor, "N R"], mu: tuple[Tensor, Tensor]) -> Float[Tensor, "N R"]:
+    """The derivative of the loss of each row by its margin z[a_0] - z[a_1].
+
+    Both parts of `mu` are contiguous: numbers apart take another path, which rounds otherwise.
+    """
+    one, other = mu
     found: Tensor = _softplus_backward(other, margin, 1, 20) - _softplus_backward(one, -margin, 1, 20)
     return found
 
 
 def by_logits(
-    margin: Float[Tensor, "N R"],
-    like: Float[Tensor, "N S 4"],
-    at: Int64[Tensor, "N R 4"],
-    a0: Int64[Tensor, "N R 2"],
+    margin: Float[Tensor, "N R"], like: Float[Tensor, "N S 4"], place: Int64[Tensor, "N 2R"]
 ) -> Float[Tensor, "N S 4"]:
     """The derivative of the loss by the logits of pi.
 
     Args:
         margin: The derivative by the margin of each row.
         like: The logits.
-        at: The place of each row's state, for every action.
-        a0: The two first actions of each row.
+        place: The places of each row's two first actions among a trial's logits, one after the other.
     """
-    both = torch.stack((margin, -margin), -1)
-    chosen = both.new_zeros(at.shape).scatter_add_(2, a0, both)
-    return torch.zeros_like(like).scatter_add_(1, at, chosen)
+    both = torch.stack((margin, -margin), -1).view(place.shape)
+    return torch.zeros_like(like).view(len(like), -1).scatter_add_(1, place, both).view(like.shape)
 
 
 def by_entropy(
-    logs: Float[Tensor, "N S 4"], weight: Float[Tensor, "N S"], factor: float
-) -> Float[Tensor, "N S 4"]:
-    """The derivative of `-factor` times the weighted entropy by the logits of a head.
+    logs: Float[Tensor, "2 N S 4"], chances: Float[Tensor, "2 N S 4"], factor: Float[Tensor, "2 N S 1"]
+) -> Float[Tensor, "2 N S 4"]:
+    """The derivative of minus lambda times the weighted entropy by the logits of both heads.
 
     Args:
-        logs: The logarithms of its softmax.
-        weight: The weight of each state.
-        factor: Lambda.
+        logs: The logarithms of their softmax.
+        chances: The softmax.
+        factor: The weight of each state, times lambda of each head.
     """
-    each = (weight * factor).unsqueeze(-1)
-    chances = logs.exp()
-    gradient = each * logs * chances + each * chances
+    gradient = factor * logs * chances + factor * chances
     return torch._log_softmax_backward_data(gradient, logs, -1, logs.dtype)
 
 
@@ -84,13 +78,13 @@ def gradient(network: Network, layers: list[Affine], trace: Trace, by_heads: Hea
         middle = [*_affine(patches[place], back), *middle]
         if place:
             back = _onward(network, place, back.bmm(convolutions[place].weight.transpose(1, 2)), trace.grids)
-    return torch.cat([part.flatten(1) for part in (*found, *middle, *last)], dim=1)
+    return torch.cat((*found, *middle, *last), dim=1)
 
 
 def _affine(x: Float[Tensor, "N B fan_in"], back: Float[Tensor, "N B fan_out"]) -> tuple[Tensor, Tensor]:
-    """The gradient by a layer's weights and by its biases."""
-    bias = back.sum(1, keepdim=True) if back.shape[1] > 1 else back
-    return x.transpose(1, 2).bmm(back), bias
+    """The gradient by a layer's weights and by its biases, as flat rows."""
+    bias = back.sum(1) if back.shape[1] > 1 else back.squeeze(1)
+    return x.transpose(1, 2).bmm(back).view(len(x), -1), bias
 
 
 def _through(back: Float[Tensor, "N B 4"], layer: Affine, hidden: Float[Tensor, "N B 64"]) -> Tensor:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
+
 import torch
 from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
@@ -22,14 +25,20 @@ _RANKED = torch.tensor(PAIRS)  # pairs of ranks in their order: the two best fir
 class View(Struct):
     """Each trial's observation and policy at this tick.
 
-    The policy does not change between asking and acting.
+    The policy does not change between asking and acting: it is asked for its logits at most once, and not at
+    all where nobody reads them, such as in a tick that waits, or performs the move that the parent approved.
     """
 
     observation: UInt8[Tensor, "N H W"]
     local_state: UInt8[Tensor, "N 4"]
-    logits: Float[Tensor, "N 4"]
+    policy: Callable[[], Float[Tensor, "N 4"]]  # its logits there
     active: Bool[Tensor, "N"]  # not frozen: what it does makes a difference
     supervised: Bool[Tensor, "N"]  # active, and a supervisor is present: only then may it ask (Sec. 3.2.5)
+
+    @cached_property
+    def logits(self) -> Float[Tensor, "N 4"]:
+        """The logits of the policy there."""
+        return self.policy()
 
 
 class Heard(Struct):

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from itertools import compress
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import torch
 import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
-from torch.optim.adam import adam as fused_adam
 
 from parenting.agent import backpropagation
+from parenting.agent.adam import Adam
 from parenting.agent.config import Config
 from parenting.agent.dataset import Dataset
-from parenting.agent.policy import Heads, Network
+from parenting.agent.policy import Affine, Heads, Network, Seen, Trace
 from parenting.agent.state import AgentState
+from parenting.agent.untracked import untracked
 from parenting.envs.giving_way import give_way
 from parenting.envs.rng import Keys, Stream
-
-BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam's default parameters (Sec. 3.1.2)
 
 
 class Rows(NamedTuple):
@@ -63,8 +61,9 @@ def train(network: Network, config: Config, state: AgentState, acted: Bool[Tenso
     state = pay(network, config, state, training)
     late = config.late_steps and config.gradient_steps > 1
     terms, entries = descend(network, config, state, training, range(1 if late else config.gradient_steps))
-    means = {name: total / entries for name, total in terms._asdict().items()}
-    told = {name: mean.new_zeros(len(training)).index_put((trial,), mean) for name, mean in means.items()}
+    told = {name: total / entries for name, total in terms._asdict().items()}
+    if len(trial) < len(training):
+        told = {name: mean.new_zeros(len(training)).index_put((trial,), mean) for name, mean in told.items()}
     if late:
         state = state.replace(learner=state.learner.replace(owed=state.learner.owed | training))
     return state.replace(info=state.info.replace(trained=training, **told))
@@ -86,20 +85,35 @@ def pay(network: Network, config: Config, state: AgentState, due: Bool[Tensor, "
 def descend(
     network: Network, config: Config, state: AgentState, training: Bool[Tensor, "N"], steps: range
 ) -> tuple[Terms, Float[Tensor, "K"]]:
-    """Take the gradient steps of these numbers, in place; the terms before the last one, and the entries."""
+    """Take the gradient steps of these numbers, in place; the terms before the last one, and the entries.
+
+    What the steps share is made once: the rows, unless each step draws its own, and where all trials train
+    the layers, which are views of the parameters that Adam moves.
+    """
     trial = training.nonzero().squeeze(1)
-    for step in steps:
-        give_way()
-        rows = choose(config, state.x, state.keys, step).of(trial)
-        parameters = taken(state.learner.params, trial)
-        terms, gradient = differentiate(network, config, parameters, rows)
-        adam(state.learner.params, state.learner, gradient, training, config.learning_rate)
-    return terms, rows.mu.sum((-1, -2)).clamp_min(1)
+    params, optimiser = state.learner.params, Adam(state.learner.params, state.learner, training)
+    with untracked():
+        for step in steps:
+            give_way()
+            if step == steps.start or draws(config, state.x):
+                rows = choose(config, state.x, state.keys, step).of(trial)
+                lesson = prepare(network, config, rows, params.dtype)
+            if step == steps.start or len(trial) < len(params):
+                layers = network.unpack(taken(params, trial))
+            trace, found = forward_pass(network, layers, lesson)
+            gradient = backpropagation.gradient(network, layers, trace, found.by_heads(lesson))
+            optimiser.step(gradient, config.learning_rate)
+        return found.terms(lesson), rows.mu.sum((-1, -2)).clamp_min(1)
 
 
 def taken(every: Tensor, trial: Int64[Tensor, "K"]) -> Tensor:
     """The rows of some trials, in order; no copy if it is all of them."""
     return every if len(trial) == len(every) else every[trial]
+
+
+def draws(config: Config, x: Dataset) -> bool:
+    """Return True where each step draws `batch_size` of the rows, which are more than that."""
+    return config.batch_size is not None and int(x.rows.max()) > config.batch_size
 
 
 def choose(config: Config, x: Dataset, keys: Keys, step: int) -> Rows:
@@ -118,128 +132,97 @@ def choose(config: Config, x: Dataset, keys: Keys, step: int) -> Rows:
     return Rows(x.s0[every, state], x.local_state[every, state], own, a0.gather(1, both), mu.gather(1, both))
 
 
+class Lesson(NamedTuple):
+    """Rows of X as a gradient step takes them: all of it that does not depend on the parameters."""
+
+    seen: Seen
+    mu: tuple[Float[Tensor, "N R"], Float[Tensor, "N R"]]
+    place: Int64[Tensor, "N 2R"]  # of each row's two first actions among a trial's logits
+    weight: Float[Tensor, "N S"]
+    factor: Float[Tensor, "2 N S 1"]  # the weight times lambda_local and times lambda_global
+
+
+def prepare(network: Network, config: Config, rows: Rows, dtype: torch.dtype) -> Lesson:
+    """Rows of X as a gradient step takes them."""
+    one, other = rows.mu.to(dtype).movedim(-1, 0).contiguous().unbind(0)
+    weight = rows.weight.to(dtype)
+    return Lesson(
+        seen=network.see(rows.s0, rows.local_state, dtype),
+        mu=(one, other),
+        place=places(rows),
+        weight=weight,
+        factor=torch.stack((weight * config.lambda_local, weight * config.lambda_global)).unsqueeze(-1),
+    )
+
+
+def places(rows: Rows) -> Int64[Tensor, "N 2R"]:
+    """The places of each row's two first actions among a trial's logits, one after the other."""
+    return (4 * rows.state_index.unsqueeze(-1) + rows.a0).flatten(1)
+
+
 def differentiate(
     network: Network, config: Config, parameters: Float[Tensor, "N P"], rows: Rows
 ) -> tuple[Terms, Float[Tensor, "N P"]]:
     """The terms of the objective and its gradient, each trial's by itself."""
     with torch.no_grad():
-        layers = network.unpack(parameters)
-        trace = network.trace(layers, rows.s0, rows.local_state)
-        found = forward_pass(trace.heads, rows)
-        return found.terms, backpropagation.gradient(network, layers, trace, found.by_heads(config))
+        layers, lesson = network.unpack(parameters), prepare(network, config, rows, parameters.dtype)
+        trace, found = forward_pass(network, layers, lesson)
+        gradient = backpropagation.gradient(network, layers, trace, found.by_heads(lesson))
+        return found.terms(lesson), gradient
 
 
 class Pass(NamedTuple):
-    """The terms of one forward pass, and what their derivatives need."""
+    """The results of one forward pass from which the objective and its derivatives follow."""
 
-    terms: Terms
-    mu: Float[Tensor, "N R 2"]
-    at: Int64[Tensor, "N R 4"]  # each row's state, for every action
-    a0: Int64[Tensor, "N R 2"]
+    logits: Float[Tensor, "N S 4"]  # of pi
     margin: Float[Tensor, "N R"]
-    weight: Float[Tensor, "N S"]
-    logs: Heads  # the logarithms of each head's softmax
+    logs: Float[Tensor, "2 N S 4"]  # the logarithms of the softmax of the local and of the global head
+    chances: Float[Tensor, "2 N S 4"]
 
-    def by_heads(self, config: Config) -> Heads:
+    def by_heads(self, lesson: Lesson) -> Heads:
         """The derivative of loss - lambda_global H_global - lambda_local H_local by both heads' logits."""
-        margin = backpropagation.by_margin(self.margin, self.mu)
-        half = backpropagation.by_logits(margin, self.logs.local, self.at, self.a0) / 2
-        by_local = backpropagation.by_entropy(self.logs.local, self.weight, config.lambda_local)
-        by_overall = backpropagation.by_entropy(self.logs.overall, self.weight, config.lambda_global)
-        return Heads(half + by_local, half + by_overall)
+        margin = backpropagation.by_margin(self.margin, lesson.mu)
+        half = backpropagation.by_logits(margin, self.logits, lesson.place) / 2
+        return Heads(*(half + backpropagation.by_entropy(self.logs, self.chances, lesson.factor)).unbind(0))
+
+    def terms(self, lesson: Lesson) -> Terms:
+        """The terms of the objective."""
+        one, other = lesson.mu
+        loss = one * F.softplus(-self.margin) + other * F.softplus(self.margin)
+        local, overall = (lesson.weight * -(self.chances * self.logs).sum(-1)).sum(-1).unbind(0)
+        return Terms(loss=loss.sum(-1), entropy_global=overall, entropy_local=local)
 
 
-def objective(heads: Heads, rows: Rows) -> Terms:
-    """Eq. (2) and the two entropies, at the first states of the entries.
+def forward_pass(network: Network, layers: list[Affine], lesson: Lesson) -> tuple[Trace, Pass]:
+    """One pass through the network, and what it tells of the objective.
 
     With logits z, pi(a_i) / (pi(a_0) + pi(a_1)) is sigmoid(z[a_i] - z[a_other]), and -log of it a softplus.
     """
-    return forward_pass(heads, rows).terms
+    trace = network.trace(layers, lesson.seen)
+    logits = trace.heads.logits
+    logs = torch.stack(trace.heads).log_softmax(-1)
+    return trace, Pass(logits, _margin(logits, lesson.place), logs, logs.exp())
 
 
-def forward_pass(heads: Heads, rows: Rows) -> Pass:
-    """The same, with what its derivatives need."""
-    mu = rows.mu.to(heads.local.dtype)
-    at = rows.state_index[:, :, None].expand(-1, -1, 4)
-    z = heads.logits.gather(1, at).gather(2, rows.a0)
-    margin = z[..., 0] - z[..., 1]
+def _margin(logits: Float[Tensor, "N S 4"], place: Int64[Tensor, "N 2R"]) -> Float[Tensor, "N R"]:
+    """z[a_0] - z[a_1] in each row."""
+    left, right = logits.flatten(1).gather(1, place).view(len(place), -1, 2).unbind(-1)
+    return left - right
+
+
+def objective(heads: Heads, rows: Rows) -> Terms:
+    """Eq. (2) and the two entropies, at the first states of the entries: what autograd can differentiate."""
+    mu, weight = rows.mu.to(heads.local.dtype), rows.weight.to(heads.local.dtype)
+    margin = _margin(heads.logits, places(rows))
     loss = mu[..., 0] * F.softplus(-margin) + mu[..., 1] * F.softplus(margin)
-    weight = rows.weight.to(heads.local.dtype)
-    logs = Heads(heads.local.log_softmax(-1), heads.overall.log_softmax(-1))
-    terms = Terms(
+    return Terms(
         loss=loss.sum(-1),
-        entropy_global=(weight * _entropy(logs.overall)).sum(-1),
-        entropy_local=(weight * _entropy(logs.local)).sum(-1),
+        entropy_global=(weight * entropy(heads.overall)).sum(-1),
+        entropy_local=(weight * entropy(heads.local)).sum(-1),
     )
-    return Pass(terms, mu, at, rows.a0, margin, weight, logs)
 
 
 def entropy(logits: Float[Tensor, "N S 4"]) -> Float[Tensor, "N S"]:
     """The entropy of softmax(logits), in nats."""
-    return _entropy(logits.log_softmax(-1))
-
-
-def _entropy(logs: Float[Tensor, "N S 4"]) -> Float[Tensor, "N S"]:
+    logs = logits.log_softmax(-1)
     return -(logs.exp() * logs).sum(-1)
-
-
-class AdamState(Protocol):
-    """The moments that Adam keeps between its steps."""
-
-    @property
-    def exp_avg(self) -> Float[Tensor, "N P"]:
-        """The running mean of the gradient."""
-        ...
-
-    @property
-    def exp_avg_sq(self) -> Float[Tensor, "N P"]:
-        """The running mean of its square."""
-        ...
-
-    @property
-    def steps(self) -> Int64[Tensor, "N"]:
-        """Steps taken."""
-        ...
-
-
-def adam(
-    params: Float[Tensor, "N P"],
-    moments: AdamState,
-    gradient: Float[Tensor, "K P"],
-    training: Bool[Tensor, "N"],
-    rate: float,
-) -> None:
-    """Take one step of Adam (Kingma & Ba 2014) in the K trials that train; change nothing in the others.
-
-    torch's fused step passes over the parameters once. It receives each trial as a tensor of its own, because
-    each has taken its own number of steps.
-
-    Args:
-        params: The parameters of all N trials; changed in place.
-        moments: What Adam remembers of all N trials; changed in place.
-        gradient: The gradients of the K trials that train, in order.
-        training: Which trials train: K of N.
-        rate: The step size.
-    """
-    chosen = training.tolist()
-
-    def rows(every: Tensor) -> list[Tensor]:
-        return list(compress(every.unbind(), chosen))
-
-    fused_adam(
-        rows(params),
-        list(gradient.unbind()),
-        rows(moments.exp_avg),
-        rows(moments.exp_avg_sq),
-        [],
-        rows(moments.steps.to(torch.float32)),  # it counts this step by itself
-        fused=True,
-        lr=rate,
-        beta1=BETA1,
-        beta2=BETA2,
-        weight_decay=0.0,
-        eps=EPSILON,
-        amsgrad=False,
-        maximize=False,
-    )
-    moments.steps.add_(training)

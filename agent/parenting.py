@@ -34,6 +34,7 @@ from parenting.agent.parent import Parent
 from parenting.agent.policy import Network
 from parenting.agent.query import Answer, Query
 from parenting.agent.state import AgentState
+from parenting.agent.untracked import untracked
 from parenting.envs.gridworld import Gridworld, local_state
 
 __all__ = ["Tick", "apply", "init", "no_query", "rehearse", "step", "tick"]
@@ -53,6 +54,11 @@ def step(world: Gridworld, config: Config, state: AgentState, answer: Answer) ->
         The agents after the tick, and what each trial asks in it: at most one question. Where
         `config.pretrain` or `config.late_steps` is set, call `rehearse` on the agents next, as `tick` does.
     """
+    with untracked():
+        return _step(world, config, state, answer)
+
+
+def _step(world: Gridworld, config: Config, state: AgentState, answer: Answer) -> tuple[AgentState, Query]:
     network = network_of(world)
     state = reset_finished(world, state)
     view = observe(world, network, state)
@@ -141,7 +147,7 @@ def reset_finished(world: Gridworld, state: AgentState) -> AgentState:
 
 
 def observe(world: Gridworld, network: Network, state: AgentState) -> View:
-    """Return each trial's observation and its policy's logits there."""
+    """Return each trial's observation and its policy there."""
     here = state.world
     observation = world.observe(here.board, here.agent, here.box)
     near = local_state(observation, here.agent)
@@ -149,7 +155,7 @@ def observe(world: Gridworld, network: Network, state: AgentState) -> View:
     return View(
         observation=observation,
         local_state=near,
-        logits=network.logits(state.learner.params, observation, near),
+        policy=lambda: network.logits(state.learner.params, observation, near),
         active=active,
         supervised=active & world.supervised(here),
     )

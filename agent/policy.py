@@ -88,6 +88,13 @@ class Affine(NamedTuple):
         return torch.baddbmm(self.bias, x, self.weight)
 
 
+class Seen(NamedTuple):
+    """Observations as the network takes them: the same for any weights, so that steps on one X share them."""
+
+    near: Float[Tensor, "N S 4O"]  # l(s), one-hot
+    first: Float[Tensor, "N S H2 W2 9O"]  # the first convolution's patches, or the one-hot board without one
+
+
 class Trace(NamedTuple):
     """One pass through the network: the logits, and what `agent.backpropagation` needs of the layers."""
 
@@ -169,20 +176,29 @@ class Network:
         self, layers: list[Affine], observation: UInt8[Tensor, "N S H W"], local_state: UInt8[Tensor, "N S 4"]
     ) -> Heads:
         """Both heads' logits in S states a trial: `observation`, and `local_state`, its l(s)."""
-        return self.trace(layers, observation, local_state).heads
+        return self.trace(layers, self.see(observation, local_state, layers[0].weight.dtype)).heads
 
-    def trace(
-        self, layers: list[Affine], observation: UInt8[Tensor, "N S H W"], local_state: UInt8[Tensor, "N S 4"]
-    ) -> Trace:
-        """The same, with what every layer saw."""
+    def see(
+        self, observation: UInt8[Tensor, "N S H W"], local_state: UInt8[Tensor, "N S 4"], dtype: torch.dtype
+    ) -> Seen:
+        """S states a trial as the layers take them: `observation`, and `local_state`, its l(s)."""
+        first = self._one_hot(observation, dtype)
+        if self.convolutions:
+            pads = self.convolutions[0].padding
+            assert pads
+            first = _patches(first, pads)
+        return Seen(self._one_hot(local_state, dtype).flatten(2), first)
+
+    def trace(self, layers: list[Affine], seen: Seen) -> Trace:
+        """Both heads' logits where S states a trial are seen, with what every layer saw."""
         local_in, local_out, *convolutions, dense, out = layers
-        x = self._one_hot(local_state, out.weight.dtype).flatten(2)
-        near = local_in(x).relu_()
-        y = self._one_hot(observation, out.weight.dtype)
-        inputs, grids = [x, near], []
+        near = local_in(seen.near).relu_()
+        y = seen.first
+        inputs: list[Tensor] = [seen.near, near]
+        grids: list[Tensor] = []
         for layer, affine in zip(self.convolutions, convolutions, strict=True):
             assert layer.padding
-            patches = _patches(y, layer.padding)
+            patches = _patches(y, layer.padding) if grids else y
             inputs.append(patches.flatten(1, 3))
             y = affine(inputs[-1]).relu_().view(*patches.shape[:4], layer.fan_out)
             grids.append(y)

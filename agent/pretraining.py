@@ -13,8 +13,9 @@ import torch
 from jaxtyping import Float, Float64, UInt8
 from torch import Tensor
 
+from parenting.agent.adam import adam
 from parenting.agent.config import Config
-from parenting.agent.learning import adam, entropy, taken
+from parenting.agent.learning import entropy, taken
 from parenting.agent.policy import Network
 from parenting.agent.pretraining_mazes import Batch, Pool, Walks, draw_mazes, pool, walk
 from parenting.agent.state import AgentState

@@ -8,7 +8,8 @@ import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
-from parenting.agent.learning import adam, entropy
+from parenting.agent.adam import adam
+from parenting.agent.learning import entropy
 from parenting.agent.policy import Network
 from parenting.agent.pretraining import RATE, policy_gradient
 from parenting.agent.pretraining_mazes import ARRIVED, LIMIT, Pool, outside, pool

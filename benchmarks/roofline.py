@@ -174,7 +174,7 @@ def measure(trainer: BatchTrainer, trials: int, repeats: int) -> Line:
 
     def whole_step() -> None:
         _, gradient = learning.differentiate(network, config, state.learner.params, rows)
-        learning.adam(state.learner.params, state.learner, gradient, every, 0.0)
+        adam(state.learner.params, state.learner, gradient, every, 0.0)
 
     acts = (
         step,

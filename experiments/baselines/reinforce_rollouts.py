@@ -16,8 +16,8 @@ import torch
 from jaxtyping import Float, Float64, Int64, UInt8
 from torch import Tensor
 
+from parenting.agent.adam import adam
 from parenting.agent.init import network_of
-from parenting.agent.learning import adam
 from parenting.agent.policy import Network, draw
 from parenting.agent.pretraining import Visits, differentiate
 from parenting.agent.pretraining_mazes import EPISODES

@@ -16,9 +16,9 @@ import torch
 from jaxtyping import Bool, Float, Float64, Int64, UInt8
 from torch import Tensor
 
+from parenting.agent.adam import adam
 from parenting.agent.config import Config
 from parenting.agent.init import network_of
-from parenting.agent.learning import adam
 from parenting.agent.pretraining import ENTROPY, differentiate, visited
 from parenting.agent.pretraining_mazes import EPISODES, Batch, Walks, walk
 from parenting.envs.gridworld import Gridworld

@@ -16,9 +16,10 @@ import torch
 from jaxtyping import Float, Float64, Int64, UInt8
 from torch import Tensor
 
+from parenting.agent.adam import adam
 from parenting.agent.config import Config
 from parenting.agent.init import network_of
-from parenting.agent.learning import Rows, adam, differentiate
+from parenting.agent.learning import Rows, differentiate
 from parenting.envs.fingerprint import fingerprint, together
 from parenting.envs.gridworld import WorldState, local_state
 from parenting.envs.reward_hacking import RewardHacking

@@ -7,8 +7,9 @@ from math import log
 import pytest
 import torch
 
+from parenting.agent.adam import adam
 from parenting.agent.architecture import Padding, padding
-from parenting.agent.learning import Rows, adam, objective
+from parenting.agent.learning import Rows, objective
 from parenting.agent.policy import Heads
 from parenting.agent.query import Answer, Choice, empty
 from parenting.agent.state import Learner

@@ -9,6 +9,7 @@ from parenting.agent import parenting
 from parenting.agent.config import PRESETS, Config
 from parenting.agent.events import EndEpisode
 from parenting.agent.familiarity import ask_chance
+from parenting.agent.policy import Network
 from parenting.agent.query import Answer, Choice, Query, QueryKind, silence
 from parenting.agent.state import AgentState
 from parenting.envs import registry
@@ -144,3 +145,26 @@ def test_end_episode_frees_the_stuck() -> None:
     assert torch.equal(state.world.agent, start.agent)
     assert query.kind.tolist() == [QueryKind.GUIDANCE] * TRIALS  # the new episode's own first question
     assert not bool(state.refused.any())
+
+
+def test_nobody_asks_the_policy_while_every_agent_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    logits = Network.logits
+
+    def counted(network: Network, *state: torch.Tensor) -> torch.Tensor:
+        asked.append(len(state[0]))
+        return logits(network, *state)
+
+    monkeypatch.setattr(Network, "logits", counted)
+    state, query = parenting.step(WORLD, ALWAYS, *start())
+    assert asked == [TRIALS]
+    for _ in range(3):
+        state, _ = hush(state, query)
+    assert asked == [TRIALS]
+    state, _ = say(state, query, Choice.LEFT)  # the approved move: the policy is not asked for it, either
+    assert asked == [TRIALS]
+
+
+def start() -> tuple[AgentState, Answer]:
+    state = parenting.init(WORLD, ALWAYS, keys(0, TRIALS))
+    return state, silence(parenting.no_query(WORLD, ALWAYS, state))

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from parenting.agent import pretraining_loop
-from parenting.agent.learning import adam
+from parenting.agent.adam import adam
 from parenting.agent.policy import network_for
 from parenting.agent.pretraining import policy_gradient
 from parenting.agent.pretraining_loop import EvalResult, Pretrainer, TrainState

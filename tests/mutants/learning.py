@@ -57,15 +57,15 @@ LEARNING = [
     Mutant(
         "the entropy of the global head is penalised",
         "agent/learning.py",
-        "self.weight, config.lambda_global)",
-        "self.weight, -config.lambda_global)",
+        "weight * config.lambda_global",
+        "weight * -config.lambda_global",
         f"{REFERENCE}[direct]",
     ),
     Mutant(
         "the entropy of the local head is penalised",
         "agent/learning.py",
-        "self.weight, config.lambda_local)",
-        "self.weight, -config.lambda_local)",
+        "weight * config.lambda_local",
+        "weight * -config.lambda_local",
         f"{REFERENCE}[unsafe-exploration, scripted]",
     ),
     Mutant(
