@@ -15,6 +15,7 @@ ENTRIES = {found["term"]: found for line in LINES if (found := ROW.match(line))}
 SECTION = re.compile(r"ours|2|2\.[1-4](, 2\.2)?|3\.1\.[1-4]|3\.2|3\.2\.1|3\.4|4\.1")
 
 SAME = {
+    "adam": "Adam",
     "architecture": "policy",
     "dataset": "X",
     "events": "operator",
