@@ -9,6 +9,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from parenting._plural import counted
+from parenting.commands.audited import note_export
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors
 from parenting.commands.export_table import export_table
@@ -149,6 +150,7 @@ def _episodes(runs: list[int], name: str, others: object) -> None:
 
     with database() as db, bar("episodes") as show:
         written = write_minari(lived_run(db, runs[0]), name, show)
+        note_export(db, runs, "episodes for Minari")
     say(
         f"{counted(written.episodes, 'episode')} with {counted(written.steps, 'step')} of run {runs[0]} "
         f"written to {written.folder}. Read them: minari.load_dataset({name!r})"
@@ -170,6 +172,7 @@ def _whole(runs: list[int], out: Path, force: bool) -> None:
 
     with database() as db, target(out, force) as files, bar("rows") as show:
         written = write_export(db, runs, files, show)
+        note_export(db, runs, f"the whole run as {'zip' if out.suffix.lower() == '.zip' else 'folder'}")
     counts = [run["counts"] for run in written["runs"]]
     told = ", ".join(
         counted(sum(one[f"{name}s"] for one in counts), name) for name in ("answer", "question", "event")

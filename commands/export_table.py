@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TextIO
 
 from parenting._plural import counted
+from parenting.commands.audited import note_export
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError
 from parenting.commands.printing import say
@@ -31,6 +32,7 @@ def export_table(run: int, out: Path | None, of: Part, form: Format, force: bool
     with database() as db:
         total = sound(stored_run(db, run), "answers") if of is Part.ANSWERS else None
         found = exported(db, run, of, form)
+        note_export(db, [run], f"{of} as {form}")
         if out is None:
             _copy(found, sys.stdout, total, of)
             return

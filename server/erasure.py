@@ -16,6 +16,8 @@ from sqlalchemy import delete, exists, func, select, update
 from sqlalchemy.orm import Session
 
 from parenting.server import deletion
+from parenting.server.audit.recording import record
+from parenting.server.audit.table import Kind
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.person_tables import Person, PersonClient, PersonName
@@ -91,8 +93,17 @@ def begin(db: Database, pseudonym: str) -> None:
     """
     with db.write() as session:
         person = find_person(session, pseudonym)
-        person.deleting = person.deleting or db.clock()
+        if person.deleting is None:
+            person.deleting = db.clock()
+            _enter(db, session, person.id)
         announce(session, "worker")
+
+
+def _enter(db: Database, session: Session, person_id: int) -> None:
+    """Add to the audit log which agents lose answers; the person is not named: nothing of them stays."""
+    record(db, session, Kind.DELETION, "a person's data")
+    for run_id in _plan(session, "", clients_of(session, person_id)).shared:
+        record(db, session, Kind.DELETION, "a person's answers", session.get(Run, run_id))
 
 
 def under_way(db: Database) -> Sequence[Person]:

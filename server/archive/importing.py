@@ -24,6 +24,8 @@ from parenting.server.archive.import_record import Naming, put_record
 from parenting.server.archive.manifest import RunEntry
 from parenting.server.archive.runs import STATE
 from parenting.server.archive.source import Source, source
+from parenting.server.audit.recording import record
+from parenting.server.audit.table import Kind
 from parenting.server.columns import UNREADABLE
 from parenting.server.damage import damage
 from parenting.server.db import Database
@@ -89,6 +91,8 @@ def _put(session: Session, db: Database, found: Source, progress: Progress) -> l
         put_blobs(session, db.clock(), found, entry, run)
         runs.append(Imported(run.id, run.public_id, entry.run, entry.counts.answers))
     put_record(session, found, naming, progress)
+    for one in runs:
+        record(db, session, Kind.OPERATOR, "import", one.public_id)
     announce(session, "worker")
     return runs
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import structlog
 from sqlalchemy.orm import Session
 
@@ -57,8 +59,17 @@ def note_export(db: Database, run_id: int, what: str) -> None:
 
     While the store takes no writes, what it holds can still be saved: the log of the process says so instead.
     """
+    refused = try_note_export(db, [run_id], what)
+    if refused is not None:
+        log.warning("an export is not in the audit log", run=run_id, what=what, reason=refused.code)
+
+
+def try_note_export(db: Database, runs: Sequence[int], what: str) -> StoreError | None:
+    """Add an entry of an export for each run; return why that was not possible, if it was not."""
     try:
         with db.write() as session:
-            record(db, session, Kind.EXPORT, what, session.get(Run, run_id))
+            for run_id in runs:
+                record(db, session, Kind.EXPORT, what, session.get(Run, run_id))
     except StoreError as error:
-        log.warning("an export is not in the audit log", run=run_id, what=what, reason=error.code)
+        return error
+    return None

@@ -12,13 +12,16 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from parenting.commands.main import app
+from parenting.server.audit.entries import entries
+from parenting.server.audit.table import Kind
 from parenting.server.db import Database
+from parenting.server.errors import DiskFullError
 from parenting.server.export import lines
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.queue.revisions import supersede
 from parenting.server.queue.worker_side import post_query
-from parenting.server.runs import claim
+from parenting.server.runs import claim, get_run
 from tests.server.conftest import CLIPS
 from tests.server.serving import parenting
 
@@ -44,6 +47,32 @@ def test_to_standard_output(db: Database) -> None:
     assert (said.exit_code, said.stderr) == (0, "")
     assert said.stdout == "".join(lines(db, 1))
     assert [json.loads(line)["choice"] for line in said.stdout.splitlines()] == ["left"] * 3 + ["right"]
+
+
+def test_the_audit_log_tells_who_exported_what(db: Database, tmp_path: Path) -> None:
+    for given in (
+        ["1"],
+        ["2", "--of", "metrics", "--format", "csv"],
+        ["1", "2", "-o", str(tmp_path / "a.zip")],
+    ):
+        assert export(*given).exit_code == 0
+    assert export("99", "-o", str(tmp_path / "b")).exit_code == 2
+    found = list(reversed(entries(db, kind=Kind.EXPORT).rows))
+    names = {get_run(db, number).public_id: number for number in (1, 2)}
+    assert [(row.what, names[row.run or ""]) for row in found] == [
+        ("answers as jsonl", 1),
+        ("metrics as csv", 2),
+        ("the whole run as zip", 1),
+        ("the whole run as zip", 2),
+    ]
+    assert all(row.who.startswith("command line (") for row in found)
+
+
+def test_it_says_so_where_the_audit_log_takes_nothing(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("parenting.commands.audited.try_note_export", lambda *_: DiskFullError())
+    said = export("1")
+    assert (said.exit_code, said.stdout) == (0, "".join(lines(db, 1)))
+    assert said.stderr.startswith("The audit log does not tell of this export: ")
 
 
 def test_to_a_file(db: Database, tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ from typer.testing import CliRunner, Result
 from parenting.commands.main import app
 from parenting.server.archive.target import target
 from parenting.server.archive.writing import write_export
+from parenting.server.audit.entries import entries
+from parenting.server.audit.table import Kind
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.runs import get_run
@@ -28,6 +30,9 @@ def test_runs_are_added(db: Database, tmp_path: Path) -> None:
     assert said.stdout.startswith("Run 2 is imported with 0 answers. Its page: /runs/")
     assert f"It was {get_run(db, 1).public_id}, which this database has or had." in said.stdout
     assert get_run(db, 2).name == "first"
+    (row,) = entries(db, kind=Kind.OPERATOR).rows
+    assert (row.what, row.run) == ("import", get_run(db, 2).public_id)
+    assert row.who.startswith("command line (")
 
 
 @pytest.mark.parametrize(

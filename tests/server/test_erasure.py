@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 
 from parenting.commands.main import app
 from parenting.server import checkpoint_pace, erasing, erasure, runs
+from parenting.server.audit.entries import entries
+from parenting.server.audit.table import Kind
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
 from parenting.server.new_run import start
@@ -108,6 +110,9 @@ def test_runs_of_theirs_go_and_shared_ones_forget_them(db: Database, ann: str) -
         snapshots = session.scalars(select(BoardSnapshot.tick).where(BoardSnapshot.run_id == SHARED)).all()
         assert set(snapshots) <= {kept.tick}
         assert session.scalar(select(func.count()).select_from(Person)) == 1
+    told = [(row.what, row.run) for row in reversed(entries(db, kind=Kind.DELETION).rows)]
+    assert told[:2] == [("a person's data", None), ("a person's answers", runs.get_run(db, SHARED).public_id)]
+    assert [what for what, _ in told[2:]] == ["run 2"]
     assert [(tick, note) for tick, note in notes(db, SHARED)] == [
         (kept.tick, PersonErased(answers=in_shared))
     ]
