@@ -45,6 +45,7 @@ from playwright.sync_api import Browser, Page
 
 from benchmarks.in_page import AHEAD, DONE, EMPTY, PROBE, SINCE, STARTED
 from parenting.server.store.sqlite import PRAGMAS, sqlite_module
+from tests.access import cookies_in
 from tests.simulated_person import chromium, up
 
 WORLDS = ("unsafe-exploration", "side-effects")
@@ -177,10 +178,13 @@ def empty_page(browser: Browser, times: int) -> Iterator[Line]:
     page.close()
 
 
-def keys(browser: Browser, web: httpx2.Client, world: str, ahead: bool, answers: int) -> Iterator[Line]:
+def keys(
+    browser: Browser, web: httpx2.Client, data: Path, world: str, ahead: bool, answers: int
+) -> Iterator[Line]:
     """Answer a run by keys; count where the next question had been fetched ahead, or where it had not."""
     run = begin(web, world, "direct", recompare=True) if ahead else begin(web, world, "conservative")
     page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.context.add_cookies(cookies_in(data, str(web.base_url)))
     page.add_init_script(PROBE)
     page.goto(str(web.base_url.join(f"/runs/{run}/parent")))
     wanted = "#question[data-listening]" + ("[data-ahead]:not([data-ahead=''])" if ahead else "")
@@ -205,11 +209,12 @@ def press(page: Page, pause: float, key: str) -> dict[str, Any]:
     return {**page.evaluate("at => rows[at]", before["count"]), "ahead": before["ahead"]}
 
 
-def starts(browser: Browser, web: httpx2.Client, world: str, times: int) -> Iterator[Line]:
+def starts(browser: Browser, web: httpx2.Client, data: Path, world: str, times: int) -> Iterator[Line]:
     """Press Start on the first page, each time in a browser that knows nothing of it."""
     painted, screen = list[float](), list[float]()
     for seed in range(times):
         context = browser.new_context(viewport={"width": 1280, "height": 800})
+        context.add_cookies(cookies_in(data, str(web.base_url)))
         page = context.new_page()
         page.add_init_script(PROBE)
         page.add_init_script(STARTED)
@@ -246,9 +251,9 @@ def measure(worlds: Sequence[str], answers: int) -> Iterator[Line]:
             yield from empty_page(browser, answers)
             for ahead in (True, False):
                 for world in worlds:
-                    yield from keys(browser, web, world, ahead, answers)
+                    yield from keys(browser, web, data, world, ahead, answers)
             for world in worlds:
-                yield from starts(browser, web, world, answers)
+                yield from starts(browser, web, data, world, answers)
         web.close()
 
 

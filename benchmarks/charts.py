@@ -28,6 +28,7 @@ from parenting.server.runs import claim, report_progress, set_status
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Metric
+from tests.access import cookies_in
 from tests.database import migrated
 from tests.server.serving import free_port, parenting, until_up
 
@@ -89,11 +90,12 @@ def resident(pid: int) -> float:
     return int(status.partition("VmRSS:")[2].split()[0]) / 1e3
 
 
-def opened(url: str) -> tuple[float, float, float]:
+def opened(url: str, folder: Path) -> tuple[float, float, float]:
     """Open the dashboard once more: seconds until it is drawn, MB that it received, MB of heap."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
         page = browser.new_page()
+        page.context.add_cookies(cookies_in(folder, url))
         page.goto(f"{url}/runs/1")
         page.wait_for_function(DRAWN, timeout=120_000)
         devtools = page.context.new_cdp_session(page)
@@ -130,7 +132,7 @@ def main() -> None:
                 size = read(web)
                 took = time.monotonic() - began
                 print(f"{what:10}{size / 1e6:8.2f} MB{took:8.2f} s; web {resident(child.pid):.0f} MB")
-            seconds, received, heap = opened(url)
+            seconds, received, heap = opened(url, folder)
             print(f"{'dashboard':10}{received:8.2f} MB{seconds:8.2f} s; web {resident(child.pid):.0f} MB")
             print(f"JavaScript heap of the dashboard {heap:.0f} MB")
 

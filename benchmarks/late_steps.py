@@ -38,6 +38,7 @@ from benchmarks.in_page import PROBE
 from parenting.experiments.reporting.comparison import ci_text, mean_sd
 from parenting.experiments.training.tasks import Goal, parent_trials
 from parenting.server.store.sqlite import sqlite_module
+from tests.access import cookies_in
 from tests.simulated_person import chromium, up
 
 WORLD = "unsafe-exploration"
@@ -89,7 +90,9 @@ def waits(preset: str, answers: int) -> Iterator[Line]:
             pages = {}
             for name, changes in AGENTS.items():
                 run = begin(web, WORLD, preset, p_pref=0.0, **changes)
-                page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
+                context = browser.new_context(viewport={"width": 1280, "height": 800})
+                context.add_cookies(cookies_in(data, url))
+                page = context.new_page()
                 page.add_init_script(PROBE)
                 page.goto(f"{url}/runs/{run}/parent")
                 pages[name] = page

@@ -37,6 +37,7 @@ from parenting.server.new_run import NewRun, start
 from parenting.server.settings import Settings
 from parenting.server.store.sqlite import PRAGMAS, sqlite_module
 from parenting.server.tables import Query, Run
+from tests.access import bearer
 from tests.database import STORES, database_url, migrated
 from tests.server.conftest import CLIPS
 from tests.server.processes import command
@@ -98,17 +99,17 @@ def parent(
     port: int, run: int, name: str, thinks: float, end: float, times: list[float], errors: list[int]
 ) -> None:
     """Lease, answer, think, until the end."""
-    lease = _request(f"/api/v1/runs/{run}/queries/lease", f'{{"client_id": "{name}"}}')
+    lease, asks = f"/api/v1/runs/{run}/queries/lease", f'{{"client_id": "{name}"}}'
     body = f'{{"client_id": "{name}", "choice": "left"}}'
     moment = random.Random(name)
     time.sleep(thinks * moment.random())
     with socket.create_connection(("127.0.0.1", port), timeout=30) as web:
         while time.monotonic() < end:
             began = time.perf_counter()
-            status, reply = _reply(web, lease)
+            status, reply = _reply(web, _request(port, lease, asks))
             if status == 200:
                 number = FIRST_ID.search(reply).group(1).decode()  # type: ignore[union-attr]  # a 200 has one
-                status, _ = _reply(web, _request(f"/api/v1/queries/{number}/answer", body))
+                status, _ = _reply(web, _request(port, f"/api/v1/queries/{number}/answer", body))
             if status == 200:
                 times.append(1e3 * (time.perf_counter() - began))
             else:
@@ -116,8 +117,9 @@ def parent(
             time.sleep(thinks * moment.uniform(0.5, 1.5))  # else all come at the same moment
 
 
-def _request(path: str, body: str) -> bytes:
+def _request(port: int, path: str, body: str) -> bytes:
     head = f"POST {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+    head += f"Authorization: {bearer(port)}\r\n"
     return f"{head}Content-Length: {len(body)}\r\n\r\n{body}".encode()
 
 
@@ -187,7 +189,8 @@ def followed(port: int, run: int, streams: int) -> Any:
 
 
 def _follow(port: int, run: int, streams: int) -> None:
-    head = f"GET /api/v1/runs/{run}/events HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
+    named = f"Host: 127.0.0.1\r\nAuthorization: {bearer(port)}"
+    head = f"GET /api/v1/runs/{run}/events HTTP/1.1\r\n{named}\r\n\r\n".encode()
     with selectors.DefaultSelector() as readable:
         for _ in range(streams):
             stream = socket.create_connection(("127.0.0.1", port))

@@ -32,6 +32,7 @@ from parenting.server.runs import claim, report_progress, set_status
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
+from tests.access import cookies_in
 from tests.database import migrated
 from tests.server.serving import free_port, parenting, until_up
 
@@ -81,11 +82,12 @@ def heap(page: Page, devtools: CDPSession) -> float:
     return float(page.evaluate("performance.memory.usedJSHeapSize")) / 1e6
 
 
-def look(url: str, run: str) -> None:
+def look(url: str, folder: Path, run: str) -> None:
     """Open the dashboard, go through all snapshots and back, and print what it took."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
         page = browser.new_page()
+        page.context.add_cookies(cookies_in(folder, url))
         devtools = page.context.new_cdp_session(page)
         page.goto(f"{url}/runs/{run}")
         began = time.monotonic()
@@ -125,7 +127,7 @@ def main() -> None:
         port = free_port()
         with parenting("web", "--port", str(port), data=Path(folder)) as web:
             until_up(url := f"http://127.0.0.1:{port}")
-            look(url, public)
+            look(url, Path(folder), public)
             print(f"web        {resident(web.pid):.0f} MB")
 
 

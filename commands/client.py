@@ -6,7 +6,8 @@ from typing import Any
 
 import httpx2
 
-from parenting.commands.errors import UsageError
+from parenting.commands.errors import UsageError, settings
+from parenting.server.access.credentials import Credentials
 
 SECONDS = 10.0
 """Seconds that a single request may take."""
@@ -45,7 +46,7 @@ class Client:
         if address.scheme not in ("http", "https") or not address.host:
             raise UsageError(f"--url: {url} is not the address of a server. {_EXAMPLE}")
         # The server accepts only the names of this machine, so no proxy lies on the way.
-        self.http = http or httpx2.Client(timeout=SECONDS, trust_env=False)
+        self.http = http or httpx2.Client(timeout=SECONDS, trust_env=False, auth=credentials())
 
     def close(self) -> None:
         """Close the connection."""
@@ -106,6 +107,17 @@ class Client:
             f"--url: {self.url} is not a server of Parenting: it answers {reply.status_code} at "
             f"{reply.request.url.path}. {_EXAMPLE}"
         )
+
+
+def credentials() -> Credentials:
+    """Return what this user's commands send: PARENTING_TOKEN, or the proof of the data folder's key.
+
+    Raises:
+        ServerError: a setting is wrong.
+    """
+    chosen = settings()
+    token = None if chosen.token is None else chosen.token.get_secret_value()
+    return Credentials(token, chosen.data)
 
 
 _EXAMPLE = "Write it as http://localhost:8765; `parenting up` says which it is."

@@ -128,7 +128,7 @@ class Crowd:
         cookies = {"parenting_client": name}
         draws = random.Random(at)
         home: Home | None = self.homes[at % len(self.homes)]
-        async with _connection(cookies) as http:
+        async with _connection(self.client, cookies) as http:
             person = Person(self.client, http, name)
             while home is not None:
                 home.people += 1
@@ -229,8 +229,9 @@ class Person:
         return self.client.read(reply)
 
 
-def _connection(cookies: dict[str, str]) -> httpx2.AsyncClient:
-    return httpx2.AsyncClient(cookies=cookies, timeout=WAIT + SECONDS, trust_env=False)
+def _connection(client: Client, cookies: dict[str, str]) -> httpx2.AsyncClient:
+    auth = client.http.auth
+    return httpx2.AsyncClient(cookies=cookies, timeout=WAIT + SECONDS, trust_env=False, auth=auth)
 
 
 def chosen_runs(text: str) -> list[int]:

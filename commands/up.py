@@ -64,10 +64,11 @@ def up(
         chosen = settings(port=port, public=public)
         listener = bind(chosen)
         with listener, _signals() as told, _children(chosen, listener, number or 1) as (web, crew, migrated):
-            _migrate(chosen)
+            secret = _migrate(chosen)
             migrated()
             with _sized(crew, chosen, number):
-                _watch(web, crew, told, listener.getsockname()[1], browser)
+                url = f"http://localhost:{listener.getsockname()[1]}/open?token={secret}"
+                _watch(web, crew, told, url, browser)
 
 
 def _number(workers: str) -> int | None:
@@ -100,10 +101,10 @@ def _sized(crew: Crew, chosen: Settings, number: int | None) -> Iterator[None]:
         ended.set()  # it ends with this process, at the latest: it only reads
 
 
-def _watch(web: Child, crew: Crew, told: threading.Event, port: int, browser: bool) -> None:
+def _watch(web: Child, crew: Crew, told: threading.Event, url: str, browser: bool) -> None:
     """Say where the pages are, and keep the processes running until told to stop."""
-    url = f"http://localhost:{port}/"
     say(f"Parenting is at {url}  (Ctrl-C stops it)")
+    say("The address lets one browser in, once. Another one: parenting access open", err=True)
     if browser and _has_screen():
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
     try:
@@ -113,13 +114,17 @@ def _watch(web: Child, crew: Crew, told: threading.Event, port: int, browser: bo
         raise typer.Exit(children.REFUSED) from None
 
 
-def _migrate(chosen: Settings) -> None:
+def _migrate(chosen: Settings) -> str:
+    """Bring the database up to date, and return the secret of a token that lets the researcher in."""
+    from parenting.server.access.roles import Role
+    from parenting.server.access.tokens import make
     from parenting.server.backups.before_migrating import migrate  # loads SQLAlchemy while the others start
     from parenting.server.db import connect
 
     db = connect(chosen)
     try:
         migrate(db, chosen.data)
+        return make(db, "opening", Role.RESEARCHER, made_by="parenting up").secret
     finally:
         db.close()
 

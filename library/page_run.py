@@ -67,7 +67,7 @@ def _refuse_another_server(db: Database, settings: Settings, url: str) -> None:
     """Refuse a server that is away, or that has another database than the one which `train` reads."""
     if not is_ready(url):
         raise ValueError(f"url: no server with a worker answers at {url}. Start one: parenting up")
-    if database_at(url) != database_id(db):
+    if database_at(url, settings.data) != database_id(db):
         raise ValueError(
             f"url: the server at {url} has another database than the folder {settings.data}. "
             "Name the folder of that server: Person(url=..., data=folder)."

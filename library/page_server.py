@@ -13,6 +13,7 @@ from pathlib import Path
 
 import httpx2
 
+from parenting.server.access.credentials import Credentials
 from parenting.server.lifeline import VARIABLE
 
 START_SECONDS, STOP_SECONDS = 90.0, 15.0
@@ -69,7 +70,7 @@ def address(process: subprocess.Popen[str], data: Path) -> str:
     place = line.find("http://")
     if place < 0:
         raise failure(data)
-    url = line[place:].split()[0].rstrip("/")
+    url = line[place:].split()[0].partition("/open?")[0]
     end = time.monotonic() + START_SECONDS
     while not is_ready(url):
         if process.poll() is not None or time.monotonic() > end:
@@ -86,10 +87,14 @@ def is_ready(url: str) -> bool:
         return False
 
 
-def database_at(url: str) -> str | None:
-    """Return the UUID of the database that a server has; None if it does not say."""
+def database_at(url: str, data: Path) -> str | None:
+    """Return the UUID of the database that a server has; None if it does not say.
+
+    It says so to whoever can read the key of its data folder, or has a token (PARENTING_TOKEN).
+    """
+    auth = Credentials(os.environ.get("PARENTING_TOKEN"), data)
     try:
-        said = httpx2.get(f"{url}/api/v1/runs?limit=1", timeout=5, trust_env=False).json()
+        said = httpx2.get(f"{url}/api/v1/runs?limit=1", timeout=5, trust_env=False, auth=auth).json()
     except (httpx2.HTTPError, ValueError):
         return None
     return str(said["database"]) if isinstance(said, dict) and "database" in said else None

@@ -16,6 +16,8 @@ from parenting.library.progress import Progress
 from parenting.library.result import TrainResult
 from parenting.library.task import Task
 from parenting.server import runs
+from parenting.server.access.roles import Role
+from parenting.server.access.tokens import make
 from parenting.server.db import Database, connect
 from parenting.server.migrate import upgrade
 from parenting.server.reads.schemas import run_schema
@@ -95,8 +97,9 @@ def _joined(
 
 
 def _path(db: Database, run: int) -> str:
-    """Return the address of the parent's page below that of the server."""
-    return f"/runs/{runs.get_run(db, run).public_id}/parent"
+    """Return the address of the parent's page below that of the server, which lets one browser in."""
+    token = make(db, "opening", Role.RESEARCHER, made_by="parenting.Person")
+    return f"/open?token={token.secret}&to=/runs/{runs.get_run(db, run).public_id}/parent"
 
 
 def _watch(

@@ -17,6 +17,8 @@ from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from tests import access
+from tests.access import cookies_in
 from tests.simulated_person import answer, chromium, create, distances, start, tell, until, up
 
 FOLDER = Path(__file__).parents[1] / "docs" / "pictures"
@@ -60,9 +62,22 @@ def few_colours(drawn: Image.Image) -> Image.Image:
     return few
 
 
-def raised(browser: Browser, url: str) -> Page:
+class Visitors:
+    """Browsers that are let in as the researcher, each with cookies of its own, and show no motion."""
+
+    def __init__(self, browser: Browser, folder: Path, url: str) -> None:
+        self.browser, self.folder, self.url = browser, folder, url
+
+    def new_page(self) -> Page:
+        """A page in a browser that has just come in."""
+        context = self.browser.new_context(reduced_motion="reduce")
+        context.add_cookies(cookies_in(self.folder, self.url))
+        return context.new_page()
+
+
+def raised(browser: Visitors, url: str) -> Page:
     """A parent's page after so many answers that dashboard and history have something to show."""
-    page = browser.new_context(reduced_motion="reduce").new_page()
+    page = browser.new_page()
     start(page, url, "conservative", seed=3, goal=GOAL)
     to_goal = distances()
     for _ in range(ANSWERS):
@@ -71,9 +86,9 @@ def raised(browser: Browser, url: str) -> Page:
     return page
 
 
-def practised(browser: Browser, url: str) -> Page:
+def practised(browser: Visitors, url: str) -> Page:
     """The first question of the practice, answered."""
-    page = browser.new_page(reduced_motion="reduce")
+    page = browser.new_page()
     page.goto(f"{url}/practice")
     page.wait_for_selector("#question[data-listening]")
     page.keyboard.press("b")
@@ -98,12 +113,12 @@ def explained(page: Page, url: str) -> Page:
     return page
 
 
-def compared(browser: Browser, url: str) -> Page:
+def compared(browser: Visitors, url: str) -> Page:
     """A parent's page that asks about two clips of three steps."""
     run = create(url, world="unsafe-exploration", preset="direct", config={"stages": 3}, seed=7)
     for _ in range(2):
         tell(url, run, "mature")
-    page = browser.new_page(reduced_motion="reduce")
+    page = browser.new_page()
     page.goto(f"{url}/runs/{run}/parent")
     steps = "[...document.querySelectorAll('#question .board')].map(b => b.dataset.actions.split(' ').length)"
     while page.wait_for_selector("#question[data-listening]") and page.evaluate(steps) != [3, 3]:
@@ -111,9 +126,9 @@ def compared(browser: Browser, url: str) -> Page:
     return page
 
 
-def painted(browser: Browser, url: str) -> Page:
+def painted(browser: Visitors, url: str) -> Page:
     """The editor of levels with a level whose goal is out of reach."""
-    page = browser.new_page(reduced_motion="reduce")
+    page = browser.new_page()
     page.goto(f"{url}/levels")
     page.locator("#begin").select_option("island-bottleneck")
     page.locator("#brushes label", has_text="water").click()
@@ -122,7 +137,7 @@ def painted(browser: Browser, url: str) -> Page:
     return page
 
 
-def beside(browser: Browser, url: str, data: Path) -> Page:
+def beside(browser: Visitors, url: str, data: Path) -> Page:
     """Two batches with different presets, compared."""
     environment = {**os.environ, "PARENTING_DATA": str(data)}
     stored = []
@@ -131,7 +146,7 @@ def beside(browser: Browser, url: str, data: Path) -> Page:
         command = [sys.executable, "-m", "parenting.commands.main", "run", "unsafe-exploration", *options]
         said = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
         stored += json.loads(said.stdout)["runs"]
-    page = browser.new_page(reduced_motion="reduce")
+    page = browser.new_page()
     page.goto(f"{url}/compare?runs={','.join(map(str, stored))}")
     page.wait_for_selector("[data-chart=rows] .scatterlayer path", state="attached")
     return page
@@ -141,7 +156,9 @@ def main(folder: Path) -> None:
     """All pictures into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     path = os.environ.get("PARENTING_CHROMIUM") or shutil.which("chromium") or "chromium"
-    with tempfile.TemporaryDirectory() as data, up(Path(data)) as url, chromium(path) as browser:
+    with tempfile.TemporaryDirectory() as data, up(Path(data)) as url, chromium(path) as chrome:
+        access.use()
+        browser = Visitors(chrome, Path(data), url)
         garden = create(
             url,
             world="reward-hacking",
@@ -159,7 +176,7 @@ def main(folder: Path) -> None:
         shoot(compared(browser, url), "preference", folder)
         shoot(painted(browser, url), "levels", folder, TALL)
         shoot(beside(browser, url, Path(data)), "compare", folder, TALL)
-        page = browser.new_page(reduced_motion="reduce")
+        page = browser.new_page()
         page.goto(f"{url}/runs/{garden}")
         page.wait_for_selector("main[data-state=resting]", timeout=600_000)
         last = page.locator("#now-stage_queries")

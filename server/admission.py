@@ -17,9 +17,9 @@ from inspect import isasyncgenfunction, iscoroutinefunction
 from typing import Any, TypeVar
 
 from fastapi import APIRouter, Request, Response
-from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 
+from parenting.server.access.guard import GuardedRoute
 from parenting.server.errors import BusyError
 from parenting.server.store.patience import patience, remaining
 from parenting.server.store.sqlite import BUSY_SECONDS
@@ -104,7 +104,7 @@ class Admission:
             return await run_in_threadpool(partial(verb, *arguments))
 
 
-class AdmittedRoute(APIRoute):
+class AdmittedRoute(GuardedRoute):
     """A route whose function blocks: its request is admitted before it gets a thread.
 
     A route that is a coroutine has no thread of its own; it asks `Admission` for each verb.
@@ -112,9 +112,9 @@ class AdmittedRoute(APIRoute):
 
     def get_route_handler(self) -> Handler:
         """Return the handler, behind the gate where the function blocks."""
-        handle: Handler = super().get_route_handler()
+        handle = self.get_handler()
         if iscoroutinefunction(self.endpoint) or isasyncgenfunction(self.endpoint):
-            return handle
+            return self.guarded(handle)
 
         async def admitted(request: Request) -> Response:
             await request.body()  # first: a slow sender holds no place
@@ -122,7 +122,7 @@ class AdmittedRoute(APIRoute):
             async with admission.gate(request.method).entered(admission.seconds):
                 return await handle(request)
 
-        return admitted
+        return self.guarded(admitted)
 
 
 def admitted_router(**options: Any) -> APIRouter:

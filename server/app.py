@@ -19,6 +19,8 @@ from starlette_compress import CompressMiddleware, remove_compress_type
 
 from parenting.drawing.sentences import mark
 from parenting.server import api, health, pages
+from parenting.server.access.door import Door
+from parenting.server.access.key import make_key
 from parenting.server.admission import Admission
 from parenting.server.api.openapi import Described
 from parenting.server.audit.acting import acting
@@ -32,6 +34,7 @@ from parenting.server.errors import (
     ServerError,
     StoreError,
     TooLargeError,
+    UnauthenticatedError,
 )
 from parenting.server.group_commit import GroupCommit
 from parenting.server.inherited import POLICY_BYTES
@@ -97,6 +100,7 @@ def create_app(settings: Settings, db: Database | None = None) -> FastAPI:
     app.state.admission, app.state.health_threads = Admission(), health.health_threads()
     app.state.group_commit = GroupCommit(db) if db.one_writer else None
     notifier = Notifier(settings.data, "web")
+    app.state.door = Door(db, make_key(settings.data), settings.session_days, settings.session_idle_days)
     app.state.seats = Seats(settings.streams_per_browser, settings.streams_per_client)
     app.state.streams = Streams(db, notifier, settings.streams, app.state.admission)
     app.state.meters.watch(db, app.state.streams.number, lambda: app.state.admission)
@@ -190,6 +194,8 @@ def _add_errors(app: FastAPI) -> None:
             limit.say(error.code, log.warning, "refused", path=request.url.path, code=error.code)
             request.app.state.meters.refuse(error.code)
         headers = {"Retry-After": "1"} if isinstance(error, StoreError) else None
+        if isinstance(error, UnauthenticatedError):
+            headers = {"WWW-Authenticate": "Bearer"}
         return _reply(request, error, headers)
 
     @app.exception_handler(RequestValidationError)

@@ -11,6 +11,7 @@ from functools import partial
 from anyio import CapacityLimiter, move_on_after, to_thread
 from fastapi import APIRouter, Request, Response
 
+from parenting.server.access.guard import GuardedRoute
 from parenting.server.api.responses import error_responses
 from parenting.server.db import Database
 from parenting.server.errors import BusyError, NotReadyError, SetupError, StoreError
@@ -19,7 +20,7 @@ from parenting.server.migrate import require_current
 from parenting.server.store.patience import patience
 from parenting.server.workers import alive
 
-router = APIRouter(tags=["health"])
+router = APIRouter(tags=["health"], route_class=GuardedRoute)
 
 SECONDS = 0.8
 """The store's time to answer; the reply is out within a second."""

@@ -11,9 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from parenting.server.log_lines import request
 from parenting.server.meters import Meters
-
-NO_ROUTE = "none"
-"""The label of an address that no route has; the address itself may be anything."""
+from parenting.server.route_names import route_of
 
 log = structlog.get_logger()
 
@@ -48,10 +46,3 @@ class RequestMiddleware:
             log.info(
                 "request", method=scope["method"], route=route, status=status, ms=round(1e3 * seconds, 1)
             )
-
-
-def route_of(scope: Scope) -> str:
-    """Return the template of a request's route: a few words for all the addresses that there are."""
-    whole = scope.get("fastapi", {}).get("effective_route_context")  # with the prefix of an included router
-    path = getattr(whole or scope.get("route"), "path", None)
-    return path or scope.get("root_path") or NO_ROUTE

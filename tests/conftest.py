@@ -10,11 +10,20 @@ from pathlib import Path
 
 import hypothesis
 import pytest
+import structlog
+
+from tests import access
 
 FAULTS = Path(__file__).parent / "faults"
 
 # Eight megabytes in each data folder would fill a disk; tests/server/store/test_ballast.py makes them.
 os.environ.setdefault("PARENTING_BALLAST", "false")
+
+access.use()
+
+# Its own formatter prints every local variable, which takes a minute for an error deep in the application.
+PLAIN = structlog.dev.ConsoleRenderer(colors=False, exception_formatter=structlog.dev.plain_traceback)
+structlog.configure(processors=[*structlog.get_config()["processors"][:-1], PLAIN])
 
 # A shared machine is sometimes slow. A property must not fail for that reason.
 hypothesis.settings.register_profile("parenting", deadline=None)

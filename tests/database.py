@@ -14,6 +14,7 @@ from sqlalchemy import make_url
 from parenting.server.db import Database, connect, utc_now
 from parenting.server.migrate import upgrade
 from parenting.server.settings import Settings
+from tests.access import seed
 from tests.postgres import cluster
 
 STORES = ("sqlite", "postgresql")
@@ -34,6 +35,7 @@ def unmigrated(settings: Settings, clock: Callable[[], datetime] = utc_now) -> D
     """A new database without tables: the one that `settings` name."""
     if settings.database_url is not None:
         cluster().create(_name(settings.database_url))
+    seed(settings.data)
     return _connect(settings, clock)
 
 
@@ -41,8 +43,10 @@ def migrated(settings: Settings, clock: Callable[[], datetime] = utc_now) -> Dat
     """A new database with all tables and no rows: the one that `settings` name."""
     if settings.database_url is not None:
         cluster().copy(_name(settings.database_url), _postgresql_template())
+        seed(settings.data)
         return _connect(settings, clock)
     database = _connect(settings, clock)
+    seed(settings.data)
     file = settings.data / "parenting.db"
     assert not file.exists(), "there is a database already"
     file.touch(0o600)

@@ -18,9 +18,6 @@ from tests.server.serving import free_port
 from tests.tree import ROOT
 
 NAME = "parenting.example"
-AUTH = ("parent", "a long password")
-HASH = "$2b$04$kSuPkpgqtk4FRf337jMkHORo6IorLnWJwa5Z4SQ5o5cOY5xjfsIOm"
-"""Of the password, by bcrypt with the least cost."""
 
 NGINX = """
 user root; # said of an administrator only: the folder of the test is closed to other users
@@ -46,13 +43,11 @@ def configuration(language: str, changes: dict[str, str]) -> str:
 
 def nginx(folder: Path, port: int, upstream: int) -> list[str]:
     """Write its files and return its command."""
-    (folder / "passwords").write_text(f"{AUTH[0]}:{HASH}\n")
     changes = {
         "listen 443 ": f"listen 127.0.0.1:{port} ",
         "127.0.0.1:8765": f"127.0.0.1:{upstream}",
         "/etc/ssl/parenting.pem": f"{folder}/certificate.pem",
         "/etc/ssl/private/parenting.key": f"{folder}/key.pem",
-        "/etc/nginx/parenting.passwords": f"{folder}/passwords",
     }
     (folder / "site.conf").write_text(configuration("nginx", changes))
     (folder / "nginx.conf").write_text(NGINX.replace("FOLDER", str(folder)))
@@ -66,7 +61,6 @@ def caddy(folder: Path, port: int, upstream: int) -> list[str]:
         f"\n{NAME} {{\n": f"\n{NAME}:{port} {{\n\tbind 127.0.0.1\n"
         f"\ttls {folder}/certificate.pem {folder}/key.pem\n",
         "127.0.0.1:8765": f"127.0.0.1:{upstream}",
-        "$2a$14$THE_OUTPUT_OF_caddy_hash-password": HASH,
     }
     (folder / "Caddyfile").write_text(configuration("caddyfile", changes))
     return ["caddy", "run", "--config", f"{folder}/Caddyfile", "--adapter", "caddyfile"]
@@ -76,8 +70,8 @@ COMMANDS = {"nginx": nginx, "caddy": caddy}
 
 
 @contextmanager
-def proxy(program: str, folder: Path, upstream: int) -> Iterator[httpx2.Client]:
-    """A client who knows the password and speaks to the upstream's port by way of this program."""
+def proxy(program: str, folder: Path, upstream: int, token: str) -> Iterator[httpx2.Client]:
+    """A program with a token, which speaks to the upstream's port by way of this program."""
     for needed in (program, "openssl"):
         if shutil.which(needed) is None:
             pytest.skip(f"{needed} is not installed")
@@ -91,7 +85,7 @@ def proxy(program: str, folder: Path, upstream: int) -> Iterator[httpx2.Client]:
             command, cwd=folder, env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", **homes}, stderr=output
         )
     try:
-        with client(port, folder) as found:
+        with client(port, folder, token) as found:
             _await(found, child, said)
             yield found
     finally:
@@ -99,8 +93,8 @@ def proxy(program: str, folder: Path, upstream: int) -> Iterator[httpx2.Client]:
         child.wait(20)
 
 
-def client(port: int, folder: Path) -> httpx2.Client:
-    """A client of the host that the certificate names, at a port of this machine."""
+def client(port: int, folder: Path, token: str) -> httpx2.Client:
+    """A client with a token, of the host that the certificate names, at a port of this machine."""
 
     def name_host(request: httpx2.Request) -> None:
         request.extensions["sni_hostname"] = NAME
@@ -108,8 +102,8 @@ def client(port: int, folder: Path) -> httpx2.Client:
     return httpx2.Client(
         base_url=f"https://127.0.0.1:{port}",
         verify=ssl.create_default_context(cafile=folder / "certificate.pem"),
-        headers={"Host": f"{NAME}:{port}"},
-        auth=AUTH,
+        headers={"Host": f"{NAME}:{port}", "Authorization": f"Bearer {token}"},
+        auth=None,
         timeout=30,
         trust_env=False,
         event_hooks={"request": [name_host]},

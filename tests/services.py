@@ -13,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from tests.access import seed
 from tests.tree import ROOT
 
 VARIABLE = re.compile(r"\$\{\w+:-([^}]*)\}")
@@ -57,6 +58,7 @@ class Stack:
 
     def __init__(self, data: Path, **instead: str) -> None:
         self.compose = read_compose()
+        seed(data)
         self.data, self.instead = data, {"PARENTING_DATA": str(data), **instead}
 
     def environment(self, service: str) -> dict[str, str]:

@@ -18,6 +18,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
+from tests.access import seed
 from tests.server.serving import until_up
 
 ROOT = Path(__file__).parents[1]
@@ -35,6 +36,7 @@ Cell = tuple[int, int]
 @contextmanager
 def up(data: Path) -> Iterator[str]:
     """`parenting up` with a database of its own, stopped by Ctrl-C: its URL."""
+    seed(data)
     command = [sys.executable, "-m", "parenting.commands.main", "up", "--port", "0", "--no-browser"]
     environment = {**os.environ, "PARENTING_DATA": str(data), "PYTHONUNBUFFERED": "1"}
     with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as process:
@@ -43,7 +45,7 @@ def up(data: Path) -> Iterator[str]:
         assert found
         try:
             # the address is told while the processes still start, which takes seconds where others work, too
-            until_up(url := found[0].rstrip("/"), seconds=60)
+            until_up(url := found[0].partition("/open?")[0], seconds=60)
             yield url
         finally:
             process.send_signal(signal.SIGINT)

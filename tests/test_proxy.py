@@ -11,11 +11,14 @@ from pathlib import Path
 import httpx2
 import pytest
 
+from parenting.server.access import tokens
+from parenting.server.access.roles import Role
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
 from parenting.server.queue.answers import get_query
 from parenting.server.settings import Settings
 from tests import proxies
+from tests.access import opening
 from tests.database import migrated
 from tests.pages import island_fixtures as fixtures
 from tests.pages.parent_page import form
@@ -55,9 +58,10 @@ def web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Web]:
 def client(
     request: pytest.FixtureRequest, web: Web, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[httpx2.Client]:
-    """A person with the password, before the proxy."""
+    """A program with the researcher's token, before the proxy."""
     folder: Path = tmp_path_factory.mktemp(request.param)
-    with proxies.proxy(request.param, folder, web.settings.port) as found:
+    token = tokens.make(web.db, "program", Role.RESEARCHER).secret
+    with proxies.proxy(request.param, folder, web.settings.port, token) as found:
         yield found
 
 
@@ -66,16 +70,22 @@ def browser(client: httpx2.Client, site: str = "same-origin") -> dict[str, str]:
     return {"Origin": f"https://{client.headers['host']}", "Sec-Fetch-Site": site}
 
 
-@pytest.mark.parametrize("path", ["/", "/healthz", "/api/v1/runs", "/static/live.js", "/metrics"])
-def test_nothing_is_shown_without_the_password(client: httpx2.Client, path: str) -> None:
+@pytest.mark.parametrize("path", ["/", "/api/v1/runs", "/metrics"])
+def test_nothing_is_shown_to_strangers(client: httpx2.Client, path: str) -> None:
     assert client.get(path).status_code == 200
-    for wrong in (("parent", "guessed"), None):
-        assert client.get(path, auth=wrong).status_code == 401
+    for wrong in ("Bearer guessed", "Basic cGFyZW50Omd1ZXNzZWQ=", ""):
+        assert client.get(path, headers={"Authorization": wrong}).status_code == 401
+    for open_to_anyone in ("/healthz", "/static/live.js"):
+        assert client.get(open_to_anyone, headers={"Authorization": ""}).status_code == 200
 
 
 def test_a_run_is_started_and_a_question_answered_by_the_forms_of_a_browser(
     client: httpx2.Client, web: Web
 ) -> None:
+    token = client.headers.pop("Authorization")
+    entered = client.post("/open", data={"token": opening(web.db)}, headers=browser(client))
+    assert entered.status_code == 303, entered.text
+    assert "; Secure" in entered.headers["set-cookie"]
     started = client.post("/runs", data={"world": "unsafe-exploration"}, headers=browser(client))
     assert started.status_code == 303, started.text
     assert client.get(started.headers["location"], headers=browser(client)).status_code == 200
@@ -94,6 +104,8 @@ def test_a_run_is_started_and_a_question_answered_by_the_forms_of_a_browser(
     assert answered.status_code == 303, answered.text
     assert answered.headers["location"].startswith(f"/runs/{run.public_id}/parent")
     assert get_query(web.db, query).status == "answered"
+    client.cookies.clear()
+    client.headers["Authorization"] = token
 
 
 def test_forms_of_other_sites_are_refused_whatever_the_browser_names(client: httpx2.Client) -> None:

@@ -55,7 +55,7 @@ class Door:
             idle_days: Days without use after which it ends.
         """
         self.db, self.days = db, days
-        self.cookie = _cookie_name(db)
+        self.cookie = cookie_name(db)
         self._key, self._idle = secret_key, timedelta(days=idle_days)
         self._known: dict[str, Known] = {}
         self._revision, self._looked, self._kept = -1, float("-inf"), time.monotonic()
@@ -69,10 +69,10 @@ class Door:
         Raises:
             StoreError: the database cannot be read now.
         """
-        given = request.headers.get("authorization")
-        if given is None:
+        given = request.headers.get("authorization", "")
+        if given[: len(BEARER)].lower() != BEARER:  # other schemes are those of a proxy that asks, too
             return await self._of(request.cookies.get(self.cookie, ""), "session")
-        secret = given[len(BEARER) :].strip() if given[: len(BEARER)].lower() == BEARER else ""
+        secret = given[len(BEARER) :].strip()
         server = request.scope.get("server")
         if key.holds(self._key, server[1] if server else None, secret):
             return LOCAL
@@ -153,7 +153,7 @@ class Door:
             one.stored = one.seen
 
 
-def _cookie_name(db: Database) -> str:
+def cookie_name(db: Database) -> str:
     """Return the name of the cookie: browsers send cookies to every port, so that each house has its own."""
     try:
         named = database_id(db)

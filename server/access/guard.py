@@ -17,7 +17,7 @@ from parenting.server.access.roles import Principal
 from parenting.server.db import Database
 from parenting.server.errors import NotAllowedError, UnauthenticatedError
 from parenting.server.public_ids import is_public_id
-from parenting.server.requests import route_of
+from parenting.server.route_names import route_of
 from parenting.server.tables import Answer, Job, Query
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -28,7 +28,15 @@ class GuardedRoute(APIRoute):
 
     def get_route_handler(self) -> Handler:
         """Return the handler, behind the guard."""
+        return self.guarded(self.get_handler())
+
+    def get_handler(self) -> Handler:
+        """Return the handler without the guard, for routes that put more between the two."""
         handle: Handler = super().get_route_handler()
+        return handle
+
+    def guarded(self, handle: Handler) -> Handler:
+        """Return a handler behind the guard: nothing of a refused request is read."""
 
         async def guarded(request: Request) -> Response:
             await admit(request)
@@ -73,28 +81,30 @@ async def _require_within(request: Request, rule: Rule, who: Principal) -> None:
     named = request.path_params
     if rule.where == "everything" or (rule.where == "run" and not who.reaches_run(named["run_id"])):
         raise NotAllowedError
+    db, read = request.app.state.db, request.app.state.admission.read
     if rule.where == "question":
-        await require_own(request, is_own_question, who, named["query_id"])
+        await read(_require, db, is_own_question, who, named["query_id"])
     elif rule.where == "job":
-        await require_own(request, is_own_job, who, named["job_id"])
+        await read(_require, db, is_own_job, who, named["job_id"])
 
 
-async def require_own(
-    request: Request, is_own: Callable[[Session, Principal, str], bool], who: Principal, name: str
-) -> None:
-    """Ask the database whether something that a request names is the caller's own.
+def require_own_question(request: Request, db: Database, name: str) -> None:
+    """Refuse a question that was never offered to the caller, where they reach their own only. This reads.
 
     Raises:
-        NotAllowedError: it is not, or is not there.
+        NotAllowedError: it is not theirs, or is not there.
     """
-    db: Database = request.app.state.db
+    who = principal_of(request)
+    if who.run is not None:
+        _require(db, is_own_question, who, name)
 
-    def look() -> bool:
-        with db.read() as session:
-            return is_own(session, who, name)
 
-    if not await request.app.state.admission.read(look):
-        raise NotAllowedError
+def _require(
+    db: Database, is_own: Callable[[Session, Principal, str], bool], who: Principal, name: str
+) -> None:
+    with db.read() as session:
+        if not is_own(session, who, name):
+            raise NotAllowedError
 
 
 def is_own_question(session: Session, who: Principal, name: str) -> bool:

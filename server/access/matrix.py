@@ -39,13 +39,13 @@ def _table(rule: Rule, rows: str) -> dict[tuple[str, str], Rule]:
 _PUBLIC = """
 GET /healthz
 GET /readyz
+GET /api/v1/openapi.json
 GET /static
 GET /static/vendor
 GET /open
 POST /open
 """
 _OPERATE_HOUSE = """
-GET /api/v1/openapi.json
 GET /docs
 POST /api/v1/runs
 POST /runs

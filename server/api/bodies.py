@@ -9,6 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 
 from parenting.envs.people_text import plain
 from parenting.server import schemas
+from parenting.server.access.current import own_name
 from parenting.server.api.names import DatabaseId, PublicId
 from parenting.server.job_kinds import (
     EpisodePayload,
@@ -28,7 +29,11 @@ After = Annotated[
     int | None,
     Query(ge=-1, le=LARGEST_INT, description="Send metrics too: those of the ticks after this one."),
 ]
-ClientId = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=CLIENT)]
+ClientId = Annotated[
+    str,
+    StringConstraints(min_length=1, max_length=64, pattern=CLIENT),
+    AfterValidator(own_name),  # whoever has one name answers under no other
+]
 Choice = schemas.Choice
 Place = Annotated[int, Field(ge=0, le=LARGEST_INT), WHOLE]
 Replays = Annotated[int, Field(ge=0, le=10_000), WHOLE]

@@ -14,15 +14,26 @@ from parenting.server.api.examples import SHOWN
 DONE = ("200", "201", "202")
 
 
+TOKEN = {
+    "type": "http",
+    "scheme": "bearer",
+    "description": "A token of `parenting access create token`. A browser that has come in sends its cookie.",
+}
+
+
 class Described(FastAPI):
     """An application whose OpenAPI description shows `server.api.examples`."""
 
     def openapi(self) -> dict[str, Any]:
         """Return the description, which is made once."""
         if self.openapi_schema is None:
-            for path in super().openapi()["paths"].values():
-                for operation in path.values():
+            found = super().openapi()
+            found["components"]["securitySchemes"] = {"token": TOKEN}
+            for path, methods in found["paths"].items():
+                for operation in methods.values():
                     _show(operation)
+                    if path.startswith("/api/"):
+                        operation["security"] = [{"token": []}]
         return super().openapi()
 
 

@@ -18,6 +18,7 @@ from parenting.server.errors import (
     ServerError,
     TooLargeError,
     TooManyOfOneError,
+    UnauthenticatedError,
     UnknownHostError,
 )
 
@@ -25,6 +26,7 @@ Replies = dict[int | str, dict[str, Any]]
 
 ERRORS: dict[int, ServerError] = {
     400: UnknownHostError(),
+    401: UnauthenticatedError(),
     403: Forbidden(),
     404: NotFound("There is no run 9."),
     409: Conflict("This run is stopped; its agent cannot be changed any more."),
@@ -36,9 +38,10 @@ ERRORS: dict[int, ServerError] = {
     503: BusyError(),
     507: DiskFullError(),
 }
-"""An example of each status. 503 also means that too many live streams are open."""
-ALWAYS = (400, 413, 422, 500, 503)
-ACTS = (403, 507)
+"""An example of each status. 403 also means that the caller may not use a route, and 503 that too many live
+streams are open."""
+ALWAYS = (400, 401, 403, 413, 422, 500, 503)
+ACTS = (507,)
 
 
 class ErrorField(BaseModel):

@@ -19,12 +19,13 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import Field
 
 from parenting.server import runs
+from parenting.server.access.guard import principal_of
 from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import ClientId, Strict
 from parenting.server.api.names import PublicId
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, store
-from parenting.server.errors import NotFound, ServerError
+from parenting.server.errors import NotAllowedError, NotFound, ServerError
 from parenting.server.identity import database_id
 from parenting.server.pages.question import question_view
 from parenting.server.pages.render import render
@@ -58,6 +59,9 @@ class Carried(Strict):
 async def found_runs(request: Request, body: Carried, db: Db) -> list[Run | None]:
     """Return the runs of the pages, None for one that is not here; refuse one stream too many."""
     streams: Streams = request.app.state.streams
+    who = principal_of(request)
+    if not all(who.reaches_run(page.run) for page in body.pages):
+        raise NotAllowedError
     streams.check_room()
     request.app.state.seats.check(request)
     return await streams.admission.read(partial(_runs, db, [page.run for page in body.pages]))

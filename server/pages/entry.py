@@ -13,37 +13,40 @@ from fastapi import Form, Query, Request, Response
 from parenting.server import runs
 from parenting.server.access import sessions
 from parenting.server.access.door import Door
-from parenting.server.access.key import make_key
 from parenting.server.access.sessions import Entered
 from parenting.server.access.tables import AccessSession
 from parenting.server.admission import admitted_router
 from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.pages.render import page, redirect
-from parenting.server.settings import Settings
+from parenting.server.public_ids import ALPHABET, LENGTH
 
 router = admitted_router(include_in_schema=False)
 
 ADDRESS = "/open"
 LONGEST = 100
 Token = Annotated[str, Query(max_length=LONGEST)]
+RUN_PAGE = rf"^/runs/[{ALPHABET}]{{{LENGTH}}}(/parent)?$"
+To = Annotated[str | None, Query(pattern=RUN_PAGE)]
+ToField = Annotated[str | None, Form(pattern=RUN_PAGE)]
+"""A page of this house to go to; no other address."""
 TokenField = Annotated[str, Form(max_length=LONGEST)]
 
 
 @router.get(ADDRESS)
-def entry_page(db: Db, token: Token = "") -> Response:
+def entry_page(db: Db, token: Token = "", to: To = None) -> Response:
     """The page that sends the token as a form; a token that opens nothing gets 410."""
     sessions.require_valid(db, token)
-    return page("open.html", token=token)
+    return page("open.html", token=token, to=to)
 
 
 @router.post(ADDRESS)
-def enter(request: Request, db: Db, token: TokenField) -> Response:
-    """For the form: begin a session, and go where its role has its work."""
+def enter(request: Request, db: Db, token: TokenField, to: ToField = None) -> Response:
+    """For the form: begin a session, and go to the page of a run, or where the role has its work."""
     door = _door(request)
     entered = sessions.enter(db, token, request.cookies.get(door.cookie), days=door.days)
     door.forget()
-    response = redirect(_first_page(db, entered.session))
+    response = redirect(to or _first_page(db, entered.session))
     _set_cookie(request, response, entered)
     return response
 
@@ -60,13 +63,7 @@ def leave(request: Request, db: Db) -> Response:
 
 
 def _door(request: Request) -> Door:
-    """Return the door of this process; the first who comes in makes it."""
-    state = request.app.state
-    if not hasattr(state, "door"):
-        chosen: Settings = state.settings
-        key = make_key(chosen.data)
-        state.door = Door(state.db, key, chosen.session_days, chosen.session_idle_days)
-    door: Door = state.door
+    door: Door = request.app.state.door
     return door
 
 

@@ -11,6 +11,7 @@ from fastapi import Query, Request, Response
 
 from parenting.drawing.sentences import mark, tr
 from parenting.server import runs, tables
+from parenting.server.access.guard import principal_of
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.damage import sound
@@ -98,18 +99,24 @@ def history_page(
     run = runs.get_run(db, run_id)
     if (there := moved(request, run)) is not None:
         return there
-    rows = answers.before(db, run_id, before, PAGE + 1, kind or None, choice or None)
+    rows = answers.before(
+        db, run_id, before, PAGE + 1, kind or None, choice or None, principal_of(request).client
+    )
     kept = {name: value for name, value in (("kind", kind), ("choice", choice)) if value}
     context = HistoryPage(
         run,
         parent_title(run),
-        _entries(rows[:PAGE], run, request.cookies.get(COOKIE, "")),
+        _entries(rows[:PAGE], run, _me(request)),
         urlencode({**kept, "before": _last_number(rows[:PAGE])}) if len(rows) > PAGE else None,
         urlencode(kept) if before is not None else None,
         kind,
         choice,
     )
     return page("history.html", **vars(context))
+
+
+def _me(request: Request) -> str:
+    return principal_of(request).client or request.cookies.get(COOKIE, "")
 
 
 def _last_number(rows: Sequence[Answered]) -> int | None:

@@ -19,6 +19,7 @@ from fastapi import Form, Query, Request, Response
 
 from parenting.drawing.sentences import mark
 from parenting.server import runs, tables
+from parenting.server.access.guard import principal_of, require_own_question
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import PublicId, RunId, RunName, read_name
 from parenting.server.db import Database
@@ -100,7 +101,9 @@ def parent_page(
         return redirect(address(run, asked, change), status=307)
     if run.practice == "required" and PRACTISED not in request.cookies:
         return redirect(Place(run=run.public_id).address())
-    client = _client(request)
+    client = client_of(request)
+    if asked is not None:
+        require_own_question(request, db, asked.public_id)
     shown = None if asked is None else _shown(db, run, asked, client, change)
     now = _page_state(run_schema(db, run_id).state, may_lease(db, run_id, client))
     refresh = shown is None and now in ("exploring", "no_worker", "elsewhere")
@@ -185,6 +188,7 @@ async def answer(
         raise ElsewhereError(BY_NUMBER)
     names = Names(database, run_id, question)
     streams: Streams = request.app.state.streams
+    await streams.admission.read(require_own_question, request, db, question)
     said = answers.Said(choice, client_id, "human", measured=BY_FORM)
     stored = await store(request, partial(answers.answer_in, db=db, query=question, said=said, names=names))
     notify_worker(request)
@@ -258,6 +262,10 @@ def _page_state(state: RunState, offered: bool) -> str:
     return "elsewhere" if state is RunState.QUESTION else state
 
 
-def _client(request: Request) -> str:
+def client_of(request: Request) -> str:
+    """Return the name of who answers: that of the link they came by, or the random one of this browser."""
+    who = principal_of(request)
+    if who.client is not None:
+        return who.client
     known = request.cookies.get(COOKIE, "")
     return known if NAME.fullmatch(known) else secrets.token_urlsafe(16)

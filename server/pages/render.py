@@ -98,6 +98,8 @@ def error_page(request: Request, error: ServerError) -> HTMLResponse:
     What a run refused leads back to it, and what the store refused to the same page, or to the page of the
     form that was sent; else there may be no such run.
     """
+    if error.status == 401:
+        return page("error.html", error.status, message=error.told, back=None, again=False)
     run = re.match(rf"/runs/([{ALPHABET}]{{{LENGTH}}}|[1-9][0-9]*)(?![^/])(/parent)?", request.url.path)
     refused = isinstance(error, StoreError)
     back = run[0] if run and (error.status == 409 or refused) else "/"

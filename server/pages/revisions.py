@@ -6,6 +6,7 @@ from functools import partial
 
 from fastapi import Request, Response
 
+from parenting.server.access.guard import require_own_question
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import PublicId
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
@@ -58,6 +59,7 @@ async def change(
     measured: MeasuredField = None,
 ) -> Response:
     """Put another answer in the place of one's own, then go on."""
+    await request.app.state.admission.read(require_own_question, request, db, question)
     names, seen = Names(database, run_id, question), BY_FORM if measured is None else measured.model_dump()
     said = Said(choice, client_id, "human", replays, seen)
     found = await store(request, partial(supersede_in, db=db, query=question, said=said, names=names))

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from functools import partial
 from typing import Annotated
 
-from fastapi import Query, Request, Response
+from fastapi import Query as QueryParameter
+from fastapi import Request, Response
 
 from parenting.server import runs
+from parenting.server.access.guard import is_own_question, principal_of, require_own_question
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import PublicId, RunId
+from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
 from parenting.server.measures import BY_FORM
 from parenting.server.pages.fields import ClientField, DatabaseField, QuestionField
@@ -23,14 +27,14 @@ from parenting.server.queue.revisions import supersede
 from parenting.server.queue.skips import skip_in
 from parenting.server.reads.set_aside import set_aside
 from parenting.server.streams import Streams
-from parenting.server.tables import SKIP
+from parenting.server.tables import SKIP, Query
 
 router = admitted_router(include_in_schema=False)
 
 OTHERS_FIRST = 0.3
 """Seconds after a skip in which other parents may have the next question."""
 
-After = Annotated[PublicId | None, Query()]
+After = Annotated[PublicId | None, QueryParameter()]
 
 
 @router.post("/runs/{run_id}/parent/skip")
@@ -44,6 +48,7 @@ async def skip(
     question: QuestionField,
 ) -> Response:
     """Skip a question, then go to the next one."""
+    await request.app.state.admission.read(require_own_question, request, db, question)
     said, names = Said(SKIP, client_id, "human", measured=BY_FORM), Names(database, run_id, question)
     found = await store(request, partial(skip_in, db=db, query=question, said=said, names=names))
     notify_worker(request)
@@ -55,9 +60,9 @@ async def skip(
 
 
 @router.get("/runs/{run_id}/parent/again")
-def again(run_id: RunId, db: Db, after: After = None) -> Response:
+def again(request: Request, run_id: RunId, db: Db, after: After = None) -> Response:
     """Go to a question that was skipped in this pause, to answer it: the first, or that after one."""
-    run, skipped = runs.get_run(db, run_id), set_aside(db, run_id)
+    run, skipped = runs.get_run(db, run_id), _set_aside(request, db, run_id)
     places = [query.public_id for query in skipped]
     following = places.index(after) + 1 if after in places else 0
     return redirect(address(run, skipped[following % len(skipped)] if skipped else None, change=True))
@@ -66,8 +71,17 @@ def again(run_id: RunId, db: Db, after: After = None) -> Response:
 @router.post("/runs/{run_id}/parent/either")
 def either(request: Request, run_id: RunId, db: Db, client_id: ClientField) -> Response:
     """Answer what was skipped last with *either*: the agent makes one of the two moves."""
-    run, skipped = runs.get_run(db, run_id), set_aside(db, run_id)
+    run, skipped = runs.get_run(db, run_id), _set_aside(request, db, run_id)
     if skipped:
         supersede(db, skipped[-1].public_id, "either", client_id, "human")
         notify_worker(request)
     return redirect(address(run, None))
+
+
+def _set_aside(request: Request, db: Database, run_id: int) -> Sequence[Query]:
+    """Return the skipped questions of a pause, as far as they are the caller's own."""
+    found, who = set_aside(db, run_id), principal_of(request)
+    if not who.bound:
+        return found
+    with db.read() as session:
+        return [query for query in found if is_own_question(session, who, query.public_id)]

@@ -59,6 +59,7 @@ def before(
     limit: int = BATCH,
     kind: str | None = None,
     choice: str | None = None,
+    client_id: str | None = None,
 ) -> Sequence[Answered]:
     """Return the answers of a run before the one of this number, newest first.
 
@@ -69,6 +70,7 @@ def before(
         limit: At most this many.
         kind: Only answers to queries of this kind.
         choice: Only answers with this choice.
+        client_id: Only answers that were given under this name.
 
     Raises:
         NotFound: there is no such run.
@@ -77,6 +79,8 @@ def before(
         find(session, run_id)
         rows = select(Answer, Query).outerjoin(Query, Answer.query_id == Query.id)
         rows = rows.where(Answer.run_id == run_id)
+        if client_id is not None:
+            rows = rows.where(Answer.client_id == client_id)
         if number is not None:
             rows = rows.where(Answer.number < number)
         if kind is not None:

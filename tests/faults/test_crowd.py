@@ -24,6 +24,7 @@ from parenting.server.replay import relive
 from parenting.server.runs import list_runs
 from parenting.server.settings import Settings
 from parenting.server.statuses import OVER, RunStatus
+from tests.access import cookies
 from tests.faults.auditor import Store, audit
 from tests.faults.figures import Figures
 from tests.faults.ledger import Entries
@@ -53,14 +54,14 @@ def until(holds: Any, said: str) -> None:
 
 
 @contextmanager
-def watched(url: str, run: str) -> Iterator[list[Page]]:
+def watched(url: str, db: Database, run: str) -> Iterator[list[Page]]:
     """The list of runs and a dashboard in two widths, which must show no error and never go blank."""
     if not TORTURE:
         yield []
         return
     path = os.environ.get("PARENTING_CHROMIUM") or shutil.which("chromium") or "chromium"
     with chromium(path) as browser:
-        tabs = BrowserTabs(browser, url)
+        tabs = BrowserTabs(browser, url, cookies(db, url))
         views = [(place, width) for place in ("/", f"/runs/{run}") for width in WIDTHS]
         pages = [tabs.open(place, viewport={"width": width, "height": 900}) for place, width in views]
         yield pages
@@ -101,7 +102,7 @@ def test_a_worker_of_several_is_killed_under_a_crowd(
         begun("web", "--port", url.rpartition(":")[2])
         workers = [begun("worker") for _ in range(WORKERS)]
         until_up(url)
-        pages = stack.enter_context(watched(url, list_runs(db)[0].public_id))
+        pages = stack.enter_context(watched(url, db, list_runs(db)[0].public_id))
         bots = begun("answer", "--url", url, "--people", str(PEOPLE), "--think", THINK, "--json")
         half = RUNS * ANSWERS // 2
         until(lambda: sum(run.answers for run in list_runs(db)) >= half, "half of the answers")

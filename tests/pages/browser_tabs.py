@@ -16,8 +16,9 @@ from parenting.server.tables import Answer
 class BrowserTabs:
     """Opens pages of one site. `wrong` lists what went wrong in any of them."""
 
-    def __init__(self, browser: Browser, address: str) -> None:
-        self.browser, self.address = browser, address
+    def __init__(self, browser: Browser, address: str, cookies: Any) -> None:
+        """`cookies` let the researcher in (`tests.access`)."""
+        self.browser, self.address, self.cookies = browser, address, cookies
         self.wrong: list[str] = []
         self.expected: tuple[str, ...] = ()  # parts of messages that a test brings about on purpose
         self.contexts: list[BrowserContext] = []
@@ -26,6 +27,7 @@ class BrowserTabs:
         """A page in a context of its own (options: viewport, color_scheme, java_script_enabled, ...)."""
         context = self.browser.new_context(**options)
         self.contexts.append(context)
+        context.add_cookies(self.cookies)
         page = context.new_page()
         page.set_default_timeout(30_000)
         page.on("console", self._heard)

@@ -24,6 +24,7 @@ from parenting.server.notify import Notifier
 from parenting.server.runs import Claim
 from parenting.server.serve import Server
 from parenting.server.settings import Settings
+from tests.access import cookies
 from tests.database import migrated
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
@@ -104,9 +105,9 @@ def browser(chromium_path: str) -> Iterator[Browser]:
 
 
 @pytest.fixture
-def tabs(browser: Browser, address: str) -> Iterator[BrowserTabs]:
+def tabs(browser: Browser, address: str, db: Database) -> Iterator[BrowserTabs]:
     """Opens pages of the site; at the end nothing may have gone wrong in them."""
-    found = BrowserTabs(browser, address)
+    found = BrowserTabs(browser, address, cookies(db, address))
     yield found
     found.close()
     assert found.wrong == []

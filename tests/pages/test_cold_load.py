@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Route, expect
 
+from parenting.server.db import Database
+from tests.access import cookies
 from tests.pages.parent_page import shown
 
 LOADED, MOST = 15_000, 5
@@ -16,10 +18,11 @@ LOADED, MOST = 15_000, 5
 
 @pytest.mark.parametrize("kind", ["guidance", "preference"])
 def test_first_question_is_on_the_screen_after_few_small_responses(
-    browser: Browser, address: str, ask: Callable[..., int], kind: str
+    browser: Browser, address: str, db: Database, ask: Callable[..., int], kind: str
 ) -> None:
     number = ask(kind)
     context = browser.new_context()
+    context.add_cookies(cookies(db, address))
     tab = context.new_page()
     network = context.new_cdp_session(tab)
     addresses: dict[str, str] = {}

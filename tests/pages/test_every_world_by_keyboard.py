@@ -14,6 +14,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from parenting.envs import registry
+from tests.access import cookies_in
 from tests.lengths import length
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import create, until, up
@@ -36,10 +37,11 @@ PLACES = [(world, 2) for world in length(["side-effects", "reward-hacking"], lis
 
 
 @pytest.fixture(scope="module")
-def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """`parenting up` with a database of its own."""
-    with up(tmp_path_factory.mktemp("up")) as found:
-        yield found
+def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Any]]:
+    """`parenting up` with a database of its own: its URL, and the cookies of the researcher."""
+    folder = tmp_path_factory.mktemp("up")
+    with up(folder) as url:
+        yield url, cookies_in(folder, url)
 
 
 def key(page: Page, number: int) -> str:
@@ -97,8 +99,11 @@ def raised(tabs: BrowserTabs, world: str, stage: int) -> dict[str, Any]:
 @pytest.mark.torture
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(("world", "stage"), PLACES)
-def test_answers_in_every_world_and_stage(browser: Browser, url: str, world: str, stage: int) -> None:
-    tabs = BrowserTabs(browser, url)
+def test_answers_in_every_world_and_stage(
+    browser: Browser, house: tuple[str, Any], world: str, stage: int
+) -> None:
+    url, cookies = house
+    tabs = BrowserTabs(browser, url, cookies)
     run = raised(tabs, world, stage)
     assert (run["answers"], run["maturity"], run["resting"]) == (QUESTIONS, stage, True)
     assert run["status"] == "active"

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from parenting.server.db import Database
+from tests.access import opening
 from tests.pages.browser_tabs import given, until
 from tests.pages.firefox import Firefox, FirefoxTab, firefox
 from tests.pages.parent_page import address as page_address
@@ -17,7 +18,7 @@ from tests.pages.parent_page import public_id
 
 
 @pytest.fixture
-def browser_of_mozilla(tmp_path: Path, address: str) -> Iterator[Firefox]:
+def browser_of_mozilla(tmp_path: Path, address: str, db: Database) -> Iterator[Firefox]:
     """Firefox. Without one a laptop skips the test, and CI fails it."""
     program = os.environ.get("PARENTING_FIREFOX") or shutil.which("firefox-esr") or shutil.which("firefox")
     if program is None:
@@ -26,6 +27,8 @@ def browser_of_mozilla(tmp_path: Path, address: str) -> Iterator[Firefox]:
             pytest.fail(reason)
         pytest.skip(reason)
     with firefox(program, tmp_path, address) as running:
+        tab = running.open(f"/open?token={opening(db)}")
+        tab.wait("location.pathname === '/'")  # the page has sent its form by itself
         yield running
         assert running.wrong == []
 

@@ -8,6 +8,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, expect
 
+from tests.access import cookies_in
 from tests.pages.browser_tabs import BrowserTabs
 from tests.simulated_person import answer, distances, up
 
@@ -19,7 +20,7 @@ ENOUGH = 10
 @pytest.mark.timeout(900)
 def test_the_first_agent_is_raised_by_at_most_ten_answers(browser: Browser, tmp_path: Path) -> None:
     with up(tmp_path) as url:
-        tabs = BrowserTabs(browser, url)
+        tabs = BrowserTabs(browser, url, cookies_in(tmp_path, url))
         page = tabs.open("/")
         page.get_by_role("button", name="Raise your first agent").click()
         page.wait_for_selector("#main[data-run]")

@@ -10,6 +10,7 @@ from playwright.sync_api import Browser
 
 from parenting.server.db import Database
 from parenting.server.runs import Claim
+from tests.access import cookies
 from tests.pages import island_fixtures as fixtures
 
 WATCH = """
@@ -35,6 +36,7 @@ def test_no_page_violates_its_policy(
     ask("guidance")
     fixtures.measure(db, mine, 40)
     context = browser.new_context()
+    context.add_cookies(cookies(db, address))
     context.add_init_script(WATCH)
     tab = context.new_page()
     found = {}

@@ -19,6 +19,7 @@ from typing import Any
 
 from parenting.server.lifeline import VARIABLE
 from parenting.server.settings import Settings
+from tests.access import seed
 
 PRELOADED = [
     "parenting.commands.main",
@@ -53,6 +54,7 @@ class Command:
         first, with the `environment` already set.
         """
         self.arguments = arguments
+        seed(data)
         self.output = data / f"{arguments[0]}-{os.urandom(4).hex()}.out"
         there, self._lifeline = _context().Pipe(duplex=False)
         variables = {

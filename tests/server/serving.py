@@ -14,12 +14,14 @@ from typing import Any
 
 import httpx2
 
+from tests.access import seed
 from tests.tree import ROOT
 
 
 @contextmanager
 def parenting(*arguments: str, data: Path, **more: str) -> Iterator[subprocess.Popen[str]]:
     """`parenting ...` as a process of its own, killed at the end if it still lives."""
+    seed(data)
     environment = {**os.environ, "PARENTING_DATA": str(data), "PYTHONPATH": str(ROOT), **more}
     command = [sys.executable, "-P", "-m", "parenting.commands.main", *arguments]
     child = subprocess.Popen(

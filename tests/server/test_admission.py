@@ -41,7 +41,7 @@ async def serving(app: FastAPI, admission: Admission) -> AsyncIterator[httpx2.As
     transport = httpx2.ASGITransport(app=app)
     async with (
         app.router.lifespan_context(app),
-        httpx2.AsyncClient(transport=transport, base_url="http://localhost", timeout=30) as client,
+        httpx2.AsyncClient(transport=transport, base_url="http://localhost:8765", timeout=30) as client,
     ):
         yield client
 

@@ -44,7 +44,7 @@ def commands() -> Iterator[Command]:
     """Those of all blocks, in their order."""
     for block in re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL):
         for line in block.splitlines():
-            if not line.startswith("api="):
+            if not line.startswith(("export PARENTING_TOKEN=", "api=", "curl() ")):
                 yield _read(shlex.split(line.replace("$api", "/api/v1")))
 
 

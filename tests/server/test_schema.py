@@ -25,6 +25,7 @@ from structlog.testing import capture_logs
 from parenting.server.app import bare_app, create_app
 from parenting.server.db import Database
 from parenting.server.settings import Settings
+from tests.access import bearer
 from tests.server.described import description, live, reply_to
 
 EXAMPLES = 3
@@ -34,6 +35,7 @@ OPERATIONS = [
 ]
 DRAWN = drawn(max_examples=EXAMPLES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 whole = cache(description)
+KNOWN = {"Authorization": bearer(80)}
 
 
 @pytest.fixture
@@ -76,8 +78,8 @@ def test_what_is_not_foreseen_is_found(
 ) -> None:
     app, seen = replies
     case = whole()["/api/v1/runs/{run_id}"]["GET"].Case(path_parameters={"run_id": 1})
-    seen[case.call_and_validate(app=app).status_code] += 1
+    seen[case.call_and_validate(app=app, headers=KNOWN).status_code] += 1
     monkeypatch.setattr("parenting.server.api.runs.run_schema", sabotage)
     # structlog's own output may be a file that an earlier test has closed
     with capture_logs(), pytest.raises(FailureGroup, match=found):
-        case.call_and_validate(app=app)
+        case.call_and_validate(app=app, headers=KNOWN)

@@ -36,6 +36,7 @@ def test_only_these_are_open_to_anyone() -> None:
     assert {row for row, rule in ROWS.items() if rule.roles is None} == {
         ("GET", "/healthz"),
         ("GET", "/readyz"),
+        ("GET", "/api/v1/openapi.json"),
         ("GET", "/static"),
         ("GET", "/static/vendor"),
         ("GET", "/open"),
