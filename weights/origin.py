@@ -16,7 +16,7 @@ from parenting.envs import registry
 from parenting.envs.levels.spec import Level, LevelError, maze_legend
 from parenting.envs.names import UnknownNameError
 from parenting.envs.people_text import printable
-from parenting.weights import answers_file, policy_file
+from parenting.weights import answers_export, answers_file, policy_file
 from parenting.weights.answers_file import Answers, AnswersFileError
 from parenting.weights.policy_file import PolicyFileError, StoredPolicy
 from parenting.weights.store import digest
@@ -69,7 +69,7 @@ def read_origin(from_policy: Path | None, from_answers: Path | None) -> Origin:
         UnreadableOriginError: one of them cannot be read, or is of something else.
     """
     policy = None if from_policy is None else (str(from_policy), _bytes(FROM_POLICY, from_policy))
-    answers = None if from_answers is None else (str(from_answers), _bytes(FROM_ANSWERS, from_answers))
+    answers = None if from_answers is None else (str(from_answers), _answers(from_answers))
     return origin_of(policy, answers)
 
 
@@ -134,6 +134,16 @@ def _bytes(field: str, path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise UnreadableOriginError(field, f"{path} cannot be read: {error.strerror}.") from None
+
+
+def _answers(path: Path) -> bytes:
+    """Return the lines of a table of answers, or those that an export of whole runs holds."""
+    if not answers_export.is_export(path):
+        return _bytes(FROM_ANSWERS, path)
+    try:
+        return answers_export.lines_of(path)
+    except AnswersFileError as error:
+        raise UnreadableOriginError(FROM_ANSWERS, f"{path}: {error}.") from None
 
 
 def _policy_misfits(policy: StoredPolicy, level: Level, config: Config) -> Wrong:
