@@ -43,6 +43,7 @@ SHEETS = {
         "parent.css",
     ),
     "audit.css": (*EVERY_PAGE, "forms.css", "audit.css"),
+    "access.css": (*EVERY_PAGE, "forms.css", "audit.css", "access.css"),
     "docs.css": ("docs.css",),
     "walk.css": ("walk.css", "growth.css"),
 }
@@ -58,6 +59,7 @@ SCRIPTS = (
     "levels.js",
     "pretraining.js",
     "open.js",
+    "access.js",
 )
 PICTURES = ("icon.svg", "query.svg", "question.svg")
 MEDIA = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}

@@ -55,6 +55,9 @@ GET /api/v1/tombstones
 GET /api/v1/audit
 GET /api/v1/audit/export
 GET /audit
+GET /access
+POST /access/create
+POST /access/{access_id}/revoke
 POST /api/v1/jobs
 POST /pretraining
 POST /api/v1/levels/check

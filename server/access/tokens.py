@@ -87,6 +87,16 @@ def make(
     return Made(token, secret)
 
 
+def require_run(db: Database, run: int) -> None:
+    """Ask for a run that a token may open.
+
+    Raises:
+        NotFound: there is none of this number, or it is being deleted.
+    """
+    with db.read() as session:
+        find(session, run)
+
+
 def list_tokens(db: Database, all_of_them: bool = False) -> Sequence[AccessToken]:
     """Return the tokens that are valid, or all that there were, the newest first."""
     rows = select(AccessToken).order_by(AccessToken.id.desc())

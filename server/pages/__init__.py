@@ -2,6 +2,7 @@
 
 from fastapi import APIRouter
 
+from parenting.server.pages.access import router as access
 from parenting.server.pages.audit import router as audit
 from parenting.server.pages.board import router as board
 from parenting.server.pages.carried import router as carried
@@ -53,5 +54,6 @@ router.include_router(history)
 router.include_router(settings)
 router.include_router(persons)
 router.include_router(why)
+router.include_router(access)
 router.include_router(audit)
 router.include_router(docs)

@@ -31,6 +31,7 @@ PATHS = (
     "/",
     "/?q=island&sort=name&archived=true",
     "/levels",
+    "/access",
     "/practice",
     "/practice?at=1&choice=left",
     "/practice?at=4",
