@@ -34,6 +34,7 @@ from parenting.server.errors import (
     ServerError,
     StoreError,
     TooLargeError,
+    TooManyGuessesError,
     UnauthenticatedError,
 )
 from parenting.server.group_commit import GroupCommit
@@ -73,7 +74,16 @@ TAGS = [
     {"name": "health", "description": "For whoever watches over the processes."},
 ]
 
-REFUSED = ("unknown_host", "plain_http", "forwarded", "cross_site", "unauthenticated", "not_allowed")
+REFUSED = (
+    "unknown_host",
+    "plain_http",
+    "forwarded",
+    "cross_site",
+    "unauthenticated",
+    "not_allowed",
+    "guessing",
+    "used_up",
+)
 """Codes of errors that the audit log tells of."""
 
 log = structlog.get_logger()
@@ -194,6 +204,8 @@ def _add_errors(app: FastAPI) -> None:
             limit.say(error.code, log.warning, "refused", path=request.url.path, code=error.code)
             request.app.state.meters.refuse(error.code)
         headers = {"Retry-After": "1"} if isinstance(error, StoreError) else None
+        if isinstance(error, TooManyGuessesError):
+            headers = {"Retry-After": str(error.seconds)}
         if isinstance(error, UnauthenticatedError):
             headers = {"WWW-Authenticate": "Bearer"}
         return _reply(request, error, headers)

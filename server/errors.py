@@ -89,6 +89,17 @@ class UsedUpError(ServerError):
     status, code = 410, "used_up"
 
 
+class TooManyGuessesError(ServerError):
+    """Too many wrong links or tokens came from this address. Wait a little, then try again."""
+
+    status, code = 429, "guessing"
+
+    def __init__(self, message: str | None = None, *, seconds: int = 1) -> None:
+        """`seconds`: after so long the next one is taken."""
+        self.seconds = seconds
+        super().__init__(message)
+
+
 class UnknownHostError(ServerError):
     """This server does not answer under this name."""
 

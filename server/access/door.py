@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import time
+from collections import OrderedDict
 from collections.abc import Callable
 from datetime import timedelta
 from typing import TypeVar
@@ -18,6 +19,7 @@ from anyio import CapacityLimiter, to_thread
 from starlette.requests import HTTPConnection
 
 from parenting.server.access import key, lookup
+from parenting.server.access.guessing import Guesses
 from parenting.server.access.lookup import Known
 from parenting.server.access.roles import LOCAL, Principal, Way
 from parenting.server.access.secret import digest, kind_of
@@ -33,6 +35,8 @@ KEEP_SECONDS = 60.0
 WAITING = 64
 """Unknown secrets that are looked up or wait for it; more are refused: guessing costs others nothing."""
 MOST_KNOWN = 20_000
+MOST_WRONG = 4096
+"""Wrong secrets that are refused without a look into the database when they come again."""
 BEARER = "bearer "
 WAYS: dict[str, Way] = {"session": "session", "program": "token"}
 
@@ -59,8 +63,11 @@ class Door:
         self._key, self._idle = secret_key, timedelta(days=idle_days)
         self._known: dict[str, Known] = {}
         self._revision, self._looked, self._kept = -1, float("-inf"), time.monotonic()
-        self._reading, self._asking, self._waiting = asyncio.Lock(), CapacityLimiter(2), 0
-        self._fresh_threads = CapacityLimiter(1)
+        self._reading, self._asking, self._waiting = asyncio.Lock(), asyncio.Semaphore(2), 0
+        self._threads, self._fresh_threads = CapacityLimiter(2), CapacityLimiter(1)
+        self.guesses = Guesses()
+        self._former: set[str] = set()
+        self._wrong: OrderedDict[str, None] = OrderedDict()
         self._keeping: asyncio.Task[None] | None = None
 
     async def principal(self, request: HTTPConnection) -> Principal | None:
@@ -68,28 +75,37 @@ class Door:
 
         Raises:
             StoreError: the database cannot be read now.
+            TooManyGuessesError: the address has brought too many wrong secrets, and this one is not known.
         """
-        given = request.headers.get("authorization", "")
+        given, client = (
+            request.headers.get("authorization", ""),
+            request.client.host if request.client else "",
+        )
         if given[: len(BEARER)].lower() != BEARER:  # other schemes are those of a proxy that asks, too
-            return await self._of(request.cookies.get(self.cookie, ""), "session")
+            return await self._of(request.cookies.get(self.cookie, ""), "session", client)
         secret = given[len(BEARER) :].strip()
         server = request.scope.get("server")
         if key.holds(self._key, server[1] if server else None, secret):
             return LOCAL
-        return await self._of(secret, "program")
+        return await self._of(secret, "program", client)
 
     def forget(self) -> None:
         """Read sessions and tokens again: something was revoked by this process."""
         self._looked = float("-inf")
 
-    async def _of(self, secret: str, kind: str) -> Principal | None:
+    async def _of(self, secret: str, kind: str, client: str) -> Principal | None:
         if kind_of(secret) != kind:
+            if secret:
+                self.guesses.require(client)
+                self.guesses.wrong(client)
             return None
         await self._refresh()
         hashed, now = digest(secret), self.db.clock()
         known = self._known.get(hashed)
         if known is None or known.is_over(now):
-            known = await self._look(hashed, WAYS[kind])
+            if kind == "session" and hashed in self._wrong:
+                return None  # a browser whose session has ended; its pages go on asking
+            known = await self._look(hashed, WAYS[kind], client)
             if known is None:
                 return None
         known.seen = max(known.seen, now)
@@ -104,29 +120,49 @@ class Door:
             began = time.monotonic()
             present = await to_thread.run_sync(self._read, lookup.revision, limiter=self._fresh_threads)
             if present != self._revision or len(self._known) > MOST_KNOWN:
-                self._known.clear()
+                self._forget_all()
             self._revision, self._looked = present, began
         if began - self._kept >= KEEP_SECONDS:
             self._kept = began
             self._keeping = asyncio.create_task(self._keep())
 
-    async def _look(self, hashed: str, way: Way) -> Known | None:
+    def _forget_all(self) -> None:
+        """Read everything again. Those who were known are asked for whatever else their address brings."""
+        if len(self._former) > MOST_KNOWN:
+            self._former.clear()
+        self._former.update(self._known)
+        self._known.clear()
+        self._wrong.clear()
+
+    async def _look(self, hashed: str, way: Way, client: str) -> Known | None:
         if self._waiting >= WAITING:
             raise BusyError("Too many unknown callers at once. Send the same again.")
         self._waiting += 1
         try:
-            now, revision = self.db.clock(), self._revision
-            found = await to_thread.run_sync(
-                self._read,
-                lambda session: lookup.find(session, way, hashed, now, self._idle),
-                limiter=self._asking,
-            )
+            async with self._asking:
+                if hashed not in self._former:
+                    self.guesses.require(client)
+                now, revision = self.db.clock(), self._revision
+                found = await to_thread.run_sync(
+                    self._read,
+                    lambda session: lookup.find(session, way, hashed, now, self._idle),
+                    limiter=self._threads,
+                )
+                if found is None:
+                    self._note_wrong(hashed, client)
         finally:
             self._waiting -= 1
         self._known.pop(hashed, None)
         if found is not None and revision == self._revision:
             self._known[hashed] = found
         return found
+
+    def _note_wrong(self, hashed: str, client: str) -> None:
+        self.guesses.wrong(client)
+        self._former.discard(hashed)
+        self._wrong[hashed] = None
+        if len(self._wrong) > MOST_WRONG:
+            self._wrong.popitem(last=False)
 
     def _read(self, look: Callable[..., Found]) -> Found:
         with self.db.read() as session:

@@ -14,12 +14,15 @@ from parenting.server.access.current import current
 from parenting.server.access.door import Door
 from parenting.server.access.matrix import Rule, rule_of
 from parenting.server.access.roles import Principal
+from parenting.server.audit.acting import acting
 from parenting.server.db import Database
 from parenting.server.errors import NotAllowedError, UnauthenticatedError
 from parenting.server.public_ids import is_public_id
 from parenting.server.route_names import route_of
 from parenting.server.tables import Answer, Job, Query
 
+ENTRANCE = "/open"
+"""The address whose tokens are checked by the route itself."""
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
@@ -51,22 +54,26 @@ async def admit(request: Request) -> None:
     Raises:
         UnauthenticatedError: nobody knows who it is from.
         NotAllowedError: the matrix does not let them.
+        TooManyGuessesError: too many wrong secrets came from the same address.
         StoreError: the database cannot be read now.
     """
     rule = rule_of(request.method, route_of(request.scope))
     if rule is None:
         raise NotAllowedError
-    if rule.roles is None:
-        return
     door: Door = request.app.state.door
+    if rule.roles is None:
+        if route_of(request.scope) == ENTRANCE:
+            door.guesses.require(request.client.host if request.client else "")
+        return
     who = await door.principal(request)
     if who is None:
         raise UnauthenticatedError
+    request.state.principal = who
+    acting().who = who.who
     if who.role not in rule.roles:
         raise NotAllowedError
     if who.run is not None:
         await _require_within(request, rule, who)
-    request.state.principal = who
     current.set(who)
 
 

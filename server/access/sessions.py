@@ -13,9 +13,13 @@ from parenting.server.access.roles import Role
 from parenting.server.access.secret import digest, draw, kind_of
 from parenting.server.access.tables import AccessSession, AccessToken
 from parenting.server.access.tokens import tell_revoked
+from parenting.server.audit.recording import record
+from parenting.server.audit.table import Kind
 from parenting.server.db import Database
 from parenting.server.errors import UsedUpError
 
+HOW = {"opening": "address", "link": "link"}
+"""The audit log's name for that by which somebody enters."""
 DAYS, IDLE_DAYS = 30.0, 7.0
 """Days after which a session ends: since it began, and since it was used."""
 
@@ -63,6 +67,12 @@ def enter(db: Database, secret: str, former: str | None = None, *, days: float =
             expires=min(expires, token.expires) if token.kind == "link" else expires,
         )
         session.add(begun)
+        session.flush()
+        way, who = (
+            f"by {HOW[token.kind]} {token.public_id[:8]}",
+            f"{token.role} by session {begun.public_id[:8]}",
+        )
+        record(db, session, Kind.LOGIN, way, who=who)
         tell_revoked(session)
     return Entered(begun, drawn)
 
@@ -73,6 +83,8 @@ def require_valid(db: Database, secret: str) -> AccessToken:
     Raises:
         UsedUpError: as `enter`.
     """
+    if kind_of(secret) not in ("opening", "link"):
+        raise UsedUpError
     with db.read() as session:
         found = session.scalar(_valid(digest(secret), db.clock()))
     if found is None:
@@ -92,6 +104,7 @@ def list_sessions(db: Database, all_of_them: bool = False) -> Sequence[AccessSes
 def end(db: Database, secret: str) -> None:
     """End the session of a cookie's secret; one that has ended stays so."""
     with db.write() as session:
+        record(db, session, Kind.LOGOUT, "left")
         _end(session, AccessSession.digest == digest(secret), db.clock())
         tell_revoked(session)
 
@@ -100,6 +113,7 @@ def end_all(db: Database, role: Role | None = None) -> None:
     """End all sessions, or those of a role."""
     with db.write() as session:
         _end(session, AccessSession.role == str(role) if role else AccessSession.id > 0, db.clock())
+        record(db, session, Kind.REVOCATION, f"all sessions of {role}s" if role else "all sessions")
         tell_revoked(session)
 
 

@@ -12,6 +12,8 @@ from sqlalchemy.orm import Session
 from parenting.server.access.roles import Role
 from parenting.server.access.secret import digest, draw
 from parenting.server.access.tables import AccessSession, AccessToken
+from parenting.server.audit.recording import record
+from parenting.server.audit.table import Kind
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError, NotFound
 from parenting.server.public_ids import public_id
@@ -23,6 +25,8 @@ TokenKind = Literal["opening", "program", "link"]
 DAYS: dict[TokenKind, float] = {"opening": 1.0, "program": 90.0, "link": 30.0}
 """Days for which a token is valid, unless its maker says otherwise."""
 MOST_DAYS = 3660.0
+NAMES: dict[TokenKind, str] = {"opening": "address", "program": "token", "link": "link"}
+"""The audit log's name for each kind."""
 COMMAND = "a command"
 """The maker of a token that was made at a terminal."""
 
@@ -70,8 +74,7 @@ def make(
         client_id = f"p-{public_id()}"
     secret, now = draw(kind), db.clock()
     with db.write() as session:
-        if run is not None:
-            find(session, run)
+        opened = None if run is None else find(session, run)
         token = AccessToken(
             kind=kind,
             digest=digest(secret),
@@ -84,6 +87,8 @@ def make(
             expires=now + timedelta(days=lasts),
         )
         session.add(token)
+        session.flush()
+        record(db, session, Kind.TOKEN, f"{NAMES[kind]} {token.public_id[:8]} for a {role}", opened)
     return Made(token, secret)
 
 
@@ -132,6 +137,7 @@ def revoke(db: Database, name: str) -> None:
         session.execute(
             update(AccessSession).where(ended, AccessSession.revoked.is_(None)).values(revoked=now)
         )
+        record(db, session, Kind.REVOCATION, f"{'session' if token is None else 'token'} {name[:8]}")
         tell_revoked(session)
 
 

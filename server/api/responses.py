@@ -38,9 +38,9 @@ ERRORS: dict[int, ServerError] = {
     503: BusyError(),
     507: DiskFullError(),
 }
-"""An example of each status. 403 also means that the caller may not use a route, and 503 that too many live
-streams are open."""
-ALWAYS = (400, 401, 403, 413, 422, 500, 503)
+"""An example of each status. 403 also means that the caller may not use a route, 429 that too many wrong
+tokens came from its address, and 503 that too many live streams are open."""
+ALWAYS = (400, 401, 403, 413, 422, 429, 500, 503)
 ACTS = (507,)
 
 

@@ -151,7 +151,7 @@ def _page(
 
 
 def _shown(request: Request, made: Made) -> dict[str, object]:
-    """Return what the page shows once. `server.entrance` has asked whether the host is a name of this server."""
+    """Return what the page shows once. The host is a name of this server: `server.entrance` has asked."""
     link = made.token.kind == "link"
     here = f"{request.scope['scheme']}://{request.headers['host']}"
     secret = f"{here}/open?token={made.secret}" if link else made.secret

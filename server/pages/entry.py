@@ -6,6 +6,8 @@ or by its button without JavaScript, and that POST uses the token up and sets th
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated
 
 from fastapi import Form, Query, Request, Response
@@ -18,6 +20,7 @@ from parenting.server.access.tables import AccessSession
 from parenting.server.admission import admitted_router
 from parenting.server.db import Database
 from parenting.server.deps import Db
+from parenting.server.errors import UsedUpError
 from parenting.server.pages.render import page, redirect
 from parenting.server.public_ids import ALPHABET, LENGTH
 
@@ -34,9 +37,10 @@ TokenField = Annotated[str, Form(max_length=LONGEST)]
 
 
 @router.get(ADDRESS)
-def entry_page(db: Db, token: Token = "", to: To = None) -> Response:
+def entry_page(request: Request, db: Db, token: Token = "", to: To = None) -> Response:
     """The page that sends the token as a form; a token that opens nothing gets 410."""
-    sessions.require_valid(db, token)
+    with _guess(request):
+        sessions.require_valid(db, token)
     return page("open.html", token=token, to=to)
 
 
@@ -44,7 +48,8 @@ def entry_page(db: Db, token: Token = "", to: To = None) -> Response:
 def enter(request: Request, db: Db, token: TokenField, to: ToField = None) -> Response:
     """For the form: begin a session, and go to the page of a run, or where the role has its work."""
     door = _door(request)
-    entered = sessions.enter(db, token, request.cookies.get(door.cookie), days=door.days)
+    with _guess(request):
+        entered = sessions.enter(db, token, request.cookies.get(door.cookie), days=door.days)
     door.forget()
     response = redirect(to or _first_page(db, entered.session))
     _set_cookie(request, response, entered)
@@ -65,6 +70,16 @@ def leave(request: Request, db: Db) -> Response:
 def _door(request: Request) -> Door:
     door: Door = request.app.state.door
     return door
+
+
+@contextmanager
+def _guess(request: Request) -> Iterator[None]:
+    """Count a token that opens nothing; the guard refuses an address that has brought too many."""
+    try:
+        yield
+    except UsedUpError:
+        _door(request).guesses.wrong(request.client.host if request.client else "")
+        raise
 
 
 def _first_page(db: Database, session: AccessSession) -> str:
