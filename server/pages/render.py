@@ -14,6 +14,7 @@ from starlette.responses import HTMLResponse, RedirectResponse, Response
 from parenting.drawing.render import environment
 from parenting.drawing.sentences import tr, trn
 from parenting.envs.people_text import isolated
+from parenting.server.access.roles import Principal, Role
 from parenting.server.assets import asset
 from parenting.server.errors import ServerError, StoreError
 from parenting.server.languages import language
@@ -26,6 +27,8 @@ FIRST = ("start.html", "dashboard.html", "parent.html")
 """The pages that people open first. No request for one of them waits until it is compiled."""
 YEAR = 365 * 24 * 3600
 """Seconds for which a browser keeps our cookies."""
+REFUSED = ("unauthenticated", "used_up", "not_allowed", "guessing")
+"""Codes of errors about who somebody is; they have a page that says how to come in."""
 WEB = Path(__file__).parent.parent.parent / "web"
 
 
@@ -92,14 +95,23 @@ def remember(request: Request, response: Response, name: str, value: str) -> Non
     response.set_cookie(name, value, max_age=YEAR, secure=secure, httponly=True, samesite="lax")
 
 
+def _way_back(request: Request) -> str | None:
+    """Return the page where somebody who is known has their work; None for a stranger."""
+    who: Principal | None = getattr(request.state, "principal", None)
+    if who is None or (who.run is not None and who.run_public_id is None):
+        return None
+    run = "/" if who.run is None else f"/runs/{who.run_public_id}"
+    return f"{run}/parent" if who.role is Role.PARENT and who.run is not None else run
+
+
 def error_page(request: Request, error: ServerError) -> HTMLResponse:
     """An error as a page: what happened, in a sentence, and the way back.
 
     What a run refused leads back to it, and what the store refused to the same page, or to the page of the
     form that was sent; else there may be no such run.
     """
-    if error.status == 401:
-        return page("error.html", error.status, message=error.told, back=None, again=False)
+    if error.code in REFUSED:
+        return page("refused.html", error.status, code=error.code, back=_way_back(request))
     run = re.match(rf"/runs/([{ALPHABET}]{{{LENGTH}}}|[1-9][0-9]*)(?![^/])(/parent)?", request.url.path)
     refused = isinstance(error, StoreError)
     back = run[0] if run and (error.status == 409 or refused) else "/"

@@ -156,6 +156,7 @@ def test_wrong_addresses_are_counted_and_then_refused_unread(
     monkeypatch.setattr(db, "write", reads.append)
     refused = guess()
     assert (refused.status_code, reads) == (429, [])
+    assert "Too many tries" in refused.text
 
 
 def test_behind_a_proxy_the_client_counts_and_not_what_it_says_of_itself(
