@@ -31,7 +31,7 @@ def restore(
     The file is read from end to end before anything is changed. A backup of an older version is brought up to
     date by the next start; one of a newer version is refused. Pages that are still open may send answers that
     the backup already holds, which changes nothing, or answers to questions that it does not know, which are
-    refused.
+    refused. Sessions, links and tokens of the backup are ended: some may have been revoked after it was made.
 
     Exit codes: 0 restored; 2 the database is in use or exists, or the file cannot be used; 130 stopped by
     Ctrl-C.
@@ -41,6 +41,7 @@ def restore(
     with exit_on_interrupt(), friendly_errors():
         done = put_back(settings(), file, replace, new_identity)
     say(f"{done.database} restored from {file}: {done.holds}.")
+    say("Its sessions, links and tokens are ended: `parenting access open` lets you in.")
     if done.aside is not None:
         say(f"The former database is {done.aside}.")
     if done.older and not new_identity:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from parenting._plural import counted
+from parenting.server.backups.ended import statements
 from parenting.server.errors import SetupError
 from parenting.server.store.driver import open_file, sqlite_module
 from parenting.server.store.sqlite import BUSY_SECONDS
@@ -64,6 +65,20 @@ def copy(source: Path, target: Path) -> Contents:
         ) from None
 
 
+def end_access(file: Path) -> None:
+    """End the sessions and tokens of a copy that nobody has open yet (`ended`).
+
+    Raises:
+        SetupError: it is damaged.
+    """
+    try:
+        with _connected(file, "mode=rw") as database:
+            for statement in statements(_tables(database)):
+                database.execute(statement)
+    except sqlite_module().Error as error:
+        raise SetupError(f"{file} is damaged: {error}. Use another backup.") from None
+
+
 def check(file: Path) -> Contents:
     """Read a database that nobody has open from end to end, and return its contents.
 
@@ -100,7 +115,7 @@ def require_database(file: Path) -> None:
 
 
 def _contents(database: Any) -> Contents:
-    there = {row[0] for row in database.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+    there = _tables(database)
     revision = None
     if "alembic_version" in there:
         found = database.execute("SELECT version_num FROM alembic_version").fetchone()
@@ -108,6 +123,10 @@ def _contents(database: Any) -> Contents:
     counted = [name for name in COUNTED if name in there]
     rows = {name: database.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in counted}
     return Contents(revision, rows)
+
+
+def _tables(database: Any) -> set[str]:
+    return {row[0] for row in database.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
 
 
 @contextmanager

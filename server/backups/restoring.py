@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
 
-from sqlalchemy import URL, make_url
+from sqlalchemy import URL, inspect, make_url, text
 
 from parenting.server import identity
 from parenting.server.backups import copies, dumps
+from parenting.server.backups.ended import statements
 from parenting.server.backups.in_use import alone, require_stopped, require_unconnected
 from parenting.server.backups.making import FOLDER, back_up, stamp
 from parenting.server.backups.whole import require_room, size, whole
@@ -36,7 +37,7 @@ class Restored:
 
 
 def restore(settings: Settings, file: Path, replace: bool = False, new_identity: bool = False) -> Restored:
-    """Put a backup in place of the database of these settings.
+    """Put a backup in place of the database of these settings. Its sessions and tokens are ended.
 
     Args:
         settings: The settings that name the database.
@@ -75,6 +76,7 @@ def _restore_copy(url: URL, file: Path, replace: bool) -> Restored:
     require_room(target.parent, size(file), "Free some space first.")
     with ExitStack() as until_replaced, whole(target, force=True) as part:
         copies.copy(file, part)
+        copies.end_access(part)
         holds = copies.check(part)
         older = _is_older(holds.revision, file)
         aside = None
@@ -114,7 +116,19 @@ def _restore_dump(settings: Settings, url: URL, file: Path, replace: bool) -> Re
             )
         aside = back_up(settings, _aside(settings.data / FOLDER, ".dump")).file
     dumps.restore(url, file)
+    _end_access(settings)
     return Restored(url.render_as_string(), f"{number} tables", aside, revision_of(settings) != newest())
+
+
+def _end_access(settings: Settings) -> None:
+    """End the sessions and tokens of the tables that were put in place (`ended`)."""
+    db = connect(settings)
+    try:
+        with db.engine.begin() as connection:
+            for statement in statements(inspect(connection).get_table_names()):
+                connection.execute(text(statement))
+    finally:
+        db.close()
 
 
 def revision_of(settings: Settings) -> str | None:

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from sqlalchemy import make_url
 
+from parenting.server.access import tokens
+from parenting.server.access.roles import Role
 from parenting.server.backups import dumps
 from parenting.server.backups.making import back_up
 from parenting.server.backups.restoring import restore
@@ -29,10 +31,20 @@ def worlds(settings: Settings) -> list[str]:
         db.close()
 
 
+def are_ended(settings: Settings, name: str) -> bool:
+    """Return whether the only token that there was is ended."""
+    db = connect(settings)
+    try:
+        return [one.public_id for one in tokens.list_tokens(db, all_of_them=True) if one.revoked] == [name]
+    finally:
+        db.close()
+
+
 def test_a_dump_brings_the_database_back_and_the_former_one_is_kept(
     settings: Settings, db: Database, guidance: int, tmp_path: Path
 ) -> None:
     answer(db, guidance, "left", "tab", "human")
+    link = tokens.make(db, "link", Role.VIEWER)
     made = back_up(settings, tmp_path / "monday.dump")
     assert stat.S_IMODE(made.file.stat().st_mode) == 0o600
     start(db, NewRun(world="reward-hacking", parent="scripted"))
@@ -43,6 +55,7 @@ def test_a_dump_brings_the_database_back_and_the_former_one_is_kept(
         restore(settings, made.file)
     done = restore(settings, made.file, replace=True)
     assert worlds(settings) == ["unsafe-exploration"]
+    assert are_ended(settings, link.token.public_id)
     assert done.aside is not None
     restore(settings, done.aside, replace=True)
     assert worlds(settings) == ["reward-hacking", "unsafe-exploration"]

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 
+from parenting.server.access import sessions, tokens
+from parenting.server.access.lookup import find
+from parenting.server.access.roles import Role
+from parenting.server.access.secret import digest
 from parenting.server.backups.making import back_up
 from parenting.server.backups.restoring import restore
 from parenting.server.db import Database, connect
-from parenting.server.errors import SetupError
+from parenting.server.errors import SetupError, UsedUpError
 from parenting.server.identity import database_id
 from parenting.server.migrate import downgrade, require_current, upgrade
 from parenting.server.new_run import NewRun, start
@@ -68,6 +73,28 @@ def test_it_brings_the_copy_back_and_keeps_the_former_database(
     other = connect(Settings(data=tmp_path / "other", database_url=None))
     assert worlds(other) == ["reward-hacking", "unsafe-exploration"]
     other.close()
+
+
+def test_what_was_revoked_since_does_not_open_again(
+    settings: Settings, db: Database, opened: Callable[[], Database], tmp_path: Path
+) -> None:
+    revoked = tokens.make(db, "program", Role.RESEARCHER)
+    link = tokens.make(db, "link", Role.VIEWER)
+    seat = sessions.enter(db, link.secret)
+    unopened = tokens.make(db, "opening", Role.RESEARCHER)
+    made = back_up(settings, tmp_path / "copy.db").file
+    tokens.revoke(db, revoked.token.public_id)
+    db.close()
+    restore(settings, made, replace=True)
+    again = opened()
+    assert (tokens.list_tokens(again), sessions.list_sessions(again)) == ([], [])
+    assert len(tokens.list_tokens(again, all_of_them=True)) == 3
+    with again.read() as session:
+        for way, secret in (("session", seat.secret), ("token", revoked.secret)):
+            assert find(session, way, digest(secret), again.clock(), timedelta(days=7)) is None  # type: ignore[arg-type]
+    for secret in (unopened.secret, link.secret):
+        with pytest.raises(UsedUpError):
+            sessions.enter(again, secret)
 
 
 def test_a_database_that_exists_is_replaced_only_when_asked(
