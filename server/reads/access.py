@@ -109,7 +109,7 @@ def _group(token: AccessToken) -> str:
 
 def _runs(db: Database, rows: Iterable[AccessToken | AccessSession]) -> dict[int | None, str]:
     """Return the public ids of the runs that rows name, by their numbers."""
-    numbers = sorted({run for row in rows if (run := sound(row, "run_id")) is not None})
+    numbers = sorted({sound(row, "run_id") for row in rows} - {None})
     found: dict[int | None, str] = {}
     for part in _parts(numbers):
         asked = select(Run.id, Run.public_id).where(Run.id.in_(part), Run.deleting.is_(None))
@@ -119,7 +119,7 @@ def _runs(db: Database, rows: Iterable[AccessToken | AccessSession]) -> dict[int
 
 
 def _people(db: Database, rows: Iterable[AccessToken | AccessSession]) -> dict[str, str]:
-    return pseudonyms(db, {client for row in rows if (client := sound(row, "client_id")) is not None})
+    return pseudonyms(db, {sound(row, "client_id") for row in rows} - {None})
 
 
 def _parts(numbers: Sequence[int]) -> Iterable[Sequence[int]]:

@@ -183,7 +183,7 @@ def test_who_came_in_and_what_was_made_is_in_the_audit_log(
     client.follow_redirects = False
     made = tokens.make(db, "opening", Role.RESEARCHER)
     client.post("/open", data={"token": made.secret})
-    client.auth = None
+    client.auth = None  # type: ignore[assignment]
     client.post(f"/api/v1/runs/{run.id}/pause", headers={"Sec-Fetch-Site": "same-origin"})
     client.post(f"/access/{link.public_id}/revoke")
     client.post("/leave")

@@ -120,7 +120,7 @@ def test_the_own_session_leaves_and_an_idle_one_is_not_listed(
     session(db)
     clock.pass_seconds(8 * 24 * 3600)
     client.cookies.update(session(db))
-    client.auth = None
+    client.auth = None  # type: ignore[assignment]
     listed = client.get("/access").text
     assert listed.count("this browser") == 1
     assert listed.count('action="/leave"') == 1
