@@ -67,4 +67,6 @@ def _cell(value: Any) -> str:
 
 
 def _numbers(cells: dict[str, str]) -> dict[str, Any]:
-    return {name: cell if name == "run" or not cell else float(cell) for name, cell in cells.items()}
+    """Return the cells of the columns that are checked; others may hold text, such as `more`."""
+    known = ((name, cells[name]) for name in MEASURED if name in cells)
+    return {name: cell if name == "run" or not cell else float(cell) for name, cell in known}

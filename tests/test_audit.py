@@ -53,7 +53,7 @@ def sound() -> dict[str, Any]:
     answers[4] |= {"standing": False, "superseded_by": 6, "in_x": False}
     chain(answers)
     asked = {"run": "R", "kind": "guidance", "status": "applied"}
-    counted: dict[str, Any] = {"run": "R", "preference": 0, "skips": 0}
+    counted: dict[str, Any] = {"run": "R", "preference": 0, "skips": 0, "more": '{"new": 0.5}'}
     metrics = [
         {"tick": 4, "size": 2, "guidance": 2, "left": 1, "right": 1, "either": 0, "neither": 0},
         {"tick": 11, "size": 4, "guidance": 5, "left": 2, "right": 1, "either": 1, "neither": 1},
