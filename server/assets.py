@@ -54,6 +54,7 @@ SCRIPTS = (
     "history.js",
     "dashboard.js",
     "comparison.js",
+    "list.js",
     "start.js",
     "docs.js",
     "levels.js",

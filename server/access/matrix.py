@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from parenting.server.access.current import current
 from parenting.server.access.roles import Role
 
 Where = Literal["everything", "nothing", "run", "question", "job", "body"]
@@ -184,6 +185,15 @@ ROWS: dict[tuple[str, str], Rule] = {
 def rule_of(method: str, path: str) -> Rule | None:
     """Return who may use a route; None where it has no row, so that nobody may."""
     return ROWS.get(("GET" if method == "HEAD" else method, path))
+
+
+def may(route: str) -> bool:
+    """Return whether the caller of the present request may use a route: `POST /runs/{run_id}/event`.
+
+    Pages ask, so that they show nobody what would be refused.
+    """
+    who, rule = current.get(), ROWS[tuple(route.split(" "))]  # type: ignore[index]  # two words
+    return rule.roles is None or (who is not None and who.role in rule.roles)
 
 
 _YES = {

@@ -33,7 +33,7 @@ const tell = {
     page.goal = now.goal;
     if (now.reason) $("reason").textContent = now.reason;
     $("optimal").hidden = !now.optimal || !now.standing || page.state === "over";
-    $("resume").hidden = !["stopped", "failed"].includes(now.status);
+    if ($("resume")) $("resume").hidden = !["stopped", "failed"].includes(now.status);
     count(now.answers, now.answers - now.standing);
     if (now.answers && (given.size || !page.current)) later(() => import("./growth.js")).then(({ grown }) => grown(now, !page.current), () => null); // the next answer asks again
     if (page.current && page.state === "over") page.current = null;

@@ -96,7 +96,7 @@ def test_five_exports_are_one_table_in_r(folders: list[str], tmp_path: Path) -> 
 
 
 def test_every_table_has_the_same_columns_in_every_world(folders: list[str]) -> None:
-    """What each reader relies on, without any of them."""
+    """Each reader relies on this; none of them is needed here."""
     heads = {(Path(one) / "metrics.csv").read_text().splitlines()[0] for one in folders}
     assert heads == {",".join(column.name for column in METRICS)}
     for one in folders:
