@@ -73,6 +73,7 @@ OTHERS = {
         "access.tokens",
         "archive.importing.import_export",
         "audit.recording.note_export",
+        "audit.recording.try_note_export",
         "batches._store",
         "deletion.begin",
         "deps._alone",

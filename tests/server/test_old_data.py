@@ -29,6 +29,7 @@ from parenting.server.replay import relive
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.snapshot import changed, versions
+from tests.access import seed
 from tests.tree import ROOT
 
 OLD = ROOT / "tests/old/0.1.0"
@@ -46,6 +47,7 @@ PAGES = ("/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/runs/{}/why", "/ap
 def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Settings:
     with tarfile.open(OLD / "data.tar.xz") as archive:
         archive.extractall(tmp_path, filter="data")
+    seed(tmp_path / "data")
     monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "data"))
     return Settings(data=tmp_path / "data", database_url=None)
 
