@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from html.parser import HTMLParser
+from typing import Any
 
 import httpx2
 import pytest
@@ -73,7 +74,7 @@ def test_no_page_offers_what_is_refused(
     run = get_run(db, mine.run_id)
     if status is not RunStatus.ACTIVE:
         set_status(db, run.id, status)
-    scope = {"run": run.id, "client_id": "a"} if role is Role.PARENT else {}
+    scope: dict[str, Any] = {"run": run.id, "client_id": "a"} if role is Role.PARENT else {}
     client.headers["Authorization"] = f"Bearer {tokens.make(db, 'program', role, **scope).secret}"
     shown = client.get(page.format(run=f"/runs/{run.public_id}"))
     assert shown.status_code == 200, shown.text
