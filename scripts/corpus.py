@@ -27,6 +27,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import structlog
 import torch
 from torch import Tensor
 
@@ -175,6 +176,7 @@ def main() -> None:
     if os.environ.get("ATEN_CPU_CAPABILITY") != CAPABILITY:
         sys.exit(f"Set ATEN_CPU_CAPABILITY={CAPABILITY}: other instructions give other bits.")
     torch.set_num_threads(1)
+    structlog.configure(logger_factory=structlog.PrintLoggerFactory(sys.stderr))  # the output is JSON
     does: dict[str, Callable[[Path], object]] = {"make": make, "check": check}
     found = does[chosen.action](chosen.folder)
     if found is not None:

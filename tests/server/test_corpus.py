@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import structlog
 import torch
 from fastapi.testclient import TestClient
 
@@ -88,6 +89,30 @@ def test_it_is_replayed_and_goes_on_with_the_bits_of_its_version(folder: Path) -
     assert found["replays"] == expected["replays"]
     assert found["goes_on"] == expected["goes_on"]
     assert {replay["parted"] for replay in found["replays"].values()} == {None}
+
+
+def test_lines_of_the_log_are_not_part_of_what_is_found(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A slow machine makes some, such as of a store that is waited for."""
+    logged = structlog.get_config()
+
+    def check(_folder: Path) -> dict[str, int]:
+        structlog.get_logger().warning("a line")
+        return {"found": 1}
+
+    monkeypatch.setattr(corpus, "check", check)
+    monkeypatch.setattr(sys, "argv", ["corpus", "check", str(tmp_path)])
+    monkeypatch.setenv("ATEN_CPU_CAPABILITY", corpus.CAPABILITY)
+    threads = torch.get_num_threads()
+    try:
+        corpus.main()
+    finally:
+        structlog.configure(**logged)
+        torch.set_num_threads(threads)
+    told = capsys.readouterr()
+    assert json.loads(told.out) == {"found": 1}
+    assert "a line" in told.err
 
 
 def test_other_instructions_are_refused() -> None:
