@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from contextvars import ContextVar
 
-from parenting.server.access.roles import Principal
+from parenting.server.access.roles import Principal, Role
 from parenting.server.errors import NotAllowedError
 
 current: ContextVar[Principal | None] = ContextVar("principal", default=None)
+
+
+def home() -> str:
+    """Return the address of the page where the caller has their work: the list of runs, or their only run."""
+    who = current.get()
+    if who is None or who.run is None:
+        return "/"
+    return f"/runs/{who.run_public_id}/parent" if who.role is Role.PARENT else f"/runs/{who.run_public_id}"
 
 
 def own_name(name: str) -> str:

@@ -193,7 +193,9 @@ def may(route: str) -> bool:
     Pages ask, so that they show nobody what would be refused.
     """
     who, rule = current.get(), ROWS[tuple(route.split(" "))]  # type: ignore[index]  # two words
-    return rule.roles is None or (who is not None and who.role in rule.roles)
+    if rule.roles is None or who is None:
+        return rule.roles is None
+    return who.role in rule.roles and (who.run is None or rule.where != "everything")
 
 
 _YES = {

@@ -14,6 +14,7 @@ from starlette.responses import HTMLResponse, RedirectResponse, Response
 from parenting.drawing.render import environment
 from parenting.drawing.sentences import tr, trn
 from parenting.envs.people_text import isolated
+from parenting.server.access.current import home
 from parenting.server.access.matrix import may
 from parenting.server.access.roles import Principal, Role
 from parenting.server.assets import asset
@@ -40,7 +41,7 @@ def tr_markup(sentence: str, **values: object) -> Markup:
 
 _templates = environment(WEB / "templates")
 _templates.filters.update(isolated=isolated, number=number, world_title=world_title)
-_templates.globals.update(asset=asset, language=language, may=may, _=tr, _n=trn, _h=tr_markup)
+_templates.globals.update(asset=asset, language=language, home=home, may=may, _=tr, _n=trn, _h=tr_markup)
 
 
 def page(template: str, status: int = 200, **context: object) -> HTMLResponse:

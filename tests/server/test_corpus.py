@@ -27,6 +27,7 @@ from parenting.server.export import lines
 from parenting.server.migrate import upgrade
 from parenting.server.settings import Settings
 from scripts import corpus
+from tests.access import seed
 from tests.tree import ROOT
 
 FOLDERS = sorted(file.parent for file in (ROOT / "tests" / "old").glob("*/data.tar.xz"))
@@ -48,6 +49,7 @@ def names(folder: Path) -> str:
 def settings(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
     with tarfile.open(request.param / "data.tar.xz") as archive:
         archive.extractall(tmp_path, filter="data")
+    seed(tmp_path / "data")
     return Settings(data=tmp_path / "data", database_url=None)
 
 

@@ -10,7 +10,7 @@ import pytest
 from starlette.routing import compile_path
 
 from parenting.server.access import tokens
-from parenting.server.access.matrix import ROWS
+from parenting.server.access.matrix import ROWS, Rule
 from parenting.server.access.roles import Role
 from parenting.server.db import Database
 from parenting.server.queue.answers import answer
@@ -32,9 +32,11 @@ PAGES = {
         "/compare",
     ),
     Role.VIEWER: ("/", "{run}", "/compare"),
-    Role.PARENT: ("{run}/parent", "{run}/history"),
+    Role.PARENT: ("{run}/parent", "{run}/history", "/practice?run={id}"),
 }
-PLACES = [(role, page) for role, pages in PAGES.items() for page in pages]
+ANYWHERE = ("/practice", "/help")
+PLACES = [(role, page, role is Role.PARENT) for role, pages in PAGES.items() for page in (*pages, *ANYWHERE)]
+PLACES += [(Role.VIEWER, page, True) for page in ("{run}", "/practice")]  # a viewer of one run
 
 
 class Targets(HTMLParser):
@@ -54,31 +56,38 @@ class Targets(HTMLParser):
                 self.found.add((method, path.partition("?")[0].partition("#")[0]))
 
 
-def roles_of(method: str, path: str) -> frozenset[Role] | None:
-    """The roles that may use an address; None: anyone."""
+def rule_of(method: str, path: str) -> Rule:
+    """The row of an address in the matrix."""
     found = [
         rule
         for (named, template), rule in ROWS.items()
         if named == method and compile_path(template)[0].fullmatch(path)
     ]
     assert found, f"no route for {method} {path}"
-    return found[0].roles
+    return found[0]
+
+
+def is_refused(rule: Rule, role: Role, confined: bool) -> bool:
+    """Return whether somebody may not use an address."""
+    if rule.roles is None:
+        return False
+    return role not in rule.roles or (confined and rule.where == "everything")
 
 
 @pytest.mark.parametrize("status", [RunStatus.ACTIVE, RunStatus.PAUSED, RunStatus.STOPPED])
-@pytest.mark.parametrize(("role", "page"), PLACES)
+@pytest.mark.parametrize(("role", "page", "confined"), PLACES)
 def test_no_page_offers_what_is_refused(
-    client: httpx2.Client, db: Database, mine: Claim, role: Role, page: str, status: RunStatus
+    client: httpx2.Client, db: Database, mine: Claim, role: Role, page: str, confined: bool, status: RunStatus
 ) -> None:
     answer(db, post_query(db, mine, 1, "guidance", 1, CLIPS), "left", "a", "human")
     run = get_run(db, mine.run_id)
     if status is not RunStatus.ACTIVE:
         set_status(db, run.id, status)
-    scope: dict[str, Any] = {"run": run.id, "client_id": "a"} if role is Role.PARENT else {}
+    scope: dict[str, Any] = {"run": run.id} if confined else {}
+    scope |= {"client_id": "a"} if role is Role.PARENT else {}
     client.headers["Authorization"] = f"Bearer {tokens.make(db, 'program', role, **scope).secret}"
-    shown = client.get(page.format(run=f"/runs/{run.public_id}"))
+    shown = client.get(page.format(run=f"/runs/{run.public_id}", id=run.public_id))
     assert shown.status_code == 200, shown.text
     found = Targets(shown.text).found
-    assert found
-    refused = {target for target in found if (roles := roles_of(*target)) is not None and role not in roles}
-    assert refused == set()
+    assert found or page == "/help", "a part of a page"
+    assert {target for target in found if is_refused(rule_of(*target), role, confined)} == set()
