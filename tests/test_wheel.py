@@ -133,7 +133,7 @@ def test_wheel_requires_what_its_code_imports(wheel: zipfile.ZipFile) -> None:
     text = wheel.read(metadata).decode()
     required = plain_names(re.findall(r"^Requires-Dist: ([\w.-]+)(?!.*extra ==)", text, re.M))
     extra = plain_names(
-        re.findall(r"^Requires-Dist: ([\w.-]+).*extra == .(?:figures|dask|parquet|postgres)", text, re.M)
+        re.findall(r"^Requires-Dist: ([\w.-]+).*extra == .(?:figures|dask|minari|parquet|postgres)", text, re.M)
     )
     code = [wheel.read(name).decode() for name in wheel.namelist() if name.endswith(".py")]
     assert lacking(set().union(*map(imported_by, code)), required | extra) == set()

@@ -169,12 +169,12 @@ def test_a_garden_goes_on_until_it_is_stopped(settings: Settings, db: Database) 
     assert run not in worker.sessions
 
 
-def test_a_dear_look_is_not_taken_at_each_answer(db: Database) -> None:
+def test_a_dear_look_is_not_taken_at_each_answer(settings: Settings, db: Database) -> None:
     """In the garden seconds lie between two rows; what is left over is written while the agent waits."""
     life = taken_up(db, start(db, NewRun(world="reward-hacking", parent="human")).id)
     run = life.claim.run_id
     life.evaluation.refresh_seconds = 1e9
-    with TestClient(create_app(Settings(), db), base_url="http://localhost") as web:
+    with TestClient(create_app(settings, db), base_url="http://localhost") as web:
         parent = script(web, run)
         while life.last_tick < 30:
             seen = worker_side.watch(db, [run])[run]

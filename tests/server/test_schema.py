@@ -35,7 +35,6 @@ OPERATIONS = [
 ]
 DRAWN = drawn(max_examples=EXAMPLES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 whole = cache(description)
-KNOWN = {"Authorization": bearer(80)}
 
 
 @pytest.fixture
@@ -78,8 +77,8 @@ def test_what_is_not_foreseen_is_found(
 ) -> None:
     app, seen = replies
     case = whole()["/api/v1/runs/{run_id}"]["GET"].Case(path_parameters={"run_id": 1})
-    seen[case.call_and_validate(app=app, headers=KNOWN).status_code] += 1
+    seen[case.call_and_validate(app=app, headers={"Authorization": bearer(80)}).status_code] += 1
     monkeypatch.setattr("parenting.server.api.runs.run_schema", sabotage)
     # structlog's own output may be a file that an earlier test has closed
     with capture_logs(), pytest.raises(FailureGroup, match=found):
-        case.call_and_validate(app=app, headers=KNOWN)
+        case.call_and_validate(app=app, headers={"Authorization": bearer(80)})
