@@ -20,6 +20,7 @@ import pytest
 from parenting.server.db import connect
 from parenting.server.migrate import upgrade
 from parenting.server.settings import Settings
+from tests.access import bearer, seed
 from tests.faults.seeds import draws
 from tests.lengths import length
 from tests.server.serving import free_port, until_up
@@ -29,16 +30,19 @@ FILES = 1024
 GET = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
 START = b'{"world": "unsafe-exploration", "name": "Zo\xc3\xab", "seed": 7}'
 SEEDS = (
-    b"GET /api/v1/runs?limit=5 HTTP/1.1\r\nHost: localhost\r\nCookie: a=b; c\r\nAccept: text/html\r\n\r\n",
-    b"GET /runs/1/parent HTTP/1.1\r\nHost: localhost:8765\r\nIf-None-Match: x\r\n\r\n",
-    b"GET /static/site.css HTTP/1.1\r\nHost: localhost\r\nRange: bytes=0-5\r\n\r\n",
-    b"POST /api/v1/runs/1/goal HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    b"GET /api/v1/runs?limit=5 HTTP/1.1\r\nPROOF\r\nHost: localhost\r\nCookie: a=b; c\r\n"
+    b"Accept: text/html\r\n\r\n",
+    b"GET /runs/1/parent HTTP/1.1\r\nPROOF\r\nHost: localhost:8765\r\nIf-None-Match: x\r\n\r\n",
+    b"GET /static/site.css HTTP/1.1\r\nPROOF\r\nHost: localhost\r\nRange: bytes=0-5\r\n\r\n",
+    b"POST /api/v1/runs/1/goal HTTP/1.1\r\nPROOF\r\nHost: localhost\r\nContent-Type: application/json\r\n"
     b'Content-Length: 11\r\n\r\n{"goal": 5}',
-    b"POST /api/v1/runs/1/queries/lease HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    b"POST /api/v1/runs/1/queries/lease HTTP/1.1\r\nPROOF\r\nHost: localhost\r\n"
+    b"Content-Type: application/json\r\n"
     b'Transfer-Encoding: chunked\r\n\r\n12\r\n{"client_id": "a"}\r\n0\r\n\r\n',
-    b"POST /runs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/x-www-form-urlencoded\r\n"
+    b"POST /runs HTTP/1.1\r\nPROOF\r\nHost: localhost\r\nContent-Type: application/x-www-form-urlencoded\r\n"
     b"Content-Length: 33\r\n\r\nworld=unsafe-exploration&seed=%31%",
 )
+"""Requests of the researcher: `Web.known` puts the header Authorization into them."""
 PIECES = (
     b"\x00",
     b"\r\n",
@@ -71,6 +75,7 @@ class Web:
         db = connect(Settings(data=data, database_url=None))
         upgrade(db)
         db.close()
+        seed(data)
         self.port = free_port()
         code = (
             f"import resource; resource.setrlimit(resource.RLIMIT_NOFILE, ({FILES}, {FILES}));"
@@ -82,6 +87,10 @@ class Web:
             [sys.executable, "-P", "-c", code, "web", "--port", str(self.port)], env=environment, cwd=data
         )
         until_up(f"http://127.0.0.1:{self.port}")
+
+    def known(self, request: bytes) -> bytes:
+        """A request with the header by which it is let in."""
+        return request.replace(b"PROOF", f"Authorization: {bearer(self.port)}".encode())
 
     def connect(self) -> socket.socket:
         return socket.create_connection(("127.0.0.1", self.port), timeout=10)
@@ -153,12 +162,14 @@ def test_more_idle_connections_than_files_keep_nobody_out(web: Web) -> None:
 def test_mutated_bytes_get_no_5xx_and_hurt_nobody(web: Web) -> None:
     """It takes half a minute: 20,000 mutations, each on a connection of its own."""
     draw = draws("mutated bytes")
-    started = b"POST /api/v1/runs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    started = web.known(
+        b"POST /api/v1/runs HTTP/1.1\r\nPROOF\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    )
     made = web.ask(started + b"Connection: close\r\nContent-Length: %d\r\n\r\n" % len(START) + START)
     assert b" 201 " in made.splitlines()[0]
     before, statuses = web.megabytes(), Counter[bytes]()
     for _ in range(length(20_000, 200_000) // 500):
-        sent = [mutated(draw) for _ in range(500)]
+        sent = [mutated(draw, web) for _ in range(500)]
         for request, reply in zip(sent, exchanged(web, sent), strict=True):
             found = re.findall(rb"HTTP/1\.1 (\d)", reply)
             statuses.update(found)
@@ -166,7 +177,9 @@ def test_mutated_bytes_get_no_5xx_and_hurt_nobody(web: Web) -> None:
     assert min(statuses[b"2"], statuses[b"4"]) > 1000, statuses
     assert web.is_alive()
     assert web.megabytes() - before < 60
-    assert b"Zo" in web.ask(b"GET /api/v1/runs/1 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+    assert b"Zo" in web.ask(
+        web.known(b"GET /api/v1/runs/1 HTTP/1.1\r\nPROOF\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+    )
 
 
 def exchanged(web: Web, sent: Sequence[bytes]) -> list[bytes]:
@@ -198,9 +211,9 @@ def exchanged(web: Web, sent: Sequence[bytes]) -> list[bytes]:
     return replies
 
 
-def mutated(draw: random.Random) -> bytes:
+def mutated(draw: random.Random, web: Web) -> bytes:
     """A request with one to four bytes or pieces changed, dropped, doubled or put in."""
-    request = bytearray(draw.choice(SEEDS))
+    request = bytearray(web.known(draw.choice(SEEDS)))
     for _ in range(draw.choice((1, 1, 2, 4))):
         at = draw.randrange(len(request) + 1)
         kind = draw.randrange(5)
