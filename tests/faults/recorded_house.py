@@ -19,6 +19,7 @@ import torch
 from pysqlite3 import dbapi2 as sqlite
 
 from parenting.server.settings import Settings
+from tests import access
 from tests.faults.house import House
 
 PARENTS = 3
@@ -56,6 +57,7 @@ class Weakened(House):
 def main(data: Path, answers: int, level: str) -> None:
     """Live until so many answers were told."""
     torch.set_num_threads(1)
+    access.use()  # pytest has not loaded its settings here
     with Weakened(Settings(data=data, database_url=None), level) as house:
         runs = [row["id"] for row in house.store.rows("SELECT id FROM run")]
         house.keep()
