@@ -13,7 +13,8 @@ from parenting.weights.answers_file import MOST_BYTES, AnswersFileError
 
 MANIFEST, ANSWERS, QUESTIONS = "manifest.json", "answers.jsonl", "questions.jsonl"
 OF_ANSWER = ("world", "kind", "maturity", "votes", "choice", "standing")
-BROKEN = (BadZipFile, EOFError, KeyError, NotImplementedError, OSError, RuntimeError, TypeError, ValueError)
+UNREADABLE = (BadZipFile, EOFError, KeyError, NotImplementedError, OSError, RuntimeError)
+"""The errors of a file that is missing in a folder or a zip, or that cannot be read."""
 
 
 def is_export(path: Path) -> bool:
@@ -34,7 +35,7 @@ def lines_of(path: Path) -> bytes:
             return _joined({name: _reader(zipped, name) for name in (MANIFEST, ANSWERS, QUESTIONS)})
     except AnswersFileError:
         raise
-    except BROKEN:
+    except (*UNREADABLE, TypeError, ValueError):
         raise AnswersFileError("it is not an export that `parenting export --out` has written") from None
 
 

@@ -18,13 +18,13 @@ from parenting.server.archive.columns import Column, Row
 from parenting.server.archive.manifest import Manifest
 from parenting.server.archive.target import MANIFEST
 from parenting.server.errors import SetupError
+from parenting.weights.answers_export import UNREADABLE
 
 LARGEST_MANIFEST = 64 * 2**20
 """Bytes of a manifest that are read at most."""
 LARGEST_BLOB = 2 * 2**30
 """Bytes of a checkpoint, or of what a run began with, that are read at most."""
 PIECE = 2**20
-UNREADABLE = (BadZipFile, EOFError, KeyError, NotImplementedError, OSError, RuntimeError)
 Progress = Callable[[int, int], None]
 
 

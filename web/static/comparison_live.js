@@ -1,6 +1,7 @@
-// Runs that go on: now and then the page asks the server for itself, and takes over the numbers that have changed. So the
-// tables stay the server's, and one request tells which curves have grown.
-const EVERY = 2000, SHARE = 10; // ms between two looks; a look and the drawing after it take a tenth of the time at most
+// Runs that go on: the tables stay the server's, and one request tells which curves have grown.
+import { fetched, follow } from "./following.js";
+
+const EVERY = 2000; // ms between two looks
 const ROWS = "tr[data-group]";
 const of = (page) => [...page.querySelectorAll(ROWS)];
 const name = ({ dataset: { run, group } }) => `${run ?? ""} ${group}`;
@@ -16,15 +17,9 @@ function update(row, fresh) {
 // Calls `moved(numbers)` with the runs that have gone on, waits until it has settled, and goes on until all runs are over.
 export function following(moved) {
   const said = document.getElementById("living");
-  let timer = 0, busy = false;
-
-  async function fetched() {
-    const reply = await fetch(location.href).catch(() => null);
-    return reply?.ok ? new DOMParser().parseFromString(await reply.text(), "text/html") : null;
-  }
 
   async function look() {
-    const page = await fetched();
+    const page = await fetched(location.href);
     if (!page) return void (said.textContent = "No connection to the server. These numbers are of a moment ago.");
     const mine = of(document), fresh = of(page);
     if (mine.map(name).join() !== fresh.map(name).join()) return location.reload(); // a filter leaves others by now
@@ -35,19 +30,5 @@ export function following(moved) {
     if (numbers.length) await moved(numbers);
   }
 
-  async function turn() {
-    timer = 0;
-    if (busy || document.hidden || !lives()) return;
-    busy = true;
-    const began = performance.now();
-    try {
-      await look();
-    } finally {
-      busy = false;
-      timer = setTimeout(turn, Math.max(EVERY, SHARE * (performance.now() - began)));
-    }
-  }
-
-  document.addEventListener("visibilitychange", () => { if (!timer) turn(); });
-  timer = setTimeout(turn, EVERY);
+  follow(look, lives, EVERY);
 }

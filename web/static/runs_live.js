@@ -1,5 +1,7 @@
-// The list of runs follows the runs on it: now and then the page asks the server for itself, and takes over what has changed.
-const EVERY = 3000, SHARE = 10; // ms between two looks; a look takes a tenth of the time at most
+// The list of runs follows the runs on it.
+import { fetched, follow } from "./following.js";
+
+const EVERY = 3000; // ms between two looks
 const list = document.querySelector("ul.runs");
 const lives = () => list.querySelector("li.run:not(.over)") !== null;
 
@@ -25,29 +27,13 @@ function update(fresh) {
 export function following() {
   if (!list) return;
   const said = document.getElementById("runs-said");
-  let timer = 0, busy = false;
 
   async function look() {
-    const reply = await fetch(list.dataset.address).catch(() => null);
-    const page = reply?.ok ? new DOMParser().parseFromString(await reply.text(), "text/html") : null;
+    const page = await fetched(list.dataset.address);
     said.textContent = page ? "" : "No connection to the server. These numbers are of a moment ago.";
     const fresh = page?.querySelector("ul.runs");
     if (fresh) update(fresh);
   }
 
-  async function turn() {
-    timer = 0;
-    if (busy || document.hidden || !lives()) return;
-    busy = true;
-    const began = performance.now();
-    try {
-      await look();
-    } finally {
-      busy = false;
-      timer = setTimeout(turn, Math.max(EVERY, SHARE * (performance.now() - began)));
-    }
-  }
-
-  document.addEventListener("visibilitychange", () => { if (!timer) turn(); });
-  timer = setTimeout(turn, EVERY);
+  follow(look, lives, EVERY);
 }
