@@ -32,8 +32,11 @@ import torch
 from torch import Tensor
 
 from parenting.server import runs
+from parenting.server.archive.format1 import read_table
+from parenting.server.archive.format1_import import import_table
 from parenting.server.db import Database, connect
 from parenting.server.export import lines
+from parenting.server.exports import Part, exported
 from parenting.server.migrate import upgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.operator_events import add_operator_event
@@ -86,9 +89,26 @@ def check(folder: Path) -> dict[str, Any]:
             for run in (FINISHED, HALF):
                 found = relive(db, run)
                 replays[str(run)] = {"tick": found.tick, "parted": found.parted, "differ": list(found.differ)}
-            return {"replays": replays, "goes_on": {str(run): _go_on(db, run) for run in (HALF, EARLY)}}
+            imported = {str(run): _import(db, Path(name), run) for run in (FINISHED, HALF, EARLY)}
+            goes_on = {str(run): _go_on(db, run) for run in (HALF, EARLY)}
+            return {"replays": replays, "imported": imported, "goes_on": goes_on}
         finally:
             db.close()
+
+
+def _import(db: Database, folder: Path, number: int) -> int:
+    """Import the table of answers that the version wrote (format 1); return the last tick of its record."""
+    run, log, data = runs.get_run(db, number), folder / "log.jsonl", folder / f"imported-{number}"
+    log.write_text("".join(exported(db, number, Part.EVENTS)), encoding="utf-8")
+    level = {"level_text": run.level_text, "level": None}
+    new = NewRun(world=run.world, parent=run.parent, seed=run.seed, config=run.config, **level)  # type: ignore[arg-type]
+    other = connect(Settings(data=data, database_url=None))
+    try:
+        upgrade(other)
+        found = import_table(other, read_table(folder / "data" / f"run-{number}.jsonl", log), new)
+        return worker_side.high_water(other, found.number)
+    finally:
+        other.close()
 
 
 def _live(db: Database) -> None:

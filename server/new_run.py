@@ -5,7 +5,7 @@ This module imports no torch.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -131,11 +131,13 @@ def start(
     origin: Origin = NO_ORIGIN,
     bound: Bound = BOUND,
     most: int | None = None,
+    fill: Callable[[Session, Run], None] = lambda session, run: None,
 ) -> Run:
     """Check a new run against worlds and hyperparameters, and add it, with all that it begins with.
 
     `folder` holds weights of one's own; those of the built-in levels are shipped, and others may be stored.
     `bound` is the most that it may cost, `most` the number of runs that may live (None: any).
+    `fill` stores what else belongs to the run, in the same transaction.
 
     Raises:
         InvalidFieldsError: names every wrong field, with a message each.
@@ -153,6 +155,7 @@ def start(
         run = Run(id=unused_number(session, Run), created=db.clock(), **columns)
         session.add(run)
         session.flush()
+        fill(session, run)
         return run
 
 

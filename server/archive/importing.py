@@ -99,7 +99,7 @@ def _put(session: Session, db: Database, found: Source, progress: Progress) -> l
 
 def _run(session: Session, now: datetime, found: Source, entry: RunEntry) -> Run:
     told = entry.settings
-    run = Run(id=unused_number(session, Run), public_id=_unused_id(session, entry.run))
+    run = Run(id=unused_number(session, Run), public_id=unused_id(session, entry.run))
     for name in (*SETTINGS, *STATE):
         value = None if name in LOST else told[name]
         setattr(run, name, _time(value) if name in TIMES and value is not None else value)
@@ -115,7 +115,8 @@ def _run(session: Session, now: datetime, found: Source, entry: RunEntry) -> Run
     return run
 
 
-def _unused_id(session: Session, wanted: str) -> str:
+def unused_id(session: Session, wanted: str) -> str:
+    """Return a public id for a run: the wanted one, unless the database has such a run or had it."""
     taken = session.scalar(select(Run.id).where(Run.public_id == wanted))
     buried = session.scalar(select(Tombstone.id).where(Tombstone.public_id == wanted))
     return public_id() if taken or buried or not is_public_id(wanted) else wanted

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from parenting.agent.config import FIELDS, Config
 from parenting.commands.main import app
-from parenting.commands.start import OPTIONS
+from parenting.commands.run_settings import OPTIONS
 from parenting.envs import registry
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun

@@ -8,6 +8,7 @@ import re
 import tarfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -19,10 +20,14 @@ from typer.testing import CliRunner
 from parenting.commands.main import app
 from parenting.server import runs
 from parenting.server.app import create_app
+from parenting.server.archive.format1 import read_table
+from parenting.server.archive.format1_import import import_table
 from parenting.server.db import Database, connect
 from parenting.server.errors import NotFound, SetupError
 from parenting.server.export import lines
+from parenting.server.exports import Part, exported
 from parenting.server.migrate import require_current, upgrade
+from parenting.server.new_run import NewRun
 from parenting.server.operator_events import add_operator_event
 from parenting.server.queue import answers, leases, worker_side
 from parenting.server.replay import relive
@@ -40,6 +45,8 @@ WRITTEN_WITH = ("AVX2", "AVX512")
 NAMES = ["database", "run_public_id", "query_public_id", "guidance_layout", "practice", "words", "remarks"]
 NAMES += ["votes", "script", "leased", "replays", "reason", "effects"]
 """The keys that later versions add to a row of the export."""
+SAME = ("number", "kind", "tick", "applied_tick", "policy", "left", "right", "choice", "received", "standing")
+"""The keys that are the same of a run that was imported from its table."""
 PAGES = ("/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/runs/{}/why", "/api/v1/runs/{}/queries")
 
 
@@ -166,6 +173,20 @@ def test_it_goes_on_with_the_bits_of_the_old_version(db: Database, same_build: N
     assert runs.get_run(db, run).answers == expected["answers"]
     assert digest(state.learner.params) == expected["parameters"]
     assert digest(state.familiarity) == expected["familiarity"]
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_its_table_of_answers_is_a_run_again(
+    db: Database, same_build: None, settings: Settings, tmp_path: Path, run: int
+) -> None:
+    was, log = runs.get_run(db, run), tmp_path / "log.jsonl"
+    log.write_text("".join(exported(db, run, Part.EVENTS)))
+    table = read_table(settings.data / f"run-{run}.jsonl", log)
+    kept: dict[str, Any] = {"world": was.world, "parent": was.parent, "seed": was.seed, "config": was.config}
+    found = import_table(db, table, NewRun(**kept, level_text=was.level_text))
+    rows = [[json.loads(line) for line in lines(db, number)] for number in (run, found.number)]
+    assert [{k: row[k] for k in SAME} for row in rows[1]] == [{k: row[k] for k in SAME} for row in rows[0]]
+    assert worker_side.high_water(db, found.number) == table.last
 
 
 def digest(tensor: Tensor) -> str:
