@@ -6,9 +6,11 @@ compared and drawn, and cannot go on, be replayed, or show its policy.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from sqlalchemy import select
 
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
@@ -72,6 +74,13 @@ def _store(db: Database, shared: Mapping[str, Any], trial: EndedTrial) -> int:
             Metric(run_id=run.id, tick=tick, values=dict(values)) for tick, values in trial.metrics.items()
         )
         return run.id
+
+
+def trials_of(db: Database, batch: str, most: int) -> Sequence[int]:
+    """Return the numbers of the runs of a batch that are left, the first of them, in their order."""
+    of_batch = select(Run.id).where(Run.batch == batch, Run.deleting.is_(None))
+    with db.read() as session:
+        return session.scalars(of_batch.order_by(Run.id).limit(most)).all()
 
 
 def refuse_if_of_batch(run: Run) -> None:

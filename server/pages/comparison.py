@@ -21,7 +21,7 @@ from parenting.server.new_run import LARGEST_INT
 from parenting.server.pages.labels import MetricLabels, metric_labels
 from parenting.server.pages.render import page, redirect
 from parenting.server.pages.texts import run_title
-from parenting.server.reads.comparison import Group, differences, found_runs, grouped, ranges
+from parenting.server.reads.comparison import Group, differences, found_runs, grouped, labels, ranges
 from parenting.server.reads.curves import POINTS, Axis, read_curves
 from parenting.server.tables import Run
 
@@ -80,6 +80,7 @@ class ComparisonPage:
     by: Axis
     share: Mapping[str, str]  # the query of this page's address, by axis
     groups: Sequence[Group]
+    labels: Sequence[str]  # what tells each group from the others, in a word or two; or ""
     differences: Sequence[tuple[str, list[Any]]]
     charts: Sequence[tuple[str, str, str]]
     names: MetricLabels
@@ -174,13 +175,14 @@ def _fields(run: Run) -> dict[str, str]:
 def _content(db: Database, choice: Choice, by: Any) -> ComparisonPage:
     groups = grouped(db, choice.left)
     chosen = [(one.name, one.chosen) for one in choice.filters if one.chosen]
-    labels = {metric_labels(run.legend) for run in choice.left}
-    names = labels.pop() if len(labels) == 1 else OF_MANY_WORLDS
+    of_worlds = {metric_labels(run.legend) for run in choice.left}
+    names = of_worlds.pop() if len(of_worlds) == 1 else OF_MANY_WORLDS
     return ComparisonPage(
         choice=choice,
         by=by,
         share={axis: _query([("runs", choice.text), ("by", axis), *chosen]) for axis in AXES},
         groups=groups,
+        labels=labels(groups),
         differences=differences(groups) if len(groups) > 1 else [],
         charts=[(metric, name.format(**names._asdict()), text) for metric, name, text in CHARTS],
         names=names,

@@ -14,9 +14,11 @@ from fastapi.responses import JSONResponse
 from parenting.server import operator_events, runs
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
+from parenting.server.batches import trials_of
 from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.pages.board import board_panel
+from parenting.server.pages.comparison import MOST
 from parenting.server.pages.labels import MetricLabels, describe_start, metric_labels
 from parenting.server.pages.operator_log import PROBABILITIES, LogEntry, log_entries, probabilities
 from parenting.server.pages.render import format_number, moved, page
@@ -77,6 +79,7 @@ class DashboardPage:
     errors: Mapping[str, str]  # a sentence for each wrong field
     focus: str | None  # the first wrong field
     sentences: Mapping[str, tuple[str, str]] = field(default_factory=lambda: STATUS)
+    trials: Sequence[int] = ()  # the numbers of the runs of its batch, as many as are compared at most
     more: int = GOAL_STEP  # answers that the goal grows by
 
 
@@ -128,7 +131,8 @@ def dashboard_page(
     """
     run = runs.get_run(db, run_id)
     state, focus = run_schema(db, run_id).state, next(iter(errors), None)
-    context = DashboardPage(run, parent_title(run), state, describe_start(run), errors, focus)
+    trials = () if run.batch is None else trials_of(db, run.batch, MOST)
+    context = DashboardPage(run, parent_title(run), state, describe_start(run), errors, focus, trials=trials)
     numbers = _numbers(db, run)
     parts = {**vars(context), **vars(numbers), **vars(_operator(db, run, typed))}
     board = board_panel(db, run, numbers.names.harm)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, NamedTuple
 from urllib.parse import urlencode
@@ -15,6 +15,7 @@ from parenting.server.access.guard import principal_of
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.damage import sound
+from parenting.server.db import Database
 from parenting.server.deps import Db
 from parenting.server.errors import DamagedRowError
 from parenting.server.new_run import LARGEST_INT
@@ -22,6 +23,7 @@ from parenting.server.pages.measures_text import measures_text
 from parenting.server.pages.question import QuestionView, question_view
 from parenting.server.pages.render import moved, page
 from parenting.server.pages.texts import parent_title
+from parenting.server.persons import pseudonyms
 from parenting.server.reads import answers
 from parenting.server.reads.answers import Answered
 from parenting.server.schemas import Said
@@ -106,7 +108,7 @@ def history_page(
     context = HistoryPage(
         run,
         parent_title(run),
-        _entries(rows[:PAGE], run, _me(request)),
+        _entries(rows[:PAGE], run, _me(request), known_people(db, [row.answer for row in rows])),
         urlencode({**kept, "before": _last_number(rows[:PAGE])}) if len(rows) > PAGE else None,
         urlencode(kept) if before is not None else None,
         kind,
@@ -123,11 +125,18 @@ def _last_number(rows: Sequence[Answered]) -> int | None:
     return next((row.answer.number for row in reversed(rows) if row.placed), None)
 
 
-def _entries(rows: Sequence[Answered], run: Run, mine: str) -> list[Entry | DamagedEntry]:
-    return [_entry(row, run, mine) for row in rows]
+def known_people(db: Database, given: Iterable[tables.Answer]) -> Mapping[str, str]:
+    """Return the pseudonyms of those who gave these answers, by the names under which they answered."""
+    return pseudonyms(db, {name for answer in given if isinstance(name := sound(answer, "client_id"), str)})
 
 
-def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
+def _entries(
+    rows: Sequence[Answered], run: Run, mine: str, people: Mapping[str, str]
+) -> list[Entry | DamagedEntry]:
+    return [_entry(row, run, mine, people) for row in rows]
+
+
+def _entry(row: Answered, run: Run, mine: str, people: Mapping[str, str]) -> Entry | DamagedEntry:
     answer, query = row.answer, row.query
     found = row.damage
     if found is not None:
@@ -142,7 +151,7 @@ def _entry(row: Answered, run: Run, mine: str) -> Entry | DamagedEntry:
         ("left", "right") if answer.choice == "either" else (answer.choice,),
         _fallen(answer, query),
         answer.standing and answer.parent == "human" and answer.client_id == mine,
-        who(answer.parent, answer.client_id, mine),
+        who(answer.parent, answer.client_id, mine, people),
         f"{answer.received:%Y-%m-%d %H:%M:%S}",
         "" if answer.measured is None else measures_text(answer.measured, answer.replays),
         query.tick,
@@ -169,10 +178,10 @@ def _fallen(answer: tables.Answer, query: tables.Query) -> str:
     return tr("taken back") if back else tr("corrected later")
 
 
-def who(parent: str, client_id: str, mine: str) -> str:
-    """Say who answered, to the client `mine`."""
+def who(parent: str, client_id: str, mine: str, people: Mapping[str, str]) -> str:
+    """Say who answered, to the client `mine`; others by their pseudonyms, as `/persons` and exports do."""
     if parent == "scripted":
         return tr("a script")
     if client_id == mine:
         return tr("you, in this browser")
-    return tr("a person ({name})", name=client_id[:8])
+    return tr("a person ({name})", name=people[client_id]) if client_id in people else tr("a person")

@@ -16,7 +16,7 @@ from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db
-from parenting.server.pages.history import said, who
+from parenting.server.pages.history import known_people, said, who
 from parenting.server.pages.numbers import number
 from parenting.server.pages.parent import QueryShown, question_of
 from parenting.server.pages.question import QuestionView, question_view, side_names
@@ -95,6 +95,7 @@ def _page(db: Database, run: Run, asked: Query, mine: str) -> WhyPage:
     reason = found.guidance or found.preference
     begins = {asked.clips[side]["actions"][0]: name for side, name in _sides(asked, run).items()}
     answers = _rows(db, asked)
+    people = known_people(db, answers.values())
     standing = next((given.choice for given in found.answers if given.standing), "")
     before, after = neighbours(db, asked)
     return WhyPage(
@@ -110,7 +111,7 @@ def _page(db: Database, run: Run, asked: Query, mine: str) -> WhyPage:
         _time(found.posted),
         "" if found.leased is None else _time(found.leased),
         [
-            _given(found, one, who(one.parent, answers[one.number].client_id, mine), shown)
+            _given(found, one, who(one.parent, answers[one.number].client_id, mine, people), shown)
             for one in found.answers
         ],
         before,

@@ -138,6 +138,20 @@ def differences(groups: Sequence[Group]) -> list[tuple[str, list[Any]]]:
     return found
 
 
+def labels(groups: Sequence[Group]) -> list[str]:
+    """Return words that tell the groups apart: the names that their runs share, or else their presets.
+
+    Where neither tells every group from the others, all of them are empty.
+    """
+    names = [{one.run.name for one in group.runs} for group in groups]
+    presets = [{one.run.preset for one in group.runs} for group in groups]
+    for of_groups in (names, presets):
+        found = [next(iter(words)) if len(words) == 1 else None for words in of_groups]
+        if len(groups) > 1 and None not in found and len(set(found)) == len(groups):
+            return [str(word) for word in found]
+    return [""] * len(groups)
+
+
 def ranges(numbers: Sequence[int]) -> str:
     """Return numbers in their order, runs of them as ranges: "1-3, 7"."""
     parts: list[list[int]] = []

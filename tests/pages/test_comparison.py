@@ -15,10 +15,11 @@ from parenting.server.db import Database
 from parenting.server.deletion import begin
 from parenting.server.metrics import write_metrics
 from parenting.server.pages.comparison import points_each, read_numbers
-from parenting.server.reads.comparison import letter, ranges
+from parenting.server.reads.comparison import Compared, Group, labels, letter, ranges
 from parenting.server.runs import claim as claims
 from parenting.server.runs import report_progress, set_status
 from parenting.server.statuses import RunStatus
+from parenting.server.tables import Run
 from tests.pages import island_fixtures as fixtures
 from tests.pages.axe import violated
 from tests.pages.browser_tabs import BrowserTabs, until
@@ -140,6 +141,31 @@ def test_the_data_of_a_chart(client: httpx2.Client, runs: None) -> None:
     assert lines[10] == "A,1,0,9.0,1.0"
     assert lines[-1] == "B,4,3,12.0,3.0"
     assert client.get("/compare/data?runs=1&metric=password").status_code == 422
+
+
+@pytest.mark.parametrize(
+    ("runs", "said"),
+    [
+        ([(None, "lax"), (None, "direct")], ["lax", "direct"]),
+        ([("one", "lax"), ("<two>", "lax")], ["one", "<two>"]),
+        ([("one", "lax"), (None, "direct")], ["lax", "direct"]),
+        ([("one", "lax"), ("one", "lax")], ["", ""]),
+        ([("one", "lax")], [""]),
+    ],
+)
+def test_groups_are_called_by_what_tells_them_apart(
+    runs: list[tuple[str | None, str]], said: list[str]
+) -> None:
+    groups = [Group("A", {}, [Compared(Run(name=name, preset=preset), {})]) for name, preset in runs]
+    assert labels(groups) == said
+
+
+def test_a_label_stands_beside_its_letter(client: httpx2.Client, db: Database) -> None:
+    for preset in ("lax", "direct"):
+        fixtures.start_run(db, preset=preset, name=f"<{preset}>")
+    page = client.get("/compare?runs=1-2").text
+    assert [row[0] for row in rows(page, "Final numbers by group")] == ["A: &lt;lax&gt;", "B: &lt;direct&gt;"]
+    assert 'data-label="&lt;lax&gt;"' in page
 
 
 def test_names_of_groups_and_lists() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import httpx2
 import pytest
@@ -157,8 +158,10 @@ def test_a_trial_of_a_batch_says_so_and_offers_nothing_that_it_lacks(
     }
     row = {"deaths": 2, "guidance": 3, "preference": 1, "maturity": 1, "return": 0.5}
     ended = EndedTrial(4, 30, 1, False, 4, False, "It was given up as unfinished after 30 ticks.", {30: row})
-    store_batch(db, shared, [ended])
+    store_batch(db, shared, [ended, replace(ended, number=5)])
     page = client.get("/runs/1").text
+    assert '<a href="/compare?runs=1,2">Compare 2 trials of the batch</a>' in page
+    assert "Run 1: <bdi>Unsafe Exploration</bdi>, <bdi>island</bdi>; " in page
     for said in ("seed 7, trial 4 of a batch", "It was trained in a batch", ended.reason):
         assert said in page
     assert '<span id="now-answered">4</span>' in page

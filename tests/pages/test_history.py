@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 
 from parenting.server.db import Database
 from parenting.server.pages.history import PAGE
+from parenting.server.persons import pseudonyms
 from parenting.server.queue import answers, revisions, worker_side
 from parenting.server.runs import Claim, get_run
 from tests.pages import island_fixtures as fixtures
@@ -70,8 +71,10 @@ def test_an_answer_with_all_that_is_known_of_it(client: httpx2.Client, db: Datab
     second = entry(page, 2)
     assert "Both too dangerous" in second
     assert second.count("refused") == 2
-    for part in ("preference", "Heard not yet", "a person (somebody)", "UTC"):
+    known = pseudonyms(db, ["somebody-else"])["somebody-else"]
+    for part in ("preference", "Heard not yet", f"a person ({known})", "UTC"):
         assert part in second
+    assert "somebody" not in page, "the name of a browser lets others answer as this person"
     third = entry(page, 3)
     assert "By a script" in third
     assert third.count("equal") == 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import httpx2
 
 from parenting.server import erasure
@@ -25,6 +27,9 @@ def test_a_person_is_listed_and_a_worker_deletes_what_the_page_was_told(
     ann = pseudonyms(db, [ANN])[ANN]
     name_person(db, ann, "<b>Ann</b>", None)
     listed = client.get("/persons").text
+    for place in ("persons", "audit", "access"):
+        found = re.findall(r'<a href="/(access|persons|audit)"', client.get(f"/{place}").text)
+        assert found == ["access", "persons", "audit"], "they lead to each other"
     assert f"<b>{ann}</b> (<bdi>&lt;b&gt;Ann&lt;/b&gt;</bdi>)" in listed
     assert ANN not in listed, "the name of a browser lets others answer as this person"
     asks = client.get(f"/persons/{ann}/delete").text

@@ -10,7 +10,12 @@ const STEPS = new Set(["deaths", "guidance", "preference", "rows"]);
 const { by, points } = document.getElementById("main").dataset;
 const figures = [...document.querySelectorAll("[data-chart]")];
 const metrics = figures.map((figure) => figure.dataset.chart);
-const groups = [...document.querySelectorAll("tr[data-group]:not([data-run])")].map((row) => row.dataset.group);
+const heads = [...document.querySelectorAll("tr[data-group]:not([data-run])")].map((row) => row.dataset);
+const groups = heads.map(({ group }) => group), LONGEST = 24; // letters of a label in a legend
+// Plotly reads a legend as markup, and a label is what somebody has typed.
+const plain = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+const short = (letters) => letters.slice(0, LONGEST).join("") + (letters.length > LONGEST ? "…" : "");
+const names = heads.map(({ group, label }) => plain(label ? `${group}: ${short([...label])}` : group));
 const runs = [...document.querySelectorAll("tr[data-run]")].map(({ dataset: { run, group } }) => ({ run, group, place: groups.indexOf(group), curves: curvesOf(run, metrics, { by, points }), loaded: false }));
 let timer = 0, version = 0;
 
@@ -22,7 +27,7 @@ function traces(metric) {
     const first = !named.has(group);
     named.add(group);
     return {
-      type: "scatter", mode: "lines", ...curves.curve(metric, metric), name: group, legendgroup: group, showlegend: first,
+      type: "scatter", mode: "lines", ...curves.curve(metric, metric), name: names[place], legendgroup: group, showlegend: first,
       hovertemplate: `run ${run} (${group})<br>${by} %{x:.6~g}: %{y:.6~g}<extra></extra>`,
       line: { width: runs.length > 20 ? 1 : 2, shape: STEPS.has(metric) ? "hv" : "linear", color: colour(COLOURS[place % COLOURS.length]), dash: DASHES[place % DASHES.length] },
     };
