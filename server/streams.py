@@ -18,6 +18,7 @@ from typing import TypeVar
 import structlog
 from fastapi.sse import ServerSentEvent
 
+from parenting.server.access.staying import Stay
 from parenting.server.admission import Admission
 from parenting.server.db import Database
 from parenting.server.errors import ServerError, StoreError, TooManyStreamsError
@@ -75,13 +76,18 @@ class Streams:
             self._loop.remove_reader(self.notifier.listen())
         self.notifier.close()
 
-    async def subscribe(self, run_id: int, after: int | None) -> AsyncIterator[ServerSentEvent]:
-        """The events of a run; `metrics` of the ticks after `after` are among them unless that is None."""
+    async def subscribe(
+        self, run_id: int, after: int | None, stay: Stay | None = None
+    ) -> AsyncIterator[ServerSentEvent]:
+        """The events of a run, until its `stay` is over.
+
+        `metrics` of the ticks after `after` are among them unless that is None.
+        """
         question, leases, run = "", "[]", ""
         with self.joined(run_id) as subscription:
             subscription.streams += 1
             try:
-                while not self.closed and not subscription.gone:
+                while not (self.closed or subscription.gone or (stay and await stay.is_over())):
                     changed, seen = subscription.changed, subscription.seen
                     if seen is not None and seen.question != question:
                         question = seen.question
@@ -95,7 +101,7 @@ class Streams:
                         async for event in self._metrics(run_id, subscription, after):
                             after = int(event.id or -1)
                             yield event
-                    await changed.wait()
+                    await (either(changed, stay.seconds) if stay else changed.wait())
             finally:
                 subscription.streams -= 1
 

@@ -8,6 +8,7 @@ from typing import Annotated
 from fastapi import Query, Request, Response
 from sqlalchemy.orm import Session
 
+from parenting.server.access.staying import Stay
 from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import AnswerBody, LeaseBody, NextBody
 from parenting.server.api.lists import AskedPart, AskedRows
@@ -62,7 +63,7 @@ async def lease_question(
     if leased is None and body.wait:
         streams: Streams = request.app.state.streams
         number = await streams.admission.read(run_number, db, run_id)
-        leased = await streams.wait_for(number, look, body.wait, request.is_disconnected)
+        leased = await streams.wait_for(number, look, body.wait, Stay(request).is_left)
     if leased is None:
         return Response(status_code=204)
     return Response(leased.model_dump_json(), media_type="application/json")

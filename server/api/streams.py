@@ -9,6 +9,7 @@ from fastapi import Depends, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
+from parenting.server.access.staying import Stay
 from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import After
 from parenting.server.api.lists import ExportPart
@@ -75,7 +76,7 @@ async def follow_run(
     ):
         after = max(after, int(last_event_id))
     with request.app.state.seats.taken(request):
-        async for event in request.app.state.streams.subscribe(run_id, after):
+        async for event in request.app.state.streams.subscribe(run_id, after, Stay(request)):
             yield event
 
 

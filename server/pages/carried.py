@@ -20,6 +20,7 @@ from pydantic import Field
 
 from parenting.server import runs
 from parenting.server.access.guard import principal_of
+from parenting.server.access.staying import Stay
 from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import ClientId, Strict
 from parenting.server.api.names import PublicId
@@ -36,6 +37,8 @@ from parenting.server.subscriptions import either
 from parenting.server.tables import Query, Run
 
 router = admitted_router(include_in_schema=False)
+
+Events = asyncio.Queue[ServerSentEvent | None]
 
 PAGES = 20
 """Pages of one stream."""
@@ -81,8 +84,8 @@ async def carry(
     `lost` the status of a run that is not here.
     """
     streams: Streams = request.app.state.streams
-    events: asyncio.Queue[ServerSentEvent | None] = asyncio.Queue(maxsize=100)
-    tasks = []
+    events: Events = asyncio.Queue(maxsize=100)
+    stay, tasks = Stay(request), []
     for at, (page, run) in enumerate(zip(body.pages, of, strict=True)):
         if run is None:
             yield _event("lost", at, 404)
@@ -93,16 +96,22 @@ async def carry(
             tasks.append(asyncio.create_task(asks))
     try:
         with request.app.state.seats.taken(request):
-            while (event := await events.get()) is not None:
+            while (event := await _next(events, stay)) is not None:
                 yield event
     finally:
         for task in tasks:
             task.cancel()
 
 
-async def _follow(
-    streams: Streams, run_id: int, at: int, events: asyncio.Queue[ServerSentEvent | None]
-) -> None:
+async def _next(events: Events, stay: Stay) -> ServerSentEvent | None:
+    """Return what comes next; None at the server's end, and once the browser's session is over."""
+    while not await stay.is_over():
+        with suppress(TimeoutError):
+            return await asyncio.wait_for(events.get(), stay.seconds)
+    return None
+
+
+async def _follow(streams: Streams, run_id: int, at: int, events: Events) -> None:
     """Pass on what happens in a run; the server's end ends the stream."""
     async for event in streams.subscribe(run_id, None):
         await events.put(ServerSentEvent(event=event.event, raw_data=f"[{at}, {event.raw_data}]"))
@@ -116,7 +125,7 @@ async def _ask(
     page: CarriedPage,
     seconds: float,
     at: int,
-    events: asyncio.Queue[ServerSentEvent | None],
+    events: Events,
 ) -> None:
     """Lease the next question whenever the page has room for one, and pass it on.
 

@@ -41,6 +41,7 @@ STATUS = {
         "The agent stands still until its parent answers one, or the episode is ended.",
     ),
     "offline": ("No connection to the server.", "These numbers are of a moment ago."),
+    "refused": ("This page is not open to this browser any more.", "These numbers are of a moment ago."),
 }
 """A heading and a sentence for each state of a run, for those who watch it."""
 

@@ -20,6 +20,7 @@ from fastapi import Form, Query, Request, Response
 from parenting.drawing.sentences import mark
 from parenting.server import runs, tables
 from parenting.server.access.guard import principal_of, require_own_question
+from parenting.server.access.staying import Stay
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import PublicId, RunId, RunName, read_name
 from parenting.server.db import Database
@@ -201,7 +202,7 @@ async def wait_for(request: Request, run_id: int, wish: leases.Wish, seconds: fl
     """Hold the question that a page wishes for, once there is one; None if none comes in time."""
     look = partial(store, request, wish.hold, durable=False, worth=wish.is_offered)
     streams: Streams = request.app.state.streams
-    return await streams.wait_for(run_id, look, seconds, request.is_disconnected)
+    return await streams.wait_for(run_id, look, seconds, Stay(request).is_left)
 
 
 def _markup(db: Database, run: Run, query: tables.Query, client_id: str) -> Response:

@@ -79,6 +79,12 @@ STATE_TEXTS = {
         mark("No connection to the server."),
         mark("Your answers are kept in this browser and sent as soon as it is back."),
     ),
+    "refused": (
+        mark("This page is not open to you any more."),
+        mark(
+            "The access of this browser has ended. Answers that were not sent are kept here until it is back."
+        ),
+    ),
 }
 """A heading and a sentence for each state of the page, shown while no question is."""
 

@@ -96,7 +96,7 @@ def test_a_static_file_is_short(path: Path) -> None:
 
 def test_script_and_server_know_the_same_states() -> None:
     """The state of a run comes from the server. A page adds what only it can know, and has words for each."""
-    own = {"elsewhere", "taken", "unsent", "away", "offline", "damaged"}
+    own = {"elsewhere", "taken", "unsent", "away", "offline", "refused", "damaged"}
     assert {*RunState} | own == set(STATE_TEXTS)
     parts = ("parent", "questions", "answers", "waiting")
     script = "".join((WEB / f"static/{part}.js").read_text() for part in parts)

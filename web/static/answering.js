@@ -12,7 +12,7 @@ import { play } from "./play.js";
 import { attentive, leases } from "./presence.js";
 import { arrive, next, prefetch, show, take } from "./questions.js";
 import { t } from "./sentences.js";
-import { wait } from "./waiting.js";
+import { lostState, wait } from "./waiting.js";
 
 // A part of the page that is loaded when it is first used, after the style sheet that such parts share.
 let styled = null;
@@ -24,10 +24,16 @@ function later(load) {
   return styled.then(load);
 }
 
+function clear() {
+  page.player?.still();
+  page.current = page.ahead = null;
+  page.later = [];
+}
+
 // What the run's stream says.
 const tell = {
   run(now) {
-    if (page.state === "offline" || page.state === "away") flushAll(report);
+    if (["offline", "away", "refused"].includes(page.state)) flushAll(report);
     page.state = now.state;
     if (page.state !== "question") page.taken = false;
     page.goal = now.goal;
@@ -52,7 +58,8 @@ const tell = {
   asked: arrive,
   leases,
   lost(status) {
-    page.state = status === 404 ? "away" : "offline";
+    page.state = lostState(status);
+    if (page.state === "refused" && page.current) clear(); // what is answered now may never be sent
     wait(page.state);
   },
 };

@@ -15,6 +15,8 @@ const HASTE = 40; // ms after an answer when the next question is asked for, if 
 const OTHERS_FIRST = 300; // ms after a skip in which other parents may have the next question
 const BELONGS = t("It was not stored; this browser keeps it and sends it once its own database is back.");
 
+const OTHER_LINK = t("An answer was given here under another link than yours. It was not stored; this browser keeps it and sends it once that link is opened again.");
+
 function elsewhere({ database, title, given: at }) {
   const values = { title, date: new Date(at).toLocaleString(), name: database?.slice(0, 8) ?? t("of an older version") };
   const named = title ? t("Your answer to “{title}” of {date} belongs to the database {name}, which is not the one that is served here.", values)
@@ -71,7 +73,7 @@ export function report(outcome, reply, answer) {
   $("saved").classList.toggle("kept", outcome === "kept");
   if (outcome === "kept") {
     $("saved").textContent = t("Kept here, not sent yet");
-    if (!page.current) wait(reply === undefined ? "offline" : "unsent"); // no reply, or one of a server in trouble
+    if (!page.current) wait(reply.state);
     return;
   }
   page.unsaved = Math.max(0, page.unsaved - 1);
@@ -80,7 +82,7 @@ export function report(outcome, reply, answer) {
     if (!page.unsaved) $("saved").textContent = t("Saved");
   } else {
     if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? t("Kept here, not stored") : "";
-    alarm(outcome === "elsewhere" ? elsewhere(answer) : reply.message);
+    alarm(outcome !== "elsewhere" ? reply.message : reply?.code === "not_allowed" ? OTHER_LINK : elsewhere(answer));
     if (outcome === "elsewhere" && given.delete(answer.question) && !page.current) next(); // a copy of its database asks the same
   }
 }

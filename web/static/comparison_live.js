@@ -19,8 +19,8 @@ export function following(moved) {
   const said = document.getElementById("living");
 
   async function look() {
-    const page = await fetched(location.href);
-    if (!page) return void (said.textContent = "No connection to the server. These numbers are of a moment ago.");
+    const page = await fetched(location.href, said);
+    if (!page) return;
     const mine = of(document), fresh = of(page);
     if (mine.map(name).join() !== fresh.map(name).join()) return location.reload(); // a filter leaves others by now
     const gone = mine.filter(({ dataset }, at) => dataset.run && (dataset.tick !== fresh[at].dataset.tick || "living" in dataset !== "living" in fresh[at].dataset));

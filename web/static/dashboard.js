@@ -188,7 +188,7 @@ const tell = {
     applied(now.tick);
     seen();
   },
-  lost: () => status("offline"),
+  lost: (code) => status(code === 401 || code === 403 ? "refused" : "offline"),
 };
 
 for (const figure of figures) {

@@ -1,9 +1,12 @@
 // A page that follows the server: now and then it asks for itself, and takes over what has changed.
+import { lost } from "./lost.js";
+
 const SHARE = 10; // a look, and the drawing after it, take a tenth of the time at most
 
-// The page as the server has it by now; null where the server does not answer.
-export async function fetched(address) {
+// The page as the server has it by now; null, and why on the line `said`, where the server does not send it.
+export async function fetched(address, said) {
   const reply = await fetch(address).catch(() => null);
+  if (!reply?.ok) said.textContent = lost(reply);
   return reply?.ok ? new DOMParser().parseFromString(await reply.text(), "text/html") : null;
 }
 

@@ -23,15 +23,19 @@ async function withStream(use, wanted) {
 export function poll(id, tell, heard, background = false) {
   let timer = 0;
   return async function ask() {
+    let pause = document.hidden ? HIDDEN : POLL;
     if (!heard()) {
       try {
         const run = await get(`/api/v1/runs/${id}`);
         const found = tell.metrics && (await get(`/api/v1/runs/${id}/metrics?after=${tell.after()}`));
         if (!heard()) { tell.run(run); if (found) tell.metrics(found.rows); }
-      } catch ({ status }) { if (!heard()) tell.lost(status); }
+      } catch ({ status }) {
+        if (!heard()) tell.lost(status);
+        if (status === 401 || status === 403) pause = HIDDEN; // until somebody has come in again
+      }
     }
     clearTimeout(timer);
-    if (!document.hidden || background) timer = setTimeout(ask, document.hidden ? HIDDEN : POLL);
+    if (!document.hidden || background) timer = setTimeout(ask, pause);
   };
 }
 

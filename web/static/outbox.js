@@ -10,7 +10,8 @@ let sending = null, delay = 500;
 const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListener("online", done, { once: true }); });
 
 // One attempt: "saved", "refused" (the question has another answer, or was withdrawn), "elsewhere" (it is meant for another
-// database, or the server cannot read it) or "kept" (no connection, or a server in trouble).
+// database or is of another name, or the server cannot read it) or "kept" with the state of the page (no connection, a
+// server in trouble, or nobody has come in).
 async function send({ database, run, question, choice, replays, measured, given, client_id }) {
   if (!question) return ["elsewhere"];
   const late = new AbortController(), timer = setTimeout(() => late.abort(), LATE);
@@ -21,11 +22,12 @@ async function send({ database, run, question, choice, replays, measured, given,
       body: JSON.stringify(skips ? asked : { choice, replays, ...asked }),
     });
     if (reply.ok) return ["saved", await reply.json()];
-    if (reply.status >= 500 || reply.status === 429) return ["kept", reply.status === 500];
+    if (reply.status === 401) return ["kept", { state: "refused" }];
+    if (reply.status >= 500 || reply.status === 429) return ["kept", { state: "unsent", alone: reply.status === 500 }];
     const { error } = await reply.json();
     return [error.code === "conflict" ? "refused" : "elsewhere", error];
   } catch {
-    return ["kept"];
+    return ["kept", { state: "offline" }];
   } finally { clearTimeout(timer); }
 }
 
@@ -35,7 +37,7 @@ async function drain(report) {
     if (outcome === "elsewhere") elsewhere.add(key(answer));
     report(outcome, reply, answer);
     if (outcome === "kept") {
-      if (reply) keep(answer); // the fault may be this question's alone: the others go first
+      if (reply.alone) keep(answer); // the fault may be this question's alone: the others go first
       await wait(delay);
       delay = Math.min(5000, delay * 2);
       continue;

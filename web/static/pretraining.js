@@ -1,5 +1,6 @@
 // Pre-training before a run: the job is looked at each second, and the form goes on once it is over.
 import "./errors.js";
+import { lost } from "./lost.js";
 import { number } from "./numbers.js";
 
 const form = document.querySelector("[data-job]"), told = document.getElementById("told"), bar = document.getElementById("progress");
@@ -19,7 +20,7 @@ async function look() {
   const found = reply?.ok ? await reply.json() : null;
   if (sent) return;
   if (reply?.status === 404 || found?.state === "done" || found?.state === "failed") return form.requestSubmit(form.querySelector("button"));
-  told.textContent = !found ? "The server does not answer." : found.worker === "silent" ? "No worker is running. It begins once one is started (parenting worker)." : found.state === "waiting" ? "It waits for a worker." : found.progress ? progressed(found.progress) : "A worker is at it.";
+  told.textContent = !found ? lost(reply) : found.worker === "silent" ? "No worker is running. It begins once one is started (parenting worker)." : found.state === "waiting" ? "It waits for a worker." : found.progress ? progressed(found.progress) : "A worker is at it.";
   setTimeout(look, 1000);
 }
 

@@ -5,7 +5,7 @@ import { begin } from "./begin.js";
 import { kept } from "./kept.js";
 import { given, page, painted } from "./page.js";
 import { attentive, leave } from "./presence.js";
-import { wait } from "./waiting.js";
+import { lostState, wait } from "./waiting.js";
 
 const BROUGHT = 400; // ms for which a stream may still bring the question that is known to wait
 
@@ -35,7 +35,7 @@ export async function next() {
 
 function failed({ status }) {
   if (status === 500) wait("damaged");
-  else wait(status === 404 ? "away" : "offline");
+  else wait(lostState(status));
 }
 
 // Answer here instead: the question comes here, whoever has it.

@@ -29,8 +29,8 @@ export function following() {
   const said = document.getElementById("runs-said");
 
   async function look() {
-    const page = await fetched(list.dataset.address);
-    said.textContent = page ? "" : "No connection to the server. These numbers are of a moment ago.";
+    const page = await fetched(list.dataset.address, said);
+    if (page) said.textContent = "";
     const fresh = page?.querySelector("ul.runs");
     if (fresh) update(fresh);
   }

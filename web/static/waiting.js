@@ -2,6 +2,9 @@
 import { settle } from "./answers.js";
 import { $, main, name, page, stage, waiting } from "./page.js";
 
+// The state of a page whose request was refused: it has lost its right, or its run, or the server.
+export const lostState = (status) => (status === 404 ? "away" : [401, 403].includes(status) ? "refused" : "offline");
+
 const QUIET = 350; // ms that an answered question stays before the page says that the agent explores
 
 export function wait(which) {
