@@ -12,7 +12,11 @@ current: ContextVar[Principal | None] = ContextVar("principal", default=None)
 
 def home() -> str:
     """Return the address of the page where the caller has their work: the list of runs, or their only run."""
-    who = current.get()
+    return home_of(current.get())
+
+
+def home_of(who: Principal | None) -> str:
+    """Return the same for somebody."""
     if who is None or who.run is None:
         return "/"
     return f"/runs/{who.run_public_id}/parent" if who.role is Role.PARENT else f"/runs/{who.run_public_id}"

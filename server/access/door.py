@@ -60,7 +60,7 @@ class Door:
         """
         self.db, self.days = db, days
         self.cookie = cookie_name(db)
-        self._key, self._idle = secret_key, timedelta(days=idle_days)
+        self._key, self.idle = secret_key, timedelta(days=idle_days)
         self._known: dict[str, Known] = {}
         self._revision, self._looked, self._kept = -1, float("-inf"), time.monotonic()
         self._reading, self._asking, self._waiting = asyncio.Lock(), asyncio.Semaphore(2), 0
@@ -145,7 +145,7 @@ class Door:
                 now, revision = self.db.clock(), self._revision
                 found = await to_thread.run_sync(
                     self._read,
-                    lambda session: lookup.find(session, way, hashed, now, self._idle),
+                    lambda session: lookup.find(session, way, hashed, now, self.idle),
                     limiter=self._threads,
                 )
                 if found is None:

@@ -9,7 +9,8 @@ from typing import NamedTuple
 from sqlalchemy import ColumnElement, Select, select, update
 from sqlalchemy.orm import Session
 
-from parenting.server.access.roles import Role
+from parenting.server.access.lookup import find
+from parenting.server.access.roles import Principal, Role
 from parenting.server.access.secret import digest, draw, kind_of
 from parenting.server.access.tables import AccessSession, AccessToken
 from parenting.server.access.tokens import tell_revoked
@@ -90,6 +91,28 @@ def require_valid(db: Database, secret: str) -> AccessToken:
     if found is None:
         raise UsedUpError
     return found
+
+
+def same_as(db: Database, secret: str, cookie: str, idle: timedelta) -> Principal | None:
+    """Return who a browser is already, if a token would make it that, or would have when it was valid.
+
+    Whoever presses twice on an address has come in by the first press. Nothing begins and nothing ends here.
+
+    Args:
+        db: The database.
+        secret: The secret of the token.
+        cookie: The secret of the browser's session.
+        idle: The time without use after which a session ends.
+    """
+    with db.read() as session:
+        known = find(session, "session", digest(cookie), db.clock(), idle)
+        rows = select(AccessToken.role, AccessToken.run_id).where(
+            AccessToken.digest == digest(secret), AccessToken.kind.in_(HOW)
+        )
+        token = session.execute(rows).first()
+    if known is None or token is None or (known.principal.role, known.principal.run) != tuple(token):
+        return None
+    return known.principal
 
 
 def list_sessions(db: Database, all_of_them: bool = False) -> Sequence[AccessSession]:

@@ -6,14 +6,13 @@ or by its button without JavaScript, and that POST uses the token up and sets th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Annotated
 
 from fastapi import Form, Query, Request, Response
 
 from parenting.server import runs
 from parenting.server.access import sessions
+from parenting.server.access.current import home_of
 from parenting.server.access.door import Door
 from parenting.server.access.sessions import Entered
 from parenting.server.access.tables import AccessSession
@@ -39,8 +38,10 @@ TokenField = Annotated[str, Form(max_length=LONGEST)]
 @router.get(ADDRESS)
 def entry_page(request: Request, db: Db, token: Token = "", to: To = None) -> Response:
     """The page that sends the token as a form; a token that opens nothing gets 410."""
-    with _guess(request):
+    try:
         sessions.require_valid(db, token)
+    except UsedUpError:
+        return _again(request, db, token, to)
     return page("open.html", token=token, to=to)
 
 
@@ -48,8 +49,10 @@ def entry_page(request: Request, db: Db, token: Token = "", to: To = None) -> Re
 def enter(request: Request, db: Db, token: TokenField, to: ToField = None) -> Response:
     """For the form: begin a session, and go to the page of a run, or where the role has its work."""
     door = _door(request)
-    with _guess(request):
+    try:
         entered = sessions.enter(db, token, request.cookies.get(door.cookie), days=door.days)
+    except UsedUpError:
+        return _again(request, db, token, to)
     door.forget()
     response = redirect(to or _first_page(db, entered.session))
     _set_cookie(request, response, entered)
@@ -72,14 +75,21 @@ def _door(request: Request) -> Door:
     return door
 
 
-@contextmanager
-def _guess(request: Request) -> Iterator[None]:
-    """Count a token that opens nothing; the guard refuses an address that has brought too many."""
-    try:
-        yield
-    except UsedUpError:
-        _door(request).guesses.wrong(request.client.host if request.client else "")
-        raise
+def _again(request: Request, db: Database, token: str, to: str | None) -> Response:
+    """Lead a browser on that has come in already, by this token or by one like it.
+
+    A token of nobody counts as a guess; the guard refuses an address that has brought too many.
+
+    Raises:
+        UsedUpError: it has not come in.
+    """
+    door = _door(request)
+    who = sessions.same_as(db, token, request.cookies.get(door.cookie, ""), door.idle)
+    if who is not None:
+        return redirect(to or home_of(who))
+    door.guesses.wrong(request.client.host if request.client else "")
+    request.state.back = to or "/"  # of two presses at once, the other one may have let it in
+    raise UsedUpError
 
 
 def _first_page(db: Database, session: AccessSession) -> str:

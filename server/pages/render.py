@@ -113,7 +113,8 @@ def error_page(request: Request, error: ServerError) -> HTMLResponse:
     form that was sent; else there may be no such run.
     """
     if error.code in REFUSED:
-        return page("refused.html", error.status, code=error.code, back=_way_back(request))
+        back = getattr(request.state, "back", None) or _way_back(request)
+        return page("refused.html", error.status, code=error.code, back=back)
     run = re.match(rf"/runs/([{ALPHABET}]{{{LENGTH}}}|[1-9][0-9]*)(?![^/])(/parent)?", request.url.path)
     refused = isinstance(error, StoreError)
     back = run[0] if run and (error.status == 409 or refused) else "/"

@@ -35,10 +35,51 @@ def test_looking_uses_nothing_up_and_the_form_does(client: httpx2.Client, db: Da
     assert {"HttpOnly", "Path=/", "SameSite=lax"} <= set(cookie.split("; "))
     assert "Secure" not in cookie, "this connection is none of TLS"
     assert len(sessions.list_sessions(db)) == 1
+    client.cookies.clear()
     for again in (client.get("/open", params={"token": secret}), enter(client, secret)):
         assert again.status_code == 410
         assert "parenting access open" in again.text
     assert len(sessions.list_sessions(db)) == 1
+
+
+def test_who_presses_twice_is_led_on_and_nothing_begins_or_ends(
+    client: httpx2.Client, db: Database, run: Run
+) -> None:
+    secret, place = tokens.make(db, "opening", Role.RESEARCHER).secret, f"/runs/{run.public_id}/parent"
+    enter(client, secret)
+    (begun,) = sessions.list_sessions(db)
+    looked = client.get("/open", params={"token": secret, "to": place})
+    sent = client.post("/open", data={"token": secret, "to": place})
+    for again, to in ((looked, place), (sent, place), (enter(client, secret), "/")):
+        assert (again.status_code, again.headers["location"]) == (303, to)
+        assert "set-cookie" not in again.headers
+    assert [one.id for one in sessions.list_sessions(db)] == [begun.id]
+
+
+def test_the_second_of_two_presses_at_once_offers_the_way_on_and_says_what_a_guess_is_told(
+    client: httpx2.Client, db: Database
+) -> None:
+    """Its cookie is on its way with the first reply."""
+    secret = tokens.make(db, "opening", Role.RESEARCHER).secret
+    enter(client, secret)
+    client.cookies.clear()
+    second, guess = enter(client, secret), enter(client, "po_" + "A" * 43)
+    assert (second.status_code, second.text) == (410, guess.text)
+    assert '<a class="button primary" href="/">Go on</a>' in second.text
+
+
+@pytest.mark.parametrize("who", ["another role", "whose session has ended", "who guesses"])
+def test_a_used_address_leads_nobody_on(client: httpx2.Client, db: Database, run: Run, who: str) -> None:
+    secret = tokens.make(db, "opening", Role.RESEARCHER).secret
+    enter(client, secret)
+    if who == "another role":
+        enter(client, tokens.make(db, "link", Role.PARENT, run=run.id).secret)
+    elif who == "whose session has ended":
+        sessions.end_all(db)
+    else:
+        secret = "po_" + "A" * 43
+    assert client.get("/open", params={"token": secret}).status_code == 410
+    assert enter(client, secret).status_code == 410
 
 
 def test_a_parents_link_leads_to_its_page(client: httpx2.Client, db: Database, run: Run) -> None:
