@@ -1,4 +1,4 @@
-"""What lasts ends with the right to it: streams, and requests that wait for a question."""
+"""Streams and requests that wait for a question end with the right to them."""
 
 from __future__ import annotations
 
