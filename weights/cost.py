@@ -12,9 +12,9 @@ from parenting.agent.config import Config
 from parenting.envs.levels.spec import Level, WorldSpec, maze_legend
 
 TICK_SECONDS, SECONDS_A_WEIGHT = 0.01, 5e-8
-"""A tick on one core, measured: of a small board, and for each weight of the policy."""
+"""A tick on one core after some twenty answers: of a small board, and for each weight of the policy."""
 LATE = 4.0
-"""A tick after a hundred answers takes so many times as long as one of the first (docs/worlds.md)."""
+"""A tick after a hundred answers takes so many times as long as one after twenty (docs/worlds.md)."""
 RECORDINGS = 2 * 4096
 """Clips of both kinds that a recorder may hold."""
 NOTABLE_SECONDS, NOTABLE_MEGABYTES = 0.1, 10.0
@@ -24,14 +24,14 @@ NOTABLE_SECONDS, NOTABLE_MEGABYTES = 0.1, 10.0
 class Cost(NamedTuple):
     """The estimate for one run."""
 
-    tick_seconds: float  # at first
+    tick_seconds: float  # after some twenty answers; the first ticks take less
     megabytes: float  # of a checkpoint, once the recorder is full
 
     def __str__(self) -> str:
         """Return the sentence that tells it."""
         early, late = f"{self.tick_seconds:.2g}", f"{self.late_seconds:.2g}"
         return (
-            f"a tick takes from {early} s at first to {late} s after a hundred answers, and a checkpoint has"
+            f"a tick takes {early} s after twenty answers and {late} s after a hundred, and a checkpoint has"
             f" up to {self.megabytes:.0f} MB"
         )
 

@@ -32,6 +32,8 @@ PATHS = (
     "/?q=island&sort=name&archived=true",
     "/levels",
     "/access",
+    "/audit",
+    "/persons",
     "/practice",
     "/practice?at=1&choice=left",
     "/practice?at=4",

@@ -29,7 +29,7 @@ def test_the_list_follows_its_runs_and_the_form_tells_the_cost_while_it_is_typed
         "own.dispatchEvent(new Event('input')); }",
         "\n".join(rows),
     )
-    expect(page.locator("#level_text-told")).to_contain_text("On this level a tick takes from")
+    expect(page.locator("#level_text-told")).to_contain_text("On this level a tick takes")
     report_progress(db, mine, tick=1234)
     fixtures.start_run(db)
     expect(row.locator(".numbers")).to_contain_text("1,234")
