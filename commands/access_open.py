@@ -12,12 +12,16 @@ from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.printing import say
 from parenting.server.access.roles import Role
 from parenting.server.access.tokens import make
+from parenting.server.public import address_of
 
 
 def command(
     url: Annotated[
         str | None,
-        typer.Option(help="The server's address.", show_default="http://localhost:PORT"),
+        typer.Option(
+            help="The server's address.",
+            show_default="http://localhost:PORT, or https://HOST of a public server",
+        ),
     ] = None,
     browser: Annotated[bool, typer.Option("--browser", help="Open the address in a browser, too.")] = False,
     days: Annotated[
@@ -33,7 +37,8 @@ def command(
     Example: parenting access open --url http://localhost:8000
     """
     with friendly_errors():
-        base = url or f"http://localhost:{settings().port}"
+        chosen = settings()
+        base = url or address_of(chosen, chosen.port)
         with database() as db:
             made = make(db, "opening", Role.RESEARCHER, days=days, made_by="parenting access open")
     address = f"{base.rstrip('/')}/open?token={made.secret}"

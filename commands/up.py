@@ -29,6 +29,7 @@ from parenting.commands.printing import say
 from parenting.commands.sizing import Sizing, most_workers
 from parenting.server.lifeline import follow
 from parenting.server.listener import bind
+from parenting.server.public import address_of
 from parenting.server.settings import Settings
 from parenting.server.store.private import make_files_private
 
@@ -67,7 +68,7 @@ def up(
             secret = _migrate(chosen)
             migrated()
             with _sized(crew, chosen, number):
-                url = f"http://localhost:{listener.getsockname()[1]}/open?token={secret}"
+                url = f"{address_of(chosen, listener.getsockname()[1])}/open?token={secret}"
                 _watch(web, crew, told, url, browser)
 
 

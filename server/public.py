@@ -39,6 +39,16 @@ def public_hosts(settings: Settings) -> tuple[str, ...]:
     return names
 
 
+def address_of(settings: Settings, port: int) -> str:
+    """Return the address at which a browser reaches the pages: of a public server, by way of its proxy.
+
+    Raises:
+        SetupError: see `public_hosts`.
+    """
+    names = public_hosts(settings)
+    return f"https://{names[0]}" if names else f"http://localhost:{port}"
+
+
 def trusted_proxies(settings: Settings) -> tuple[Network, ...]:
     """Return the addresses of a public server's proxies; a server for this machine believes none.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import pytest
 from typer.testing import CliRunner, Result
 
 from parenting.commands.main import app
@@ -24,6 +25,15 @@ def test_an_address_lets_a_browser_in(db: Database) -> None:
     assert access("open", "--url", "https://lab.example/").stdout.startswith(
         "https://lab.example/open?token=po_"
     )
+
+
+def test_the_address_of_a_public_server_is_that_of_its_proxy(
+    db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PARENTING_HOSTS", "lab.example")
+    assert access("open").stdout.startswith("http://localhost:8765/open?token=")
+    monkeypatch.setenv("PARENTING_PUBLIC", "true")
+    assert access("open").stdout.startswith("https://lab.example/open?token=")
 
 
 def test_links_and_tokens_are_made_listed_and_ended(db: Database) -> None:

@@ -8,6 +8,7 @@ import pytest
 from parenting.server.db import Database
 from parenting.server.errors import SetupError
 from parenting.server.listener import bind
+from parenting.server.public import address_of
 from parenting.server.serve import make_server
 from parenting.server.settings import Settings
 
@@ -73,6 +74,13 @@ def test_a_public_server_listens_where_it_is_told() -> None:
         with bind(at(host, public=True, hosts="parenting.example")) as listener:
             assert isinstance(listener, Listener)
             assert listener.asked == (host, 0)
+
+
+def test_the_address_that_is_printed_is_that_of_the_proxy_where_the_server_is_public() -> None:
+    assert address_of(at("127.0.0.1"), 8000) == "http://localhost:8000"
+    assert address_of(at("127.0.0.1", hosts="parenting.example"), 8000) == "http://localhost:8000"
+    public = at("127.0.0.1", public=True, hosts="Parenting.example, lab.example")
+    assert address_of(public, 8000) == "https://parenting.example"
 
 
 def test_an_address_of_no_interface_is_refused_by_name() -> None:
