@@ -17,6 +17,7 @@ from pydantic import (
     StringConstraints,
     ValidationError,
 )
+from sqlalchemy.orm import Session
 
 from parenting.agent.config import PRESETS, Config, merge
 from parenting.envs import registry

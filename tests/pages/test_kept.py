@@ -10,7 +10,8 @@ from parenting.server import deletion, keeping
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.pages.run_list import PAGE
-from parenting.server.runs import get_run
+from parenting.server.runs import get_run, set_status
+from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 
 
@@ -32,6 +33,9 @@ def test_the_list_shows_world_level_preset_parent_tags_and_space(client: httpx2.
     )
     assert "&lt;pilot&gt;" in text
     assert "0 bytes · Name, tags, files" in text
+    set_status(db, 1, RunStatus.STOPPED)
+    ended = re.sub(r"<[^>]*>", "", client.get("/").text)
+    assert "0 bytes · Dashboard · Name, tags, files" in ended, "a run that is over has no buttons"
 
 
 def test_a_search_goes_on_over_its_pages(client: httpx2.Client, db: Database) -> None:
