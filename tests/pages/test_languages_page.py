@@ -31,7 +31,7 @@ DATA = {"bdi", "code", "kbd", "time", "script", "style", "text"}
 """Elements whose text is not a sentence: names that people give, keys, times, letters on a board."""
 WORD = re.compile(r"[A-Za-z]{2,}")
 TITLES = [f"{world_title(world)}, {level}" for world, level in LEVELS]
-NAMES = re.compile("|".join(["Parenting", "JSON", r"\(me\)", *TITLES]))
+NAMES = re.compile("|".join(["Parenting", "JSON", r"\(p[0-9a-z]+\)", *TITLES]))
 """Names, which stay as they are."""
 PATHS = (
     "/runs/1/parent?query=5",
