@@ -6,12 +6,13 @@ other programs share the environment, but it is told with the nearest setting: i
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from io import StringIO
 from pathlib import Path
 
-from dotenv import dotenv_values
+from dotenv.parser import parse_stream
 from pydantic_settings import DotEnvSettingsSource
 
 from parenting.server.errors import SetupError
@@ -31,6 +32,8 @@ RENAMED = {
 """Settings of earlier versions, and what is used instead."""
 NEAR = 0.85
 """The least likeness of a name without the prefix to that of a setting, so that it counts as misspelt."""
+UNREAD = "Warning: line {} of {} is ignored: it is not NAME=value, or a quotation mark in it is not closed."
+"""What is told of a line that cannot be read; the line itself may hold a secret."""
 SAVE_AGAIN = "Save it as UTF-8, in an editor or by: iconv -f"
 
 
@@ -39,6 +42,9 @@ class EnvironmentFile(DotEnvSettingsSource):
 
     def _read_env_file(self, file_path: Path) -> Mapping[str, str | None]:
         read(file_path)
+        logging.getLogger("dotenv.main").setLevel(
+            logging.ERROR
+        )  # `warnings` tells it, once and with the file
         return super()._read_env_file(file_path)
 
 
@@ -70,7 +76,7 @@ def read(file: Path) -> str:
 
 
 def warnings(environment: Iterable[str], file: Path, settings: Iterable[str]) -> list[str]:
-    """Return a sentence for each name that is not a setting, but looks like one.
+    """Return a sentence for each line that cannot be read, and for each name that is nearly a setting.
 
     Args:
         environment: The names of the environment's variables.
@@ -80,11 +86,11 @@ def warnings(environment: Iterable[str], file: Path, settings: Iterable[str]) ->
     Raises:
         SetupError: the file cannot be read.
     """
-    known = list(settings)
-    in_file = dotenv_values(stream=StringIO(read(file)))
+    known, lines = list(settings), list(parse_stream(StringIO(read(file))))
     found = [(name, "in the environment") for name in environment]
-    found += [(name, f"in {file.absolute()}") for name in in_file]
-    return [said for name, where in found if (said := _warning(name, where, known)) is not None]
+    found += [(line.key, f"in {file.absolute()}") for line in lines if line.key is not None]
+    said = [told for name, where in found if (told := _warning(name, where, known)) is not None]
+    return [UNREAD.format(line.original.line, file.absolute()) for line in lines if line.error] + said
 
 
 def _warning(name: str, where: str, known: Sequence[str]) -> str | None:

@@ -15,6 +15,10 @@ from parenting.weights.cost import Bound
 
 FILE = Path(".env")
 """Settings of the folder where the program is started."""
+YEAR = 31_536_000
+"""Seconds of a year: much longer times have no date."""
+MOST = 10**9
+"""The largest number of what is counted; a column of the database holds little more."""
 
 
 def state_folder() -> Path:
@@ -31,7 +35,9 @@ class Settings(BaseSettings):
         SetupError: the file `.env` cannot be read.
     """
 
-    model_config = SettingsConfigDict(env_prefix=PREFIX, env_ignore_empty=True, extra="ignore")
+    model_config = SettingsConfigDict(
+        env_prefix=PREFIX, env_ignore_empty=True, extra="ignore", allow_inf_nan=False
+    )
 
     data: Path = Field(
         default_factory=state_folder,
@@ -70,11 +76,12 @@ class Settings(BaseSettings):
         None, description="Token that commands send to a server (`parenting access create token`)."
     )
     lease_seconds: float = Field(
-        60.0, gt=0, description="How long a question is held for the parent who was shown it."
+        60.0, gt=0, le=YEAR, description="How long a question is held for the parent who was shown it."
     )
     attention_seconds: float = Field(
         120.0,
         gt=0,
+        le=YEAR,
         description="How long after a parent's last sign of life (pointer, key, scroll, focus, touch) their "
         "question is still held.",
     )
@@ -90,32 +97,39 @@ class Settings(BaseSettings):
         "none is the one of this package, web/languages.",
     )
     claim_seconds: float = Field(
-        5.0, gt=0, description="How long a run stays with a worker that gives no sign of life."
+        5.0, gt=0, le=YEAR, description="How long a run stays with a worker that gives no sign of life."
     )
     lives: int = Field(
         100,
         ge=1,
+        le=MOST,
         description="Agents that a worker keeps in memory; others that wait are in their checkpoints.",
     )
     lives_megabytes: float = Field(
         500.0, gt=0, description="Megabytes of the tensors of those agents, as far as the others wait."
     )
-    runs: int = Field(5000, ge=1, description="Runs that may live at once; those that are over do not count.")
+    runs: int = Field(
+        5000, ge=1, le=MOST, description="Runs that may live at once; those that are over do not count."
+    )
     runs_per_client: int = Field(
-        250, ge=1, description="Living runs that one address may have started on the pages or the API."
+        250,
+        ge=1,
+        le=MOST,
+        description="Living runs that one address may have started on the pages or the API.",
     )
     frame_ancestors: str = Field(
         "none",
         description="Sites that may show the pages in a frame, as the header Content-Security-Policy names "
         "them; a notebook needs http://localhost:*.",
     )
-    streams: int = Field(300, ge=1, description="Live streams of events that may be open at once.")
+    streams: int = Field(300, ge=1, le=MOST, description="Live streams of events that may be open at once.")
     streams_per_browser: int = Field(
-        12, ge=1, description="Live streams of one browser at once, by its cookie."
+        12, ge=1, le=MOST, description="Live streams of one browser at once, by its cookie."
     )
     streams_per_client: int = Field(
         100,
         ge=1,
+        le=MOST,
         description="Live streams of one address at once; loopback, where a proxy stands, has no such limit.",
     )
     connections: int = Field(
@@ -124,6 +138,7 @@ class Settings(BaseSettings):
     connections_per_client: int = Field(
         250,
         ge=1,
+        le=MOST,
         description="Connections of one address at once; loopback, where a proxy stands, has no such limit.",
     )
     tick_seconds: float = Field(
@@ -146,7 +161,10 @@ class Settings(BaseSettings):
         None, description="Folder of log files, one for each process; none is standard error."
     )
     log_bytes: int = Field(
-        10_000_000, ge=10_000, description="Size at which a log file is renamed and a new one begun."
+        10_000_000,
+        ge=10_000,
+        le=10**12,
+        description="Size at which a log file is renamed and a new one begun.",
     )
     log_files: int = Field(5, ge=1, le=1000, description="How many renamed log files are kept.")
 

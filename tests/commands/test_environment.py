@@ -99,6 +99,29 @@ def test_a_name_that_is_no_setting_is_told_wherever_it_stands(
     assert CliRunner().invoke(app, ["worlds"]).stderr == f"Warning: {name} in the environment{end}"
 
 
+@pytest.mark.parametrize("line", ["PARENTING_PORT 8123", 'PARENTING_TOKEN="secret', "= 3"])
+def test_a_line_that_cannot_be_read_is_told_once_and_not_shown(folder: Path, line: str) -> None:
+    (folder / ".env").write_text(f"# settings\n{line}\nPARENTING_PORT=1\n", encoding="utf-8")
+    said = CliRunner().invoke(app, ["worlds"]).stderr
+    assert said.startswith(f"Warning: line 2 of {folder}/.env is ignored: it is not NAME=value")
+    assert said.count("\n") == 1
+    assert "secret" not in said
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("claim_seconds", "inf"), ("lease_seconds", "1e300"), ("tick_seconds", "nan"), ("runs", "9" * 30)],
+)
+def test_a_number_without_bounds_is_refused(
+    monkeypatch: pytest.MonkeyPatch, folder: Path, name: str, value: str
+) -> None:
+    """A time that has no date, or a number that no database holds, would end the worker later."""
+    monkeypatch.setenv(f"PARENTING_{name.upper()}", value)
+    ended = CliRunner().invoke(app, ["runs"])
+    assert ended.exit_code == 2
+    assert ended.stderr.startswith(f"PARENTING_{name.upper()}: '{value}' is wrong: Input should be")
+
+
 def test_a_setting_of_an_earlier_version_is_told_with_its_successor(folder: Path) -> None:
     (folder / ".env").write_text("PARENTING_CONTAINER=true\n", encoding="utf-8")
     end = (
