@@ -118,8 +118,8 @@ class RunSchema(Schema):
     """Ticks a second, as last measured."""
     waiting: Waiting | None
     """The reason why no tick passes: the agent waits for guidance, for fewer open preference questions, or
-    for the operator (*stuck*: no action was acceptable, so the episode has to be ended), or for an answer to
-    what was skipped (*unsure*: every pair of moves was); null while it acts.
+    for the end of its episode (*stuck*: no action was acceptable), or for an answer to what was skipped
+    (*unsure*: every pair of moves was); null while it acts.
     """
     state: RunState
     """One word for who waits for whom, the first of these that holds: over, paused, resting (the goal is

@@ -77,7 +77,7 @@ QUERY_STATUSES = {
 WAITING = {
     Waiting.GUIDANCE: "The agent waits for guidance before it moves.",
     Waiting.PREFERENCES: "The agent waits until fewer preference questions are open.",
-    Waiting.STUCK: "No action was acceptable: the operator has to end the episode.",
+    Waiting.STUCK: "No action was acceptable: its parent or the operator has to end the episode.",
     Waiting.UNSURE: "Every pair of moves was skipped: one of them has to be answered, or the episode ended.",
 }
 
@@ -94,7 +94,7 @@ RUN_STATES = {
     RunState.RESTING: "The goal of answers is reached; the agent goes on once the goal is raised.",
     RunState.QUESTION: "A question waits for the person who is the parent.",
     RunState.NO_WORKER: "No worker raises the run.",
-    RunState.STUCK: "No action was acceptable: the operator has to end the episode.",
+    RunState.STUCK: "No action was acceptable: its parent or the operator has to end the episode.",
     RunState.UNSURE: "Every pair of moves was skipped: one of them has to be answered, or the episode ended.",
     RunState.EXPLORING: "The agent acts on its own, or a scripted parent answers it.",
 }

@@ -136,6 +136,7 @@ POST /runs/{run_id}/parent/change
 POST /runs/{run_id}/parent/skip
 GET /runs/{run_id}/parent/again
 POST /runs/{run_id}/parent/either
+POST /runs/{run_id}/parent/end-episode
 GET /runs/{run_id}/parent/grid
 GET /runs/{run_id}/history
 POST /runs/{run_id}/walk

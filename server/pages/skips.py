@@ -1,4 +1,4 @@
-"""Forms of a parent who cannot tell: skip a question, look at what was skipped again, let either move do."""
+"""Forms of a parent who cannot tell: skip, look again, let either move do, or end the episode."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from parenting.server.api.names import PublicId, RunId
 from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, notify_worker, store
 from parenting.server.measures import BY_FORM
+from parenting.server.operator_events import end_episode_that_stands_still
 from parenting.server.pages.fields import ClientField, DatabaseField, QuestionField
 from parenting.server.pages.parent import PATIENCE, address, wait_for
 from parenting.server.pages.render import redirect
@@ -75,6 +76,15 @@ def either(request: Request, run_id: RunId, db: Db, client_id: ClientField) -> R
     if skipped:
         supersede(db, skipped[-1].public_id, "either", client_id, "human")
         notify_worker(request)
+    return redirect(address(run, None))
+
+
+@router.post("/runs/{run_id}/parent/end-episode")
+def end_episode(request: Request, run_id: RunId, db: Db) -> Response:
+    """End an episode in which the agent stands still, since its parent refused or skipped every move."""
+    run = runs.get_run(db, run_id)
+    end_episode_that_stands_still(db, run_id)
+    notify_worker(request)
     return redirect(address(run, None))
 
 

@@ -57,7 +57,7 @@ STATE_TEXTS = {
         mark("This question cannot be shown."),
         mark(
             "Its stored clips are damaged. "
-            "End the episode on the dashboard, and the agent goes on without it."
+            "Once the researcher has ended the episode on the dashboard, the agent goes on without it."
         ),
     ),
     "unsure": (
@@ -69,7 +69,10 @@ STATE_TEXTS = {
         mark("No worker is running."),
         mark("Nothing moves until one is started (parenting worker)."),
     ),
-    "resting": (mark("That was the last question of this goal."), mark("The agent rests until you go on.")),
+    "resting": (
+        mark("That was the last question of this goal."),
+        mark("The agent rests until it is given another goal."),
+    ),
     "over": (mark("This run is over."), mark("The agent asks no more questions.")),
     "away": (
         mark("This run is not here."),

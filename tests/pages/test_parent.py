@@ -12,6 +12,10 @@ from fastapi import FastAPI
 from sqlalchemy import select
 
 from parenting.server import runs
+from parenting.server.access import tokens
+from parenting.server.access.roles import Role
+from parenting.server.audit.entries import entries
+from parenting.server.audit.table import Kind
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
 from parenting.server.pages.texts import STATE_TEXTS
@@ -201,13 +205,25 @@ def test_while_it_waits_the_page_without_javascript_reloads(
     assert 'http-equiv="refresh"' not in look(client).text
 
 
-def test_the_operator_ends_an_episode(client: httpx2.Client, db: Database, life: tuple[Run, Claim]) -> None:
-    runs.report_progress(db, life[1], waiting="stuck")
-    page = look(client).text
-    assert 'data-state="stuck"' in page.partition("<main")[2].partition(">")[0]
-    reply = client.post("/runs/1/event", data={"kind": "end_episode", "back": "parent"})
-    assert reply.headers["location"] == "/runs/1/parent"
+@pytest.mark.parametrize("waiting", ["stuck", "unsure"])
+def test_a_parent_ends_an_episode_that_stands_still(
+    client: httpx2.Client, db: Database, life: tuple[Run, Claim], waiting: str
+) -> None:
+    link = tokens.make(db, "program", Role.PARENT, run=life[0].id)
+    client.headers["Authorization"] = f"Bearer {link.secret}"
+    page, end = f"/runs/{life[0].public_id}/parent", f"/runs/{life[0].public_id}/parent/end-episode"
+    assert client.post(end).headers["location"] == page
+    assert rows(db, OperatorEvent) == [], "it acts: nothing is to be ended"
+    runs.report_progress(db, life[1], waiting=waiting)
+    shown = client.get(page).text
+    assert f'data-state="{waiting}"' in shown.partition("<main")[2].partition(">")[0]
+    assert f'action="{end}"' in shown
+    for _ in range(2):  # the second press ends nothing more
+        assert client.post(end).headers["location"] == page
     assert [event.kind for event in rows(db, OperatorEvent)] == ["end_episode"]
+    (told,) = entries(db, kind=Kind.OPERATOR).rows
+    assert (told.what, told.who) == ("end episode", f"parent by token {link.token.public_id[:8]}")
+    assert client.post(f"/runs/{life[0].id}/event", data={"kind": "end_episode"}).status_code == 403
 
 
 def test_an_optimal_agent_is_announced(
