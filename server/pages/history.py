@@ -12,6 +12,7 @@ from fastapi import Query, Request, Response
 from parenting.drawing.sentences import mark, tr
 from parenting.server import runs, tables
 from parenting.server.access.guard import principal_of
+from parenting.server.access.matrix import may
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
 from parenting.server.damage import sound
@@ -126,7 +127,12 @@ def _last_number(rows: Sequence[Answered]) -> int | None:
 
 
 def known_people(db: Database, given: Iterable[tables.Answer]) -> Mapping[str, str]:
-    """Return the pseudonyms of those who gave these answers, by the names under which they answered."""
+    """Return the pseudonyms of those who gave these answers, by the names under which they answered.
+
+    Whoever may not see the list of people is told none.
+    """
+    if not may("GET /persons"):
+        return {}
     return pseudonyms(db, {name for answer in given if isinstance(name := sound(answer, "client_id"), str)})
 
 
