@@ -19,11 +19,14 @@ FILE_CHARACTERS = 1_000_000
 """Characters of a text that holds several levels."""
 FENCE = re.compile(r"\s*(`{3,}|~{3,})\s*\w*\s*")
 """The line before and after a block of code in Markdown."""
+ENTRY = re.compile(r"\s*[a-z_]+\s*:\s*\S.*")
+"""An entry of a header, which may stand above a block of code."""
 COMMENT = ";"
 """The sign before a line that names the level below it, as in collections of Sokoban levels."""
 BLANKS = " \t"
 ENDS = re.compile("\r\n|[\n\r\u2028\u2029]")
 """The ends of lines: of Unix, Windows, old Macs and Unicode."""
+PROSE = "the text outside of the code fences was left out"
 SPACES = {"\u00a0": "non-breaking space"}
 """The words for a space whose name in Unicode few people know."""
 NUMBER = re.compile("[0-9]{1,9}")
@@ -92,6 +95,8 @@ def written(text: str, glyphs: str) -> list[Written]:
         Line(number, line, tuple(range(1, len(line) + 1)))
         for number, line in enumerate(ENDS.split(text.removeprefix("\ufeff")), 1)
     ]
+    prose = _prose(lines, glyphs)
+    lines = [replace(line, text="", columns=()) if line.number in prose else line for line in lines]
     found: list[Written] = []
     now = Written()
     for kind, several in groupby(lines, lambda line: _kind(line, glyphs)):
@@ -107,7 +112,7 @@ def written(text: str, glyphs: str) -> list[Written]:
             now = replace(now, art=[*now.art, *block])
     if now.art or now.header or not found:
         found += _apart(now, lines)
-    said = _around(lines, found, glyphs)
+    said = (*([PROSE] if prose else []), *_around(lines, found, glyphs))
     return [_tidied(one, glyphs, said) for one in found]
 
 
@@ -138,6 +143,20 @@ def _kind(line: Line, glyphs: str) -> str:
     if line.text.lstrip().startswith(COMMENT) and COMMENT not in glyphs:
         return "comment"
     return "header" if ":" in line.text and ":" not in glyphs else "rows"
+
+
+def _prose(lines: Sequence[Line], glyphs: str) -> set[int]:
+    """Return the numbers of the lines of text around blocks of code, if rows stand in a block."""
+    inside, prose, rows = False, set(), 0
+    for line in lines:
+        kind = _kind(line, glyphs)
+        if kind == "fence":
+            inside = not inside
+        elif inside:
+            rows += kind == "rows"
+        elif kind in ("rows", "header") and not ENTRY.fullmatch(line.text):
+            prose.add(line.number)
+    return prose if rows else set()
 
 
 def _is_fence(line: Line, glyphs: str) -> bool:

@@ -42,6 +42,10 @@ DISGUISED = {
     "no width": (POND.replace("A", "\u200bA\u2060"), "1 zero width space was left out"),
     "soft": (POND.replace("WW", "W\u00adW"), "1 soft hyphen was left out"),
     "fenced": (f"```\n{POND}```\n", "the code fences around the art were left out"),
+    "fenced amid a text": (
+        f"Here is my level:\n\n```\n{POND}```\nNote: it is *hard*.\nHave fun!\n",
+        "the text outside of the code fences was left out",
+    ),
     "fenced with a language": (f"~~~~ text\n{POND}~~~~", "the code fences around the art were left out"),
     "blank lines": (f"   \n{POND}\n  \t\n", "2 blank rows around the art were cut"),
     "old Mac": (POND.replace("\n", "\r"), None),
