@@ -33,7 +33,7 @@ RENAMED = {
 NEAR = 0.85
 """The least likeness of a name without the prefix to that of a setting, so that it counts as misspelt."""
 UNREAD = "Warning: line {} of {} is ignored: it is not NAME=value, or a quotation mark in it is not closed."
-"""What is told of a line that cannot be read; the line itself may hold a secret."""
+"""The warning of a line that cannot be read; the line itself may hold a secret."""
 SAVE_AGAIN = "Save it as UTF-8, in an editor or by: iconv -f"
 
 
