@@ -248,8 +248,7 @@ def test_no_number_of_a_run_or_a_question_reaches_a_parent(client: httpx2.Client
     got += others(client, counted)
     for reply in got:
         # The second line of the dashboard, which no link of a parent opens, names the run as researchers do.
-        shown = reply.text.replace(f"Run {RUN}: ", "", 1)
-        said = shown + str(reply.headers)
+        said = reply.text.replace(f"Run {RUN}: ", "", 1) + str(reply.headers)
         assert not re.search(f"{RUN}|{QUESTION}", said), said
         assert not re.search(r"/runs/\d+\b", said), said
 
