@@ -28,6 +28,7 @@ from tests.pages.parent_page import address, form, look, public_id, shown
 
 RUN, QUESTION = 471100, 882200
 KEPT = "this browser keeps it"
+STREAM = "**/runs/parent/stream"
 
 
 @pytest.fixture
@@ -39,9 +40,6 @@ def other(tmp_path: Path) -> Iterator[Database]:
     fixtures.ask(database, mine, 1, "guidance", fixtures.guidance("left", "down", start=(1, 2)))
     yield database
     database.close()
-
-
-STREAM = "**/runs/parent/stream"
 
 
 def serve(site: FastAPI, database: Database) -> None:
