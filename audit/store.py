@@ -17,6 +17,11 @@ ASKED = ("run", "question", "kind", "tick", "status")
 MEASURED = (
     *("run", "tick", "size", "guidance", "preference", "left", "right", "either", "neither", "skips"),
 )
+INDICES = (
+    "CREATE INDEX of_question ON answer (question, applied_tick)",
+    "CREATE INDEX after ON answer (run, supersedes) WHERE supersedes IS NOT NULL",
+)
+"""Without them a check looks through all answers for each answer."""
 APOSTROPHE = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")  # noqa: RUF001 - wide ones, too
 Found = Callable[[str], None]
 """A function that takes a sentence on what is wrong."""
@@ -24,14 +29,21 @@ Found = Callable[[str], None]
 
 def load(files: Files, found: Found) -> sqlite3.Connection:
     """Return the tables of an export; duplicates and differences between forms are found on the way."""
+    store = begun()
+    _fill(store, "answer", SAID, _answers(files, found), found)
+    _fill(store, "question", ASKED, files.lines("questions.jsonl"), found)
+    _fill(store, "metric", MEASURED, map(_numbers, files.cells("metrics.csv")), found)
+    return store
+
+
+def begun() -> sqlite3.Connection:
+    """Return the tables without rows. SQLite keeps them in a file without a name, gone with this process."""
     store = sqlite3.connect("")
     store.execute(f"CREATE TABLE answer ({', '.join(SAID)}, PRIMARY KEY (run, number))")
     store.execute(f"CREATE TABLE question ({', '.join(ASKED)}, PRIMARY KEY (question))")
     store.execute(f"CREATE TABLE metric ({', '.join(MEASURED)}, PRIMARY KEY (run, tick))")
-    _fill(store, "answer", SAID, _answers(files, found), found)
-    _fill(store, "question", ASKED, files.lines("questions.jsonl"), found)
-    _fill(store, "metric", MEASURED, map(_numbers, files.cells("metrics.csv")), found)
-    store.execute("CREATE INDEX of_question ON answer (question, applied_tick)")
+    for index in INDICES:
+        store.execute(index)
     return store
 
 

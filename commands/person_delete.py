@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +15,9 @@ from parenting.commands.database import database
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
 from parenting.commands.printing import say
 from parenting.server.backups.making import FOLDER
-from parenting.server.erasure import Plan, plan, under_way
+from parenting.server.db import Database
+from parenting.server.erasure import Plan, finish, nameless, plan, under_way
+from parenting.server.errors import NotFound
 from parenting.server.settings import Settings
 
 
@@ -33,7 +36,8 @@ def command(
     nothing, so `parenting verify` goes on holding; `parenting replay` ends before the first of them.
 
     At the end the database's file is written afresh, so that no deleted row is left in it; no other program
-    can write meanwhile. Whoever was stopped in the middle may give the command again, and a worker goes on.
+    can write meanwhile. Whoever was stopped in the middle, or killed, may give the command again; a worker
+    goes on, too.
 
     Exit codes: 0 deleted; 1 not deleted, as was answered; 2 there is no such person, or nobody can be asked
     and --yes is missing; 3 deleted, but the database's log could not be emptied; 130 stopped by Ctrl-C.
@@ -41,23 +45,47 @@ def command(
     Example: parenting person delete p7k2m9xq4t
     """
     with exit_on_interrupt(), friendly_errors(), database() as db:
-        found = plan(db, pseudonym)
-        goes_on = pseudonym in [one.pseudonym for one in under_way(db)]
-        files = _copies(settings())
-        if not goes_on and not _confirmed(found, files, copies, yes):
-            say(f"Nothing of {pseudonym} is deleted.")
-            raise typer.Exit(1)
-        from parenting._process import settle
-        from parenting.server.erasing import delete_person
-
-        settle()
-        done = delete_person(db, pseudonym)
-    for file in files if copies else ():
-        file.unlink(missing_ok=True)
-    say(f"The data of {pseudonym} are deleted.")
+        done = _delete(db, pseudonym, yes, copies)
     if not done:
         say("Another program reads the database, so its log holds them yet; a worker tries again.", err=True)
         raise typer.Exit(3)
+
+
+def _delete(db: Database, pseudonym: str, yes: bool, copies: bool) -> bool:
+    """Delete a person's data; return whether the store's file was overwritten as well.
+
+    Raises:
+        NotFound: there is no such person, and no deletion was stopped after their names were gone.
+        Exit: it was not confirmed.
+    """
+    files = _copies(settings())
+    try:
+        found = plan(db, pseudonym)
+    except NotFound:
+        rest = nameless(db)
+        if not rest:
+            raise
+        _remove(files if copies else ())
+        done = min([finish(db, person) for person in rest])  # each of them, whatever the others say
+        say("A deletion that was stopped is finished: the file was yet to be written afresh.")
+        return done
+    goes_on = pseudonym in [one.pseudonym for one in under_way(db)]
+    if not goes_on and not _confirmed(found, files, copies, yes):
+        say(f"Nothing of {pseudonym} is deleted.")
+        raise typer.Exit(1)
+    from parenting._process import settle
+    from parenting.server.erasing import delete_person
+
+    settle()
+    _remove(files if copies else ())  # before: a process that is killed at the end leaves nobody to name
+    done = delete_person(db, pseudonym)
+    say(f"The data of {pseudonym} are deleted.")
+    return done
+
+
+def _remove(files: Iterable[Path]) -> None:
+    for file in files:
+        file.unlink(missing_ok=True)
 
 
 def _confirmed(found: Plan, files: list[Path], copies: bool, yes: bool) -> bool:

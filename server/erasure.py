@@ -112,6 +112,13 @@ def under_way(db: Database) -> Sequence[Person]:
         return session.scalars(select(Person).where(Person.deleting.is_not(None)).order_by(Person.id)).all()
 
 
+def nameless(db: Database) -> Sequence[int]:
+    """Return the people of whom nothing is stored any more, but whose old rows the file may hold yet."""
+    named = exists().where(PersonClient.person_id == Person.id)
+    with db.read() as session:
+        return session.scalars(select(Person.id).where(Person.deleting.is_not(None), ~named)).all()
+
+
 @dataclass(frozen=True)
 class Left:
     """The rest of the work for a person who is marked."""

@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 
 from parenting.audit import audit
+from parenting.audit.checks import PER_RUN
+from parenting.audit.store import begun
 
 BEGIN = hashlib.sha256(b"parenting: the answers of a run, 1").hexdigest()
 CHOICES = ("left", "right", "either", "neither", "left")
@@ -244,3 +246,23 @@ def test_what_is_not_an_export(tmp_path: Path, text: str | None) -> None:
     assert not audit(tmp_path).sound
     assert "cannot be read" in str(audit(tmp_path))
     assert "neither a folder nor a zip" in str(audit(tmp_path / "nowhere"))
+
+
+@pytest.mark.parametrize("query", PER_RUN.values(), ids=PER_RUN)
+def test_no_check_looks_through_a_run_for_each_of_its_rows(query: str) -> None:
+    """A million answers would take it days; an index is there for each look."""
+    plan = begun().execute(f"EXPLAIN QUERY PLAN {query}").fetchall()
+    parents = {number: (parent, told) for number, parent, _, told in plan}
+    inner = [told for parent, told in parents.values() if is_for_each_row(parents, parent)]
+    assert plan
+    assert not [told for _, told in parents.values() if told.endswith("(run=?)")]
+    assert not [told for told in inner if told.startswith("SCAN")]
+
+
+def is_for_each_row(parents: dict[int, tuple[int, str]], number: int) -> bool:
+    """Return whether a part of a plan lies in a query that is asked for each row of another."""
+    while number in parents:
+        number, told = parents[number]
+        if told.startswith("CORRELATED"):
+            return True
+    return False

@@ -26,14 +26,21 @@ from parenting.server.store.held import Held, hold, log_of
 
 LENGTH = 200
 """Bytes of a mark, always the same, so that it is written over in one piece."""
-HEAD = "parenting-mark-1"
+HEAD = "parenting-mark-2"
+FORMER = "parenting-mark-1"
+"""The head of marks that did not count answers of deleted runs: they are lower, so they hold, too."""
 NOUNS = {"answers": "answer", "questions": "question", "runs": "run"}
 COUNT = """
-    SELECT uuid, (SELECT coalesce(max(id), 0) FROM answer),
+    SELECT uuid,
+        (SELECT coalesce(max(id), 0) FROM answer) + coalesce(sum(answers) FILTER (WHERE gone), 0),
         max(last_query, (SELECT coalesce(max(id), 0) FROM query)),
-        max(last_run, (SELECT coalesce(max(id), 0) FROM run))
-    FROM database_identity
+        max(last_run, (SELECT coalesce(max(id), 0) FROM run)),
+        coalesce(sum(answers) FILTER (WHERE NOT gone), 0)
+    FROM database_identity LEFT JOIN (
+        SELECT gone IS NOT NULL AS gone, json_extract(held, '$.answers') AS answers
+        FROM tombstone WHERE json_valid(held))
 """
+"""Numbers of answers are given again after the last ones were deleted; a tombstone counts on for them."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +51,13 @@ class Counts:
     answers: int
     questions: int
     runs: int
+    leaving: int = 0  # answers of runs that are being deleted: there, or gone without a loss
 
     def below(self, other: Counts) -> dict[str, int]:
         """Return by how much each number is below another's."""
-        lacks = {name: getattr(other, name) - getattr(self, name) for name in NOUNS}
+        here = {name: getattr(self, name) for name in NOUNS}
+        here["answers"] += self.leaving
+        lacks = {name: getattr(other, name) - here[name] for name in NOUNS}
         return {name: lack for name, lack in lacks.items() if lack > 0}
 
 
@@ -77,7 +87,9 @@ def count(execute: Callable[[str], Any]) -> Counts | None:
         if str(error).startswith("no such"):
             return None
         raise
-    return None if row is None else Counts(str(row[0]), int(row[1]), int(row[2]), int(row[3]))
+    if row is None or row[0] is None:
+        return None
+    return Counts(str(row[0]), *map(int, row[1:]))
 
 
 def write(database: Path, held: Held, counts: Counts) -> None:
@@ -99,7 +111,7 @@ def read(database: Path) -> Mark | None:
         with suppress(OSError, ValueError):
             words, _, told = mark_of(database).read_text("ascii").strip().rpartition(" ")
             head, inode, log, uuid, *numbers = words.split(" ")
-            if head == HEAD and told == f"{zlib.crc32(words.encode()):08x}":
+            if head in (HEAD, FORMER) and told == f"{zlib.crc32(words.encode()):08x}":
                 answers, questions, runs = map(int, numbers)
                 return Mark(int(inode), int(log), Counts(uuid, answers, questions, runs))
     return None

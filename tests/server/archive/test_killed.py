@@ -1,4 +1,4 @@
-"""An export and an import whose process is killed (SIGKILL) leave nothing half done, and begin again cleanly.
+"""An export, a check and an import that are killed (SIGKILL) leave nothing half done and begin again.
 
 The process kills itself at a row, so no test waits for a moment.
 """
@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
+from parenting.audit import audit
 from parenting.server.archive.importing import import_export
 from parenting.server.archive.source import source
 from parenting.server.archive.target import target
@@ -22,6 +23,7 @@ from parenting.server.db import Database, connect
 from parenting.server.settings import Settings
 from parenting.server.tables import Answer, Query, Run
 from tests.database import migrated
+from tests.lengths import length
 from tests.tree import ROOT
 
 pytestmark = pytest.mark.only("sqlite", "PostgreSQL rolls back what a killed client began")
@@ -42,6 +44,36 @@ db, path = connect(Settings(data=Path(sys.argv[1]), database_url=None)), Path(sy
 """
 EXPORT = HEAD + "with target(path) as files: write_export(db, [1, 2, 3, 4, 5], files, killed)"
 IMPORT = HEAD + "import_export(db, path, progress=killed)"
+
+CHECK = """
+import os, signal, sqlite3, sys
+from contextlib import suppress
+from pathlib import Path
+from parenting.audit import audit
+
+scratch, out, at, begin, passed = *sys.argv[1:3], int(sys.argv[3]), sqlite3.connect, []
+
+def small(name):
+    found = begin(name)  # a database that goes into its file at once
+    found.execute("PRAGMA cache_size = 1").fetchall()
+    found.set_trace_callback(seen)
+    return found
+
+def seen(statement):
+    passed.append(statement)
+    if len(passed) == at:
+        names = []
+        for one in os.listdir("/proc/self/fd"):
+            with suppress(OSError):
+                names.append(os.readlink(f"/proc/self/fd/{one}"))
+        print(any(name.startswith(scratch) for name in names), flush=True)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+sqlite3.connect = small
+audit(Path(out))
+print(len(passed))
+"""
+"""It kills itself at a statement of the auditor's database, and says whether the file was there."""
 
 
 def end(code: str, data: Path, path: Path, row: int) -> int:
@@ -67,6 +99,29 @@ def test_an_export_that_was_killed_leaves_no_name_and_begins_again(
     with source(place) as found:
         found.verify()
         assert len(found.manifest.runs) == 5
+
+
+@pytest.mark.parametrize("at", length((30, 100), (30, 60, 80, 100, 110, 120, 128)))
+@pytest.mark.torture
+def test_a_check_that_was_killed_leaves_nothing_and_begins_again(
+    db: Database, five: list[int], tmp_path: Path, at: int
+) -> None:
+    """Its database is a temporary file without a name, killed while it is filled and amid the checks."""
+    out, scratch = tmp_path / "written" / "out.zip", tmp_path / "scratch"
+    scratch.mkdir()
+    out.parent.mkdir()
+    with target(out) as files:
+        write_export(db, five, files)
+    before = out.read_bytes()
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "SQLITE_TMPDIR": str(scratch)}
+    command = [sys.executable, "-c", CHECK, str(scratch), str(out), str(at)]
+    killed = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert (killed.returncode, killed.stderr) == (-signal.SIGKILL, ""), killed.stdout
+    assert killed.stdout == "True\n", "it had written nothing that could have been left"
+    assert list(scratch.iterdir()) == []
+    assert out.read_bytes() == before
+    assert list(out.parent.iterdir()) == [out]
+    assert audit(out).sound
 
 
 def test_an_import_that_was_killed_has_added_nothing_and_begins_again(

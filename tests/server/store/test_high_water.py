@@ -11,13 +11,16 @@ from pathlib import Path
 import pytest
 from sqlalchemy import PoolProxiedConnection
 
-from parenting.server import identity
+from parenting.server import deletion, identity
 from parenting.server.db import Database, connect
 from parenting.server.errors import SetupError
 from parenting.server.migrate import downgrade, upgrade
+from parenting.server.new_run import NewRun
+from parenting.server.new_run import start as start_run
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim
+from parenting.server.runs import claim as claim_runs
 from parenting.server.settings import Settings
 from parenting.server.store import high_water
 from parenting.server.store.driver import sqlite_module
@@ -33,6 +36,7 @@ from parenting.server.db import connect
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim
+from parenting.server.runs import claim as claim_runs
 from parenting.server.settings import Settings
 start, token = int(sys.argv[2]), int(sys.argv[3])
 db = connect(Settings(data=Path(sys.argv[1]), database_url=None))
@@ -116,6 +120,24 @@ def test_hurried_writes_leave_the_mark(db: Database, settings: Settings, mine: C
         session.connection().exec_driver_sql("UPDATE run SET answers = 7")
         session.connection().exec_driver_sql("UPDATE database_identity SET last_query = 99")
     assert high_water.read(settings.data / "parenting.db") == before
+
+
+def test_a_run_that_is_being_deleted_is_no_loss(db: Database, mine: Claim, settings: Settings) -> None:
+    """Its answers have the largest numbers; whoever is killed between two pieces leaves the mark behind."""
+    file = settings.data / "parenting.db"
+    answer(db, post_query(db, mine, 1, "guidance", 1, CLIPS), "left", "a", "human")
+    start_run(db, NewRun(world="unsafe-exploration"))
+    mine, other = sorted(claim_runs(db, "worker-2", -1), key=lambda claim: claim.run_id)
+    for tick in range(3):
+        answer(db, post_query(db, other, tick, "guidance", 1, CLIPS), "left", "a", "human")
+    deletion.begin(db, 2)
+    while not deletion.piece(db, 2):
+        assert high_water.lost(file) is None
+    answer(db, post_query(db, mine, 2, "guidance", 1, CLIPS), "left", "a", "human")
+    assert high_water.lost(file) is None
+    mark = high_water.read(file)
+    assert mark is not None
+    assert mark.counts.answers == 5, "the number of an answer is given again; what was deleted counts on"
 
 
 def test_copies_restores_identities_and_downgrades_are_no_loss(
