@@ -9,7 +9,8 @@ they are pinned, by ATEN_CPU_CAPABILITY, to those that every machine has; withou
 
 The data folder holds three runs: a scripted one that has finished; one of a parent, half answered, with a
 changed probability, an early end of a stage and ticks after its last checkpoint; and a garden whose worker
-wrote no checkpoint yet. Beside the database lies the export of each. `expected.json` says how the making
+wrote no checkpoint yet. Beside the database lies the table of answers of each, and beside the folder, since
+version 0.7.0, `runs.zip`, the export of all. `expected.json` says how the making
 version went on with the second and the third once every question was answered *left*.
 """
 
@@ -34,6 +35,9 @@ from torch import Tensor
 from parenting.server import runs
 from parenting.server.archive.format1 import read_table
 from parenting.server.archive.format1_import import import_table
+from parenting.server.archive.importing import import_export
+from parenting.server.archive.target import target
+from parenting.server.archive.writing import write_export
 from parenting.server.db import Database, connect
 from parenting.server.export import lines
 from parenting.server.exports import Part, exported
@@ -50,6 +54,7 @@ CAPABILITY = "default"
 ROOT = Path(__file__).parents[1]
 FINISHED, HALF, EARLY = 1, 2, 3
 CHOICES = ("left", "right", "either", "left")
+EXPORT = "runs.zip"
 SAVED_AT, EVENT_AT, MATURE_AT = 8, 5, 12
 """Answers of the second run before its only checkpoint and before its events."""
 GOES_ON = 12
@@ -70,6 +75,8 @@ def make(folder: Path) -> None:
         _live(db)
         for run in (FINISHED, HALF, EARLY):
             (data / f"run-{run}.jsonl").write_text("".join(lines(db, run)), encoding="utf-8")
+        with target(folder / EXPORT, force=False) as files:
+            write_export(db, (FINISHED, HALF, EARLY), files)
         db.close()
         with tarfile.open(folder / "data.tar.xz", "w:xz") as archive:
             for file in sorted(data.glob("*.db")) + sorted(data.glob("*.jsonl")):
@@ -90,8 +97,9 @@ def check(folder: Path) -> dict[str, Any]:
                 found = relive(db, run)
                 replays[str(run)] = {"tick": found.tick, "parted": found.parted, "differ": list(found.differ)}
             imported = {str(run): _import(db, Path(name), run) for run in (FINISHED, HALF, EARLY)}
+            exported = _import_export(folder / EXPORT, Path(name) / "exported")
             goes_on = {str(run): _go_on(db, run) for run in (HALF, EARLY)}
-            return {"replays": replays, "imported": imported, "goes_on": goes_on}
+            return {"replays": replays, "imported": imported, "exported": exported, "goes_on": goes_on}
         finally:
             db.close()
 
@@ -107,6 +115,20 @@ def _import(db: Database, folder: Path, number: int) -> int:
         upgrade(other)
         found = import_table(other, read_table(folder / "data" / f"run-{number}.jsonl", log), new)
         return worker_side.high_water(other, found.number)
+    finally:
+        other.close()
+
+
+def _import_export(file: Path, data: Path) -> dict[str, Any]:
+    """Import the version's export of whole runs; return, by run, its answers and where its replay parted."""
+    if not file.is_file():
+        return {}
+    other = connect(Settings(data=data, database_url=None))
+    try:
+        upgrade(other)
+        found = {run.number: run.answers for run in import_export(other, file)}
+        parted = {number: relive(other, number).parted for number in found if number != EARLY}
+        return {str(number): [answers, parted.get(number)] for number, answers in found.items()}
     finally:
         other.close()
 

@@ -20,6 +20,7 @@ import structlog
 import torch
 from fastapi.testclient import TestClient
 
+from parenting.audit import audit
 from parenting.server import runs
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
@@ -33,6 +34,8 @@ from tests.tree import ROOT
 FOLDERS = sorted(file.parent for file in (ROOT / "tests" / "old").glob("*/data.tar.xz"))
 PINNED = [folder for folder in FOLDERS if folder.name != "0.1.0"]
 """Version 0.1.0 did not pin its instructions; tests/server/test_old_data.py checks its bits."""
+EXPORTED = [folder for folder in PINNED if (folder / corpus.EXPORT).is_file()]
+"""Those with an export of whole runs (format 2), which is imported, and replayed too."""
 REPLAYED = [
     pytest.param(folder, id=folder.name, marks=[pytest.mark.faults] * (folder is not PINNED[-1]))
     for folder in PINNED
@@ -65,6 +68,12 @@ def test_there_is_one_of_each_version_that_was_published() -> None:
     assert [folder.name for folder in FOLDERS][:2] == ["0.1.0", "0.2.0"]
 
 
+def test_every_version_since_0_7_has_an_export_that_holds() -> None:
+    assert [folder.name for folder in EXPORTED][:2] == ["0.7.0", "0.8.0"]
+    for folder in EXPORTED:
+        assert audit(folder / corpus.EXPORT).problems == []
+
+
 def test_its_pages_open(db: Database, settings: Settings) -> None:
     with TestClient(create_app(settings, db), base_url="http://localhost") as client:
         for run in runs.list_runs(db):
@@ -91,6 +100,9 @@ def test_it_is_replayed_and_goes_on_with_the_bits_of_its_version(folder: Path) -
     assert found["replays"] == expected["replays"]
     assert found["goes_on"] == expected["goes_on"]
     assert min(found["imported"].values()) >= 8, "its tables of answers are runs again"
+    assert found["exported"] == (
+        {"1": [18, None], "2": [16, None], "3": [4, None]} if folder in EXPORTED else {}
+    )
     assert {replay["parted"] for replay in found["replays"].values()} == {None}
 
 
