@@ -147,16 +147,28 @@ def _kind(line: Line, glyphs: str) -> str:
 
 def _prose(lines: Sequence[Line], glyphs: str) -> set[int]:
     """Return the numbers of the lines of text around blocks of code, if rows stand in a block."""
-    inside, prose, rows = False, set(), 0
-    for line in lines:
-        kind = _kind(line, glyphs)
+    inside, prose, rows = False, set[int](), False
+    for kind, several in groupby(lines, lambda line: _kind_around(line, glyphs)):
+        block = list(several)
         if kind == "fence":
-            inside = not inside
-        elif inside:
-            rows += kind == "rows"
-        elif kind in ("rows", "header") and not ENTRY.fullmatch(line.text):
-            prose.add(line.number)
+            inside ^= len(block) % 2 == 1
+        elif kind == "text" and inside:
+            rows = True
+        elif kind == "text" and not any(_is_of_a_level(line, glyphs) for line in block):
+            prose |= {line.number for line in block}
     return prose if rows else set()
+
+
+def _kind_around(line: Line, glyphs: str) -> str:
+    kind = _kind(line, glyphs)
+    return "text" if kind in ("rows", "header") else kind
+
+
+def _is_of_a_level(line: Line, glyphs: str) -> bool:
+    """Return whether a line is an entry of a header, or holds nothing but glyphs and blanks."""
+    return ENTRY.fullmatch(line.text) is not None or all(
+        one in glyphs or _is_space(one) or _is_zero_width(one) for one in line.text
+    )
 
 
 def _is_fence(line: Line, glyphs: str) -> bool:

@@ -99,6 +99,7 @@ SEVERAL = {
     "comments": f"; first\n{POND}\n; second\n{SECOND}",
     "headers": f"name: first\n\n{POND}\nname: second\n\n{SECOND}",
     "comments without a line between": f";first\n{POND};second\n{SECOND}",
+    "one in a fence": f"Two of them:\n\n; first\n```\n{POND}```\n\n; second\n{SECOND}",
     "fences": f"; first\n```\n{POND}```\n\n; second\n```\n{SECOND}```\n",
 }
 

@@ -59,10 +59,18 @@ def seen(page: Page, parts: str) -> list[tuple[int, float]]:
     return [(frame, opacity) for frame, opacity in page.locator(parts).evaluate_all(script)]
 
 
+HOLD = """async at => {
+    const all = document.getAnimations();
+    for (const one of all) one.pause();
+    await Promise.all(all.map(one => one.ready)); // a time that is set before that is not painted
+    for (const one of all) one.currentTime = at || 1; // the player starts a clock that stands at 0
+}"""
+
+
 def at(page: Page, moment: float) -> None:
     """Hold both boards at a moment of their clock, once the player has set it."""
     page.wait_for_selector("#question[data-listening]")
-    page.evaluate("at => document.getAnimations().forEach(a => { a.pause(); a.currentTime = at; })", moment)
+    page.evaluate(HOLD, moment)
 
 
 def within_sight(page: Page, screen: str) -> None:

@@ -89,6 +89,7 @@ OTHERS = {
         "migrate",
         "new_run.start",
         "operator_events.add_operator_event",
+        "operator_events.end_episode_that_stands_still",
         "persons.name_person",
         "queue.answers.answer",
         "queue.leases",
