@@ -16,6 +16,7 @@ CHOICES = ("left", "right", "either", "neither")
 SKIP = "skip"  # the parent cannot tell: this counts as no choice
 SAID = (*CHOICES, SKIP)
 PARENTS = ("human", "scripted")
+SCRIPT = "scripted"  # the client of what a scripted parent answers, beside `parent`
 
 
 class Answer(Table):

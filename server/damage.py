@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, NamedTuple, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
@@ -78,16 +79,22 @@ def reading(row: Table) -> Iterator[None]:
 
 
 def _columns(row: Table) -> Iterator[str]:
-    state = inspect(row)
-    for column in row.__table__.columns:
-        value = state.dict.get(column.name)
-        place = f"{row.__tablename__}.{column.name}"
-        if isinstance(value, Damaged):
-            yield f"{place} {value.reason}"
-        elif value is None and not column.nullable and column.name in state.dict:
-            yield f"{place} is missing"
-        elif column.name == "public_id" and value is not None and not is_public_id(value):
-            yield f"{place} is not a public id"
+    there = inspect(row).dict
+    for name, needed in _known(type(row)):
+        value = there.get(name)
+        if value is None:
+            if needed and name in there:
+                yield f"{row.__tablename__}.{name} is missing"
+        elif isinstance(value, Damaged):
+            yield f"{row.__tablename__}.{name} {value.reason}"
+        elif name == "public_id" and not is_public_id(value):
+            yield f"{row.__tablename__}.{name} is not a public id"
+
+
+@cache
+def _known(kind: type[Table]) -> tuple[tuple[str, bool], ...]:
+    """Return the columns of a table, and whether a value of each is needed: exports ask row by row."""
+    return tuple((column.name, not column.nullable) for column in kind.__table__.columns)
 
 
 def _shapes(row: Table) -> Iterator[str]:

@@ -17,6 +17,7 @@ from parenting.agent.config import Config
 from parenting.agent.init import world_of
 from parenting.envs.gridworld import Gridworld
 from parenting.server import chain, weights
+from parenting.server.answer_tables import SCRIPT
 from parenting.server.archive.format1 import Line, Table
 from parenting.server.archive.format1_record import Asked, Progress, Relived, relive_table
 from parenting.server.archive.importing import Imported, unused_id
@@ -149,7 +150,7 @@ def _answers(session: Session, table: Table, queries: Mapping[int, Query], run: 
             **{name: getattr(line, name) for name in same},
             "query_id": query.id,
             "run_id": run.id,
-            "client_id": client if line.parent == "human" else "scripted",
+            "client_id": client if line.parent == "human" else SCRIPT,
             "supersedes": None if line.supersedes is None else stored[line.supersedes],
         }
         asked = {name: getattr(query, name) for name in chain.OF_QUERY}

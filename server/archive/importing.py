@@ -20,7 +20,8 @@ from sqlalchemy.orm import Session
 from parenting.envs import registry
 from parenting.envs.levels.spec import LevelError
 from parenting.server.archive.import_blobs import put_blobs
-from parenting.server.archive.import_record import Naming, put_record
+from parenting.server.archive.import_names import Naming
+from parenting.server.archive.import_record import put_record
 from parenting.server.archive.manifest import RunEntry
 from parenting.server.archive.runs import STATE
 from parenting.server.archive.source import Source, source

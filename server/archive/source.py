@@ -6,7 +6,7 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -91,10 +91,10 @@ class Source:
             SetupError: one is not as its columns say, or was damaged in the database that it is of.
         """
         with self.open(name) as file:
-            read = _csv_rows(file, columns) if name.endswith(".csv") else map(json.loads, file)
+            read: Iterable[str | bytes] = _csv_lines(file, columns) if name.endswith(".csv") else file
             try:
-                for number, found in enumerate(read, start=1):
-                    row: Any = model.model_validate_json(json.dumps(found))
+                for number, line in enumerate(read, start=1):
+                    row: Any = model.model_validate_json(line)
                     if row.damaged is not None:
                         raise SetupError(
                             f"{self._path}: row {number} of {name} was damaged in its database: "
@@ -143,11 +143,12 @@ def _inside(folder: Path, name: str) -> IO[bytes]:
     return file.open("rb")
 
 
-def _csv_rows(file: IO[bytes], columns: list[Column]) -> Iterator[dict[str, Any]]:
+def _csv_lines(file: IO[bytes], columns: list[Column]) -> Iterator[str]:
+    """Yield the rows of a CSV file as JSON."""
     kinds = {column.name: column.type for column in columns}
     with io.TextIOWrapper(file, encoding="utf-8", newline="") as text:
         for cells in csv.DictReader(text):
-            yield {name: _value(kinds.get(name, str), cell) for name, cell in cells.items()}
+            yield json.dumps({name: _value(kinds.get(name, str), cell) for name, cell in cells.items()})
 
 
 def _value(kind: type, cell: str) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import IO, Any
@@ -30,15 +29,20 @@ def write_jsonl(file: IO[bytes], columns: Sequence[Column], rows: Rows) -> None:
 def write_csv(file: IO[bytes], columns: Sequence[Column], rows: Rows) -> None:
     """Write a head and a line for each row; text that a spreadsheet would take for a formula is quoted."""
     names = [column.name for column in columns]
-    file.write(_csv_line(names))
+    lines = csv.writer(_Encoded(file), lineterminator="\n")
+    lines.writerow(names)
     for row in rows:
-        file.write(_csv_line([cell(row[name]) for name in names]))
+        lines.writerow([cell(row[name]) for name in names])
 
 
-def _csv_line(cells: Sequence[str]) -> bytes:
-    line = io.StringIO()
-    csv.writer(line, lineterminator="\n").writerow(cells)
-    return line.getvalue().encode()
+class _Encoded:
+    """A file of bytes that takes text, a line at a time."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    def write(self, line: str) -> None:
+        self._file.write(line.encode())
 
 
 def parquet_installed() -> bool:

@@ -30,7 +30,8 @@ class Written(NamedTuple):
 class Files(ABC):
     """The files of an export that is being written."""
 
-    def __init__(self) -> None:
+    def __init__(self, scratch: Path) -> None:
+        self.scratch = scratch  # a folder on the same disk, for files without a name
         self.written: dict[str, Written] = {}
 
     @contextmanager
@@ -50,7 +51,7 @@ class FolderFiles(Files):
     """Files in a folder."""
 
     def __init__(self, folder: Path) -> None:
-        super().__init__()
+        super().__init__(folder)
         self.folder = folder
 
     @contextmanager
@@ -66,8 +67,8 @@ class FolderFiles(Files):
 class ZipFiles(Files):
     """Files in a zip, which is written from its beginning to its end."""
 
-    def __init__(self, zipped: ZipFile) -> None:
-        super().__init__()
+    def __init__(self, zipped: ZipFile, scratch: Path) -> None:
+        super().__init__(scratch)
         self.zipped = zipped
 
     @contextmanager
@@ -109,17 +110,17 @@ def target(path: Path, force: bool = False) -> Iterator[Files]:
     if path.suffix.lower() == ".zip":
         _sweep(path)
         with whole(path, force) as part, ZipFile(part, "w", ZIP_DEFLATED) as zipped:
-            yield ZipFiles(zipped)
+            yield ZipFiles(zipped, part.parent)
         return
     with folder_target(path, force) as part:
         yield FolderFiles(part)
 
 
 @contextmanager
-def zip_in(file: IO[bytes]) -> Iterator[Files]:
-    """Write an export as a zip into a file that is open."""
+def zip_in(file: IO[bytes], scratch: Path) -> Iterator[Files]:
+    """Write an export as a zip into a file that is open; other files without a name lie in `scratch`."""
     with ZipFile(file, "w", ZIP_DEFLATED) as zipped:
-        yield ZipFiles(zipped)
+        yield ZipFiles(zipped, scratch)
 
 
 @contextmanager

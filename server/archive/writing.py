@@ -17,6 +17,7 @@ from parenting.server.archive.card import card
 from parenting.server.archive.codebook import codebook
 from parenting.server.archive.parts import PARQUET, TABLES, Part
 from parenting.server.archive.runs import last_link, settings_of, write_blobs
+from parenting.server.archive.spool import Spool
 from parenting.server.archive.tables import REMEDY, parquet_installed
 from parenting.server.archive.target import MANIFEST, Files
 from parenting.server.damage import readable
@@ -59,11 +60,9 @@ class _Export:
         """Write every file, the manifest last."""
         left_out = []
         for name, part in TABLES.items():
-            for file in part.files:
-                if file == PARQUET and not parquet_installed():
-                    left_out.append({"file": file, "why": "pyarrow is not installed", "remedy": REMEDY})
-                    continue
-                self._table(name, part, file)
+            if PARQUET in part.files and not parquet_installed():
+                left_out.append({"file": PARQUET, "why": "pyarrow is not installed", "remedy": REMEDY})
+            self._table(name, part)
         blobs = {run.public_id: write_blobs(self.session, run, self.files) for run in self.runs}
         for name, text in (("codebook.md", codebook()), ("README.md", card())):
             with self.files.open(name) as out:
@@ -80,22 +79,35 @@ class _Export:
             last.write(manifest.dumped(whole))
         return whole
 
-    def _table(self, name: str, part: Part, file: str) -> None:
-        first = file == next(iter(part.files))
-        with self.files.open(file) as out:
-            part.files[file](out, part.columns, self._seen(name, part, file, first))
+    def _table(self, name: str, part: Part) -> None:
+        """Write a table in its forms; its rows are read once."""
+        first, *others = [file for file in part.files if file != PARQUET or parquet_installed()]
+        with Spool(self.files.scratch, [column.name for column in part.columns]) as spool:
+            rows = self._stored(name, part)
+            self._form(part, first, spool.kept(rows) if others else rows)
+            for file in others:
+                self._form(part, file, spool.rows())
 
-    def _seen(self, name: str, part: Part, file: str, first: bool) -> Iterator[Mapping[str, Any]]:
-        """Yield the rows of all runs; the first time they are counted."""
+    def _form(self, part: Part, file: str, rows: Iterator[Mapping[str, Any]]) -> None:
         self.rows[file] = 0
+        with self.files.open(file) as out:
+            part.files[file](out, part.columns, self._told(file, rows))
+
+    def _told(self, file: str, rows: Iterator[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
+        """Yield rows, and tell of the progress."""
+        for row in rows:
+            self.rows[file] += 1
+            self.done += 1
+            self.progress(self.done, self.total)
+            yield row
+
+    def _stored(self, name: str, part: Part) -> Iterator[Mapping[str, Any]]:
+        """Yield the rows of all runs from the database, and count them."""
         for run in self.runs:
+            counts = self.counts[run.public_id]
             for row in part.rows(self.session, run):
-                self.rows[file] += 1
-                if first:
-                    self.counts[run.public_id][name] += 1
-                    self.counts[run.public_id]["in_x"] += bool(row.get("in_x"))
-                self.done += 1
-                self.progress(self.done, self.total)
+                counts[name] += 1
+                counts["in_x"] += bool(row.get("in_x"))
                 yield row
 
     def _entry(self, run: Run, blobs: dict[str, Any]) -> dict[str, Any]:

@@ -24,7 +24,7 @@ def zipped(db: Database, runs: Sequence[int], folder: Path) -> Iterator[bytes]:
     Args:
         db: The database.
         runs: The runs.
-        folder: The folder in which the file without a name lies meanwhile.
+        folder: The folder in which files without a name lie meanwhile.
 
     Raises:
         NotFound: a run does not exist; raised here, not at the first piece.
@@ -32,7 +32,7 @@ def zipped(db: Database, runs: Sequence[int], folder: Path) -> Iterator[bytes]:
     """
     file: IO[bytes] = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - the reply closes it
     try:
-        with zip_in(file) as files:
+        with zip_in(file, folder) as files:
             write_export(db, runs, files)
         file.seek(0)
     except BaseException:

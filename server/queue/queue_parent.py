@@ -21,6 +21,7 @@ from parenting.envs.gridworld import Gridworld
 from parenting.envs.rng import Keys
 from parenting.parents.fallible import FallibleRule
 from parenting.server import tables
+from parenting.server.answer_tables import SCRIPT
 from parenting.server.codec import CHOICE_NAMES, CHOICES, decode, encode, kind_name
 from parenting.server.damage import readable, reading, sound
 from parenting.server.db import Database
@@ -29,7 +30,6 @@ from parenting.server.queue import answers, corrections, skips, worker_side
 from parenting.server.queue.repairs import repair
 from parenting.server.runs import Claim
 
-SCRIPT = "scripted"
 _EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
 
 

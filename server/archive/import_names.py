@@ -1,0 +1,64 @@
+"""What the rows of an import share: the names of runs and questions here, and the values of cells."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
+
+from parenting.server.errors import SetupError
+from parenting.server.public_ids import ALPHABET, LENGTH
+
+
+class Naming(NamedTuple):
+    """The names of a run in the export and here."""
+
+    number: int
+    public_id: str
+    was: str
+
+    def question(self, name: str) -> str:
+        """Return a question's public id here: the same one, where its run has kept its own."""
+        if self.public_id == self.was:
+            return name
+        number = int.from_bytes(hashlib.sha256(f"{self.public_id} {name}".encode()).digest())
+        return "".join(ALPHABET[number // 58**place % 58] for place in range(LENGTH))
+
+
+Names = Mapping[str, Naming]
+
+
+def run_of(names: Names, row: Any) -> Naming:
+    """Return the names of the run that a row is of.
+
+    Raises:
+        SetupError: the manifest does not name it.
+    """
+    if row.run not in names:
+        raise SetupError(
+            f"A row is of the run {row.run}, which the manifest does not name. Nothing was imported."
+        )
+    return names[row.run]
+
+
+def same(row: Any, *names: str) -> dict[str, Any]:
+    """Return the cells that columns of the same name take as they are."""
+    return {name: getattr(row, name) for name in names}
+
+
+def needed(value: datetime | None) -> datetime:
+    """Return a time that must be there.
+
+    Raises:
+        ValueError: it is missing.
+    """
+    if value is None:
+        raise ValueError("a time is missing")
+    return value
+
+
+def time_of(text: str | None) -> datetime | None:
+    """Return the time that a cell tells, in UTC."""
+    return None if text is None else datetime.fromisoformat(re.sub(r"Z$", "+00:00", text)).astimezone(UTC)
