@@ -15,6 +15,7 @@ from parenting.experiments.questions.report import findings, words
 from parenting.experiments.questions.settings import (
     ANSWERS,
     ARMS,
+    ASKED,
     IDEAL,
     IDEAL_TRIALS,
     ISLANDS,
@@ -179,7 +180,7 @@ EXPERIMENT = Experiment(
     title="Questions: a third of them",
     section="",
     claim="An agent that asks what it does not know, and nothing twice, spares its parent most questions.",
-    trials={"quick": 3, "paper": TRIALS},
+    trials={"quick": 3, "paper": ASKED},
     config=_config,
     tasks=_tasks,
     report=_report,

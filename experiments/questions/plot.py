@@ -56,7 +56,10 @@ def draw_arms(figure: Figure, rows: Sequence[Row]) -> None:
         axes.set_title(level)
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(lambda number, _place: f"{number:g}")
-        axes.xaxis.set_minor_formatter(lambda _number, _place: "")
+        axes.xaxis.set_minor_formatter(
+            lambda number, _place: f"{number:g}" if f"{number:g}"[0] in "25" else ""
+        )
+        axes.tick_params(axis="x", which="both", labelsize=8)
         axes.set_xlabel("answers until optimal")
         axes.set_yticks(range(len(names)), names, fontsize=8)
         axes.set_ylim(len(names) - 0.5, -0.5)
@@ -65,7 +68,7 @@ def draw_arms(figure: Figure, rows: Sequence[Row]) -> None:
 
 
 def _arm(axes: Axes, place: int, name: str, mine: Sequence[Row]) -> None:
-    """A dot for the mean with its interval, and beside it the mean of deaths."""
+    """A dot for the mean with its interval, and right of the axes the mean of deaths."""
     found = answers(mine)
     if not found or not any(found):
         return
@@ -77,9 +80,9 @@ def _arm(axes: Axes, place: int, name: str, mine: Sequence[Row]) -> None:
         f"{fmean(deaths(mine)):.2f}",
         (1.0, place),
         xycoords=("axes fraction", "data"),
-        xytext=(-3, 0),
+        xytext=(3, 0),
         textcoords="offset points",
-        ha="right",
+        ha="left",
         va="center",
         fontsize=7,
         color=PAPER,

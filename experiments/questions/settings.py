@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 
 from parenting.experiments.spec import Scale, share_of
 
-TRIALS = 300
+ASKED = 1000
 """Trials asked at the paper's scale."""
+TRIALS = 300
+"""Trials of which an arm raises its part: of a thousand, three times as many (`trials_of`)."""
 ANSWERS = 60
 """Answers up to which the areas go."""
 MARKS = (*range(20), *range(20, ANSWERS + 1, 4))
