@@ -7,6 +7,8 @@ import sqlite3
 from collections.abc import Iterator
 from typing import Any
 
+from parenting.audit.findings import SOME, more
+
 BEGIN = hashlib.sha256(b"parenting: the answers of a run, 1").hexdigest()
 """The link before a run's first answer."""
 PER_RUN = {
@@ -65,8 +67,6 @@ PER_RUN = {
     "answer {0} of run {1} is in X, and was not heard": """
         SELECT number, run FROM answer WHERE in_x AND applied_tick IS NULL""",
 }
-SOME = 5
-"""Sentences of one check."""
 HEARD = """
     SELECT run, applied_tick AS tick, kind, choice, 1 AS more FROM answer
     WHERE applied_tick IS NOT NULL AND run = ?
@@ -84,7 +84,7 @@ def rows_agree(store: sqlite3.Connection) -> Iterator[str]:
         wrong = store.execute(query).fetchmany(SOME + 1)
         yield from (sentence.format(*row) for row in wrong[:SOME])
         if len(wrong) > SOME:
-            yield f"... and more of this kind: {sentence.format('N', 'R')}"
+            yield more(sentence)
 
 
 def chain_holds(store: sqlite3.Connection, run: str, last_link: str | None) -> Iterator[str]:

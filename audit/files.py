@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import json
+import zlib
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import IO, Any
 from zipfile import BadZipFile, ZipFile
 
 PIECE = 2**20
-BROKEN = (BadZipFile, EOFError, KeyError, OSError, RuntimeError, ValueError)
+BROKEN = (BadZipFile, EOFError, KeyError, OSError, RuntimeError, ValueError, zlib.error)
 
 
 class Files:
@@ -83,3 +84,15 @@ class Files:
         """Yield the rows of a CSV file as text."""
         with io.TextIOWrapper(self.open(name), encoding="utf-8", newline="") as text:
             yield from csv.DictReader(text)
+
+
+def unpacked_lines(file: IO[bytes]) -> Iterator[bytes]:
+    """Yield the lines of a file that zlib has compressed; a piece of it at a time is in memory."""
+    unpack, rest = zlib.decompressobj(), b""
+    while packed := unpack.unconsumed_tail or file.read(PIECE):
+        *lines, rest = (rest + unpack.decompress(packed, PIECE)).split(b"\n")
+        yield from lines
+    rest += unpack.flush()
+    if not unpack.eof:
+        raise ValueError("a compressed file is cut off")
+    yield from rest.splitlines()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sqlite3
-import zlib
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing
@@ -13,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from parenting.audit.checks import chain_holds, counts_agree, metrics_follow, rows_agree
-from parenting.audit.files import BROKEN, Files
+from parenting.audit.files import BROKEN, Files, unpacked_lines
+from parenting.audit.findings import Findings
 from parenting.audit.store import load
 
 MANIFEST = "manifest.json"
@@ -77,7 +77,7 @@ def _hashes(files: Files, told: dict[str, Any], report: Report) -> Iterator[str]
 
 
 def _tables(files: Files, told: dict[str, Any], report: Report) -> None:
-    found = report.problems.append
+    found = Findings(report.problems)
     with closing(load(files, found)) as store:
         report.problems += rows_agree(store)
         events = Counter(row["run"] for row in files.cells("events.csv"))
@@ -85,7 +85,7 @@ def _tables(files: Files, told: dict[str, Any], report: Report) -> None:
         for table in ("answer", "question", "metric"):
             for (run,) in store.execute(f"SELECT DISTINCT run FROM {table}"):
                 if run not in known:
-                    found(f"a row of {table} is of the run {run}, which the manifest does not name")
+                    found(f"a row of {table} is of the run {{0}}, which the manifest does not name", run)
         for run in told["runs"]:
             report.runs += 1
             report.answers += run["counts"]["answers"]
@@ -106,5 +106,4 @@ def _inherited(files: Files, run: dict[str, Any]) -> int:
     if began is None:
         return 0
     with closing(files.open(run["weights"][began])) as file:
-        lines = zlib.decompress(file.read()).splitlines()
-    return sum(json.loads(line)["choice"] in ("left", "right", "either") for line in lines)
+        return sum(json.loads(line)["choice"] in ("left", "right", "either") for line in unpacked_lines(file))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from parenting.audit.files import Files
+from parenting.audit.findings import Findings
 
 SAID = (
     *("run", "number", "question", "kind", "choice", "standing", "supersedes", "superseded_by"),
@@ -23,11 +24,9 @@ INDICES = (
 )
 """Without them a check looks through all answers for each answer."""
 APOSTROPHE = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")  # noqa: RUF001 - wide ones, too
-Found = Callable[[str], None]
-"""A function that takes a sentence on what is wrong."""
 
 
-def load(files: Files, found: Found) -> sqlite3.Connection:
+def load(files: Files, found: Findings) -> sqlite3.Connection:
     """Return the tables of an export; duplicates and differences between forms are found on the way."""
     store = begun()
     _fill(store, "answer", SAID, _answers(files, found), found)
@@ -48,25 +47,25 @@ def begun() -> sqlite3.Connection:
 
 
 def _fill(
-    store: sqlite3.Connection, table: str, names: tuple[str, ...], rows: Iterator[Any], found: Found
+    store: sqlite3.Connection, table: str, names: tuple[str, ...], rows: Iterator[Any], found: Findings
 ) -> None:
     into = f"INSERT INTO {table} VALUES ({', '.join('?' * len(names))})"
     for row in rows:
         try:
             store.execute(into, [row[name] for name in names])
         except sqlite3.IntegrityError:
-            found(f"{table} {row.get('number', row.get('question', row.get('tick')))} stands twice")
+            found(f"{table} {{0}} stands twice", row.get("number", row.get("question", row.get("tick"))))
         except (KeyError, sqlite3.Error):
             found(f"a row of {table} lacks a column or holds a value of another type")
 
 
-def _answers(files: Files, found: Found) -> Iterator[dict[str, Any]]:
+def _answers(files: Files, found: Findings) -> Iterator[dict[str, Any]]:
     """Yield the answers of the JSON lines, each compared with its row of the CSV."""
     cells, number = files.cells("answers.csv"), 0
     for number, row in enumerate(files.lines("answers.jsonl"), start=1):
         told = next(cells, None)
         if told is None or told != {name: _cell(value) for name, value in row.items()}:
-            found(f"row {number} of answers.csv is not row {number} of answers.jsonl")
+            found("row {0} of answers.csv is not row {0} of answers.jsonl", number)
         yield row
     if next(cells, None) is not None:
         found(f"answers.csv has more than the {number} rows of answers.jsonl")

@@ -6,13 +6,14 @@ import csv
 import hashlib
 import io
 import json
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from parenting.audit import audit
+from parenting.audit import audit, files
 from parenting.audit.checks import PER_RUN
 from parenting.audit.store import begun
 
@@ -237,6 +238,29 @@ def test_a_file_is_held_against_its_hash(tmp_path: Path, name: str, how: str) ->
         file.write_bytes(b"\xff\x00{" if how == "not what it was" else file.read_bytes() + b"\n")
     found = audit(tmp_path)
     assert any(one.startswith(name) for one in found.problems), found
+
+
+def test_where_every_row_is_wrong_a_few_sentences_say_so(tmp_path: Path) -> None:
+    whole = sound()
+    whole["csv"] = table(whole["answers"]).replace("guidance", "preference")
+    write(tmp_path, whole)
+    kind = "row {0} of answers.csv is not row {0} of answers.jsonl"
+    told = [
+        *(kind.format(number) for number in range(1, 6)),
+        f"... and more of this kind: {kind.format('N')}",
+    ]
+    assert audit(tmp_path).problems == told
+
+
+@pytest.mark.parametrize("piece", [1, 7, 2**20])
+def test_packed_lines_are_unpacked_piece_by_piece(monkeypatch: pytest.MonkeyPatch, piece: int) -> None:
+    monkeypatch.setattr(files, "PIECE", piece)
+    lines = [b"left" * 50, b"", b"right", b"neither"]
+    packed = zlib.compress(b"\n".join(lines) + b"\n")
+    assert list(files.unpacked_lines(io.BytesIO(packed))) == lines
+    assert list(files.unpacked_lines(io.BytesIO(zlib.compress(b"one\nlast")))) == [b"one", b"last"]
+    with pytest.raises((ValueError, zlib.error)):
+        list(files.unpacked_lines(io.BytesIO(packed[:-5])))
 
 
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"format": "parenting-export", "version": 3}'])
