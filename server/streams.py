@@ -37,8 +37,11 @@ LONGEST_REST = 0.1
 STREAM_SECONDS, SELDOM_SECONDS = 0.005, 1.0
 """A run's streams are told at most once in so many seconds for each stream of the process, up to the second:
 each costs the processor a fraction of a millisecond, which answers would have."""
-AGAIN_SECONDS = 1.0
-"""Seconds after which who waits for a question asks again, whether anything was seen to change or not."""
+AGAIN_SECONDS = 5.0
+"""Seconds after which who waits for a question asks again, whether anything was seen to change or not: a
+precaution only, as the watcher sees each commit."""
+GONE_SECONDS = 1.0
+"""Seconds between two looks at whether who waits for a question is still there."""
 
 Found = TypeVar("Found")
 
@@ -49,6 +52,8 @@ class Streams:
     def __init__(self, db: Database, notifier: Notifier, limit: int, admission: Admission) -> None:
         self.db, self.notifier, self.limit, self.admission = db, notifier, limit, admission
         self.subscriptions: dict[int, Subscription] = {}
+        self.numbers: dict[str, int] = {}
+        """The numbers of runs by their public ids, as far as they were asked for."""
         self.relay = Relay(db.engine, "web", notifier.wake)
         self.closed = False
         self._news = asyncio.Event()
@@ -86,6 +91,8 @@ class Streams:
         question, leases, run = "", "[]", ""
         with self.joined(run_id) as subscription:
             subscription.streams += 1
+            if subscription.seen is None:
+                self._wake_watcher()
             try:
                 while not (self.closed or subscription.gone or (stay and await stay.is_over())):
                     changed, seen = subscription.changed, subscription.seen
@@ -130,27 +137,31 @@ class Streams:
         look: Callable[[], Awaitable[Found | None]],
         seconds: float,
         gone: Callable[[], Awaitable[bool]],
+        sure: Callable[[], Awaitable[Found | None]] | None = None,
     ) -> Found | None:
         """Return what `look` finds now or within `seconds`; None if it finds nothing.
 
-        It looks again when another question of the run may be leased. It does not wait when as many requests
-        wait already as streams are allowed. It stops once the client is `gone`: a question would be leased to
-        nobody.
+        It looks again when another question of the run may be leased; by `sure`, if that is given, where
+        nobody else waits for it. It does not wait when as many requests wait already as streams are allowed.
+        It stops once the client is `gone`: a question would be leased to nobody.
         """
         waiting = sum(one.requests for one in self.subscriptions.values())
         until = time.monotonic() + (seconds if waiting < self.limit else 0.0)
         with self.joined(run_id) as subscription:
             subscription.requests += 1
+            seek = look
             try:
                 while not await gone():
                     offered, again = subscription.offered, time.monotonic() + AGAIN_SECONDS
-                    found = await look()
+                    found = await seek()
                     if found is not None or time.monotonic() >= until or self.closed:
                         return found
                     while not offered.is_set() and time.monotonic() < min(until, again):
-                        await either(offered, min(min(until, again) - time.monotonic(), POLL_SECONDS))
-                        if await gone():
+                        await either(offered, min(min(until, again) - time.monotonic(), GONE_SECONDS))
+                        if not offered.is_set() and await gone():
                             return None
+                    alone = offered.is_set() and subscription.requests == 1
+                    seek = sure if sure is not None and alone else look
                 return None
             finally:
                 subscription.requests -= 1
@@ -160,8 +171,6 @@ class Streams:
         """Have a run watched within the block."""
         subscription = self.subscriptions.setdefault(run_id, Subscription())
         subscription.holders += 1
-        if subscription.seen is None:
-            self._wake_watcher()
         if self._watcher is None or self._watcher.done():
             self._watcher = asyncio.create_task(self._watch())
         try:
@@ -170,6 +179,7 @@ class Streams:
             subscription.holders -= 1
             if not subscription.holders:
                 self.subscriptions.pop(run_id, None)
+            if not self.subscriptions:
                 self._wake_watcher()  # it ends where nothing is watched any more
 
     async def _watch(self) -> None:
@@ -189,14 +199,17 @@ class Streams:
 
     async def _look(self) -> float:
         """Look at every run that is watched, unless nobody has committed since; return what that cost."""
-        ids, now = tuple(self.subscriptions), time.monotonic()
+        now, followed = time.monotonic(), [i for i, one in self.subscriptions.items() if one.streams]
+        asked = [run_id for run_id in self.subscriptions if run_id not in set(followed)]
         self._ended += now >= self._ends
-        key = ("watched", *ids, now // UNSURE_SECONDS, self._ended)
-        found: Look = await self.admission.read(self.db.cached, key, partial(look, self.db, ids))
+        signs = now // UNSURE_SECONDS if followed else 0.0
+        key = ("watched", *followed, "asked", *asked, signs, self._ended)
+        found: Look = await self.admission.read(self.db.cached, key, partial(look, self.db, followed, asked))
         self._ends = found.ends
-        for run_id in ids:
-            if run_id in self.subscriptions:
-                self.subscriptions[run_id].take(found.runs.get(run_id), now)
+        for run_id in (i for i in followed if i in self.subscriptions):
+            self.subscriptions[run_id].take(found.runs.get(run_id), now)
+        for run_id in (i for i in asked if i in self.subscriptions):
+            self.subscriptions[run_id].take_offer(found.offers.get(run_id))
         return found.cost
 
     async def _read(self) -> None:

@@ -7,6 +7,7 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass, field
 
+from parenting.server.reads.offering import Offer
 from parenting.server.reads.watching import Rows, Seen
 
 UNSURE_SECONDS = 1.0
@@ -22,7 +23,8 @@ class Subscription:
     streams: int = 0
     requests: int = 0  # that wait for a question
     holders: int = 0  # both of them, and who else has it watched
-    seen: Seen | None = None
+    seen: Seen | None = None  # by its streams
+    offers: Offer | None = None  # by those who wait for a question, where it has no streams
     run: str = ""  # as JSON
     stale: bool = True  # it has changed since
     untold: bool = False  # its streams have not been told of the last change
@@ -46,11 +48,9 @@ class Subscription:
 
     def take(self, seen: Seen | None, now: float) -> None:
         """Note what was seen of the run, and wake those whom it concerns."""
-        before, self.seen = self.seen, seen
+        before, self.seen, self.offers = self.seen, seen, None
         if seen is None:
-            self.gone = True  # its streams end, and whoever opens one again gets 404
-            self.offer()
-            self.tell()
+            self.leave()
             return
         if before is None or (seen.offers != before.offers and seen.question != NOTHING):
             self.offer()  # after an answer there is nothing to lease until the agent asks again
@@ -59,6 +59,20 @@ class Subscription:
         changed = before is None or (seen.row, seen.signed) != (before.row, before.signed)
         if changed or (not seen.signed and now - self.read >= UNSURE_SECONDS):
             self.stale = True
+
+    def take_offer(self, offers: Offer | None) -> None:
+        """Note what a run without streams offers, and wake those who wait where they may find a question."""
+        before, self.offers, self.seen = self.offers, offers, None
+        if offers is None:
+            self.leave()
+        elif offers != before and offers.free:
+            self.offer()
+
+    def leave(self) -> None:
+        """End what lasts, as the run is not here any more; whoever comes again gets 404."""
+        self.gone = True
+        self.offer()
+        self.tell()
 
 
 async def either(event: asyncio.Event, timeout: float) -> None:

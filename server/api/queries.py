@@ -20,8 +20,8 @@ from parenting.server.queue.answers import Said, Stored, answer_in
 from parenting.server.queue.leases import is_offered, lease_in, release_in
 from parenting.server.queue.names import Names
 from parenting.server.reads import pagination
-from parenting.server.reads.names import is_there, require_run, run_number, run_number_in
-from parenting.server.reads.schemas import asked_schema, asked_schemas, leased_schema
+from parenting.server.reads.names import is_there, require_run, run_number
+from parenting.server.reads.schemas import SHOWN_RUNS, asked_schema, asked_schemas, leased_schema
 from parenting.server.reads.why import why
 from parenting.server.receipts import StoredSchema
 from parenting.server.schemas import AskedSchema, LeasedSchema
@@ -56,23 +56,36 @@ async def lease_question(
     no question waits or if the run has reached its goal. With `wait` the request lies at the server for so
     many seconds until one is free; where too many lie there already, the status is 204 at once.
     """
-    asks = (db, run_id, body.client_id)
-    verb, worth = partial(_lease, *asks, settings.lease_seconds), partial(_is_worth_it, *asks)
-    look = partial(store, request, verb, durable=False, worth=worth)
-    leased: LeasedSchema | None = await look()
-    if leased is None and body.wait:
-        streams: Streams = request.app.state.streams
-        number = await streams.admission.read(run_number, db, run_id)
-        leased = await streams.wait_for(number, look, body.wait, Stay(request).is_left)
+    streams: Streams = request.app.state.streams
+    number = await _number(streams, db, run_id)
+    asks = (db, number, body.client_id)
+    sure = partial(store, request, partial(_lease, *asks, settings.lease_seconds), durable=False)
+    look, leased = partial(sure, worth=partial(_is_worth_it, *asks)), None
+    if body.wait:
+        leased = await streams.wait_for(number, look, body.wait, Stay(request).is_left, sure)
+    else:
+        leased = await look()
     if leased is None:
         return Response(status_code=204)
     return Response(leased.model_dump_json(), media_type="application/json")
 
 
+async def _number(streams: Streams, db: Database, name: int | str) -> int:
+    """Return the number of a run. That of a public id never changes, and no other run ever gets it."""
+    if isinstance(name, int):
+        return name
+    known = streams.numbers.get(name)
+    if known is None:
+        known = await streams.admission.read(run_number, db, name)
+        if len(streams.numbers) >= SHOWN_RUNS:
+            streams.numbers.clear()
+        streams.numbers[name] = known
+    return known
+
+
 def _lease(
-    db: Database, name: int | str, client_id: str, seconds: float, session: Session
+    db: Database, run_id: int, client_id: str, seconds: float, session: Session
 ) -> LeasedSchema | None:
-    run_id = run_number_in(session, name)
     query = lease_in(session, db, run_id, client_id, seconds)
     if query is None:
         require_run(session, run_id)
@@ -80,9 +93,8 @@ def _lease(
     return leased_schema(session, query)
 
 
-def _is_worth_it(db: Database, name: int | str, client_id: str, session: Session) -> bool:
+def _is_worth_it(db: Database, run_id: int, client_id: str, session: Session) -> bool:
     """Return whether a question can be leased, or the run is not there, which the verb says."""
-    run_id = run_number_in(session, name)
     return is_offered(session, db, run_id, client_id) or not is_there(session, run_id)
 
 

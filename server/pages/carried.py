@@ -32,7 +32,7 @@ from parenting.server.pages.question import question_view
 from parenting.server.pages.render import render
 from parenting.server.queue.leases import More
 from parenting.server.reads.names import query_numbers, run_number
-from parenting.server.streams import AGAIN_SECONDS, POLL_SECONDS, Streams
+from parenting.server.streams import POLL_SECONDS, Streams
 from parenting.server.subscriptions import either
 from parenting.server.tables import Query, Run
 
@@ -40,6 +40,9 @@ router = admitted_router(include_in_schema=False)
 
 Events = asyncio.Queue[ServerSentEvent | None]
 
+AGAIN_SECONDS = 1.0
+"""Seconds after which a question is looked for again, whether anything was seen to change or not: one that
+the page gave up is offered to others first."""
 PAGES = 20
 """Pages of one stream."""
 

@@ -11,11 +11,13 @@ from datetime import datetime
 from typing import Any
 
 from sqlalchemy import Row, bindparam, func, select
+from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
 from parenting.server.queue.presence import holder
 from parenting.server.queue.queries import urgency
 from parenting.server.reads.metrics import list_metrics
+from parenting.server.reads.offering import Offer, offers
 from parenting.server.reads.schemas import SILENT_AFTER, metric_schemas, run_schemas
 from parenting.server.schemas import RunSchema
 from parenting.server.statuses import OVER, QueryStatus
@@ -47,6 +49,8 @@ class Look:
     """One look at many runs: those that are there, and when the first of their leases ends."""
 
     runs: dict[int, Seen]
+    offers: dict[int, Offer]
+    """The same of runs that nobody follows, whose next question somebody waits for."""
     ends: float  # by the monotonic clock; infinite where nobody holds any
     cost: float  # seconds of the processor
 
@@ -60,25 +64,35 @@ class Rows:
     more: bool
 
 
-def look(db: Database, run_ids: Sequence[int]) -> Look:
-    """Look at runs by four statements, however many they are."""
+def look(db: Database, run_ids: Sequence[int], asked: Sequence[int] = ()) -> Look:
+    """Look at runs by four statements, however many they are, and at those that are only asked by one."""
     began = time.thread_time()
-    asks = {"runs": list(run_ids)}
     with db.read() as session:
-        mark = db.mark(session)
-        runs = session.execute(_RUNS, asks).all()
-        counted, leased = defaultdict[int, list[Row[Any]]](list), defaultdict[int, list[Row[Any]]](list)
-        for statement, rows in ((_COUNTED, counted), (_LEASED, leased)):
-            for row in session.execute(statement, asks):
-                rows[row.run_id].append(row)
-        firsts = {row.run_id: row for row in session.execute(_FIRST, asks)}
+        mark, found, offered, ends = db.mark(session), dict[int, Seen](), dict[int, Offer](), float("inf")
+        if run_ids:
+            found, ends = _followed(session, run_ids, mark)
+        if asked:
+            offered, soonest = offers(session, asked, mark)
+            ends = min(ends, soonest)
+    return Look(found, offered, ends, time.thread_time() - began)
+
+
+def _followed(session: Session, run_ids: Sequence[int], mark: Mark) -> tuple[dict[int, Seen], float]:
+    """Return what is seen of runs, and when the first of their leases ends."""
+    asks = {"runs": list(run_ids)}
+    runs = session.execute(_RUNS, asks).all()
+    counted, leased = defaultdict[int, list[Row[Any]]](list), defaultdict[int, list[Row[Any]]](list)
+    for statement, rows in ((_COUNTED, counted), (_LEASED, leased)):
+        for row in session.execute(statement, asks):
+            rows[row.run_id].append(row)
+    firsts = {row.run_id: row for row in session.execute(_FIRST, asks)}
     found, left = {}, float("inf")
     for row in runs:
         if isinstance(row.deleting, datetime):
             continue
         found[row.id], soonest = _seen(row, firsts.get(row.id), counted[row.id], leased[row.id], mark)
         left = min(left, soonest)
-    return Look(found, time.monotonic() + left, time.thread_time() - began)
+    return found, time.monotonic() + left
 
 
 def _seen(

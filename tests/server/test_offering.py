@@ -1,0 +1,118 @@
+"""What a run offers to those who wait for its next question, and whom the watcher wakes."""
+
+import asyncio
+from typing import Any
+
+import pytest
+from sqlalchemy import event
+
+from parenting.server.admission import Admission
+from parenting.server.db import Database
+from parenting.server.new_run import NewRun, start
+from parenting.server.notify import Notifier
+from parenting.server.queue.answers import answer
+from parenting.server.queue.leases import lease, release
+from parenting.server.queue.worker_side import post_query
+from parenting.server.reads.offering import Offer
+from parenting.server.reads.watching import Look, look
+from parenting.server.runs import Claim
+from parenting.server.settings import Settings
+from parenting.server.streams import Streams
+from parenting.server.subscriptions import Subscription
+from parenting.server.tables import Run
+from tests.server.conftest import CLIPS, Clock
+
+
+def offered(db: Database, run: int) -> Offer:
+    return look(db, [], [run]).offers[run]
+
+
+def test_held_questions_are_not_free_until_their_lease_ends(
+    db: Database, clock: Clock, mine: Claim, guidance: int
+) -> None:
+    asked = offered(db, mine.run_id)
+    assert asked.free == 1
+    assert lease(db, mine.run_id, "a", seconds=60) is not None
+    held = offered(db, mine.run_id)
+    assert held.free == 0
+    assert held != asked
+    clock.pass_seconds(61)
+    assert offered(db, mine.run_id).free == 1
+    lease(db, mine.run_id, "b")
+    release(db, guidance, "b")
+    assert offered(db, mine.run_id) == asked
+    answer(db, guidance, "left", "a", "human")
+    assert offered(db, mine.run_id).free == 0
+
+
+def test_any_number_of_runs_takes_one_statement(db: Database, mine: Claim, guidance: int) -> None:
+    others = [start(db, NewRun(world="unsafe-exploration")).id for _ in range(3)]
+    said: list[str] = []
+    event.listen(db.engine, "before_cursor_execute", lambda *words: said.append(words[2]))
+    found = look(db, [], [mine.run_id, *others, 99]).offers
+    assert [found[run].free for run in (mine.run_id, *others)] == [1, 0, 0, 0]
+    assert 99 not in found
+    assert len([words for words in said if "FROM run" in words]) == 1
+
+
+def test_a_look_knows_when_the_first_lease_ends(db: Database, mine: Claim) -> None:
+    assert look(db, [], [mine.run_id]).ends == float("inf")
+    for tick, seconds in ((1, 500.0), (2, 200.0)):
+        post_query(db, mine, tick, "preference", 1, CLIPS)
+        lease(db, mine.run_id, f"client-{tick}", seconds)
+    soon = look(db, [], [mine.run_id])
+    assert soon.ends == pytest.approx(look(db, [mine.run_id]).ends, abs=60)
+
+
+def test_a_question_wakes_who_waits_and_its_lease_does_not() -> None:
+    one, woken = Subscription(), list[bool]()
+    for state, free in (((1,), 0), ((1,), 1), ((1,), 1), ((2,), 0), ((3,), 0), ((4,), 2)):
+        before = one.offered
+        one.take_offer(Offer(state, free))
+        woken.append(before.is_set())
+    assert woken == [False, True, False, False, False, True]
+
+
+def test_a_run_that_is_deleted_ends_the_wait() -> None:
+    one = Subscription()
+    before = one.offered
+    one.take_offer(None)
+    assert one.gone
+    assert before.is_set()
+
+
+def test_who_waits_alone_takes_the_question_at_once(
+    settings: Settings, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One look when they come; after the offer no look that only reads."""
+    monkeypatch.setattr("parenting.server.streams.AGAIN_SECONDS", 3600)
+    streams, called = Streams(db, Notifier(settings.data, "web"), 2, Admission()), list[str]()
+
+    async def call(name: str) -> Any:
+        called.append(name)
+        return await asyncio.to_thread(lease, db, mine.run_id, "a")
+
+    async def here() -> bool:
+        return False
+
+    async def wait() -> Any:
+        streams.open()
+        waits = streams.wait_for(mine.run_id, lambda: call("look"), 60, here, lambda: call("sure"))
+        waiting = asyncio.ensure_future(waits)
+        while not streams.subscriptions or streams.subscriptions[mine.run_id].offers is None:
+            await asyncio.sleep(0.01)
+        await asyncio.to_thread(post_query, db, mine, 1, "guidance", 1, CLIPS)
+        found = await waiting
+        streams.end()
+        return found
+
+    assert asyncio.run(wait()).run_id == mine.run_id
+    assert called == ["look", "sure"]
+
+
+def test_followed_runs_and_asked_ones_are_looked_at_together(
+    db: Database, run: Run, mine: Claim, guidance: int
+) -> None:
+    other = start(db, NewRun(world="unsafe-exploration")).id
+    found: Look = look(db, [run.id], [other])
+    assert (list(found.runs), list(found.offers)) == ([run.id], [other])
