@@ -1,7 +1,7 @@
 """Peak memory of an export of many answers, of its check and of its import.
 
     python -m benchmarks.exports                          5,000 and 30,000 answers
-    python -m benchmarks.exports --answers 5000 1000000   other numbers, from the smallest on
+    python -m benchmarks.exports --answers 5000 200000    other numbers, from the smallest on
 
 The rows are written straight into a database in a temporary folder, chained as the server chains them. Then
 `parenting export`, `export --check` and `import` run as processes of their own, and the system tells the most

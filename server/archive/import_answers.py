@@ -86,10 +86,11 @@ def _put(session: Session, portion: Portion, links: dict[int, str]) -> None:
 
 def _asked(session: Session, portion: Portion) -> dict[tuple[int, str], Mapping[str, Any]]:
     """Return the columns of the questions that answers name, by run and public id."""
-    columns = [getattr(Query, name) for name in ("id", "run_id", "public_id", *chain.OF_QUERY)]
+    names = ("id", "run_id", "public_id", *chain.OF_QUERY)
     wanted = {mine.question(row.question) for mine, row in portion}
-    found = session.execute(select(*columns).where(Query.public_id.in_(wanted))).mappings()
-    return {(one["run_id"], one["public_id"]): one for one in found}
+    columns = (getattr(Query, name) for name in names)
+    found = session.execute(select(*columns).where(Query.public_id.in_(wanted)))
+    return {(row.run_id, row.public_id): dict(zip(names, row, strict=True)) for row in found}
 
 
 def _earlier(session: Session, portion: Portion) -> dict[tuple[int, int], int]:
