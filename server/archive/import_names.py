@@ -1,4 +1,4 @@
-"""What the rows of an import share: the names of runs and questions here, and the values of cells."""
+"""The names of runs and questions in an import, and the values of cells: rows of all tables share them."""
 
 from __future__ import annotations
 
