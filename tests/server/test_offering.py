@@ -1,4 +1,4 @@
-"""What a run offers to those who wait for its next question, and whom the watcher wakes."""
+"""The offers of a run to those who wait for its next question, and the readers whom the watcher wakes."""
 
 import asyncio
 from typing import Any
