@@ -44,7 +44,7 @@ def choose(config: Config, state: AgentState, observation: Tensor, logits: Float
     if not config.remembers:
         pair = _draw(state, perturbed)
         return Found(pair, torch.zeros_like(state.waiting), pair[:, 0])
-    known = memory.recall(state.x, observation)
+    known = memory.recall(state.x, observation, memory.rounds(config))
     refused = known.refused & config.learn_refusals
     pair = _draw(state, perturbed - LAST * refused)
     move, decided = _implied(known, pair)

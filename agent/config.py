@@ -126,6 +126,10 @@ class Config(BaseModel):
         False,
         description="Moves refused by neither count as worse than what is approved in this state. (ours)",
     )
+    relabel: bool = Field(
+        False,
+        description="Ask again about a reused answer with the chance that it is wrong. (ours)",
+    )
     confirm: float = Field(
         0.0,
         ge=0,

@@ -86,15 +86,24 @@ def decide(
         votes: 1 + the verdict of each vote, 0 for none.
         rate: The parent's error rate. A slip is any of the three other verdicts.
     """
+    counts = F.one_hot(votes, 5).sum(1)[:, 1:]
+    best, winner = posterior(gap, counts, rate).max(1)
+    return winner, (best >= bound) | (counts.sum(1) >= MOST_VOTES)
+
+
+def posterior(
+    gap: Float64[Tensor, "n"], counts: Int64[Tensor, "n 4"], rate: Float64[Tensor, "n"]
+) -> Float64[Tensor, "n 4"]:
+    """Return the probability of each verdict on a pair, given how many votes each has had.
+
+    Gap and rate are those of `decide`; at a gap of 0 all verdicts have the same prior.
+    """
     opinion = gap.clamp(-OPINION, OPINION)
     flat = torch.full_like(gap, 0.25)
     prior = torch.stack((flat, opinion.sigmoid() / 2, (-opinion).sigmoid() / 2, flat), 1)
-    counts = F.one_hot(votes, 5).sum(1)[:, 1:]
     number = counts.sum(1, keepdim=True)
     slip = (rate / 3).log()[:, None]
-    posterior = (prior.log() + counts * (1 - rate).log()[:, None] + (number - counts) * slip).softmax(1)
-    best, winner = posterior.max(1)
-    return winner, (best >= bound) | (number.squeeze(1) >= MOST_VOTES)
+    return (prior.log() + counts * (1 - rate).log()[:, None] + (number - counts) * slip).softmax(1)
 
 
 def error_rate(kept: Confirmation) -> Float64[Tensor, "N"]:

@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
 
-from parenting.agent import candidates, confirmation, dataset, familiarity, memory
+from parenting.agent import candidates, confirmation, dataset, familiarity, memory, relabelling
 from parenting.agent.config import Config
 from parenting.agent.dataset import Entry
 from parenting.agent.query import Answer, Choice, Query, QueryKind
@@ -158,6 +158,8 @@ def ask(
     if not bool(asking.any()):
         return state, heard, query
     found = candidates.choose(config, state, view.observation, view.logits)
+    if config.relabel and config.reuse_answers:
+        found = relabelling.doubt(state, view.observation, found)
     decided = asking & found.decided & ~confirmation.unsettled(state).any(1)
     state, heard = _reuse(state, heard, found.move, decided)
     asking = asking & ~decided

@@ -48,7 +48,7 @@ def remember(
     x.guided[trial, state, pair, _answer(choice, mirrored)] += 1
     if not config.learn_refusals:
         return x
-    known = conclude(x.guided[trial, state])
+    known = conclude(x.guided[trial, state], rounds(config))
     for one, other in permutations(range(4), 2):
         follows = known.approved[:, one] & known.refused[:, other] & ~known.compared[:, one, other]
         x = dataset.imply(x, entry.pick(follows), (one, other), trial[follows], state[follows])
@@ -82,17 +82,27 @@ class Memory(NamedTuple):
         return (self.better & proposed[:, :, None]).any(1)
 
 
-def recall(x: Dataset, observation: Tensor) -> Memory:
+def rounds(config: Config) -> int:
+    """Return how far orders are followed: two rounds find all of them unless answers contradict each other.
+
+    A contradiction needs three to be found whole. Only `relabel` makes many of them; without it there are two
+    rounds, as in the runs of versions 0.5 to 0.8, which are replayed bit for bit.
+    """
+    return 3 if config.relabel else 2
+
+
+def recall(x: Dataset, observation: Tensor, rounds: int) -> Memory:
     """Look the present states up in X.
 
     Args:
         x: X of N trials.
         observation: The present state of each, as observed: N boards.
+        rounds: As the config has them.
 
     Returns:
         What guidance has told there; nothing in a state that X does not hold.
     """
-    return conclude(said(x, observation))
+    return conclude(said(x, observation), rounds)
 
 
 def said(x: Dataset, observation: Tensor) -> Int64[Tensor, "N 6 4"]:
@@ -104,7 +114,7 @@ def said(x: Dataset, observation: Tensor) -> Int64[Tensor, "N 6 4"]:
     return told * here.any(1)[:, None, None]
 
 
-def conclude(told: Int64[Tensor, "N 6 4"]) -> Memory:
+def conclude(told: Int64[Tensor, "N 6 4"], rounds: int) -> Memory:
     """Return what follows: of each pair the answer that was given most often, unless two were."""
     most = told.max(2, keepdim=True).values
     leading = (told == most) & (most > 0)
@@ -113,6 +123,7 @@ def conclude(told: Int64[Tensor, "N 6 4"]) -> Memory:
     better, equal = _closure(
         _square(first, _FIRST, _SECOND) | _square(second, _SECOND, _FIRST),
         both_ways(either),
+        rounds,
     )
     approved = _moves(first | either, _FIRST) | _moves(second | either, _SECOND)
     refused = _moves(neither, _FIRST) | _moves(neither, _SECOND)
@@ -136,11 +147,11 @@ def _moves(holds: Bool[Tensor, "N 6"], move: Tensor) -> Bool[Tensor, "N 4"]:
 
 
 def _closure(
-    better: Bool[Tensor, "N 4 4"], equal: Bool[Tensor, "N 4 4"]
+    better: Bool[Tensor, "N 4 4"], equal: Bool[Tensor, "N 4 4"], rounds: int
 ) -> tuple[Bool[Tensor, "N 4 4"], Bool[Tensor, "N 4 4"]]:
     """Return the order by transitivity. Where answers contradict each other, nothing follows."""
     least = better | equal | torch.eye(4, dtype=torch.bool, device=better.device)
-    for _ in range(2):  # chains of up to four moves
+    for _ in range(rounds):
         better = better | _then(better, least) | _then(least, better)
         least = least | _then(least, least)
     contradicted = better & better.mT

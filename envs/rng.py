@@ -37,6 +37,7 @@ class Stream(IntEnum):
     BATCH = 11  # place 65536 g + r : row r of X in gradient step g; the smallest are taken
     MAZES = 12  # [16] : maze floor(4096 u) of the pool, for each episode of a pre-training step
     WALKS = 13  # place 16 t + e : the action of episode e at its step t, by the chances of pi summed up
+    RELABEL = 14  # [] : ask again about a pair if u < the chance that its answer is wrong
     # the worlds (envs/)
     DRYING = 21  # [H, W] : a watered plant dries if u < drying
     INTERRUPTS = 22  # [] : this episode interrupts if u < 0.5 (drawn at its start)

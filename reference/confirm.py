@@ -58,12 +58,16 @@ class Confirming(Reference):
         opinion = 1 / (1 + exp(-max(-2.0, min(2.0, z[lower] - z[higher]))))  # at most 2 in log odds
         weight: dict[Verdict, float]
         weight = {"neither": 0.25, lower: opinion / 2, higher: (1 - opinion) / 2, "either": 0.25}
-        e = min(0.5, (1 + self.dissents) / (10 + self.repeats))
+        e = self.error_rate()
         for vote in votes:
             for verdict in weight:
                 weight[verdict] *= 1 - e if vote == verdict else e / 3
         best = max(weight, key=lambda verdict: weight[verdict])
         return best, weight[best] / sum(weight.values())
+
+    def error_rate(self) -> float:
+        """The parent's error rate: how many repeats were overruled, after one in ten that were not."""
+        return min(0.5, (1 + self.dissents) / (10 + self.repeats))
 
     def ask(self) -> None:
         """Ask about a pair that is not decided once more, or as ever."""
@@ -83,6 +87,8 @@ class Confirming(Reference):
 
 class FrugalConfirming(Frugal, Confirming):
     """One trial that remembers every vote, and asks again before it is moved by any."""
+
+    error_rate = Confirming.error_rate
 
     def ask_or_reuse(self) -> int | None:
         """Ask about a pair that is not decided once more; else ask or reuse. No vote outlives its pause."""

@@ -64,7 +64,7 @@ def reachable(steps: set[Pair]) -> set[Pair]:
 
 
 class Frugal(Reference):
-    """One trial that remembers guidance: `fresh_pairs`, `reuse_answers`, `learn_refusals`, `late_steps`."""
+    """One trial that remembers guidance: all settings of *Frugal asking*, and `relabel`."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ class Frugal(Reference):
             lambda: defaultdict(Counter)
         )
         self.owing = False  # all gradient steps of a tick but the first
-        self.reused = self.implied = self.late = 0
+        self.reused = self.implied = self.late = self.relabelled = 0
         super().__init__(world, config, seed, trial, choose)
 
     def tick(self) -> None:
@@ -155,13 +155,39 @@ class Frugal(Reference):
         known = self.lessons(self.frame(self.state).observation)
         pair, move = self.candidates(free, known)
         if self.config.reuse_answers and move in known.approved and move in free:
-            self.refused = None
-            self.reused += 1
-            return move
+            doubted = self.doubted(move, free) if self.config.relabel else None
+            if doubted is None:
+                self.refused = None
+                self.reused += 1
+                return move
+            pair = doubted
+            self.relabelled += 1
         left, right = pair if self.u(Stream.SIDES) < 0.5 else pair[::-1]
         self.familiarity[l] += 1
         self.post(Query(GUIDANCE, self.forecast(left), self.forecast(right), 1))
         return None
+
+    def doubted(self, move: int, free: list[int]) -> Pair | None:
+        """Return the pair whose leading answer is likeliest wrong, with that chance.
+
+        It must hold the move, or be refused by *neither*. All votes on it count, and no opinion.
+        """
+        state, stage = self.frame(self.state).observation, self.stage if self.config.own_stage_only else 0
+        e, worst, pair = self.error_rate(), 0.0, None
+        for candidate, counts in sorted(self.told.get((state, stage), {}).items()):
+            votes, lead = counts.total(), max(counts.values())
+            refused = all(counts[v] < counts["neither"] for v in (*candidate, "either"))
+            if (move in candidate or refused) and set(candidate) <= set(free):
+                each = (*sorted(counts.values(), reverse=True), 0, 0, 0)[:4]
+                weights = [(1 - e) ** n * (e / 3) ** (votes - n) for n in each]
+                wrong = 1 - (1 - e) ** lead * (e / 3) ** (votes - lead) / sum(weights)
+                if wrong > worst:
+                    worst, pair = wrong, candidate
+        return pair if self.u(Stream.RELABEL) < worst else None
+
+    def error_rate(self) -> float:
+        """The parent's error rate before any repeat was heard."""
+        return 0.1
 
     def candidates(self, free: list[int], known: Lessons) -> tuple[Pair, int | None]:
         """Return the pair to ask about, and the move that earlier answers decide for, if there is one."""

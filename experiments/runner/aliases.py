@@ -42,6 +42,7 @@ LATER: Mapping[str, Any] = {
     "fresh_pairs": False,
     "late_steps": False,
     "learn_refusals": False,
+    "relabel": False,
     "reuse_answers": False,
 }
 """Settings that came after version 0.4, and their values where they are off: then they change no result."""

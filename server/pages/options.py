@@ -121,6 +121,13 @@ OPTIONS = (
         "Where both moves were too dangerous.",
     ),
     Option(
+        "config.relabel",
+        "Answers that it moves by, and that may be wrong",
+        "",
+        (*PRESET_OR, ("false", "Not asked about again"), ("true", "Asked about again in later visits")),
+        "Seldom, and less often the more answers agree: it helps against slips.",
+    ),
+    Option(
         "config.stages",
         "Stages (maximum clip length)",
         "",

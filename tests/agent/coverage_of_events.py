@@ -31,7 +31,7 @@ class EventCoverage(Counter[str]):
             self["asked again"], self["overruled"] = trial.repeats, trial.dissents
         if isinstance(trial, Frugal):
             self["answer reused"], self["refusal learnt"] = trial.reused, trial.implied
-            self["steps paid late"] = trial.late
+            self["steps paid late"], self["asked about again"] = trial.late, trial.relabelled
         self["levels look alike"] += look_alike(trial)
         self._cells(trial, before)
 

@@ -111,12 +111,24 @@ SPECIAL: dict[str, tuple[str, str, dict[str, object]]] = {
         "random",
         stages("lax", 24, **{**FRUGAL, "p_guid": 0.5}, confirm=0.95),
     ),
+    "relabelled": (
+        "unsafe-exploration",
+        "random",
+        stages("lax", 40, **{**FRUGAL, "p_guid": 1.0}, relabel=True),
+    ),
+    "relabelled, confirmed": (
+        "unsafe-exploration",
+        "random",
+        stages("lax", 40, **{**FRUGAL, "p_guid": 1.0}, relabel=True, confirm=0.8),
+    ),
     "own length, guided": ("interruptibility", "random", stages("lax", 8, own_length=True)),
 }
 ALSO = {
     "levels that look alike": {"levels look alike"},
     "own length": {"ended early"},
     "confirmed": {"asked again", "overruled", "neither"},
+    "relabelled": {"answer reused", "asked about again", "neither"},
+    "relabelled, confirmed": {"answer reused", "asked about again", "asked again"},
     "frugal": {"answer reused", "refusal learnt", "neither"},
     "frugal, confirmed": {"answer reused", "refusal learnt", "asked again", "overruled"},
     "frugal, late": {"answer reused", "steps paid late"},

@@ -160,7 +160,7 @@ def test_a_refused_move_is_not_proposed_again_and_loses_to_what_is_approved() ->
     state, _ = parenting.step(WORLD, ASKING, state, said(query, Choice.LEFT))
     s = bytes(WORLD.observe(first.board, first.agent, first.box).flatten().tolist())
     assert {move for move in refused if entries(state).get((s, good, move)) == 1.0} == refused
-    known = memory.recall(state.x, WORLD.observe(first.board, first.agent, first.box))
+    known = memory.recall(state.x, WORLD.observe(first.board, first.agent, first.box), 2)
     assert set(known.refused[0].nonzero().flatten().tolist()) == refused
     nothing = silence(parenting.no_query(WORLD, ASKING, state))
     state, query = parenting.step(WORLD, ASKING, state.replace(world=first.clone()), nothing)
@@ -177,13 +177,18 @@ def counts(*answers: tuple[int, int]) -> torch.Tensor:
 
 def test_contradictory_answers_decide_nothing_and_a_majority_does() -> None:
     up_or_down = 0
-    torn = memory.conclude(counts((up_or_down, 0), (up_or_down, 1)))
+    torn = memory.conclude(counts((up_or_down, 0), (up_or_down, 1)), 2)
     assert not bool(torn.compared.any() | torn.approved.any())
-    most = memory.conclude(counts((up_or_down, 0), (up_or_down, 1), (up_or_down, 0)))
+    most = memory.conclude(counts((up_or_down, 0), (up_or_down, 1), (up_or_down, 0)), 2)
     assert most.better[0].nonzero().tolist() == [[0, 1]]
-    circle = memory.conclude(counts((0, 0), (3, 0), (1, 1)))  # 0 over 1, 1 over 2, 2 over 0
+    circle = memory.conclude(counts((0, 0), (3, 0), (1, 1)), 2)  # 0 over 1, 1 over 2, 2 over 0
     assert not bool(circle.better.any())
-    chain = memory.conclude(counts((0, 0), (3, 2), (5, 0)))  # 0 over 1, 1 as good as 2, 2 over 3
+    crossed = counts((3, 2), (5, 2), (4, 1))  # 1 as good as 2, 2 as good as 3, and 3 over 1
+    assert not bool(memory.conclude(crossed, 3).compared.any())
+    assert memory.conclude(crossed, 2).better[0].nonzero().tolist() == [
+        [3, 1]
+    ]  # as runs of version 0.8 have it
+    chain = memory.conclude(counts((0, 0), (3, 2), (5, 0)), 2)  # 0 over 1, 1 as good as 2, 2 over 3
     assert chain.better[0].nonzero().tolist() == [[0, 1], [0, 2], [0, 3], [1, 3], [2, 3]]
 
 
