@@ -55,6 +55,41 @@ def panel(what: str, every: Sequence[Row]) -> Ends:
     return student(measured(group, rule, measure))
 
 
+def in_pairs(measure: str, chosen: Sequence[Row], other: Sequence[Row]) -> list[float]:
+    """The mean difference of each of twenty islands, over the agents that have both values."""
+
+    def value(row: Row) -> float | None:
+        if measure == "trials unfinished":
+            return float(row["finished"] == "False")
+        answers = float(row["guidance"]) + float(row["preference"])
+        return float(row["deaths"]) if measure == "deaths" else answers if row["finished"] == "True" else None
+
+    islands = defaultdict[int, list[float]](list)
+    for one, another in zip(chosen, other, strict=True):
+        mine, theirs = value(one), value(another)
+        if mine is not None and theirs is not None:
+            islands[int(one["trial"]) % 20].append(mine - theirs)
+    return [fmean(island) for island in islands.values()]
+
+
+def gardens(arm: str, measure: str, every: Sequence[Row]) -> Ends:
+    def measured(name: str, what: str) -> list[float]:
+        mine = [row for row in every if row["of"] == name and row["trial"]]
+        if what.startswith("answers"):
+            return [float(row["guidance"]) + float(row["preference"]) for row in mine]
+        column = "deaths" if "bucket" in what else "waterings" if "waterings" in what else "area_regret"
+        return numbers(mine, column)
+
+    if not measure.endswith(", frugal minus conservative"):
+        values = measured(arm, measure)
+        low, high = wilson(0, len(values))
+        return of_counts(values) if any(values) else (low / 100, high / 100)
+    ours, theirs = (measured(f"{name}, garden", measure) for name in ("frugal", "conservative"))
+    if any((*ours, *theirs)):
+        return welch(ours, theirs)
+    return -wilson(0, len(theirs))[1] / 100, wilson(0, len(ours))[1] / 100
+
+
 def questions(what: str, every: Sequence[Row]) -> Ends:
     def of(arm: str) -> list[Row]:
         return [row for row in every if row["of"] == arm and row["trial"]]
@@ -89,6 +124,10 @@ def questions(what: str, every: Sequence[Row]) -> Ends:
         if any((*ours, *theirs)):
             return welch(ours, theirs)
         return -wilson(0, len(theirs))[1] / 100, wilson(0, len(ours))[1] / 100
+    if against := re.fullmatch("(answers|trials unfinished|deaths), frugal minus frugal with (.*)", measure):
+        return student(in_pairs(against[1], of(f"frugal, {arm}"), of(f"frugal, {against[2]}, {arm}")))
+    if "garden" in arm:
+        return gardens(arm, measure, every)
     if measure.startswith("answers minus"):
         return welch(answers(arm), answers(f"{IDEAL}, {arm.rsplit(', ', 1)[1]}"))
     if measure == "optimal at the end":

@@ -13,9 +13,11 @@ from parenting.envs import registry
 from parenting.envs.mdp import explore
 from parenting.envs.random_islands import island_levels
 from parenting.envs.rng import keys
+from parenting.experiments.questions import garden
 from parenting.experiments.questions.bounds import certain, chance, expected
+from parenting.experiments.questions.choice import verdict
 from parenting.experiments.questions.report import findings
-from parenting.experiments.questions.settings import ISLANDS, LEVELS, RANDOM, WORLD
+from parenting.experiments.questions.settings import CHOICE, CHOSEN, ISLANDS, LEVELS, RANDOM, WORLD
 from parenting.experiments.questions.tabular import ideal_trial, table
 from parenting.experiments.questions.tasks import long_trials, question_trials
 from parenting.experiments.questions.tracking import QuestionTrainer
@@ -119,6 +121,46 @@ def test_deaths_of_none_are_no_higher_only_if_enough_trials_say_so(
     found = verdicts(rows)
     assert found["island: deaths, frugal minus conservative"] is agrees
     assert found["frugal, island: deaths"] is agrees
+
+
+def test_a_setting_is_chosen_by_pairs_of_the_same_agent() -> None:
+    """Islands differ by far more than settings do, and an unfinished trial has no answers to compare."""
+    chosen = [row(CHOSEN, trial, guidance=5 * (trial % 20)) for trial in range(40)]
+    worse = [
+        row(f"frugal, drawn pairs, {CHOICE}", one["trial"], guidance=one["guidance"] + 1 + one["trial"] % 3)
+        for one in chosen
+    ]
+    worse[3] |= {"finished": False, "guidance": 0}
+    better = [
+        row(f"frugal, late steps, {CHOICE}", one["trial"], guidance=one["guidance"] - 1 - one["trial"] % 3)
+        for one in chosen
+    ]
+    rows = [*chosen, *worse, *better]
+    found = {one.what: one for one in findings(rows) if one.reference == "check"}
+    what = f"{CHOICE}: answers, frugal minus frugal with"
+    assert found[f"{what} drawn pairs"].agrees is True
+    assert found[f"{what} late steps"].agrees is False
+    assert found[f"{CHOICE}: trials unfinished, frugal minus frugal with drawn pairs"].ours == "-0.03"
+    assert not any("unfinished" in name and "late steps" in name for name in found)
+    assert verdict(rows) == (
+        "The preset needs fewer answers than it does with *drawn pairs*; "
+        "it needs more than with *late steps*."
+    )
+
+
+def test_the_garden_is_watched_for_its_ticks_and_deployed_at_its_marks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(garden, "EPISODES", 2)
+    *trials, first, second = garden.garden_trials("x", "frugal", 6, (0, 2), (1, 3), 0)
+    assert [one["trial"] for one in trials] == [1, 2]
+    assert {one["ticks"] for one in trials} == {6}
+    assert all(1 <= one["guidance"] <= 6 for one in trials)
+    assert (first["answers"], second["answers"]) == (0, 2)
+    assert first["trials"] == second["trials"] == 2
+    area = fmean(one["area_regret"] for one in trials)
+    assert area == pytest.approx(first["regret_then"] + second["regret_then"])
+    assert trials[0]["parent_waterings"] > trials[0]["waterings"] >= 0
 
 
 def long_life(rates: list[float], trials: int = 20) -> list[Row]:
