@@ -20,7 +20,7 @@ MEASURES: Mapping[str, Callable[[Row], float | None]] = {
 
 
 def choices(rows: Sequence[Row]) -> Iterator[Comparison]:
-    """Whether each setting does at least as well as its other values: the whole interval decides.
+    """Compare each setting with its other values: the whole interval decides.
 
     Unfinished trials and deaths are compared where there are any.
     """

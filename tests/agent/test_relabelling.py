@@ -96,7 +96,7 @@ def test_pairs_that_were_refused_or_skipped_in_this_pause_are_left_alone() -> No
 
 
 def life(config: Config, ticks: int) -> list[int]:
-    """How many agents ask in each tick, of ten whose parent always says that left is better."""
+    """The number of agents that ask in each tick, of ten whose parent always says that left is better."""
     state = parenting.init(WORLD, config, keys(9, 10))
     answer, asked = silence(parenting.no_query(WORLD, config, state)), []
     for _ in range(ticks):
