@@ -88,7 +88,9 @@ class Confirming(Reference):
 class FrugalConfirming(Frugal, Confirming):
     """One trial that remembers every vote, and asks again before it is moved by any."""
 
-    error_rate = Confirming.error_rate
+    def error_rate(self) -> float:
+        """The parent's error rate, as repeats tell it."""
+        return Confirming.error_rate(self)
 
     def ask_or_reuse(self) -> int | None:
         """Ask about a pair that is not decided once more; else ask or reuse. No vote outlives its pause."""

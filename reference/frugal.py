@@ -173,7 +173,8 @@ class Frugal(Reference):
         It must hold the move, or be refused by *neither*. All votes on it count, and no opinion.
         """
         state, stage = self.frame(self.state).observation, self.stage if self.config.own_stage_only else 0
-        e, worst, pair = self.error_rate(), 0.0, None
+        e, worst = self.error_rate(), 0.0
+        pair: Pair | None = None
         for candidate, counts in sorted(self.told.get((state, stage), {}).items()):
             votes, lead = counts.total(), max(counts.values())
             refused = all(counts[v] < counts["neither"] for v in (*candidate, "either"))

@@ -37,7 +37,7 @@ def choices(rows: Sequence[Row]) -> Iterator[Comparison]:
 
 def verdict(rows: Sequence[Row]) -> str:
     """The sentence on the answers of all settings."""
-    found = {True: [], False: [], None: []}  # type: dict[bool | None, list[str]]
+    found: dict[bool | None, list[str]] = {True: [], None: [], False: []}
     chosen = raised(CHOSEN, rows)
     for name in TRIED:
         other = raised(f"frugal, {name}, {CHOICE}", rows)

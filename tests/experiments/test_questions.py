@@ -125,7 +125,7 @@ def test_deaths_of_none_are_no_higher_only_if_enough_trials_say_so(
 
 def test_a_setting_is_chosen_by_pairs_of_the_same_agent() -> None:
     """Islands differ by far more than settings do, and an unfinished trial has no answers to compare."""
-    chosen = [row(CHOSEN, trial, guidance=5 * (trial % 20)) for trial in range(40)]
+    chosen = [row(CHOSEN, trial, guidance=5 + 5 * (trial % 20)) for trial in range(40)]
     worse = [
         row(f"frugal, drawn pairs, {CHOICE}", one["trial"], guidance=one["guidance"] + 1 + one["trial"] % 3)
         for one in chosen
