@@ -86,17 +86,14 @@ CHOICE_TRIALS = 40
 """Of each arm, however many are asked: two on each island."""
 CHOSEN = f"frugal, {CHOICE}"
 TRIED = {
-    name: Arm("frugal", changes)
-    for name, changes in {
-        "1 gradient step": {"gradient_steps": 1},
-        "3 gradient steps": {"gradient_steps": 3},
-        "18 gradient steps": {"gradient_steps": 18},
-        "late steps": {"late_steps": True},
-        "drawn pairs": {"fresh_pairs": False},
-        "no reuse": {"reuse_answers": False},
-        "refusals forgotten": {"learn_refusals": False},
-        "p_guid 0.95": {"p_guid": 0.95},
-    }.items()
+    "1 gradient step": Arm("frugal", {"gradient_steps": 1}),
+    "3 gradient steps": Arm("frugal", {"gradient_steps": 3}),
+    "18 gradient steps": Arm("frugal", {"gradient_steps": 18}),
+    "late steps": Arm("frugal", {"late_steps": True}),
+    "drawn pairs": Arm("frugal", {"fresh_pairs": False}),
+    "no reuse": Arm("frugal", {"reuse_answers": False}),
+    "refusals forgotten": Arm("frugal", {"learn_refusals": False}),
+    "p_guid 0.95": Arm("frugal", {"p_guid": 0.95}),
 }
 """Other values of the preset's settings, one at a time."""
 CHOICES: dict[str, tuple[str, str, Arm]] = {CHOSEN: (WORLD, RANDOM, Arm("frugal"))}
