@@ -16,7 +16,7 @@ from parenting.envs.registry import make
 from parenting.envs.rng import keys
 
 WORLD = make("unsafe-exploration", "island")
-FRUGAL = Config(**PRESETS["frugal"], relabel=True, p_train=0.0)
+FRUGAL = Config.model_validate({**PRESETS["frugal"], "relabel": True, "p_train": 0.0})
 MANY, TICKS = 20, 100
 
 
