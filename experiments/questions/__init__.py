@@ -15,6 +15,12 @@ from parenting.experiments.questions.report import findings, words
 from parenting.experiments.questions.settings import (
     ANSWERS,
     ARMS,
+    CHOICE_SEED,
+    CHOICES,
+    GARDEN_MARKS,
+    GARDEN_ONE_OF,
+    GARDEN_TICKS,
+    GARDENERS,
     IDEAL,
     IDEAL_TRIALS,
     ISLANDS,
@@ -53,6 +59,11 @@ def _config(request: Request) -> Mapping[str, Any]:
             **{name: [world, level, *_plain(arm)] for name, (world, level, arm) in ARMS.items()},
             **{name: _plain(life) for name, life in lives.items()},
             **{f"{IDEAL}, {level}": [world] for world, level in LEVELS},
+            **{
+                name: [world, level, *_plain(arm), CHOICE_SEED]
+                for name, (world, level, arm) in CHOICES.items()
+            },
+            **{name: [preset, GARDEN_TICKS, list(GARDEN_MARKS)] for name, preset in GARDENERS.items()},
         },
     }
 
@@ -64,7 +75,8 @@ def _plain(settings: Sequence[Any]) -> list[Any]:
 def _tasks(request: Request) -> list[Task]:
     arms = [task for name in _asked(request) for task in _raised(name, request)]
     starts = {task.key: task for name in _asked(request) for task in _starts(name, request)}
-    return [*_ideal(request), *starts.values(), *arms, *_lives(request)]
+    more = [*_choices(request), *_gardeners(request)] if request.scale == "paper" else []
+    return [*_ideal(request), *starts.values(), *arms, *_lives(request), *more]
 
 
 def _asked(request: Request) -> list[str]:
@@ -150,6 +162,46 @@ def _life(call: str, name: str, life: LongLife, span: range, request: Request) -
     if call == "long_trials":
         mine["stage_ticks"] = STAGE_TICKS[request.scale]
     return Task(_key(f"{name} {ticks}", span), f"{CALL}:{call}", mine, life.cost * len(span))
+
+
+def _choices(request: Request) -> list[Task]:
+    return [
+        Task(
+            _key(name, span),
+            f"{CALL}:question_trials",
+            {
+                "label": name,
+                "life": (world, level, arm.preset, dict(arm.changes), arm.parent),
+                "share": arm.share,
+                "max_ticks": arm.max_ticks,
+                "span": (span.start, span.stop),
+                "seed": request.seed + CHOICE_SEED,
+            },
+            arm.cost * len(span),
+        )
+        for name, (world, level, arm) in CHOICES.items()
+        for span in _spans(name, arm.one_of, request)
+    ]
+
+
+def _gardeners(request: Request) -> list[Task]:
+    return [
+        Task(
+            _key(f"{name} {GARDEN_TICKS}", span),
+            "parenting.experiments.questions.garden:garden_trials",
+            {
+                "label": name,
+                "preset": preset,
+                "ticks": GARDEN_TICKS,
+                "marks": GARDEN_MARKS,
+                "span": (span.start, span.stop),
+                "seed": request.seed,
+            },
+            20.0 * len(span),
+        )
+        for name, preset in GARDENERS.items()
+        for span in _spans(name, GARDEN_ONE_OF, request)
+    ]
 
 
 def _spans(name: str, one_of: int, request: Request) -> list[range]:

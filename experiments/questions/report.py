@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from parenting.agent.config import FRUGAL_WORLDS
 from parenting.envs.registry import WORLDS
 from parenting.evaluation.statistics import count_interval
+from parenting.experiments.questions.choice import choices
+from parenting.experiments.questions.gardeners import gardeners, gardens
 from parenting.experiments.questions.measures import (
     answers,
     deaths,
@@ -20,7 +22,10 @@ from parenting.experiments.questions.settings import (
     ANSWERS,
     ARMS,
     BASELINES,
+    CHOICE_TRIALS,
+    CHOICES,
     DEATHS_GOAL,
+    GARDEN_TICKS,
     IDEAL,
     ISLAND,
     LASTING,
@@ -47,13 +52,13 @@ from parenting.experiments.runner.store import Row
 
 def findings(rows: Sequence[Row]) -> list[Comparison]:
     """Verdicts first, then every number."""
-    return [*verdicts(rows), *_numbers(rows)]
+    return [*verdicts(rows), *choices(rows), *gardens(rows), *_numbers(rows)]
 
 
 def _numbers(rows: Sequence[Row]) -> Iterator[Comparison]:
     for world, level in LEVELS:
         yield from _bounds(world, level, rows)
-    for name in ARMS:
+    for name in (*ARMS, *CHOICES):
         mine = raised(name, rows)
         if not mine:
             continue
@@ -71,6 +76,7 @@ def _numbers(rows: Sequence[Row]) -> Iterator[Comparison]:
             for what in ("deaths", "regret"):
                 area = _column(mine, f"area_{what}")
                 yield compare_mean(f"{name}: area under {what}, up to {ANSWERS} answers", area)
+    yield from gardeners(rows)
     yield from _starts(rows)
 
 
@@ -102,6 +108,8 @@ def words(rows: Sequence[Row]) -> list[str]:
         "questions/page.md",
         last=ANSWERS - 1,
         random=RANDOM,
+        choice_trials=CHOICE_TRIALS,
+        garden_ticks=GARDEN_TICKS,
         random_start=STARTS[ISLAND].number,
         goal=DEATHS_GOAL,
         offered=" and ".join(WORLDS[world].title for world in FRUGAL_WORLDS),

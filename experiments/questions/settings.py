@@ -76,6 +76,30 @@ ABLATIONS = {
     "conservative, 9 gradient steps": Arm("conservative", {"gradient_steps": 9}, one_of=6),
 }
 """The preset with one setting changed."""
+CHOICE = f"{RANDOM}, for the choice"
+"""The same random islands, and other agents than those whose results are reported."""
+CHOICE_SEED = 2
+"""Added to the request's seed for these agents."""
+CHOICE_TRIALS = 40
+"""Of each arm, however many are asked: two on each island."""
+CHOSEN = f"frugal, {CHOICE}"
+TRIED = {
+    name: Arm("frugal", changes)
+    for name, changes in {
+        "1 gradient step": {"gradient_steps": 1},
+        "3 gradient steps": {"gradient_steps": 3},
+        "18 gradient steps": {"gradient_steps": 18},
+        "late steps": {"late_steps": True},
+        "drawn pairs": {"fresh_pairs": False},
+        "no reuse": {"reuse_answers": False},
+        "refusals forgotten": {"learn_refusals": False},
+        "p_guid 0.95": {"p_guid": 0.95},
+    }.items()
+}
+"""Other values of the preset's settings, one at a time."""
+CHOICES: dict[str, tuple[str, str, Arm]] = {CHOSEN: (WORLD, RANDOM, Arm("frugal"))}
+CHOICES |= {f"frugal, {name}, {CHOICE}": (WORLD, RANDOM, arm) for name, arm in TRIED.items()}
+"""World, level and arm of the agents by which the settings are chosen; their costs are each other's."""
 BASELINES = {
     "always ask": Arm("conservative", {"p_guid": 1.0}, one_of=6),
     "never": Arm("direct", {"p_rec": 0.0, "p_pref": 0.0}, max_ticks=SILENT_TICKS, one_of=6),
@@ -112,6 +136,7 @@ SHARED = {
 }
 """Arms whose trials share levels or first policies in rotation, and how many there are of these: that many
 trials are independent, as far as an interval is concerned."""
+SHARED |= dict.fromkeys(CHOICES, ISLANDS[RANDOM].number)
 OTHER_WORLDS = (
     ("side-effects", "box"),
     ("interruptibility", "button"),
@@ -154,7 +179,16 @@ LASTING_LIVES = {
     for parent in ("scripted", "noisy:0.1")
     for preset in ("conservative", "frugal")
 }
+LASTING_LIVES[f"frugal, confirm 0.95, noisy:0.1, {LASTING['paper']} ticks"] = LongLife(
+    "frugal", {"confirm": 0.95}, LASTING, parent="noisy:0.1", one_of=10
+)
 """Lives that go on after the policy was first optimal."""
+GARDEN, GARDEN_WORLD = "garden", "reward-hacking"
+GARDENERS = {f"{name}, {GARDEN}": name for name in ("frugal", "conservative")}
+"""The preset of each arm in the garden, which has no goal: it is watched for a fixed number of ticks."""
+GARDEN_TICKS, GARDEN_ONE_OF = 200, 30
+GARDEN_MARKS = tuple(range(0, ANSWERS + 1, 12))
+"""Numbers of answers at which its policies are deployed."""
 IDEAL = "ideal tabular agent"
 IDEAL_TRIALS = 3000
 
@@ -168,5 +202,9 @@ def trials_of(name: str, asked: int) -> int:
     """Return how many trials the rows of a name have."""
     if name.startswith(IDEAL):
         return IDEAL_TRIALS
+    if name in CHOICES:
+        return CHOICE_TRIALS
+    if name in GARDENERS:
+        return share_of(asked, TRIALS // GARDEN_ONE_OF, TRIALS)
     one_of = ARMS[name][2].one_of if name in ARMS else {**LONG_LIVES, **LASTING_LIVES}[name].one_of
     return share_of(asked, TRIALS // one_of, TRIALS)

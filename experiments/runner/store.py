@@ -23,6 +23,8 @@ Row = dict[str, Any]
 """Name -> number, word, truth value or null. A name that begins with HIDDEN is for other tasks alone."""
 HIDDEN = "_"
 PLAN, ELAPSED = "plan.json", "spent.json"
+VARIANTS = "variants"
+"""The part of a plan that may grow."""
 OF, MADE, ROWS = "of", "made", "rows"
 """The parts of a result's file."""
 
@@ -57,7 +59,8 @@ class Store:
     def __init__(self, folder: Path, plan: Mapping[str, Any], scale: str = "paper") -> None:
         """Open a folder, or make it. `plan` is all that results depend on besides their tasks.
 
-        Time is counted for each `scale` by itself.
+        It may name variants that the folder's own plan has not, of which there are no results yet: they are
+        added there. Time is counted for each `scale` by itself.
 
         Raises:
             PlanMismatchError: the folder's results belong to another plan.
@@ -72,7 +75,11 @@ class Store:
         path = folder / PLAN
         if not path.exists():
             _write(path, wanted)
-        _same(folder, _read(path), wanted)
+        found = _read(path)
+        grown = _grown(found, wanted)
+        _same(folder, grown, wanted)
+        if grown != found:
+            _write(path, grown)
 
     def expect(self, tasks: Sequence[Task]) -> None:
         """Name the tasks whose results are wanted.
@@ -180,6 +187,13 @@ def _write(path: Path, data: object) -> None:
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     beside.write_text(json.dumps(data, allow_nan=False), encoding="utf-8")
     beside.replace(path)
+
+
+def _grown(found: dict[str, Any], wanted: Mapping[str, Any]) -> dict[str, Any]:
+    """A stored plan with the variants that are wanted and that it does not name."""
+    if not isinstance(found.get(VARIANTS), dict):
+        return found
+    return {**found, VARIANTS: {**wanted.get(VARIANTS, {}), **found[VARIANTS]}}
 
 
 def _same(folder: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:

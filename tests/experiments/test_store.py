@@ -163,6 +163,22 @@ def test_another_plan_is_refused(store: Store) -> None:
         Store(store.folder, {**PLAN, "presets": {"lax": {"p_guid": 0.9, "p_rec": 0.5}}})
 
 
+def test_a_plan_grows_by_variants_and_changes_none(store: Store) -> None:
+    """So results stay of use when an arm is added. What a folder once planned stays in its plan."""
+    one, two = {"variants": {"one": [1]}}, {"variants": {"one": [1], "two": [2]}}
+    folder = store.folder.parent / "growing"
+    for plan in (one, two, two):
+        Store(folder, {**PLAN, **plan})
+        assert json.loads((folder / "plan.json").read_text()) == {**PLAN, **plan}
+    with pytest.raises(PlanMismatchError, match=r"plan: variants\.two was \[2\] and is \[3\] now\."):
+        Store(folder, {**PLAN, "variants": {"one": [1], "two": [3]}})
+    with pytest.raises(PlanMismatchError, match=r"plan: variants\.two was \[2\] and is None now\."):
+        Store(folder, {**PLAN, **one})
+    with pytest.raises(PlanMismatchError, match="variants"):
+        Store(store.folder, {**PLAN, **one})
+    assert json.loads((folder / "plan.json").read_text()) == {**PLAN, **two}
+
+
 def test_numbers_that_are_none_are_refused(store: Store) -> None:
     store.expect([task(1)])
     with pytest.raises(ValueError, match="JSON"):
