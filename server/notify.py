@@ -21,6 +21,10 @@ MAX_PATH_BYTES = 100
 """The longest path of a Unix socket that we use; the operating systems allow 104 to 108 bytes."""
 
 
+SOCKETS = "sockets"
+"""The folder of all channels in a data folder."""
+
+
 class Notifier:
     """One channel of a data folder.
 
@@ -76,17 +80,9 @@ class Notifier:
             OSError: no socket can be made in the folder.
         """
         if self._listener is None:
-            self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             # A random name instead of the process id: containers that share the folder have equal ids.
             path = self.folder / secrets.token_hex(8)
-            listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-            try:
-                listener.setblocking(False)
-                listener.bind(str(path))
-            except OSError:
-                listener.close()
-                raise
-            self._listener, self._path = listener, path
+            self._listener, self._path = _bound(path), path
         return self._listener
 
     def drain(self) -> None:
@@ -99,12 +95,28 @@ class Notifier:
             return
 
     def close(self) -> None:
-        """Stop listening and remove the socket."""
+        """Stop listening and remove the socket; with the last one, its folder in the temporary folder."""
         if self._listener is not None and self._path is not None:
             self._listener.close()
             with suppress(OSError):
                 self._path.unlink()
+                _tidy(self.folder)
             self._listener = self._path = None
+
+
+def _bound(path: Path, tries: int = 3) -> socket.socket:
+    """A socket bound to this path, whose folder another process may remove before it is bound."""
+    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        listener.setblocking(False)
+        listener.bind(str(path))
+    except OSError as error:
+        listener.close()
+        if isinstance(error, FileNotFoundError) and tries > 1:
+            return _bound(path, tries - 1)
+        raise
+    return listener
 
 
 def _held(path: Path) -> bool:
@@ -128,9 +140,20 @@ def _send(path: Path) -> None:
         # any other error: its buffer is full, so that it wakes anyway; or the folder cannot be written
 
 
+def _tidy(folder: Path) -> None:
+    """Remove a channel's folder from the temporary folder, if it is there and empty.
+
+    Raises:
+        OSError: another process listens there.
+    """
+    if folder.parent.name != SOCKETS:
+        folder.rmdir()
+        folder.parent.rmdir()
+
+
 def _folder(data: Path, channel: str) -> Path:
     """Return a folder below the data folder, or below the temporary one where a path would be too long."""
-    folder = data.absolute() / "sockets" / channel
+    folder = data.absolute() / SOCKETS / channel
     if len(os.fsencode(folder)) + 20 <= MAX_PATH_BYTES:
         return folder
     digest = hashlib.sha256(os.fsencode(data.absolute())).hexdigest()[:16]

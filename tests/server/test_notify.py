@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -104,6 +105,41 @@ def test_long_folder_names_are_no_obstacle(tmp_path: Path, monkeypatch: pytest.M
         Notifier(deep, "worker").notify()
         assert notifier.wait(1)
         notifier.close()
+
+
+def test_the_last_listener_leaves_nothing_in_the_temporary_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with tempfile.TemporaryDirectory() as short:
+        monkeypatch.setattr("parenting.server.notify.tempfile.gettempdir", lambda: short)
+        deep = tmp_path / ("x" * 120)
+        web, worker = Notifier(deep, "web"), Notifier(deep, "worker")
+        web.listen()
+        worker.listen()
+        web.close()
+        Notifier(deep, "worker").notify()
+        assert worker.wait(1), "a folder went that is still needed"
+        worker.close()
+        assert list(Path(short).iterdir()) == []
+
+
+def test_a_folder_that_goes_before_the_socket_is_bound(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last listener before this one closes just then."""
+    listener, made = Notifier(tmp_path, "worker"), Path.mkdir
+    listener.folder.parent.mkdir()
+
+    def slow(path: Path, *given: Any, **named: Any) -> None:
+        made(path, *given, **named)
+        monkeypatch.undo()
+        path.rmdir()
+
+    monkeypatch.setattr(Path, "mkdir", slow)
+    listener.listen()
+    Notifier(tmp_path, "worker").notify()
+    assert listener.wait(5)
+    listener.close()
 
 
 def test_a_folder_that_cannot_be_written_costs_the_hint_alone(tmp_path: Path) -> None:
