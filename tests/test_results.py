@@ -15,7 +15,7 @@ from parenting.agent.config import offered_preset
 from parenting.envs.registry import WORLDS
 from parenting.experiments.calibrate.settings import SOME
 from parenting.experiments.fallible.settings import ARMS
-from parenting.experiments.long_lives.settings import STAGES
+from parenting.experiments.long_lives.settings import STAGES, agents_of
 from parenting.experiments.panel.settings import RULES
 from parenting.experiments.questions.settings import LEVELS, WORLD, trials_of
 from parenting.experiments.registry import BEYOND, experiment
@@ -77,6 +77,8 @@ def wanted(name: str, of: str, asked: int) -> int:
         return -(-asked // VARIANTS[of].one_of)
     if name == "questions":
         return trials_of(of, asked)
+    if name == "long-lives":
+        return agents_of(STAGES[of], asked)
     if name == "fallible":
         return ARMS[of].trials(asked)
     if name == "calibrate" and of.startswith("search"):

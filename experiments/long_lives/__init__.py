@@ -11,6 +11,7 @@ from typing import Any
 
 from parenting.agent.config import PRESETS
 from parenting.experiments.long_lives.settings import (
+    FEW,
     LEVEL,
     PRESET,
     STAGE_TICKS,
@@ -19,6 +20,7 @@ from parenting.experiments.long_lives.settings import (
     TOGETHER,
     WINDOW,
     WORLD,
+    agents_of,
 )
 from parenting.experiments.questions.plot import draw_windows
 from parenting.experiments.questions.verdicts import falling
@@ -34,8 +36,8 @@ def _config(request: Request) -> Mapping[str, Any]:
 def _tasks(request: Request) -> list[Task]:
     return [
         _task(name, last, span, request)
-        for span in chunk_ranges(request.trials, TOGETHER)
         for name, last in STAGES.items()
+        for span in chunk_ranges(agents_of(last, request.trials), TOGETHER)
     ]
 
 
@@ -59,7 +61,9 @@ def _report(request: Request, rows: Sequence[Row]) -> Results:
     ticks, window = TICKS[request.scale], WINDOW[request.scale]
     words = paragraphs(
         "long_lives/page.md",
-        trials=request.trials,
+        agents=", ".join(f"{agents_of(last, request.trials)} at T = {last}" for last in STAGES.values()),
+        few=FEW,
+        together=TOGETHER,
         ticks=ticks,
         window=window,
         stage_ticks=STAGE_TICKS[request.scale],
@@ -76,7 +80,7 @@ EXPERIMENT = Experiment(
     title="Long lives: questions and deaths in thousands of ticks",
     section="",
     claim="Do both the rate of questions and that of deaths fall towards zero as an agent lives on?",
-    trials={"quick": 2, "paper": 5},
+    trials={"quick": 2, "paper": 100},
     config=_config,
     tasks=_tasks,
     report=_report,
