@@ -24,6 +24,10 @@ WRITTEN_DOWN = """() => {
     heard.push("tone");
     return start.apply(this, when);
   };
+  const now = performance.now.bind(performance);
+  let back = 0;
+  performance.now = () => now() - back;
+  window.early = () => { back += 600000; };
   let hidden = false;
   Object.defineProperty(document, "hidden", { get: () => hidden });
   window.hide = (now) => { hidden = now; document.dispatchEvent(new Event("visibilitychange")); };
@@ -57,7 +61,8 @@ def test_a_question_is_told_of_to_those_who_asked_for_it_and_look_elsewhere(
     until(lambda: page.evaluate("heard.length") == 3)
     assert heard(page) == ["asked", "tone", "tone"]
     assert len([url for url in loaded if "sound" in url]) == 1
-    ask()  # the page is seen, and nobody has waited for long
+    page.evaluate("early()")  # so that nobody has waited for long, however slow the machine is
+    ask()  # the page is seen
     page.wait_for_selector("#question[data-listening]")
     page.keyboard.press("e")
     until(lambda: len(given(db)) == 2)
