@@ -11,9 +11,11 @@ from parenting.experiments.fallible.plot import frontier, kinds, misconceptions,
 from parenting.experiments.fallible.report import PROBED, Rows, by_arm, findings
 from parenting.experiments.fallible.settings import (
     ARMS,
+    FRESH_SEED,
     PLACES,
     TICKS,
     TRIALS,
+    TRIPLE,
     WAYS,
     Arm,
     ticks,
@@ -63,6 +65,8 @@ def _task(arm: Arm, span: range, request: Request) -> Task:
         "span": (span.start, span.stop),
         "seed": request.seed,
     }
+    if arm.fresh:
+        mine |= {"seed": request.seed + FRESH_SEED, "until_optimal": True}
     name = arm.name.replace(",", "").replace(" ", "-").replace(":", "-")
     key = f"{name}-{last}-{span.start:06d}-{span.stop:06d}"
     return Task(key, "parenting.experiments.fallible.tasks:erring_trials", mine, arm.work * len(span))
@@ -70,7 +74,14 @@ def _task(arm: Arm, span: range, request: Request) -> Task:
 
 def _report(request: Request, rows: Sequence[Row]) -> Results:
     found = by_arm(rows)
-    words = paragraphs("fallible/page.md", ticks=ticks(request.scale), seed=request.seed, probed=PROBED)
+    words = paragraphs(
+        "fallible/page.md",
+        ticks=ticks(request.scale),
+        seed=request.seed,
+        fresh=request.seed + FRESH_SEED,
+        fresh_trials=round(TRIALS * TRIPLE),
+        probed=PROBED,
+    )
     every: dict[str, Callable[[Figure, Rows], None]] = {
         "frontier": frontier,
         "all-questions": partial(frontier, until=False),

@@ -18,6 +18,7 @@ from parenting.experiments.fallible.settings import (
     LIKENESS,
     PLACES,
     PRESETS,
+    RELABELLED,
     ROBUST,
     SLIPS,
     TODAY,
@@ -40,8 +41,10 @@ COLOURS = (
     "#999999",
     "#6a3d9a",
     "#b15928",
+    "#f0e442",
+    "#117733",
 )
-MARKERS = "osD^v<>PX*"
+MARKERS = "osD^v<>PX*hd"
 
 
 def rates(figure: Figure, rows: Rows) -> None:
@@ -97,7 +100,7 @@ def frontier(figure: Figure, rows: Rows, until: bool = True) -> None:
         [(level, eps) for level in (ISLAND, BOTTLENECK) for eps in SLIPS],
         strict=True,
     ):
-        for place, way in enumerate((TODAY, *ROBUST)):
+        for place, way in enumerate((TODAY, *ROBUST, *RELABELLED)):
             arm = Arm(level, way, noisy(eps))
             if arm.name in rows:
                 _point(axes, rows, arm, UNTIL if until else QUESTIONS, place)
@@ -106,7 +109,7 @@ def frontier(figure: Figure, rows: Rows, until: bool = True) -> None:
         axes.set_ylabel("deaths")
         axes.set_ylim(bottom=0)
         axes.set_xlim(left=0)
-    _legend(figure, axes, 5)
+    _legend(figure, figure.axes[0], 4)
 
 
 def misconceptions(figure: Figure, rows: Rows) -> None:

@@ -14,9 +14,12 @@ from parenting.experiments.fallible.settings import (
     BOTH,
     BOTTLENECK,
     CONFIRM,
+    CONFIRMED,
+    DOUBTED,
     FRUGAL,
     ISLAND,
     PRESETS,
+    RELABEL,
     REPEATED,
     SLIPS,
     THRICE,
@@ -73,7 +76,15 @@ def values(rows: Sequence[Row], measure: str) -> list[float]:
 
 def findings(rows: Rows) -> list[Comparison]:
     """All rows of the page: checks first."""
-    checks = [*_robust(rows), *_rates(rows), *_kinds(rows), *_lost(rows), *_probes(rows)]
+    checks = [
+        *_robust(rows),
+        *_relabelled(rows),
+        *_confirmed(rows),
+        *_rates(rows),
+        *_kinds(rows),
+        *_lost(rows),
+        *_probes(rows),
+    ]
     return [*checks, *_misconceptions(rows), *(one for name in rows for one in _arm(name, rows[name]))]
 
 
@@ -131,6 +142,25 @@ def _robust(rows: Rows) -> Iterator[Comparison]:
             yield from _less(rows, Arm(level, REPEATED, noisy(eps)), today, DEATHS, "above 0")
 
 
+def _relabelled(rows: Rows) -> Iterator[Comparison]:
+    """Answers that are doubted in later visits, against the same agents that never doubt them."""
+    for level in (ISLAND, BOTTLENECK):
+        for doubting, sure in ((RELABEL, FRUGAL), (DOUBTED, BOTH)):
+            one, other = (Arm(level, way, noisy(0.1)) for way in (doubting, sure))
+            yield from _less(rows, one, other, DEATHS)
+            yield from _less(rows, one, other, QUESTIONS, "above 0")
+
+
+def _confirmed(rows: Rows) -> Iterator[Comparison]:
+    """What a screening had picked, on fresh trials until optimal."""
+    for level in (ISLAND, BOTTLENECK):
+        today, *picked = (Arm(level, way, noisy(0.1), fresh=True) for way in CONFIRMED)
+        for arm in picked:
+            yield from _less(rows, arm, today, DEATHS)
+        for arm in picked[1:]:
+            yield from _less(rows, arm, today, QUESTIONS)
+
+
 def _rates(rows: Rows) -> Iterator[Comparison]:
     """More errors, more deaths: the highest rate against a perfect parent."""
     for level in (ISLAND, BOTTLENECK):
@@ -152,7 +182,15 @@ def _kinds(rows: Rows) -> Iterator[Comparison]:
 def _lost(rows: Rows) -> Iterator[Comparison]:
     """Policies that were optimal and are not any more."""
     for level in (ISLAND, BOTTLENECK):
-        for way, eps in ((TODAY, 0.0), (TODAY, 0.1), (CONFIRM, 0.1), (FRUGAL, 0.1), (BOTH, 0.1)):
+        for way, eps in (
+            (TODAY, 0.0),
+            (TODAY, 0.1),
+            (CONFIRM, 0.1),
+            (FRUGAL, 0.1),
+            (BOTH, 0.1),
+            (RELABEL, 0.1),
+            (DOUBTED, 0.1),
+        ):
             name = Arm(level, way, noisy(eps)).name
             once = [row for row in rows.get(name, ()) if row["optimal_at"]]
             if once:
@@ -174,8 +212,8 @@ PROBES = (
     (ISLAND, CONFIRM, 0.2, 0.23, 51),
     (ISLAND, THRICE, 0.1, 0.05, 48),
     (BOTTLENECK, TODAY, 0.1, 2.63, 63.9),
-    (ISLAND, BOTH, 0.1, 0.0, 15.9),
-    (BOTTLENECK, BOTH, 0.1, 0.10, 42.7),
+    (ISLAND, DOUBTED, 0.1, 0.0, 15.9),
+    (BOTTLENECK, DOUBTED, 0.1, 0.10, 42.7),
 )
 """Level, way, rate of slips, and the first probe's deaths and questions until optimal."""
 

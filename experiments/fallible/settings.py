@@ -34,6 +34,7 @@ class Way(NamedTuple):
 
 TODAY, REPEATED, CONFIRM = "conservative", "repeated queries", "confirm 0.95"
 FRUGAL, BOTH = "frugal", "frugal, confirm 0.95"
+RELABEL, DOUBTED = "frugal, relabel", "frugal, confirm 0.95, relabel"
 WAYS: Mapping[str, Way] = {
     TODAY: Way(),
     "lax": Way("lax"),
@@ -47,9 +48,13 @@ WAYS: Mapping[str, Way] = {
     "9 steps": Way(changes={"gradient_steps": 9}, work=5.0),
     FRUGAL: Way("frugal", work=5.0),
     BOTH: Way("frugal", {"confirm": 0.95}, 5.0),
+    RELABEL: Way("frugal", {"relabel": True}, 5.0),
+    DOUBTED: Way("frugal", {"confirm": 0.95, "relabel": True}, 5.0),
 }
 """By name. All but the first three are ways to withstand errors; those without a preset are conservative."""
 ROBUST = (REPEATED, "confirm 0.8", CONFIRM, "confirm 0.99", THRICE, "fresh pairs", "9 steps", FRUGAL, BOTH)
+RELABELLED = (RELABEL, DOUBTED)
+"""Ways that ask again in later visits."""
 AGAINST_MISCONCEPTIONS = (TODAY, CONFIRM, FRUGAL, BOTH)
 
 
@@ -74,6 +79,10 @@ PLACES: Mapping[str, Place] = {
 ELSEWHERE = ("box", "button", "supervisor", "garden")
 
 
+FRESH, FRESH_SEED = ", until optimal", 1
+"""The end of the name of an arm with fresh trials, and what is added to the request's seed for these."""
+
+
 class Arm(NamedTuple):
     """A level, an agent and a parent."""
 
@@ -81,11 +90,12 @@ class Arm(NamedTuple):
     way: str
     parent: str  # as `--parent` has it
     share: float = 1.0  # of the request's trials
+    fresh: bool = False  # other trials than all others', until optimal
 
     @property
     def name(self) -> str:
         """As in trials.csv."""
-        return f"{self.level}, {self.way}, {self.parent}"
+        return f"{self.level}, {self.way}, {self.parent}{FRESH * self.fresh}"
 
     @property
     def changes(self) -> dict[str, Any]:
@@ -112,7 +122,7 @@ def noisy(eps: float) -> str:
     return f"noisy:{eps:g}" if eps else "scripted"
 
 
-DOUBLE, HALF, THIRD, QUARTER, FIFTH, TENTH, TWENTIETH = 2.0, 0.5, 0.3, 0.25, 0.2, 0.1, 0.05
+TRIPLE, DOUBLE, HALF, THIRD, QUARTER, FIFTH, TENTH, TWENTIETH = 3.0, 2.0, 0.5, 0.3, 0.25, 0.2, 0.1, 0.05
 """Shares of a request's trials: more for what the findings are about, fewer for what is slow."""
 
 SHARES = {0.0: DOUBLE, 0.1: DOUBLE, 0.2: 1.0}
@@ -158,7 +168,22 @@ def _misconceptions() -> Iterator[Arm]:
         yield Arm(ISLAND, way, "misconceived:0.1", FIFTH if WAYS[way].work > 1 else HALF)
 
 
-ARMS: Mapping[str, Arm] = {arm.name: arm for arm in (*_sweep(), *_kinds(), *_frontier(), *_misconceptions())}
+def _relabelled() -> Iterator[Arm]:
+    """Answers that are doubted in later visits."""
+    yield from (Arm(level, way, noisy(0.1)) for level in (ISLAND, BOTTLENECK) for way in RELABELLED)
+
+
+CONFIRMED = (TODAY, CONFIRM, BOTH, DOUBTED)
+
+
+def _confirmed() -> Iterator[Arm]:
+    """The ways that a screening of twenty on one seed had picked, on fresh trials."""
+    for level in (ISLAND, BOTTLENECK):
+        yield from (Arm(level, way, noisy(0.1), TRIPLE, fresh=True) for way in CONFIRMED)
+
+
+EVERY = (*_sweep(), *_kinds(), *_frontier(), *_misconceptions(), *_relabelled(), *_confirmed())
+ARMS: Mapping[str, Arm] = {arm.name: arm for arm in EVERY}
 QUICK = tuple(
     Arm(ISLAND, *rest).name for rest in ((TODAY, "scripted"), (TODAY, "noisy:0.1"), (CONFIRM, "noisy:0.1"))
 )

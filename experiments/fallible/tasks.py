@@ -39,8 +39,12 @@ def erring_trials(
     ticks: int,
     span: tuple[int, int],
     seed: int,
+    until_optimal: bool = False,
 ) -> list[Row]:
-    """Raise the trials of a span for so many ticks by a parent who errs, or is asked thrice each time."""
+    """Raise the trials of a span for so many ticks by a parent who errs, or is asked thrice each time.
+
+    Each ends when its policy is first optimal, if that is asked for.
+    """
     config = compose(preset, registry.defaults(world), changes, strict=True)
     lived, mine = world_of(world, level, config), keys(seed, span[1]).pick(torch.arange(*span))
     asked = list[BestOfThree]()
@@ -48,7 +52,7 @@ def erring_trials(
         lived,
         config,
         mine,
-        StopRule("ticks", ticks),
+        StopRule("optimal") if until_optimal else StopRule("ticks", ticks),
         max_ticks=ticks,
         weights=initial_weights(lived, config),
         parent=_maker(lived, config, parent, asked if thrice else None),

@@ -14,7 +14,8 @@ from parenting.agent.query import empty as no_query
 from parenting.envs.rng import keys
 from parenting.experiments.fallible import EXPERIMENT
 from parenting.experiments.fallible.report import by_arm, findings
-from parenting.experiments.fallible.settings import ARMS, CONFIRM, ISLAND, TODAY, Arm
+from parenting.experiments.fallible.settings import ARMS, BOTH, CONFIRM, DOUBTED, ISLAND, TODAY, Arm
+from parenting.experiments.fallible.tasks import erring_trials
 from parenting.experiments.fallible.thrice import APART, BestOfThree
 from parenting.experiments.reporting.comparison import Comparison
 from parenting.experiments.runner.store import Row
@@ -85,6 +86,36 @@ def test_every_arm_has_a_task_of_its_own() -> None:
     tasks = EXPERIMENT.tasks(Request(100))
     assert len({task.key for task in tasks}) == len(tasks)
     assert {task.arguments["label"] for task in tasks} == set(ARMS)
+
+
+def test_fresh_trials_have_a_seed_of_their_own_and_end_with_the_first_optimal_policy() -> None:
+    tasks = EXPERIMENT.tasks(Request(100, seed=7))
+    told = {task.arguments["label"]: task.arguments for task in tasks}
+    fresh = {name for name, arm in ARMS.items() if arm.fresh}
+    assert {name for name, one in told.items() if one.get("until_optimal")} == fresh
+    assert {told[name]["seed"] for name in fresh} == {8}
+    assert {told[name]["seed"] for name in ARMS.keys() - fresh} == {7}
+
+
+def test_a_trial_until_optimal_ends_with_the_first_optimal_policy() -> None:
+    common = {
+        "world": "unsafe-exploration",
+        "level": "island",
+        "preset": "frugal",
+        "changes": {"pretrain": False},
+    }
+    alike: dict[str, Any] = {**common, "parent": "scripted", "thrice": False, "span": (0, 3), "seed": 1}
+    ended = erring_trials("ended", ticks=100, until_optimal=True, **alike)
+    lived = erring_trials("lived", ticks=100, **alike)
+    assert [row["ticks"] for row in ended] == [row["optimal_at"] for row in lived]
+    assert all(row["ticks"] == 100 for row in lived)
+
+
+def test_doubted_answers_may_help_or_harm() -> None:
+    one, other = rows(DOUBTED, [0, 1] * 20), rows(BOTH, [2, 3] * 20)
+    found_rows = found(one, other)
+    assert found_rows[f"{one[0]['of']} minus {other[0]['of']}: deaths"].agrees is True
+    assert found_rows[f"{one[0]['of']} minus {other[0]['of']}: questions"].agrees is None
 
 
 class Told:
