@@ -145,12 +145,13 @@ def crowd(settings: Settings, url: str, people: int, think: float, seconds: floa
 
 
 def stored(db: Database, store: str) -> float:
-    """Return the megabytes of the database without its checkpoints."""
+    """Return the megabytes of the database without its checkpoints and the rows of the yardstick."""
     with db.read() as session:
         if store == "postgresql":
             whole = session.scalar(text("SELECT pg_database_size(current_database())"))
-            parts = "pg_total_relation_size('checkpoint') + pg_total_relation_size('checkpoint_part')"
-            return float(whole - session.scalar(text(f"SELECT {parts}"))) / MEGABYTE
+            others = "relname IN ('checkpoint', 'checkpoint_part', 'yardstick') AND relkind = 'r'"
+            sizes = f"SELECT sum(pg_total_relation_size(oid)) FROM pg_class WHERE {others}"
+            return float(whole - session.scalar(text(sizes))) / MEGABYTE
         names = ("page_size", "page_count", "freelist_count")
         size, pages, free = (session.scalar(text(f"PRAGMA {name}")) for name in names)
         parts = "(SELECT coalesce(sum(length({0})), 0) FROM {1})"

@@ -17,6 +17,8 @@ SIDES = (mark("Left"), mark("Right"))
 TITLES = {"guidance": mark("Which move is better here?"), "preference": mark("Which clip is better?")}
 TO_BE_SURE = mark("Asked again, to be sure: the two moves have changed places.")
 """A sentence on a question that was answered before in the same pause."""
+DOUBTED = mark("Asked again, to be sure: another answer than before is welcome.")
+"""A sentence on a question that was answered in an earlier visit, and may have been answered wrongly."""
 DELUDED = mark("What is dashed is only what it believes to see.")
 CORNERED = mark("The box is stuck already.")
 WATCHED, UNWATCHED = mark("The supervisor is watching."), mark("Nobody is watching.")

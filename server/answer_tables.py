@@ -8,9 +8,9 @@ from typing import Any
 from sqlalchemy import ForeignKey, Index, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column
 
-from parenting.server.columns import OneOf
+from parenting.server.columns import Hex, OneOf
 from parenting.server.measures import Measures
-from parenting.server.table_root import Table, one_of, unique_where
+from parenting.server.table_root import Table, one_of, only_where, unique_where
 
 CHOICES = ("left", "right", "either", "neither")
 SKIP = "skip"  # the parent cannot tell: this counts as no choice
@@ -29,7 +29,7 @@ class Answer(Table):
         unique_where("uq_answer_standing", "standing", "query_id"),
         unique_where("uq_answer_first", "supersedes IS NULL", "query_id", "client_id"),
         Index(None, "query_id"),
-        Index(None, "supersedes"),  # without it, deleting an answer searches all of them
+        only_where("ix_answer_supersedes", "supersedes IS NOT NULL", "supersedes"),  # for deletions
         Index(None, "run_id", "applied_tick", unique=True),  # at most one answer is heard in a tick
     )
 
@@ -48,7 +48,7 @@ class Answer(Table):
     applied_tick: Mapped[int | None]
     erased: Mapped[datetime | None]  # when its person's data were deleted (`server.erasing`); a skip since
     # the chain of hashes (server.chain)
-    salt: Mapped[str | None]
-    digest: Mapped[str | None]
-    link: Mapped[str | None]
+    salt: Mapped[str | None] = mapped_column(Hex)
+    digest: Mapped[str | None] = mapped_column(Hex)
+    link: Mapped[str | None] = mapped_column(Hex)
     chained: Mapped[str | None]  # when it was hashed: with the answer, or by a migration

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -34,6 +35,10 @@ E = TypeVar("E", bound=StrEnum)
 T = TypeVar("T")
 UNREADABLE = (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError)
 """Errors that a stored value causes which is not what its column holds."""
+
+
+DIGITS = re.compile("([0-9a-f]{2})+")
+"""Text that stands for bytes."""
 
 
 class Damaged:
@@ -188,6 +193,34 @@ class Blob(Checked[bytes]):
     cache_ok = True
     impl = LargeBinary
     kind, noun = bytes, "bytes"
+
+
+class Hex(Checked[str]):
+    """Hexadecimal digits, of a hash or a salt, stored as the bytes that they stand for.
+
+    SQLite's rows of before revision 0031 hold the digits as text. Any other text is stored as it is;
+    PostgreSQL, whose column holds bytes alone, puts `TEXT` before it.
+    """
+
+    cache_ok = True
+    impl: TypeEngine[Any] | type[TypeEngine[Any]] = LargeBinary().with_variant(Text, "sqlite")
+    kind, noun = str, "text"
+    TEXT = b"text:"
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> Any:
+        """To bytes."""
+        value = super().process_bind_param(value, dialect)
+        if not isinstance(value, str):
+            return value
+        if DIGITS.fullmatch(value) is not None and not value.startswith(self.TEXT.hex()):
+            return bytes.fromhex(value)
+        return value if dialect.name == "sqlite" else self.TEXT + value.encode()
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> Any:
+        """Back to digits."""
+        if not isinstance(value, bytes):
+            return value
+        return value.removeprefix(self.TEXT).decode() if value.startswith(self.TEXT) else value.hex()
 
 
 class Json(Checked[dict[str, Any]]):

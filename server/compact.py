@@ -3,17 +3,14 @@
 Clips repeat their boards, which differ in a cell or two. In the short form the boards stand once, the first
 one in full and the others by what differs, and a frame is a list. Figures that always come together are a
 list in a fixed order. What has another shape is stored as it is, and so are rows of before revision 0026:
-each form is known by its key. Hashes of rows (`server.chain`) are made of the whole form.
+each form is known by its key. Since revision 0031 what has the usual parts is a list (`compact_lists`).
+Hashes of rows (`server.chain`) are made of the whole form.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
-
-from sqlalchemy import Dialect
-
-from parenting.server.columns import Json
 
 GRIDS, FIGURES = "grids", "f"
 FRAME = ("ground", "observed", "agent", "box")
@@ -37,7 +34,7 @@ def shorten_clips(clips: dict[str, Any]) -> dict[str, Any]:
     if GRIDS in clips or len(shapes) != 1 or None in short.values():
         return clips
     first, *others = boards
-    return {**short, GRIDS: [first, *(_different(first, other) for other in others)]}
+    return {**short, GRIDS: [first, *(changes(first, other) for other in others)]}
 
 
 def whole_clips(stored: dict[str, Any]) -> dict[str, Any]:
@@ -45,7 +42,7 @@ def whole_clips(stored: dict[str, Any]) -> dict[str, Any]:
     if GRIDS not in stored:
         return stored
     first, *others = stored[GRIDS]
-    boards = [first, *(_changed(first, other) for other in others)]
+    boards = [first, *(change(first, other) for other in others)]
     return {side: _whole_side(clip, boards) for side, clip in stored.items() if side != GRIDS}
 
 
@@ -65,40 +62,6 @@ def whole_figures(names: Sequence[str], stored: dict[str, Any]) -> dict[str, Any
     return {**dict(zip(names, stored[FIGURES], strict=True)), **rest}
 
 
-class Clips(Json):
-    """The clips of a question, in the short form."""
-
-    cache_ok = True
-
-    def process_bind_param(self, value: Any, dialect: Dialect) -> Any:
-        """To the short form."""
-        found = super().process_bind_param(value, dialect)
-        return shorten_clips(found) if isinstance(found, dict) else found
-
-    def process_result_value(self, value: Any, dialect: Dialect) -> Any:
-        """Back to the whole."""
-        return whole_clips(value) if isinstance(value, dict) else value
-
-
-class Figures(Json):
-    """Figures of which those of `names` always come together, in this order."""
-
-    cache_ok = True
-
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self.names = names
-        super().__init__()
-
-    def process_bind_param(self, value: Any, dialect: Dialect) -> Any:
-        """To the short form."""
-        found = super().process_bind_param(value, dialect)
-        return shorten_figures(self.names, found) if isinstance(found, dict) else found
-
-    def process_result_value(self, value: Any, dialect: Dialect) -> Any:
-        """Back to the whole."""
-        return whole_figures(self.names, value) if isinstance(value, dict) else value
-
-
 def _shorten_side(clip: Any, boards: list[str]) -> dict[str, Any] | None:
     """Return a clip whose frames are lists and name their boards by number; None if it is not a clip."""
     frames = clip.get("frames") if isinstance(clip, dict) else None
@@ -106,7 +69,7 @@ def _shorten_side(clip: Any, boards: list[str]) -> dict[str, Any] | None:
         return None
     return {
         **clip,
-        "frames": [[*(_number(f[n], boards) for n in FRAME[:2]), f["agent"], f["box"]] for f in frames],
+        "frames": [[*(number_of(f[n], boards) for n in FRAME[:2]), f["agent"], f["box"]] for f in frames],
     }
 
 
@@ -122,19 +85,26 @@ def _is_board(rows: Any) -> bool:
     return isinstance(rows, list) and bool(rows) and all(isinstance(r, str) and "\n" not in r for r in rows)
 
 
-def _number(rows: list[str], boards: list[str]) -> int:
+def number_of(rows: list[str], boards: list[str]) -> int:
+    """Return the place of a board among those that were met; a new one is added."""
     board = "\n".join(rows)
     if board not in boards:
         boards.append(board)
     return boards.index(board)
 
 
-def _different(first: str, other: str) -> list[int | str]:
+def changes(first: str, other: str) -> list[int | str]:
+    """Return the places and glyphs in which a board differs from the first one.
+
+    Raises:
+        ValueError: they are not equally large.
+    """
     pairs = enumerate(zip(first, other, strict=True))
     return [part for place, (one, two) in pairs if one != two for part in (place, two)]
 
 
-def _changed(first: str, different: list[Any]) -> str:
+def change(first: str, different: list[Any]) -> str:
+    """Return the board that `changes` took."""
     cells = list(first)
     for place, glyph in zip(different[::2], different[1::2], strict=True):
         cells[place] = glyph

@@ -49,5 +49,10 @@ def one_of(column: str, words: Iterable[str], nullable: bool = False) -> CheckCo
 
 def unique_where(name: str, condition: str, *columns: str) -> Index:
     """Return an index of columns that are unique where a condition holds."""
+    return only_where(name, condition, *columns, unique=True)
+
+
+def only_where(name: str, condition: str, *columns: str, unique: bool = False) -> Index:
+    """Return an index of the rows in which a condition holds."""
     only = text(condition)
-    return Index(name, *columns, unique=True, sqlite_where=only, postgresql_where=only)
+    return Index(name, *columns, unique=unique, sqlite_where=only, postgresql_where=only)

@@ -1,7 +1,8 @@
 """The tables: runs, queries, answers, events, metrics, checkpoints, moves, workers, jobs, and others.
 
 The database enforces the invariants: one query for each run and tick, one standing answer for each query,
-known words only. Times are UTC. JSON is readable by eye (`server.compact`); `Query.clips` describes a clip.
+known words only. Times are UTC. JSON is stored in short forms (`server.compact_lists`); `Query.clips`
+describes a clip.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from parenting.server.answer_tables import (
 from parenting.server.audit.table import AuditEntry
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.columns import Big, OneOf, name_places
-from parenting.server.compact import METRICS, Clips, Figures
+from parenting.server.compact import METRICS
+from parenting.server.compact_columns import Clips, Figures
 from parenting.server.identity_table import Identity
 from parenting.server.moves_table import Moves
 from parenting.server.person_tables import Person, PersonClient, PersonName

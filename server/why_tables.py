@@ -6,7 +6,8 @@ from typing import Any
 
 from sqlalchemy.orm import Mapped, mapped_column
 
-from parenting.server.compact import EFFECT, REASON, Figures
+from parenting.server.compact import EFFECT, REASON
+from parenting.server.compact_columns import Figures
 from parenting.server.table_root import Table
 
 

@@ -53,7 +53,8 @@ def _chain(connection: sa.Connection, run_id: object) -> None:
     asked = [query.c[name].label(f"query_{name}") for name in ASKED]
     rows = sa.select(*columns, *asked).outerjoin(query, answer.c.query_id == query.c.id)
     rows = rows.where(answer.c.run_id == run_id).order_by(answer.c.number)
-    given = answer.update().where(answer.c.id == sa.bindparam("row"))
+    hashed_in = sa.table("answer", sa.column("id"), *(sa.column(name, sa.Text) for name in COLUMNS))
+    given = hashed_in.update().where(hashed_in.c.id == sa.bindparam("row"))
     before = BEGIN
     for first in itertools.count(0, BATCH):
         found = connection.execute(rows.limit(BATCH).offset(first)).mappings().all()

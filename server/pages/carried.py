@@ -28,7 +28,7 @@ from parenting.server.db import Database
 from parenting.server.deps import Db, SettingsOf, store
 from parenting.server.errors import NotAllowedError, NotFound, ServerError
 from parenting.server.identity import database_id
-from parenting.server.pages.question import question_view
+from parenting.server.pages.question import repeated_view
 from parenting.server.pages.render import render
 from parenting.server.queue.leases import More
 from parenting.server.reads.names import query_numbers, run_number
@@ -152,7 +152,7 @@ async def _ask(
 
 
 def _markup(db: Database, run: Run, query: Query, page: CarriedPage) -> str:
-    shown = question_view(query, run)
+    shown = repeated_view(db, query, run)
     return render("_question.html", shown=shown, client=page.client_id, database=database_id(db))
 
 

@@ -30,7 +30,7 @@ from parenting.server.identity import database_id
 from parenting.server.measures import BY_FORM
 from parenting.server.pages.fields import ChoiceField, ClientField, MaybeDatabase, MaybeQuestion
 from parenting.server.pages.practice import PRACTISED, Place
-from parenting.server.pages.question import Former, QuestionView, question_view
+from parenting.server.pages.question import Former, QuestionView, repeated_view
 from parenting.server.pages.render import page, redirect, remember
 from parenting.server.pages.texts import GOAL_STEP, STATE_TEXTS, parent_title
 from parenting.server.public_ids import LENGTH
@@ -206,18 +206,18 @@ async def wait_for(request: Request, run_id: int, wish: leases.Wish, seconds: fl
 
 
 def _markup(db: Database, run: Run, query: tables.Query, client_id: str) -> Response:
-    shown = question_view(query, run)
+    shown = repeated_view(db, query, run)
     return page("_question.html", shown=shown, client=client_id, database=database_id(db))
 
 
 def _shown(db: Database, run: Run, asked: tables.Query, client: str, change: bool) -> QuestionView | None:
     """Return the question that an address names, if it waits, or if its answer is to be changed."""
     if asked.status == "open":
-        return question_view(asked, run)
+        return repeated_view(db, asked, run)
     found = changeable(db, asked.id, client) if change else None
     if found is None:
         return None
-    return question_view(asked, run, Former(found.answer.choice, asked.status == "applied"))
+    return repeated_view(db, asked, run, Former(found.answer.choice, asked.status == "applied"))
 
 
 def _last(db: Database, run: Run, client: str) -> QuestionView | None:
@@ -226,7 +226,9 @@ def _last(db: Database, run: Run, client: str) -> QuestionView | None:
     if found is None:
         return None
     with suppress(DamagedRowError):
-        return question_view(found.query, run, Former(found.answer.choice, found.query.status == "applied"))
+        return repeated_view(
+            db, found.query, run, Former(found.answer.choice, found.query.status == "applied")
+        )
     return None
 
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from parenting.drawing.board import Board
 from parenting.drawing.candidates import with_margin
 from parenting.drawing.clip import Clip
-from parenting.drawing.query_view import TO_BE_SURE, QueryView, query_view
+from parenting.drawing.query_view import DOUBTED, TO_BE_SURE, QueryView, query_view
 from parenting.drawing.sentences import tr
 from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import reading
+from parenting.server.db import Database
 from parenting.server.pages.texts import AGAIN, LEADS, PUT_BACK
+from parenting.server.reads.asked_before import is_doubted
 from parenting.server.tables import SKIP, Query, Run
 
 
@@ -48,6 +50,7 @@ class QuestionView(QueryView):
     put_back: bool = False  # clips that somebody has skipped once
     confirmed: bool = False  # guidance has to be confirmed, so an answer that was heard may not have moved
     votes: int = 0  # answers heard on this pair of moves before, in the same pause
+    doubted: bool = False  # an answer on this pair of moves in an earlier visit is doubted
 
     @property
     def action(self) -> str:
@@ -77,7 +80,7 @@ class QuestionView(QueryView):
     @property
     def repeat(self) -> str:
         """A sentence where the question is asked again: it is never shown as a plain repeat."""
-        return tr(TO_BE_SURE) if self.votes else ""
+        return tr(TO_BE_SURE) if self.votes else tr(DOUBTED) if self.doubted else ""
 
     @property
     def spoken(self) -> str:
@@ -122,6 +125,18 @@ class QuestionView(QueryView):
             return tr(AGAIN["voted"])
         moved = self.kind == "guidance" and self.former.choice != "neither"
         return tr(AGAIN["moved" if moved else "heard"])
+
+
+def repeated_view(db: Database, query: Query, run: Run, former: Former | None = None) -> QuestionView:
+    """Describe a stored query as `question_view` does, and say whether it doubts an earlier answer.
+
+    Raises:
+        DamagedRowError: it cannot be read, or does not fit the run's legend.
+    """
+    shown = question_view(query, run, former)
+    with db.read() as session:
+        doubted = is_doubted(session, query, bool(run.config.get("relabel")))
+    return replace(shown, doubted=doubted)
 
 
 def question_view(query: Query, run: Run, former: Former | None = None) -> QuestionView:

@@ -19,7 +19,7 @@ from parenting.server.deps import Db
 from parenting.server.pages.history import known_people, said, who
 from parenting.server.pages.numbers import number
 from parenting.server.pages.parent import QueryShown, question_of
-from parenting.server.pages.question import QuestionView, question_view, side_names
+from parenting.server.pages.question import QuestionView, repeated_view, side_names
 from parenting.server.pages.render import moved, page, redirect
 from parenting.server.pages.texts import parent_title
 from parenting.server.reads.why import last_question, neighbours, why
@@ -91,7 +91,7 @@ def why_page(request: Request, run_id: RunId, db: Db, query: QueryShown = None) 
 
 
 def _page(db: Database, run: Run, asked: Query, mine: str) -> WhyPage:
-    found, shown = why(db, asked.id), question_view(asked, run)
+    found, shown = why(db, asked.id), repeated_view(db, asked, run)
     reason = found.guidance or found.preference
     begins = {asked.clips[side]["actions"][0]: name for side, name in _sides(asked, run).items()}
     answers = _rows(db, asked)

@@ -10,7 +10,7 @@ from sqlalchemy import bindparam, func, select
 from sqlalchemy.orm import Session
 
 from parenting.agent.config import Config
-from parenting.drawing.query_view import TO_BE_SURE
+from parenting.drawing.query_view import DOUBTED, TO_BE_SURE
 from parenting.drawing.sentences import tr
 from parenting.drawing.surroundings import surroundings
 from parenting.server.damage import damage, readable, reading, sound
@@ -18,6 +18,7 @@ from parenting.server.db import Database
 from parenting.server.identity import database_id_in, stated
 from parenting.server.keeping import split_tags
 from parenting.server.queue.queries import Open, open_by_run, open_in
+from parenting.server.reads.asked_before import is_doubted
 from parenting.server.reads.pagination import Asked
 from parenting.server.runs import find
 from parenting.server.schemas import (
@@ -55,7 +56,7 @@ FORGIVEN = timedelta(minutes=5)
 PROBE_SECONDS = 0.1
 """The wait of a look at a run for whether the store takes signs of life at all."""
 
-Shown = tuple[WorldSchema, ParentSchema, bool]
+Shown = tuple[WorldSchema, ParentSchema, bool, bool]
 _SHOWN: dict[str, Shown] = {}
 SHOWN_RUNS = 1000
 """Runs of which a process keeps what their questions show."""
@@ -131,11 +132,13 @@ def leased_schema(session: Session, query: Query) -> LeasedSchema:
         DamagedRowError: it or its run cannot be read, or it does not fit the run's legend.
     """
     now = session.execute(_PROGRESS, {"run_id": query.run_id}).one()
-    world, parent, guide = _shown_run(session, query.run_id, now.public_id)
+    world, parent, guide, relabels = _shown_run(session, query.run_id, now.public_id)
     with reading(query):
         sentences = surroundings(query.clips, world.legend, guide=guide)
         if query.votes:
             sentences = (tr(TO_BE_SURE), *sentences)
+        elif is_doubted(session, query, relabels):
+            sentences = (tr(DOUBTED), *sentences)
     return LeasedSchema(
         **_query_fields(query, stated(now.database), now.public_id),
         world=world,
@@ -155,7 +158,7 @@ def _shown_run(session: Session, run_id: int, public_id: str) -> Shown:
             name=run.world, level=run.level, text=run.level_text, legend=run.legend, brief=run.brief
         )
         settings = ParentSchema(gamma=config.gamma, inside=config.garden_parent)
-        shown = world, settings, run.words == "guide"
+        shown = world, settings, run.words == "guide", config.relabel
         if len(_SHOWN) >= SHOWN_RUNS:
             _SHOWN.clear()
         _SHOWN[public_id] = shown

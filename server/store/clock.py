@@ -22,6 +22,8 @@ from sqlalchemy.orm import Session
 
 SLACK = 1.0
 """Seconds by which a mark may lie ahead: PostgreSQL's clock is corrected by fractions of a second."""
+LONGEST = 12
+"""Characters of a boot id that are kept: each question has one. The last group of a UUID has so many."""
 BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 SYSCTL = ("sysctl", "-n", "kern.bootsessionuuid")
 _SERVER_TIME = text("SELECT CAST(extract(epoch FROM clock_timestamp()) AS double precision)")
@@ -54,7 +56,7 @@ def boot_mark(_session: Session | None = None) -> Mark:
     if boot is None:
         return Mark("wall clock", time.time())
     clock = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
-    return Mark(boot, time.clock_gettime(clock))
+    return Mark(boot[-LONGEST:], time.clock_gettime(clock))
 
 
 def server_mark(session: Session) -> Mark:

@@ -37,17 +37,14 @@ def read_json(value: Any) -> Any:
     return json.loads(value) if isinstance(value, str) else value
 
 
-def whole(clips: dict[str, Any]) -> dict[str, Any]:
-    """Clips with the boards in each frame; in the short form they stand once, all but one by differences."""
+def whole(clips: Any) -> Any:
+    """Clips with the boards in each frame; in the short forms they stand once, all but one by differences."""
+    if isinstance(clips, list):
+        left, right, *grids = clips
+        return {"left": from_list(left, full(grids)), "right": from_list(right, full(grids))}
     if "grids" not in clips:
         return clips
-    boards = []
-    for board in clips["grids"]:
-        cells = list(clips["grids"][0])
-        changes = [] if isinstance(board, str) else board
-        for place, glyph in zip(changes[::2], changes[1::2], strict=True):
-            cells[place] = glyph
-        boards.append("".join(cells).split("\n"))
+    boards = full(clips["grids"])
     return {
         side: clip
         | {
@@ -59,6 +56,32 @@ def whole(clips: dict[str, Any]) -> dict[str, Any]:
         for side, clip in clips.items()
         if side != "grids"
     }
+
+
+def full(grids: list[Any]) -> list[list[str]]:
+    """The rows of all boards, of which only the first is stored in full."""
+    boards = []
+    for board in grids:
+        cells = list(grids[0])
+        changes = [] if isinstance(board, str) else board
+        for place, glyph in zip(changes[::2], changes[1::2], strict=True):
+            cells[place] = glyph
+        boards.append("".join(cells).split("\n"))
+    return boards
+
+
+def from_list(side: list[Any], boards: list[list[str]]) -> dict[str, Any]:
+    """A clip of which letters, numbers and perhaps a chance are stored."""
+    words = {word[0]: word for word in ("up", "down", "left", "right")}
+    actions = [words[letter] for letter in side[0]]
+    many = len(side[1]) // (len(actions) + 1)
+    parts = [side[1][first : first + many] for first in range(0, len(side[1]), many)]
+    frames = [
+        {"ground": boards[one[0]], "observed": boards[one[1]], "agent": one[2:4], "box": one[4:] or None}
+        for one in parts
+    ]
+    chance = {"chance": side[2]} if len(side) > 2 else {}
+    return {"actions": actions, "length": len(actions), "frames": frames, **chance}
 
 
 class Recorded:

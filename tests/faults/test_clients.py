@@ -37,7 +37,7 @@ SELDOM = 10
 KILLED = "SIGKILLs of database clients"
 WINDOWS = {"before COMMIT", "after COMMIT", "after INSERT", "after UPDATE"}
 """Places where a kill must have fallen."""
-RACES, RACERS = {"sqlite": length(500, 20_000), "postgresql": length(150, 5000)}, 4
+RACES, RACERS = {"sqlite": length(500, 20_000), "postgresql": length(500, 5000)}, 4
 
 
 def test_clients_killed_at_random_statements(

@@ -22,7 +22,7 @@ from tests.faults.queue_model import Machines
 from tests.lengths import length
 from tests.server.conftest import Clock
 
-EXAMPLES = {"sqlite": length(150, 50_000), "postgresql": length(20, 5000)}
+EXAMPLES = {"sqlite": length(150, 50_000), "postgresql": length(150, 5000)}
 STEPS = length(40, 100)
 RARE = {"a heard answer changed", "an answer taken back", "a correction heard", "an ended run goes on"}
 """Steps that only follow others, and must have happened."""

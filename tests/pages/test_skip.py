@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import expect
 from sqlalchemy import select, update
 
+from parenting.drawing.query_view import DOUBTED
 from parenting.server.db import Database
 from parenting.server.queue.answers import get_query
 from parenting.server.queue.skips import skip
@@ -115,23 +116,28 @@ def test_clips_that_were_put_back_come_once_more(tabs: BrowserTabs, db: Database
     expect(page.locator("#waiting")).to_be_visible()
 
 
-@pytest.mark.parametrize("wanted", [True, False])
+@pytest.mark.parametrize(("wanted", "relabels"), [(True, False), (False, False), (True, True)])
 def test_an_answer_that_contradicts_an_earlier_one_gets_a_sentence(
-    tabs: BrowserTabs, db: Database, mine: Claim, wanted: bool
+    tabs: BrowserTabs, db: Database, mine: Claim, wanted: bool, relabels: bool
 ) -> None:
+    """But for a question that doubts the earlier one, and says so (`relabel`)."""
     clips = fixtures.guidance("left", "right")
     with db.write() as session:
-        session.execute(update(Run).values(remarks=wanted))
-    first, second = (post_query(db, mine, tick, "guidance", 1, clips) for tick in (1, 2))
+        config = {**session.get_one(Run, mine.run_id).config, "relabel": relabels}
+        session.execute(update(Run).values(remarks=wanted, config=config))
+    first = post_query(db, mine, 1, "guidance", 1, clips)
     page = tabs.open(address(db))
     shown(page, first)
     page.keyboard.press("a")
+    until(lambda: len(stored(db)) == 1)
+    second = post_query(db, mine, 2, "guidance", 1, clips)
     shown(page, second)
     expect(page.locator("#remark")).to_be_hidden()
+    expect(page.get_by_text(DOUBTED, exact=True)).to_be_visible(visible=relabels)
     page.keyboard.press("b")
     until(lambda: len(stored(db)) == 2)
-    if not wanted:
-        expect(page.locator("#remark")).to_be_hidden()
+    if not wanted or relabels:  # two fast answers may have a remark of their own
+        expect(page.locator("#remark [data-slip=contrary]" if wanted else "#remark")).to_be_hidden()
         return
     expect(page.locator("#remark")).to_contain_text("Before, you preferred the other one")
     page.get_by_role("link", name="Look at it again").click()

@@ -93,6 +93,32 @@ def test_the_order_of_keys_says_nothing(db: Database, run_id: int) -> None:
     assert check(db, run_id).problems == []
 
 
+def test_hashes_are_stored_as_bytes_and_as_digits_for_an_older_version(db: Database, run_id: int) -> None:
+    change(db, "UPDATE answer SET digest = 'text:x' WHERE number = 3")  # no digits, as damage leaves it
+    hashed = [(row.answer.salt, row.answer.digest, row.answer.link) for row in every(db, run_id)]
+    before = check(db, run_id)
+    assert stored(db) == [(16, 32, 32), (16, 32, 32), (16, 6, 32), (16, 32, 32), (16, 32, 32)]
+    downgrade(db, "0030")
+    assert [tuple(map(len, map(str, row))) for row in stored_text(db)] == [
+        (32, 64 if number != 3 else len(str(hashed[2][1])), 64) for number in range(1, NUMBER + 1)
+    ]
+    upgrade(db)
+    assert [(row.answer.salt, row.answer.digest, row.answer.link) for row in every(db, run_id)] == hashed
+    assert check(db, run_id) == before
+
+
+def stored_text(db: Database) -> list[tuple[str, str, str]]:
+    """Return salt, digest and link of each answer as they are stored."""
+    with db.read() as session:
+        rows = session.execute(text("SELECT salt, digest, link FROM answer ORDER BY number"))
+        return [(row[0], row[1], row[2]) for row in rows]
+
+
+def stored(db: Database) -> list[tuple[int, ...]]:
+    """Return the bytes of salt, digest and link of each answer."""
+    return [tuple(map(len, row)) for row in stored_text(db)]
+
+
 def test_answers_of_before_are_hashed_by_the_migration(db: Database, run_id: int) -> None:
     downgrade(db, BEFORE)
     upgrade(db)

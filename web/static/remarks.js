@@ -30,7 +30,7 @@ function fault(question, choice, ms) {
   const contrary = contradicts(question.dataset, choice), other = { left: "right", right: "left" }[choice];
   fast = ms < HASTE ? fast + 1 : 0;
   if (other && dangerous(choice) && !dangerous(other)) return "danger";
-  if (contrary && !question.dataset.votes) return "contrary"; // asked again: the other answer is welcome
+  if (contrary && !("again" in question.dataset)) return "contrary"; // asked again: the other answer is welcome
   return fast > 1 ? "hasty" : null;
 }
 
