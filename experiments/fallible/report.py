@@ -152,7 +152,7 @@ def _relabelled(rows: Rows) -> Iterator[Comparison]:
 
 
 def _confirmed(rows: Rows) -> Iterator[Comparison]:
-    """What a screening had picked, on fresh trials until optimal."""
+    """The ways that a screening had picked, on fresh trials until optimal."""
     for level in (ISLAND, BOTTLENECK):
         today, *picked = (Arm(level, way, noisy(0.1), fresh=True) for way in CONFIRMED)
         for arm in picked:
