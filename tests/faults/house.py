@@ -26,11 +26,17 @@ from tests.server.serving import free_port
 PATCHES = {
     "parenting.server.checkpoint_pace.CHECKPOINT_SECONDS": 0.05,
     "parenting.server.checkpoint_pace.QUIET_SECONDS": 0.05,
+    "parenting.server.checkpoint_pace.CHECKPOINT_SHARE": 1.0,
+    "parenting.server.checkpoint_pace.LARGE_SECONDS": 1e9,
     "parenting.server.checkpoint_pace.CHECKPOINT_SPEED": 1e12,
     "parenting.server.session.METRIC_SECONDS": 0.05,
-    "parenting.server.checkpoint_parts.PART_BYTES": 200_000,
+    "parenting.server.checkpoint_parts.PART_BYTES": 400_000,
 }
-"""Checkpoints and metrics are written often, so that kills hit them too; each checkpoint has a few parts."""
+"""Checkpoints and metrics are written often, so that kills hit them too; each checkpoint has a few parts.
+
+They take up to half of a run's time. With the share that the product allows them, a slow machine writes one
+every 20 s, and a process that is to die at its third one lives for a minute.
+"""
 LEASE_SECONDS = 2.0
 CLAIM_SECONDS = 2.0
 """Of three workers: with a shorter one they take runs from one another all the time where all is slow."""
@@ -83,8 +89,11 @@ class House:
         url = self.settings.url
         return Store(Path(make_url(url).database or "") if url.startswith("sqlite") else url)
 
-    def begin(self, name: str, point: Point | None = None) -> Command:
-        """Start a process, which kills itself at the point, if there is one."""
+    def begin(self, name: str, point: Point | None = None, later: bool = False) -> Command:
+        """Start a process, which kills itself at the point, if there is one; `later`: from `release` on."""
+        gate = self._gate(name) if later else None
+        if gate is not None:
+            gate.unlink(missing_ok=True)
         environment = {"PARENTING_LEASE_SECONDS": str(LEASE_SECONDS)}
         if "worker 3" in self.orders:
             environment["PARENTING_CLAIM_SECONDS"] = str(CLAIM_SECONDS)
@@ -97,10 +106,17 @@ class House:
             *self.orders[name],
             data=self.settings.data,
             patches=self.patches,
-            prepare=self.prepare or partial(arm, str(self.mark(name)), point, self.points),
+            prepare=self.prepare or partial(arm, str(self.mark(name)), point, self.points, gate),
             environment=environment,
         )
         return self.commands[name]
+
+    def release(self, name: str) -> None:
+        """Let a process that was started with a point for `later` kill itself there."""
+        self._gate(name).touch()
+
+    def _gate(self, name: str) -> Path:
+        return self.mark(name).with_suffix(".gate")
 
     def mark(self, name: str) -> Path:
         """The file that says where a process was."""

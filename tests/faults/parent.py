@@ -14,7 +14,8 @@ from tests.faults.ledger import Ledger, Offer
 
 CHOICES = ("left", "right", "either")
 """Without *neither*: an agent that is refused everything waits for its operator."""
-PAUSE = 0.01
+PAUSE = 0.05
+"""Seconds before it asks or sends again. Shorter ones take the processor from what they wait for."""
 SECONDS = 10.0
 AGAIN = 0.1
 """The share of answers that are sent again, of those sent with another choice, and of leases let go."""

@@ -28,6 +28,7 @@ class Point(NamedTuple):
     pattern: str  # of the statement
     commit: bool = False  # the commit of the transaction that it is in, instead of itself
     seldom: bool = False  # a process may pass it but once
+    first: bool = False  # a process passes it at its start, before it works
     passage: int = 1  # which passage kills
     signal: signal.Signals = signal.SIGKILL
 
@@ -39,13 +40,13 @@ class Point(NamedTuple):
 
 
 class Trigger:
-    """Kills this process at a point."""
+    """Kills this process at a point. Passages count from when the file `gate` is there, if one is named."""
 
-    def __init__(self, point: Point) -> None:
-        self.point, self.passed = point, 0
+    def __init__(self, point: Point, gate: Path | None = None) -> None:
+        self.point, self.gate, self.passed = point, gate, 0
 
     def __call__(self, moment: Moment) -> None:
-        if self.point.fits(moment):
+        if self.point.fits(moment) and (self.gate is None or self.gate.exists()):
             self.passed += 1
             if self.passed == self.point.passage:
                 os.kill(os.getpid(), self.point.signal)
@@ -72,11 +73,14 @@ class Mark:
         self.memory[:] = name.encode().ljust(MARK_BYTES)
 
 
-def arm(mark: str, point: Point | None, points: Sequence[Point]) -> None:
-    """In a process that was just started: note where it is, and kill it at the point, if there is one."""
+def arm(mark: str, point: Point | None, points: Sequence[Point], gate: Path | None = None) -> None:
+    """In a process that was just started: note where it is, and kill it at the point, if there is one.
+
+    With a `gate` it lives on until that file is there.
+    """
     tap.listen(Mark(Path(mark), points))
     if point is not None:
-        tap.listen(Trigger(point))
+        tap.listen(Trigger(point, gate))
 
 
 def marked(file: Path) -> str:
@@ -84,13 +88,13 @@ def marked(file: Path) -> str:
     return file.read_bytes().decode().strip() or "before the first statement"
 
 
-def around(name: str, pattern: str, seldom: bool = False) -> list[Point]:
+def around(name: str, pattern: str, seldom: bool = False, first: bool = False) -> list[Point]:
     """The four points of a write: before and after the statement, before and after its commit."""
     return [
-        Point(f"before {name}", "before", pattern, False, seldom),
-        Point(f"after {name}, before its commit", "after", pattern, False, seldom),
-        Point(f"at the commit of {name}", "before", pattern, True, seldom),
-        Point(f"after the commit of {name}", "after", pattern, True, seldom),
+        Point(f"before {name}", "before", pattern, False, seldom, first),
+        Point(f"after {name}, before its commit", "after", pattern, False, seldom, first),
+        Point(f"at the commit of {name}", "before", pattern, True, seldom, first),
+        Point(f"after the commit of {name}", "after", pattern, True, seldom, first),
     ]
 
 
@@ -116,7 +120,7 @@ WORKER = [
     *around("a checkpoint", r"INSERT INTO checkpoint\b"),
     *around("old checkpoints' end", r"DELETE FROM checkpoint\b"),
     *around("an old part's end", r"DELETE FROM checkpoint_part\b"),
-    *around("a claim", r"UPDATE run SET .*fencing_token=", seldom=True),
+    *around("a claim", r"UPDATE run SET .*fencing_token=", seldom=True, first=True),
     *around("a sign of life", r"UPDATE (run|worker) SET .*heartbeat="),
     *around("metrics", r"INSERT INTO metric"),
 ]

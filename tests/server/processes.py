@@ -27,6 +27,7 @@ PRELOADED = [
     "parenting.commands.judge",
     "parenting.server.serve",
     "parenting.server.worker",
+    "tests.server.warmed",
 ]
 
 
