@@ -125,7 +125,7 @@ OPTIONS = (
         "Answers that it moves by, and that may be wrong",
         "",
         (*PRESET_OR, ("false", "Not asked about again"), ("true", "Asked about again in later visits")),
-        "Seldom, and less often the more answers agree. For slips: more agents learn all, for more questions.",
+        "Seldom, and less often the more answers agree. For slips: more agents learn all, for more answers.",
     ),
     Option(
         "config.stages",
