@@ -31,7 +31,10 @@ from scripts import corpus
 from tests.access import seed
 from tests.tree import ROOT
 
-FOLDERS = sorted(file.parent for file in (ROOT / "tests" / "old").glob("*/data.tar.xz"))
+FOLDERS = sorted(
+    (file.parent for file in (ROOT / "tests" / "old").glob("*/data.tar.xz")),
+    key=lambda folder: [int(part) for part in folder.name.split(".")],
+)
 PINNED = [folder for folder in FOLDERS if folder.name != "0.1.0"]
 """Version 0.1.0 did not pin its instructions; tests/server/test_old_data.py checks its bits."""
 EXPORTED = [folder for folder in PINNED if (folder / corpus.EXPORT).is_file()]
