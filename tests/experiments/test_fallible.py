@@ -104,11 +104,11 @@ def test_a_trial_until_optimal_ends_with_the_first_optimal_policy() -> None:
         "preset": "frugal",
         "changes": {"pretrain": False},
     }
-    alike: dict[str, Any] = {**common, "parent": "scripted", "thrice": False, "span": (0, 3), "seed": 1}
-    ended = erring_trials("ended", ticks=100, until_optimal=True, **alike)
-    lived = erring_trials("lived", ticks=100, **alike)
+    alike: dict[str, Any] = {**common, "parent": "scripted", "thrice": False, "span": (0, 2), "seed": 1}
+    ended = erring_trials("ended", ticks=50, until_optimal=True, **alike)
+    lived = erring_trials("lived", ticks=50, **alike)
     assert [row["ticks"] for row in ended] == [row["optimal_at"] for row in lived]
-    assert all(row["ticks"] == 100 for row in lived)
+    assert all(row["ticks"] == 50 for row in lived)
 
 
 def test_doubted_answers_may_help_or_harm() -> None:
