@@ -152,6 +152,8 @@ def main() -> None:
     parser.add_argument("--store", choices=STORES, default="sqlite")
     parser.add_argument("--world", choices=WORLDS, action="append", help="repeatable [default: both]")
     said = parser.parse_args()
+    if not 1 <= said.runs <= said.answers:
+        parser.error(f"--runs {said.runs}: from 1 to --answers {said.answers}, so that each run gets one")
     torch.set_num_threads(1)  # as a worker does
     for world in said.world or WORLDS:
         with database(said.store) as db:
