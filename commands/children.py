@@ -6,13 +6,13 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol
 
 from parenting.server.lifeline import VARIABLE
+from parenting.server.signal_event import SignalEvent
 
 FIRST_WAIT, LONGEST_WAIT = 0.5, 30.0
 """Seconds before a dead process is started again: doubled at each death, up to the longest."""
@@ -83,7 +83,7 @@ class Watched(Protocol):
         ...
 
 
-def watch(children: Sequence[Watched], told: threading.Event) -> None:
+def watch(children: Sequence[Watched], told: SignalEvent) -> None:
     """Keep processes running until the event is set.
 
     Raises:

@@ -31,6 +31,7 @@ from parenting.server.lifeline import follow
 from parenting.server.listener import bind
 from parenting.server.public import address_of
 from parenting.server.settings import Settings
+from parenting.server.signal_event import SignalEvent
 from parenting.server.store.private import make_files_private
 
 MOST_WORKERS = 64
@@ -102,7 +103,7 @@ def _sized(crew: Crew, chosen: Settings, number: int | None) -> Iterator[None]:
         ended.set()  # it ends with this process, at the latest: it only reads
 
 
-def _watch(web: Child, crew: Crew, told: threading.Event, url: str, browser: bool) -> None:
+def _watch(web: Child, crew: Crew, told: SignalEvent, url: str, browser: bool) -> None:
     """Say where the pages are, and keep the processes running until told to stop."""
     say(f"Parenting is at {url}  (Ctrl-C stops it)")
     say("The address lets one browser in, once. Another one: parenting access open", err=True)
@@ -131,9 +132,9 @@ def _migrate(chosen: Settings) -> str:
 
 
 @contextmanager
-def _signals() -> Iterator[threading.Event]:
+def _signals() -> Iterator[SignalEvent]:
     """Yield an event that Ctrl-C and SIGTERM set; inside this block they do nothing else."""
-    told = threading.Event()
+    told = SignalEvent()
 
     def tell(_number: int, _frame: FrameType | None) -> None:
         told.set()

@@ -28,6 +28,7 @@ from parenting.server.errors import StoreError
 from parenting.server.migrate import require_ready
 from parenting.server.notify import Notifier
 from parenting.server.settings import Settings
+from parenting.server.signal_event import SignalEvent
 from parenting.server.store.relay import Relay
 from parenting.server.trackers.stored import chosen_feeds
 from parenting.server.work.chores import Chores
@@ -70,7 +71,7 @@ class Worker:
         self.name = workers.worker_name(os.getpid())
         self.notifier, self.web_notifier = Notifier(settings.data, "worker"), Notifier(settings.data, "web")
         self.relay = Relay(db.engine, "worker", self.notifier.wake)
-        self.told = threading.Event()
+        self.told = SignalEvent()
         self.patience, self.turns = Patience(), Turns(self.notifier.wake, beside_after)
         self.jobs = Jobs(db, settings.claim_seconds, self.notifier.wake, self.turns.courtesy)
         self.chores = Chores(db, settings.claim_seconds)
@@ -288,7 +289,7 @@ def main(settings: Settings) -> int:
     return 0
 
 
-def _keep(work: Callable[[], None], told: threading.Event, failed: list[BaseException]) -> None:
+def _keep(work: Callable[[], None], told: SignalEvent, failed: list[BaseException]) -> None:
     """Call a function and keep what it raises for the main thread."""
     try:
         work()

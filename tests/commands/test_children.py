@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import threading
 
 import pytest
 
 from parenting.commands import children
 from parenting.commands.children import Child, RefusedError, stop, watch
+from parenting.server.signal_event import SignalEvent
 
 
 class Clock:
@@ -84,7 +84,7 @@ def test_after_a_steady_life_the_first_wait_is_short_again(clock: Clock) -> None
 
 def test_a_wrong_setting_at_the_first_start_ends_it_all(clock: Clock) -> None:
     with pytest.raises(RefusedError, match="The worker process cannot work like this"):
-        watch([mortal([children.REFUSED], [])], threading.Event())
+        watch([mortal([children.REFUSED], [])], SignalEvent())
 
 
 def test_the_same_exit_code_later_does_not(clock: Clock) -> None:
