@@ -44,7 +44,7 @@ def worker(
         if after_fd is None:
             require_file(chosen)
         set_up_log(chosen, "worker")
-        from parenting.server.worker import (
+        from parenting.server.worker_process import (
             main,  # loads torch, which takes a second, so the settings are checked before
         )
 

@@ -7,25 +7,18 @@ is that of its worker, which another thread gives.
 
 from __future__ import annotations
 
-import gc
 import math
 import os
-import signal
-import sys
-import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import FrameType
 
 import structlog
 
-from parenting._process import settle
-from parenting.envs import registry
 from parenting.server import runs, workers
-from parenting.server.db import Database, connect
+from parenting.server.db import Database
 from parenting.server.errors import StoreError
-from parenting.server.migrate import require_ready
 from parenting.server.notify import Notifier
 from parenting.server.settings import Settings
 from parenting.server.signal_event import SignalEvent
@@ -39,21 +32,19 @@ from parenting.server.work.patience import Patience
 from parenting.server.work.schedule import Schedule
 from parenting.server.work.sharing import prospect, surplus
 from parenting.server.work.signs import Signs
-from parenting.server.work.turns import BESIDE_SECONDS, HUNG_SECONDS, SLOW_SECONDS, Turns
+from parenting.server.work.turns import HUNG_SECONDS, SLOW_SECONDS, Turns
 from parenting.server.work.watching import News, Watching
 
 log = structlog.get_logger()
 
 POLL_SECONDS = 0.05
 CLAIM_EVERY = 0.25
+ROUND_SECONDS = 0.1
+"""A round that has taken so long begins no third turn: somebody else may be more urgent by now."""
 CLOSE_SECONDS = 3.0
 """Seconds that saving at the end may take. What is not saved by then goes on from its last checkpoint."""
 JOB_SECONDS = 0.2
 """Seconds that an end waits for jobs; another worker does again what is not done by then."""
-SWITCH_SECONDS = 0.001
-"""A thread that waits for Python's lock gets it after so long: a tick takes it some hundred times."""
-STOP_SECONDS = 3.5
-"""A worker that has not ended so long after the signal ends anyway: a store may hold its threads."""
 
 
 class Worker:
@@ -87,6 +78,7 @@ class Worker:
         self.schedule, self.watching, self.load = Schedule(), Watching(db), Load()
         every = min(workers.SIGN_SECONDS, settings.claim_seconds / 4)
         self.signs = Signs(self._give_sign, every, HUNG_SECONDS, self.patience)
+        self._round_seconds = math.inf if beside_after is None else ROUND_SECONDS
         self._found: News | None = None
         self._lost: set[int] = set()
         self._claimed_at, self._committed, self._soonest = -math.inf, True, POLL_SECONDS
@@ -176,7 +168,10 @@ class Worker:
     # A round
 
     def _round(self) -> bool:
-        """Give every run that is due its turn, as far as threads are free; return whether any has ticked."""
+        """Give runs that are due their turns, as far as threads are free and for `ROUND_SECONDS`.
+
+        Return whether another turn is due at once.
+        """
         self._end_turns()
         self._look()
         self.jobs.begin(self.name)
@@ -184,16 +179,25 @@ class Worker:
         self._make_room(len(set(due) - self.sessions.keys() - self.held.lives.asleep))
         slow = self.turns.working(SLOW_SECONDS)
         self.held.lives.begin_round(self.schedule.seen, due, self.turns.working(), slow)
+        late = self._begin_turns(due)
+        ticked = self._end_turns()
+        self._soonest = self.schedule.soonest(POLL_SECONDS)
+        return ticked or late
+
+    def _begin_turns(self, due: Sequence[int]) -> bool:
+        """Begin turns in this order; return whether the time of the round was over before the last."""
+        until, begun = time.monotonic() + self._round_seconds, 0
         for run_id in due:
             if self.stopping or self.patience.doubts:
-                break
+                return False
+            if begun > 1 and time.monotonic() >= until:
+                return True
             if self._may_begin(run_id):
+                begun += 1
                 seen = self.schedule.begin(run_id)
                 self.turns.begin(run_id, partial(self.held.turn, run_id, seen), seen.urgent)
                 self.jobs.begin(self.name)
-        ticked = self._end_turns()
-        self._soonest = self.schedule.soonest(POLL_SECONDS)
-        return ticked
+        return False
 
     def _may_begin(self, run_id: int) -> bool:
         """Return whether a run may have its turn now: a thread is free, and memory for its life."""
@@ -253,47 +257,3 @@ class Worker:
         self.held.tracked.close()
         self.relay.close()
         self.notifier.close()
-
-
-def main(settings: Settings) -> int:
-    """Raise the runs of this database until SIGTERM or SIGINT.
-
-    The work is in another thread: this one hears signals, and ends the process in time even while the store
-    holds the other.
-
-    Raises:
-        SetupError: the database cannot be used as it is.
-    """
-    settle()
-    sys.setswitchinterval(SWITCH_SECONDS)
-    for broken in registry.INSTALLED.broken().values():
-        log.warning(broken)
-    worker = Worker(connect(settings), settings, BESIDE_SECONDS)
-    signal.signal(signal.SIGTERM, worker.stop)
-    signal.signal(signal.SIGINT, worker.stop)
-    worker.patient(partial(require_ready, worker.db))
-    if settings.ballast:
-        worker.db.keep_ballast()
-    gc.freeze()  # loaded modules stay: searching them for garbage takes a tenth of a second
-    failed: list[BaseException] = []
-    loop = threading.Thread(target=_keep, args=(worker.work, worker.told, failed), name="worker", daemon=True)
-    loop.start()
-    worker.told.wait()
-    loop.join(STOP_SECONDS)
-    if failed:
-        raise failed[0]
-    if loop.is_alive() or worker.turns.working() or worker.jobs.working():
-        sys.stderr.flush()
-        os._exit(0)  # whatever goes on is lost, and done again from the last checkpoint
-    worker.db.close()
-    return 0
-
-
-def _keep(work: Callable[[], None], told: SignalEvent, failed: list[BaseException]) -> None:
-    """Call a function and keep what it raises for the main thread."""
-    try:
-        work()
-    except BaseException as error:
-        failed.append(error)
-    finally:
-        told.set()

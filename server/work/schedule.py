@@ -10,6 +10,8 @@ from parenting.server.queue.worker_side import Watch
 
 NOW, AT_NEWS = 0.0, math.inf
 """When the next turn of a run is due: at once, or when something is new for it."""
+OVERDUE_SECONDS = 1.0
+"""A turn that is due for so long is overdue: not all others for which a person waits go before it."""
 
 
 class Schedule:
@@ -43,10 +45,18 @@ class Schedule:
                 self._set(run_id, NOW)
 
     def due(self) -> Sequence[int]:
-        """Return the runs whose turn is due: those for which a person waits, then the longest due."""
+        """Return the runs whose turn is due: those for which a person waits, then the longest due.
+
+        The one of these that has been due for longest is the second of all if it is overdue: a round that has
+        no time for all runs has time for two.
+        """
         now = time.monotonic()
         due = [run_id for run_id, at in self._at.items() if at <= now]
-        return sorted(due, key=lambda run_id: (not self.seen[run_id].urgent, self._since.get(run_id, now)))
+        due.sort(key=lambda run_id: (not self.seen[run_id].urgent, self._since.get(run_id, now)))
+        urgent = sum(self.seen[run_id].urgent for run_id in due)
+        if 1 < urgent < len(due) and self._waits(due[urgent], now) > OVERDUE_SECONDS:
+            due.insert(1, due.pop(urgent))
+        return due
 
     def begin(self, run_id: int) -> Watch:
         """Take note that a run's turn begins; return what was seen of the run."""

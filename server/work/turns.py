@@ -2,8 +2,9 @@
 
 Threads suffice: torch works without Python's lock, and a step on a large network spends its time there. All
 turns of a run come one after another, each with the state that the one before left, so bits do not depend on
-what goes on beside them. Steps on small networks take the lock again and again: long turns of such runs stand
-back while a person waits for a quick one (`server.work.courtesy`).
+what goes on beside them. Steps on small networks take the lock again and again, so that two quick turns
+beside each other take several times as long as one after the other: long ones alone go on beside others. Long
+turns of small networks stand back while a person waits for a quick one (`server.work.courtesy`).
 """
 
 from __future__ import annotations
@@ -19,14 +20,18 @@ import torch
 
 from parenting.server.work.courtesy import Courtesy
 
-BESIDE_SECONDS = 0.05
+BESIDE_SECONDS = 0.15
 """A turn that takes longer no longer holds up the other runs."""
+LONG_SECONDS = 0.1
+"""A run whose last turn took the processor for longer is not waited for at all. The time that a turn waited
+for the lock, the store or the processor does not count: beside others every turn would soon be a long one."""
 HUNG_SECONDS = 300.0
 """A turn that takes longer counts as hung: the run's claim is not renewed, and another worker may take it."""
 LONG_AT_ONCE = max(2, os.cpu_count() or 1)
 """Long turns at once. More would only take the processor from quick ones, and one alone may hang."""
 SLOW_SECONDS = 1.0
-"""A run whose last turn took longer is a slow one: its person waits anyway, and others should not."""
+"""A run whose last turn took the processor for longer is a slow one: its person waits anyway, and others
+should not."""
 QUICK_AT_ONCE = 2 * LONG_AT_ONCE
 """Turns at once, long or not: some that were quick before turn out to be long."""
 SLOW_AT_ONCE = QUICK_AT_ONCE + 4
@@ -39,11 +44,21 @@ Turn = Callable[[], float]
 
 
 @dataclass(frozen=True)
+class Ended:
+    """A turn that has ended."""
+
+    due: float
+    """When the run's next turn is due."""
+    worked: float
+    """Its seconds of the processor."""
+
+
+@dataclass(frozen=True)
 class Working:
     """A turn that has begun."""
 
     began: float
-    done: Future[float]
+    done: Future[Ended]
 
 
 class Turns:
@@ -96,9 +111,10 @@ class Turns:
         if not begun.done.done():
             begun.done.add_done_callback(lambda _: self._wake())
 
-    def _courteous(self, run_id: int, turn: Turn, hurried: bool) -> float:
+    def _courteous(self, run_id: int, turn: Turn, hurried: bool) -> Ended:
         with self.courtesy.turn(run_id, hurried):
-            return turn()
+            began = time.thread_time()
+            return Ended(turn(), time.thread_time() - began)
 
     def ended(self) -> dict[int, float]:
         """Return when the next turn is due, for each run whose turn has ended since the last call.
@@ -107,12 +123,13 @@ class Turns:
             Exception: what a turn raised.
         """
         over = {run_id: begun for run_id, begun in self._working.items() if begun.done.done()}
-        for run_id, begun in over.items():
+        for run_id in over:
             del self._working[run_id]
-            took = time.monotonic() - begun.began
-            (self._long.add if took > BESIDE_SECONDS else self._long.discard)(run_id)
-            (self._slow.add if took > SLOW_SECONDS else self._slow.discard)(run_id)
-        return {run_id: begun.done.result() for run_id, begun in over.items()}
+        ended = {run_id: begun.done.result() for run_id, begun in over.items()}
+        for run_id, turn in ended.items():
+            (self._long.add if turn.worked > LONG_SECONDS else self._long.discard)(run_id)
+            (self._slow.add if turn.worked > SLOW_SECONDS else self._slow.discard)(run_id)
+        return {run_id: turn.due for run_id, turn in ended.items()}
 
     def working(self, longer_than: float = -math.inf) -> set[int]:
         """Return the runs whose turn has begun and not ended, for longer than some seconds."""

@@ -26,7 +26,7 @@ PRELOADED = [
     "parenting.commands.answer",
     "parenting.commands.judge",
     "parenting.server.serve",
-    "parenting.server.worker",
+    "parenting.server.worker_process",
     "tests.server.warmed",
 ]
 

@@ -76,6 +76,21 @@ def test_a_run_that_takes_long_holds_up_no_other(
     rounds(worker, lambda: get_run(db, held).waiting == "guidance")
 
 
+def test_a_round_that_takes_long_looks_again_after_two_turns(
+    db: Database, settings: Settings, worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker, "_round_seconds", 0.0)
+    begin(db, 5)
+    worker._claim()
+    begun: list[int] = []
+    monkeypatch.setattr(worker.turns, "begin", lambda run_id, turn, urgent: begun.append(run_id))
+    assert worker._round(), "another round follows at once"
+    assert len(begun) == 2
+    monkeypatch.setattr(worker, "_round_seconds", 60.0)
+    worker._round()
+    assert len(begun) == 7
+
+
 def test_a_hung_run_loses_its_claim_and_another_worker_takes_it(
     db: Database,
     settings: Settings,

@@ -15,7 +15,7 @@ from parenting.server.doctor.findings import State
 from parenting.server.doctor.server import OLDEST
 from parenting.server.errors import SetupError
 from parenting.server.settings import Settings
-from parenting.server.worker import main
+from parenting.server.worker_process import main
 from tests.postgres import Cluster, programs
 from tests.tree import ROOT
 

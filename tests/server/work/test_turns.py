@@ -57,12 +57,19 @@ def test_a_long_turn_goes_on_beside_a_quick_one(woken: threading.Event, gate: th
     assert some.may_begin(1, new=False)
 
 
-def test_a_turn_that_took_long_is_not_waited_for_the_next_time(
-    woken: threading.Event, gate: threading.Event, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("worked", "waited_for"), [(turns.LONG_SECONDS + 0.01, 1), (0.0, 2)])
+def test_a_turn_that_took_the_processor_long_is_not_waited_for_the_next_time(
+    woken: threading.Event,
+    gate: threading.Event,
+    monkeypatch: pytest.MonkeyPatch,
+    worked: float,
+    waited_for: int,
 ) -> None:
+    """One that waited for the store, or for others, is."""
+    spent = iter([0.0, worked, 0.0, 0.0, 0.0, 0.0])
+    monkeypatch.setattr("parenting.server.work.turns.time.thread_time", lambda: next(spent))
     some = Turns(woken.set, beside_after=0.02)
     some.begin(1, lambda: held(gate))
-    time.sleep(turns.BESIDE_SECONDS)
     gate.set()
     until_woken(woken)
     some.ended()
@@ -71,7 +78,7 @@ def test_a_turn_that_took_long_is_not_waited_for_the_next_time(
     monkeypatch.setattr(turns, "wait", lambda _futures, seconds: waits.append(seconds))
     some.begin(1, lambda: held(gate))
     some.begin(2, lambda: 0.0)
-    assert waits == [0.02]  # for the other run alone
+    assert waits == [0.02] * waited_for
 
 
 def test_long_turns_leave_room_for_quick_ones(woken: threading.Event, gate: threading.Event) -> None:
