@@ -11,13 +11,13 @@ import json
 import threading
 import time
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from sqlalchemy import Engine, PoolProxiedConnection, make_url
+from sqlalchemy import Engine, make_url
 from sqlalchemy.exc import ArgumentError
 from sqlalchemy.orm import Session
 
@@ -27,7 +27,7 @@ from parenting.server.settings import Settings
 from parenting.server.store import postgresql, sqlite
 from parenting.server.store.ballast import Ballast
 from parenting.server.store.clock import Marks, boot_mark, server_mark
-from parenting.server.store.guard import confirm
+from parenting.server.store.commits import Commits, committed
 from parenting.server.store.patience import remaining
 from parenting.server.store.refusals import translated
 from parenting.server.store.sqlite import BUSY_SECONDS
@@ -66,9 +66,7 @@ class Database:
         # One writer of this process at a time: fairer than many threads that sleep on SQLite's lock.
         self._turn = threading.BoundedSemaphore(1 if self._sqlite else postgresql.WRITERS)
         self._among = Turn(Path(str(engine.url.database)).parent if self._sqlite else None)
-        self._cache_lock = threading.Lock()
-        self._watcher: PoolProxiedConnection | None = None
-        self._last: tuple[int | str, Hashable, Any] | None = None
+        self._commits = Commits(self._hurried)
         self._refused: tuple[StoreError, float] | None = None
         self._ballast: Ballast | None = None
 
@@ -92,9 +90,15 @@ class Database:
         Raises:
             StoreError: no turn to write within five seconds, or the store refused; nothing was stored.
         """
+        engine = self._writing if durable else self._hurried
+        with self._noted(), self._transaction(partial(_begun, engine)) as session:
+            yield session
+
+    @contextmanager
+    def _noted(self) -> Iterator[None]:
+        """Take note of what the store says to a write."""
         try:
-            with self._transaction(self._writing if durable else self._hurried) as session:
-                yield session
+            yield
         except StoreError as error:
             self._refused = (error, time.monotonic())
             if self._ballast is not None:
@@ -118,7 +122,7 @@ class Database:
         only a write would meet, such as a full disk, is what the last write met.
         """
         try:
-            with self._transaction(self._hurried) as session:
+            with self._transaction(partial(_begun, self._hurried)) as session:
                 session.rollback()
         except StoreError as error:
             return error
@@ -133,45 +137,46 @@ class Database:
         return refused[0]
 
     @contextmanager
-    def _transaction(self, engine: Engine) -> Iterator[Session]:
+    def _transaction(self, begun: Callable[[], AbstractContextManager[Session]]) -> Iterator[Session]:
         if not self._turn.acquire(timeout=remaining(BUSY_SECONDS)):
             raise BusyError
         try:
             self._among.take()
-            with translated(), Session(engine, expire_on_commit=False) as session:
-                with session.begin():
-                    info = session.connection().info  # BEGIN IMMEDIATE now, not at the first statement
-                    yield session
-                confirm(info)  # before anybody is told
+            with translated(), begun() as session:
+                yield session
         finally:
             self._among.give_back()
             self._turn.release()
+
+    @contextmanager
+    def write_unseen(self) -> Iterator[Session]:
+        """Begin a transaction as `write` does that is no news to `cached` of this process; it is not durable.
+
+        Raises:
+            StoreError: no turn to write within five seconds, or the store refused; nothing was stored.
+        """
+        if self._sqlite:
+            with self._noted(), self._transaction(self._commits.unseen) as session:
+                yield session
+        else:
+            with self.write(durable=False) as session:
+                number = postgresql.transaction_number(session)
+                yield session
+            with translated():
+                self._commits.forgive(number)
 
     def cached(self, key: Hashable, look: Callable[[], Seen]) -> Seen:
         """Return `look()`, or its last result under this key if nobody has committed since.
 
         This is for polls: a store says cheaply whether anything was committed. Only the last result is kept.
         """
-        with self._cache_lock:
-            version = self.data_version()  # before the look: later commits belong to the next one
-            if self._last is None or self._last[:2] != (version, key):
-                self._last = (version, key, look())
-            seen: Seen = self._last[2]
-            return seen
+        with translated():
+            return self._commits.cached(key, look)
 
     def data_version(self) -> int | str:
-        """Return a value that changes with each commit, whoever made it."""
-        store = sqlite if self._sqlite else postgresql
+        """Return a value that changes with each commit, whoever made it, but for `write_unseen` on SQLite."""
         with translated():
-            if self._watcher is None:
-                self._watcher = store.watcher(self.engine)
-            try:
-                version: int | str = store.data_version(self._watcher)
-                return version
-            except BaseException:
-                watcher, self._watcher = self._watcher, None  # the next poll connects again
-                watcher.invalidate()
-                raise
+            return self._commits.version()
 
     def keep_ballast(self) -> None:
         """Keep some disk space beside a SQLite file for the day when the disk is full."""
@@ -183,11 +188,13 @@ class Database:
         """Close every connection."""
         if self._ballast is not None:
             self._ballast.close()
-        if self._watcher is not None:
-            self._watcher.close()
-            self._watcher = None
+        self._commits.close()
         self._among.close()
         self.engine.dispose()
+
+
+def _begun(engine: Engine) -> AbstractContextManager[Session]:
+    return committed(Session(engine, expire_on_commit=False))
 
 
 def connect(

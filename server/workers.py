@@ -48,7 +48,7 @@ def sign(db: Database, name: str, figures: Figures = NO_FIGURES) -> None:
 
     Rows of workers that were silent for a day are removed.
     """
-    with db.write(durable=False) as session:
+    with db.write_unseen() as session:
         now, mark = db.clock(), db.mark(session)
         gone = is_over(Worker.epoch, Worker.mark, Worker.mark + DAY)
         session.execute(delete(Worker).where(gone), mark.bound())

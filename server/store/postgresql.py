@@ -135,6 +135,16 @@ def data_version(connection: PoolProxiedConnection) -> str:
     return snapshot.decode("ascii")
 
 
+def snapshot_before(transaction: int) -> str:
+    """Return the `data_version` before the transaction of this number, if it is the next and none goes on."""
+    return f"{transaction}:{transaction}:"
+
+
+def transaction_number(session: Session) -> int:
+    """Return the number of this transaction, which it is given at the latest now."""
+    return int(session.connection().exec_driver_sql("SELECT pg_current_xact_id()::text").scalar_one())
+
+
 def wait_for_log(session: Session) -> None:
     """Have this transaction's commit wait until the log is on the disk."""
     session.connection().exec_driver_sql("SET LOCAL synchronous_commit = on")

@@ -97,13 +97,10 @@ def make_folder(folder: Path) -> None:
         ) from None
 
 
-def watcher(engine: Engine) -> PoolProxiedConnection:
-    """Return a connection for `data_version`. It never writes, so every commit is another's."""
-    return engine.raw_connection()
-
-
 def data_version(connection: PoolProxiedConnection) -> int:
     """Return SQLite's number that changes with each commit of another connection than this one.
+
+    So a connection that watches never writes, but for what it need not be told (`server.store.commits`).
 
     Raises:
         GoneError: the file that the connection has open is not at its path any more.
