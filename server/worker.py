@@ -177,15 +177,15 @@ class Worker:
         self.jobs.begin(self.name)
         due = self.schedule.due()
         self._make_room(len(set(due) - self.sessions.keys() - self.held.lives.asleep))
-        slow = self.turns.working(SLOW_SECONDS)
-        self.held.lives.begin_round(self.schedule.seen, due, self.turns.working(), slow)
-        late = self._begin_turns(due)
+        late = bool(due) and self._begin_turns(due)
         ticked = self._end_turns()
         self._soonest = self.schedule.soonest(POLL_SECONDS)
         return ticked or late
 
     def _begin_turns(self, due: Sequence[int]) -> bool:
         """Begin turns in this order; return whether the time of the round was over before the last."""
+        slow = self.turns.working(SLOW_SECONDS)
+        self.held.lives.begin_round(self.schedule.seen, due, self.turns.working(), slow)
         until, begun = time.monotonic() + self._round_seconds, 0
         for run_id in due:
             if self.stopping or self.patience.doubts:
@@ -215,6 +215,8 @@ class Worker:
     def _make_room(self, coming: int = 0) -> None:
         """Let lives that wait leave memory where there are too many, or others are coming."""
         lives = self.held.lives
+        if not lives.crowded(coming):
+            return
         guided = lives.guided() & set(self.schedule.not_due())  # else an answer would be passed over
         for run_id in lives.too_many(guided | set(self.schedule.at_rest()), coming):
             if self.turns.may_begin(run_id, new=False, urgent=True):  # others wait for that memory

@@ -6,11 +6,11 @@ import socket
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from sqlalchemy import delete, select
+from sqlalchemy import bindparam, delete, insert, select, update
 
 from parenting.server.db import Database
 from parenting.server.store.clock import Mark, holds, is_over
-from parenting.server.tables import Worker
+from parenting.server.tables import Table, Worker
 
 SIGN_SECONDS = 2.0
 """Seconds between two signs of life of a worker."""
@@ -46,18 +46,15 @@ NO_FIGURES = Figures()
 def sign(db: Database, name: str, figures: Figures = NO_FIGURES) -> None:
     """Give a sign of life of a worker, and so of all that it raises (`runs.silent`).
 
-    Rows of workers that were silent for a day are removed.
+    The first sign of each removes the rows of workers that were silent for a day.
     """
     with db.write_unseen() as session:
         now, mark = db.clock(), db.mark(session)
-        gone = is_over(Worker.epoch, Worker.mark, Worker.mark + DAY)
-        session.execute(delete(Worker).where(gone), mark.bound())
-        row = session.get(Worker, name)
-        if row is None:
-            row = Worker(name=name, started=now)
-            session.add(row)
-        row.heartbeat, row.epoch, row.mark = now, mark.epoch, mark.seconds
-        row.runs, row.lives, row.busy, row.memory, row.waited = figures
+        found = {"heartbeat": now, "epoch": mark.epoch, "mark": mark.seconds, **figures._asdict()}
+        if session.execute(_SIGN, {"worker": name, **found}).rowcount:  # type: ignore[attr-defined]
+            return
+        session.execute(delete(_WORKER).where(_GONE), mark.bound())
+        session.execute(insert(_WORKER), {"name": name, "started": now, **found})
 
 
 def sign_off(db: Database, name: str) -> None:
@@ -89,3 +86,9 @@ def last_signs(db: Database, names: Collection[str]) -> dict[str, Mark]:
         found = session.execute(rows).all()
     sound = [row for row in found if isinstance(row.epoch, str) and isinstance(row.mark, float)]
     return {row.name: Mark(row.epoch, row.mark) for row in sound}
+
+
+_WORKER = Table.metadata.tables[Worker.__tablename__]
+_GONE = is_over(_WORKER.c.epoch, _WORKER.c.mark, _WORKER.c.mark + DAY)
+_SIGN = update(_WORKER).where(_WORKER.c.name == bindparam("worker"))
+_SIGN = _SIGN.values({name: bindparam(name) for name in ("heartbeat", "epoch", "mark", *Figures._fields)})

@@ -63,10 +63,7 @@ class Lives:
             coming: The number of runs that wait until they can be taken up; some of them get room.
         """
         used = dict(self._used)
-        number, size = len(self.sessions), sum(size for _, size in used.values())
-        number += min(coming, self._some)
-        if number <= self.most and size <= self.most_bytes:
-            return []
+        number, size = self._expected(coming)
         leaving = []
         for run_id in sorted(self.sessions.keys() & at_rest, key=lambda one: used.get(one, (0.0, 0))):
             if number <= self.most and size <= self.most_bytes:
@@ -74,6 +71,16 @@ class Lives:
             leaving.append(run_id)
             number, size = number - 1, size - used.get(run_id, (0.0, 0))[1]
         return leaving
+
+    def crowded(self, coming: int = 0) -> bool:
+        """Return whether some lives should leave, if so many others are coming."""
+        number, size = self._expected(coming)
+        return number > self.most or size > self.most_bytes
+
+    def _expected(self, coming: int) -> tuple[int, int]:
+        """Return the number of lives in memory and their bytes, some that are to come counted in."""
+        size = sum(size for _, size in list(self._used.values()))
+        return len(self.sessions) + min(coming, self._some), size
 
     @property
     def _some(self) -> int:

@@ -21,7 +21,8 @@ class Schedule:
         """Nothing is due."""
         self.seen: dict[int, Watch] = {}
         self._given: dict[int, Watch] = {}
-        self._at: dict[int, float] = {}
+        self._at: dict[int, float] = {}  # of runs that do not wait for news
+        self._resting: set[int] = set()
         self._since: dict[int, float] = {}
         self._longest = 0.0
 
@@ -37,11 +38,12 @@ class Schedule:
         for run_id in self.seen.keys() - run_ids:
             for table in (self.seen, self._at, self._since):
                 table.pop(run_id, None)
+            self._resting.discard(run_id)
 
     def hurry(self, run_ids: Iterable[int]) -> None:
         """Let these runs have a turn at once."""
         for run_id in run_ids:
-            if run_id in self._at:
+            if run_id in self.seen:
                 self._set(run_id, NOW)
 
     def due(self) -> Sequence[int]:
@@ -74,9 +76,10 @@ class Schedule:
         at_once = False
         for run_id, due in turns.items():
             given = self._given.pop(run_id)
-            if run_id in self._at:
-                self._set(run_id, due if self.seen.get(run_id) is given else NOW)
-                at_once |= self._at[run_id] == NOW
+            if run_id in self.seen:
+                due = due if self.seen[run_id] is given else NOW
+                self._set(run_id, due)
+                at_once |= due == NOW
         return at_once
 
     def soonest(self, most: float) -> float:
@@ -90,12 +93,12 @@ class Schedule:
 
     def at_rest(self) -> Sequence[int]:
         """Return the runs that wait for news."""
-        return [run_id for run_id, at in self._at.items() if at == AT_NEWS]
+        return list(self._resting)
 
     def not_due(self) -> Sequence[int]:
         """Return the runs of which nothing is new: they wait for news, or for a time to come."""
         now = time.monotonic()
-        return [run_id for run_id, at in self._at.items() if at > now]
+        return [*self._resting, *(run_id for run_id, at in self._at.items() if at > now)]
 
     def waited(self) -> float:
         """Return the longest time that a turn which was due has waited since the last call."""
@@ -108,8 +111,10 @@ class Schedule:
         return max(0.0, now - self._since.get(run_id, now))
 
     def _set(self, run_id: int, at: float) -> None:
-        self._at[run_id] = at
         if at == AT_NEWS:
+            self._resting.add(run_id)
+            self._at.pop(run_id, None)
             self._since.pop(run_id, None)
         else:
-            self._since[run_id] = max(at, time.monotonic())
+            self._resting.discard(run_id)
+            self._at[run_id], self._since[run_id] = at, max(at, time.monotonic())

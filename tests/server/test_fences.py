@@ -113,7 +113,7 @@ def writers(node: ast.AST, name: str) -> Iterator[str]:
             inner = f"{name}.{child.name}"
         if isinstance(child, ast.Call) and isinstance(child.func, ast.Attribute):
             of = ast.unparse(child.func.value).rpartition(".")[2]
-            if child.func.attr == "write" and of in ("db", "_db"):
+            if child.func.attr in ("write", "write_unseen") and of in ("db", "_db"):
                 yield name
         yield from writers(child, inner)
 
