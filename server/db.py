@@ -150,7 +150,7 @@ class Database:
 
     @contextmanager
     def write_unseen(self) -> Iterator[Session]:
-        """Begin a transaction as `write` does that is no news to `cached` of this process; it is not durable.
+        """Begin a transaction as `write` does, which `cached` of this process passes over; it is not durable.
 
         Raises:
             StoreError: no turn to write within five seconds, or the store refused; nothing was stored.

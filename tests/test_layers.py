@@ -100,7 +100,7 @@ def test_miniature_is_allowed(miniature: Path) -> None:
         ("server/app/__init__.py", "import parenting.agent.learning", "web-without-torch"),
         ("envs/levels/__init__.py", "import torch", "web-without-torch"),
         ("agent/__init__.py", "from parenting.agent.learning import torch", "inits-without-torch"),
-        ("server/worker/__init__.py", "import alembic.config", "start-without-alembic"),
+        ("server/worker_process/__init__.py", "import alembic.config", "start-without-alembic"),
         ("commands/up/__init__.py", "import parenting.server.app", "up-without-web"),
     ],
 )

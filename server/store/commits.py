@@ -79,7 +79,7 @@ class Commits:
                 raise
 
     def forgive(self, transaction: int) -> None:
-        """Take a commit to PostgreSQL for no news, if it is the only one since the last look."""
+        """Pass over a commit to PostgreSQL if it is the only one since the last look."""
         with self._lock:
             if self._last is not None and self._last[0] == postgresql.snapshot_before(transaction):
                 version = self.version()

@@ -15,19 +15,17 @@ STATEMENTS = "tests/faults/test_web_statements.py::test_refusal_at_every_stateme
 BROKEN = [
     Mutant(
         "commit after the reply (A3)",
-        "server/db.py",
-        "with translated(), Session(engine, expire_on_commit=False) as session:\n"
-        "                with session.begin():\n"
-        "                    info = session.connection().info  "
+        "server/store/commits.py",
+        "    with session:\n"
+        "        with session.begin():\n"
+        "            info = session.connection().info  "
         "# BEGIN IMMEDIATE now, not at the first statement\n"
-        "                    yield session\n"
-        "                confirm(info)  # before anybody is told\n",
-        "with translated():\n"
-        "                session = Session(engine, expire_on_commit=False)\n"
-        "                session.connection()\n"
-        "                yield session\n"
-        "                session.flush()\n"
-        "                threading.Timer(0.05, session.commit).start()\n",
+        "            yield session\n"
+        "        confirm(info)  # before anybody is told\n",
+        "    session.connection()\n"
+        "    yield session\n"
+        "    session.flush()\n"
+        "    threading.Timer(0.05, session.commit).start()\n",
         f"{KILLS}::test_killed_as_an_answer_is_committed[sqlite]",
     ),
     Mutant(

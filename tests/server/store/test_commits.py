@@ -1,4 +1,4 @@
-"""Polls look where somebody has committed; a worker's own sign of life is no news to it."""
+"""Polls look where somebody has committed; a worker's own sign of life is passed over."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -39,7 +39,7 @@ def sign(db: Database, clock: Clock) -> None:
     workers.sign(db, "this one")
 
 
-def test_a_sign_of_its_own_is_no_news_to_a_worker(db: Database, other: Database, clock: Clock) -> None:
+def test_a_worker_passes_over_its_own_sign(db: Database, other: Database, clock: Clock) -> None:
     looks, elsewhere = Looks(db), Looks(other)
     sign(db, clock)
     before = looks(), elsewhere()
