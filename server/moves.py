@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 from parenting.server.damage import sound
 from parenting.server.db import Database
-from parenting.server.runs import Claim, held
+from parenting.server.runs import Claim, held_status
 from parenting.server.tables import Moves
 
 PART = 4096
@@ -79,11 +79,11 @@ class MovesWriter:
             return
         rows = self._full | ({self._part: bytes(self._now)} if self._now else {})
         with self._db.write(durable=False) as session:
-            run = held(session, self._mine)
-            first = min(rows)
-            session.execute(delete(Moves).where(Moves.run_id == run.id, Moves.part >= first))
+            held_status(session, self._mine)
+            run_id, first = self._mine.run_id, min(rows)
+            session.execute(delete(Moves).where(Moves.run_id == run_id, Moves.part >= first))
             session.add_all(
-                Moves(run_id=run.id, part=part, blob=zlib.compress(blob, 1)) for part, blob in rows.items()
+                Moves(run_id=run_id, part=part, blob=zlib.compress(blob, 1)) for part, blob in rows.items()
             )
         self._full, self._changed = {}, False
 

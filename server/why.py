@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jaxtyping import Float, UInt8
-from sqlalchemy import select
+from sqlalchemy import BindParameter, bindparam, insert, select
 from torch import Tensor
 
 from parenting.agent import familiarity
@@ -28,14 +28,20 @@ from parenting.server.codec import first_state
 from parenting.server.damage import damage
 from parenting.server.db import Database
 from parenting.server.lesson import Asked, Lesson
-from parenting.server.runs import Claim, held
+from parenting.server.runs import Claim, held_status
 from parenting.server.snapshot import Snapshot
-from parenting.server.tables import SKIP, Answer, Effect, Reason
+from parenting.server.tables import SKIP, Answer, Effect, Reason, Table
 
 TICKS = (1, 10, 100)
 """The ticks after which the effect of an answer is measured; the one in which it is heard is the first."""
 
 
+_REASON, _EFFECT = (Table.metadata.tables[one.__tablename__] for one in (Reason, Effect))
+_RUN: BindParameter[int] = bindparam("run")
+_TICKS: BindParameter[int] = bindparam("ticks", expanding=True)
+_KNOWN = select(_REASON.c.tick).where(_REASON.c.run_id == _RUN, _REASON.c.tick.in_(_TICKS))
+_MEASURED = select(_EFFECT.c.tick, _EFFECT.c.ticks)
+_MEASURED = _MEASURED.where(_EFFECT.c.run_id == _RUN, _EFFECT.c.tick.in_(_TICKS))
 WRITE_SECONDS = 0.5
 """Rows wait so long for others, and for the question that may follow at once."""
 
@@ -102,21 +108,24 @@ class Why:
         if not self._reasons and not self._effects:
             return
         with self._db.write(durable=False) as session:
-            run = held(session, self._mine)
+            held_status(session, self._mine)
+            run_id = self._mine.run_id
             asked, heard = list(self._reasons), [tick for tick, _ in self._effects]
-            reasons = select(Reason.tick).where(Reason.run_id == run.id, Reason.tick.in_(asked))
-            effects = select(Effect.tick, Effect.ticks).where(Effect.run_id == run.id, Effect.tick.in_(heard))
-            known, measured = set(session.scalars(reasons)), set(map(tuple, session.execute(effects)))
-            session.add_all(
-                Reason(run_id=run.id, tick=tick, why=why)
+            known = set(session.scalars(_KNOWN, {"run": run_id, "ticks": asked}))
+            measured = set(map(tuple, session.execute(_MEASURED, {"run": run_id, "ticks": heard})))
+            reasons = [
+                {"run_id": run_id, "tick": tick, "why": why}
                 for tick, why in self._reasons.items()
                 if tick not in known
-            )
-            session.add_all(
-                Effect(run_id=run.id, tick=tick, ticks=ticks, policy=policy)
+            ]
+            effects = [
+                {"run_id": run_id, "tick": tick, "ticks": ticks, "policy": policy}
                 for (tick, ticks), policy in self._effects.items()
                 if (tick, ticks) not in measured
-            )
+            ]
+            for table, rows in ((_REASON, reasons), (_EFFECT, effects)):
+                if rows:
+                    session.execute(insert(table), rows)
         self._reasons, self._effects = {}, {}
 
     def _guidance(self, saved: Snapshot) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from sqlalchemy.orm import Session, defer
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.columns import UNREADABLE, Damaged
 from parenting.server.db import Database
-from parenting.server.runs import Claim, held
+from parenting.server.runs import Claim, held_status
 
 MOST_BYTES = 2_000_000
 """Bytes of all snapshots of a run, its states included."""
@@ -72,19 +72,20 @@ def write(
         LostClaimError: another worker trains this run now.
     """
     with db.write(durable=False) as session:
-        run = held(session, mine)
+        held_status(session, mine)
+        run_id = mine.run_id
         if after is not None:
-            later = delete(BoardSnapshot).where(BoardSnapshot.run_id == run.id, BoardSnapshot.tick > after)
+            later = delete(BoardSnapshot).where(BoardSnapshot.run_id == run_id, BoardSnapshot.tick > after)
             session.execute(later)
         if states is not None:
-            session.execute(delete(BoardStates).where(BoardStates.run_id == run.id))
+            session.execute(delete(BoardStates).where(BoardStates.run_id == run_id))
             blob = zlib.compress(json.dumps(states).encode(), 6)
             count = len(states["cells"])
-            session.add(BoardStates(run_id=run.id, states=count, complete=complete, blob=blob))
+            session.add(BoardStates(run_id=run_id, states=count, complete=complete, blob=blob))
         for one in found:
-            _replace(session, run.id, one)
+            _replace(session, run_id, one)
         session.flush()
-        _thin(session, run.id)
+        _thin(session, run_id)
 
 
 def _replace(session: Session, run_id: int, one: Numbers) -> None:
