@@ -24,7 +24,8 @@ from sqlalchemy import insert
 
 from parenting.server.metrics import write_metrics
 from parenting.server.new_run import NewRun, start
-from parenting.server.runs import claim, report_progress, set_status
+from parenting.server.progress import report_progress
+from parenting.server.runs import claim, set_status
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Metric

@@ -25,8 +25,9 @@ import torch
 from benchmarks.beside_garden import CELLS, garden
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.queue.worker_side import watch
-from parenting.server.runs import claim, report_progress, set_status
+from parenting.server.runs import claim, set_status
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus

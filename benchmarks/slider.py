@@ -27,8 +27,9 @@ from benchmarks.charts import CHROMIUM, resident
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.queue.worker_side import watch
-from parenting.server.runs import claim, report_progress, set_status
+from parenting.server.runs import claim, set_status
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus

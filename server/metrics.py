@@ -9,7 +9,8 @@ from typing import Any
 from sqlalchemy import bindparam, delete, insert
 
 from parenting.server.db import Database
-from parenting.server.runs import Claim, held_status, report_in
+from parenting.server.progress import report_in
+from parenting.server.runs import Claim, held_status
 from parenting.server.tables import Metric, Table
 
 
@@ -27,7 +28,7 @@ def write_metrics(
         db: The database.
         mine: The worker's claim on the run.
         rows: The metrics by tick.
-        progress: The progress of the agent that is stored with them (`runs.report_progress`).
+        progress: The progress of the agent that is stored with them (`progress.report_progress`).
 
     Raises:
         LostClaimError: another worker trains this run now.

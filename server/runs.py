@@ -1,4 +1,4 @@
-"""Verbs on runs: the operator's (pause, resume, stop) and the worker's (claim, report_progress, finish).
+"""Verbs on runs: the operator's (pause, resume, stop) and the worker's (claim, let go, finish).
 
 Exactly one worker raises a run: `claim` increments the run's fencing token, and every later write of a worker
 checks the token inside its own transaction (`held`). So a worker that slept past its claim cannot write.
@@ -6,12 +6,11 @@ checks the token inside its own transaction (`held`). So a worker that slept pas
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
-from sqlalchemy import ColumnElement, Update, and_, bindparam, exists, or_, select, tuple_, update
+from sqlalchemy import ColumnElement, and_, bindparam, exists, or_, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from parenting.drawing.sentences import mark
@@ -23,11 +22,9 @@ from parenting.server.failures import fail_if_damaged, note_failure, resume_in
 from parenting.server.queue.queries import withdraw_in
 from parenting.server.statuses import LIVING, OVER, RESUMABLE, VERBS, RunStatus
 from parenting.server.store.clock import holds, is_over
-from parenting.server.tables import Run, Table, Worker
+from parenting.server.tables import Run, Worker
 
 CLAIM_SECONDS = 5.0
-PROGRESS_FIELDS = {"tick", "waiting", "optimal", "versions", "maturity", "speed", "milestones", "lesson"}
-"""The columns that a worker reports."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,6 @@ class Claim:
     fencing_token: int
 
 
-_RUN = Table.metadata.tables[Run.__tablename__]
 _LOCKED = select(Run.id).where(Run.id == bindparam("run_id"), Run.deleting.is_(None)).with_for_update()
 _CLAIMED = (Run.worker == bindparam("worker"), Run.fencing_token == bindparam("fencing_token"))
 _MINE = select(Run.status).where(Run.id == bindparam("run_id"), *_CLAIMED).with_for_update()
@@ -192,37 +188,6 @@ def _of(claims: Sequence[Claim]) -> ColumnElement[bool]:
     """Return the condition that a run is one of these claims', and the claim still holds."""
     held = tuple_(Run.id, Run.worker, Run.fencing_token)
     return held.in_([(mine.run_id, mine.worker, mine.fencing_token) for mine in claims])
-
-
-def report_progress(db: Database, mine: Claim, **fields: Any) -> None:
-    """Store the progress of an agent: any of `PROGRESS_FIELDS`. This renews the claim too.
-
-    Raises:
-        LostClaimError: another worker trains this run now.
-    """
-    with db.write(durable=False) as session:
-        report_in(session, db, mine, fields)
-
-
-def report_in(session: Session, db: Database, mine: Claim, fields: Mapping[str, Any]) -> None:
-    """Store progress as `report_progress` does, in a transaction that is already open."""
-    if unknown := set(fields) - PROGRESS_FIELDS:
-        raise TypeError(f"report_progress takes {sorted(PROGRESS_FIELDS)}, not {sorted(unknown)}")
-    mark = db.mark(session)
-    sign = {"heartbeat": db.clock(), "claim_epoch": mark.epoch, "claim_mark": mark.seconds}
-    whose = {"of_run": mine.run_id, "of_worker": mine.worker, "of_token": mine.fencing_token}
-    found = session.execute(_report(tuple(sorted(fields))), {**fields, **sign, **whose})
-    if not found.rowcount:  # type: ignore[attr-defined]
-        held(session, mine)  # it says why
-
-
-@cache
-def _report(fields: tuple[str, ...]) -> Update:
-    """Return the statement that stores these columns of a run, with a sign of life, if its claim holds."""
-    names = (*fields, "heartbeat", "claim_epoch", "claim_mark")
-    mine = (_RUN.c.worker == bindparam("of_worker"), _RUN.c.fencing_token == bindparam("of_token"))
-    stored = update(_RUN).where(_RUN.c.id == bindparam("of_run"), _RUN.c.deleting.is_(None), *mine)
-    return stored.values({name: bindparam(name) for name in names})
 
 
 def finish(db: Database, mine: Claim, status: RunStatus, reason: str, error: str | None = None) -> Run:

@@ -16,7 +16,7 @@ from parenting.evaluation.argmax import evaluation
 from parenting.parents.fallible import FallibleRule
 from parenting.parents.grammar import SCRIPTED, read_parent
 from parenting.parents.scripted import ScriptedRule
-from parenting.server import checkpoints, metrics, runs
+from parenting.server import checkpoints, metrics
 from parenting.server.begun import inherited
 from parenting.server.board.writer import BoardWriter
 from parenting.server.checkpoint_pace import CheckpointPace
@@ -30,6 +30,7 @@ from parenting.server.growth import Growth
 from parenting.server.lived import Lived
 from parenting.server.machine import diverged, follow, take_up
 from parenting.server.metrics_row import NOTHING_LEARNT, Row, learnt, measure
+from parenting.server.progress import report_progress
 from parenting.server.queue import worker_side
 from parenting.server.queue.queue_parent import QueueParent, ScriptedQueueParent
 from parenting.server.queue.worker_side import Watch
@@ -124,7 +125,7 @@ class RunSession:
             reason = Waiting.PREFERENCES
         if reason != self.waiting or (reason is Waiting.STUCK and self.last_tick != self._stuck_at):
             self.waiting, self._stuck_at = reason, self.last_tick
-            runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
+            report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
         self.why.write_if_due()
         self.board.go_on(self.saved)
         self.save_if_due()
@@ -245,7 +246,7 @@ class RunSession:
         now = time.monotonic()
         if self._look_every > METRIC_SECONDS and now - self._told_at >= METRIC_SECONDS:
             self._told_at, self.waiting = now, None
-            runs.report_progress(self.db, self.claim, tick=self.last_tick, waiting=None)
+            report_progress(self.db, self.claim, tick=self.last_tick, waiting=None)
 
     @property
     def _look_every(self) -> float:

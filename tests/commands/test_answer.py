@@ -16,6 +16,7 @@ from typer.testing import CliRunner, Result
 from parenting.commands.main import app
 from parenting.server import operator_events, runs
 from parenting.server.db import Database
+from parenting.server.progress import report_progress
 from parenting.server.queue import answers, leases
 from parenting.server.reads.answers import every
 from parenting.server.settings import Settings
@@ -140,7 +141,7 @@ def _interrupt(*_: object) -> str:
 def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Client) -> None:
     begin(db)
     (mine,) = runs.claim(db, "test", -1)
-    runs.report_progress(db, mine, tick=7, waiting="stuck")
+    report_progress(db, mine, tick=7, waiting="stuck")
     said = answer()
     assert said.exit_code == 1
     assert "No action was acceptable at tick 7, so the agent stands still. End the episode on " in said.stdout

@@ -12,6 +12,7 @@ from parenting.commands.runs import COLUMNS
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.reads.schemas import run_schema
@@ -66,12 +67,12 @@ def test_a_narrow_terminal_gets_fewer_columns(
 
 def test_who_waits_for_whom(db: Database, mine: Claim) -> None:
     assert "exploring" in now()
-    runs.report_progress(db, mine, tick=12, optimal=True)
+    report_progress(db, mine, tick=12, optimal=True)
     assert now().split()[-2:] == ["yes", mine.worker]
     query = post_query(db, mine, 12, "guidance", 1, CLIPS)
     assert "a question waits" in now()
     answer(db, query, "left", "me", "human")
-    runs.report_progress(db, mine, waiting="stuck")
+    report_progress(db, mine, waiting="stuck")
     assert "no action acceptable" in now()
     runs.set_goal(db, mine.run_id, 1)
     assert "goal reached" in now()

@@ -16,11 +16,11 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from playwright.sync_api import Browser, expect, sync_playwright
 
-from parenting.server import runs
 from parenting.server.app import create_app
 from parenting.server.db import Database
 from parenting.server.listener import bind
 from parenting.server.notify import Notifier
+from parenting.server.progress import report_progress
 from parenting.server.runs import Claim
 from parenting.server.serve import Server
 from parenting.server.settings import Settings
@@ -124,7 +124,7 @@ def ask(db: Database, mine: Claim, settings: Settings) -> Callable[..., int]:
     ticks = iter(range(1, 1000))
 
     def post(kind: str = "guidance", left: str = "left", right: str = "down", start: Any = (1, 2)) -> int:
-        runs.report_progress(db, mine, tick=0)  # a sign of life
+        report_progress(db, mine, tick=0)  # a sign of life
         clips = {"guidance": fixtures.guidance, "preference": fixtures.preference}[kind](left, right, start)
         number = fixtures.ask(db, mine, next(ticks), kind, clips)
         Notifier(settings.data, "web").notify()

@@ -8,8 +8,9 @@ from parenting.drawing.clip import Clip, Frame
 from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.queue.worker_side import post_query
-from parenting.server.runs import Claim, claim, report_progress
+from parenting.server.runs import Claim, claim
 from parenting.server.tables import Run
 
 MOVES = {"up": (-1, 0), "down": (1, 0), "left": (0, -1), "right": (0, 1)}

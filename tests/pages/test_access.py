@@ -11,6 +11,7 @@ from playwright.sync_api import Page, ViewportSize, expect
 
 from parenting.server import operator_events, runs
 from parenting.server.db import Database
+from parenting.server.progress import report_progress
 from parenting.server.queue import answers
 from parenting.server.queue.worker_side import take_answer
 from parenting.server.runs import Claim
@@ -74,10 +75,10 @@ def lives(db: Database) -> None:
     guided = fixtures.ask(db, mine, 44, "guidance", fixtures.guidance("left", "up", start=(1, 2)))
     answers.answer(db, guided, "neither", "me", "human")
     _, other = fixtures.start_run(db, level="island-bottleneck")
-    runs.report_progress(db, other, waiting="stuck", optimal=True)
+    report_progress(db, other, waiting="stuck", optimal=True)
     _, third = fixtures.start_run(db, goal=1, pace=2.5, config={"stages": 2})
     fixtures.measure(db, third, 40)
-    runs.report_progress(db, third, maturity=2)
+    report_progress(db, third, maturity=2)
     operator_events.add_operator_event(db, 3, "end_episode", {})
     answers.answer(
         db, fixtures.ask(db, third, 41, "guidance", fixtures.guidance("up", "left")), "left", "me", "human"

@@ -14,8 +14,9 @@ from parenting.server.board import store, sweep, writer
 from parenting.server.board.columns import unpack
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.queue.worker_side import watch
-from parenting.server.runs import claim, report_progress
+from parenting.server.runs import claim
 from parenting.server.session import RunSession
 from parenting.server.work.jobs import Jobs
 from tests.pages.browser_tabs import BrowserTabs

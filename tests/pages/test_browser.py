@@ -8,6 +8,7 @@ from playwright.sync_api import Route, expect
 
 from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.progress import report_progress
 from parenting.server.queue import answers
 from parenting.server.runs import Claim
 from parenting.server.statuses import RunStatus
@@ -200,12 +201,12 @@ def test_it_works_without_javascript(tabs: BrowserTabs, db: Database, ask: Calla
 def test_who_waits_is_told_as_it_changes(tabs: BrowserTabs, db: Database, mine: Claim) -> None:
     page = tabs.open("/runs/1/parent")
     expect(page.get_by_role("heading", name="exploring on its own")).to_be_visible()
-    runs.report_progress(db, mine, waiting="stuck", optimal=True)
+    report_progress(db, mine, waiting="stuck", optimal=True)
     expect(page.get_by_role("heading", name="No action was acceptable")).to_be_visible()
     optimal = page.get_by_text("The agent has found the optimal way.")
     expect(optimal).not_to_be_visible()  # nothing was answered yet
     page.get_by_role("button", name="End this episode").click()
-    runs.report_progress(db, mine, waiting=None)
+    report_progress(db, mine, waiting=None)
     runs.set_status(db, 1, RunStatus.PAUSED)
     expect(page.get_by_role("heading", name="The run is paused")).to_be_visible()
     page.get_by_role("button", name="Resume").click()

@@ -11,9 +11,9 @@ from fastapi import FastAPI
 from playwright.sync_api import Error as PlaywrightError
 from playwright.sync_api import Page, expect
 
-from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
+from parenting.server.progress import report_progress
 from parenting.server.settings import Settings
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs, given, until
@@ -30,7 +30,7 @@ def two(db: Database, settings: Settings) -> Callable[[int], int]:
     ticks = iter(range(1, 1000))
 
     def post(run: int) -> int:
-        runs.report_progress(db, mine[run - 1], tick=0)
+        report_progress(db, mine[run - 1], tick=0)
         clips = fixtures.preference("down down", "left")
         number = fixtures.ask(db, mine[run - 1], next(ticks), "preference", clips)
         Notifier(settings.data, "web").notify()

@@ -6,7 +6,8 @@ from playwright.sync_api import Page, expect
 
 from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
-from parenting.server.runs import Claim, report_progress
+from parenting.server.progress import report_progress
+from parenting.server.runs import Claim
 from tests.pages.browser_tabs import BrowserTabs, until
 
 ROWS = 3_000

@@ -15,9 +15,10 @@ from parenting.server.db import Database
 from parenting.server.deletion import begin
 from parenting.server.metrics import write_metrics
 from parenting.server.pages.comparison import points_each, read_numbers
+from parenting.server.progress import report_progress
 from parenting.server.reads.comparison import Compared, Group, labels, letter, ranges
 from parenting.server.runs import claim as claims
-from parenting.server.runs import report_progress, set_status
+from parenting.server.runs import set_status
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 from tests.pages import island_fixtures as fixtures

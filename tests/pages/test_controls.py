@@ -12,10 +12,11 @@ import pytest
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.operator_events import list_operator_events
+from parenting.server.progress import report_progress
 from parenting.server.queue import worker_side
 from parenting.server.queue.answers import answer
 from parenting.server.queue.queries import open_counts
-from parenting.server.runs import Claim, get_run, report_progress, set_status
+from parenting.server.runs import Claim, get_run, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
@@ -140,7 +141,7 @@ def test_a_preset_of_the_pace_shows_that_it_holds(client: httpx2.Client, mine: C
 
 def test_the_last_stage_cannot_be_ended(client: httpx2.Client, db: Database, mine: Claim) -> None:
     assert "Mature now" in client.get("/runs/1").text
-    runs.report_progress(db, mine, maturity=2)
+    report_progress(db, mine, maturity=2)
     assert "Mature now" not in client.get("/runs/1").text
     reply = client.post("/runs/1/event", data={"kind": "mature"})
     assert reply.status_code == 409

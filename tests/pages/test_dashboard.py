@@ -12,9 +12,10 @@ from parenting.envs import registry
 from parenting.server.batches import SHARED, EndedTrial, store_batch
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, plan, start
+from parenting.server.progress import report_progress
 from parenting.server.queue.worker_side import watch
 from parenting.server.reads.metrics import latest_metrics, sampled_metrics
-from parenting.server.runs import claim, get_run, report_progress, set_status
+from parenting.server.runs import claim, get_run, set_status
 from parenting.server.session import RunSession
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures

@@ -8,7 +8,8 @@ import httpx2
 from playwright.sync_api import expect
 
 from parenting.server.db import Database
-from parenting.server.runs import report_progress, set_status
+from parenting.server.progress import report_progress
+from parenting.server.runs import set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs

@@ -9,6 +9,7 @@ from playwright.sync_api import Page, expect
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
+from parenting.server.progress import report_progress
 from parenting.server.queue import answers, worker_side
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
@@ -30,7 +31,7 @@ def test_the_table_of_stages_grows_as_it_is_drawn(tabs: BrowserTabs, db: Databas
     assert table(page) == ["1 now – – – – – –", "2 – – – – – –", "3 – – – – – –"]
     fixtures.measure(db, mine, 30)
     fixtures.measure(db, mine, 50, begin=31, maturity=2)
-    runs.report_progress(db, mine, maturity=2)
+    report_progress(db, mine, maturity=2)
     expect(page.locator("tr.now")).to_contain_text("2")
     expect(page.locator("tr.now")).to_contain_text("31 to 50")
     drawn = table(page)
@@ -52,7 +53,7 @@ def test_an_event_gets_its_tick_on_the_page(tabs: BrowserTabs, db: Database) -> 
     page.get_by_role("button", name="Change").click()
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 before the next tick")
     worker_side.take_operator_events(db, mine, 8)
-    runs.report_progress(db, mine, tick=8)
+    report_progress(db, mine, tick=8)
     expect(page.locator("#events li")).to_have_text("Set p_guid to 0.5 at tick 8")
 
 
@@ -67,7 +68,7 @@ def test_the_buttons_go_by_what_holds(tabs: BrowserTabs, db: Database) -> None:
     expect(page.get_by_role("button", name="Resume")).to_be_visible()
     expect(page.get_by_role("button", name="Pause")).to_be_hidden()
     runs.set_status(db, 1, RunStatus.ACTIVE)
-    runs.report_progress(db, mine, waiting="stuck")
+    report_progress(db, mine, waiting="stuck")
     expect(page.get_by_role("button", name="End the episode")).to_have_count(2)
     runs.set_status(db, 1, RunStatus.STOPPED, "Stopped by the operator.")
     expect(page.get_by_text("Stopped by the operator.")).to_be_visible()

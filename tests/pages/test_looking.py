@@ -7,8 +7,9 @@ from typing import Any
 import httpx2
 from sqlalchemy import select
 
-from parenting.server import operator_events, runs
+from parenting.server import operator_events
 from parenting.server.db import Database
+from parenting.server.progress import report_progress
 from parenting.server.queue import answers
 from parenting.server.tables import Table
 from tests.pages import island_fixtures as fixtures
@@ -38,7 +39,7 @@ def test_no_get_changes_anything(client: httpx2.Client, db: Database) -> None:
     answers.answer(db, query, "left", "me", "human")
     operator_events.add_operator_event(db, 1, "end_episode", {"kind": "end_episode"})
     _, other = fixtures.start_run(db)
-    runs.report_progress(db, other, waiting="stuck")
+    report_progress(db, other, waiting="stuck")
     fixtures.ask(db, other, 1, "guidance", fixtures.guidance("left", "down"))
     before = rows(db)
     assert all(before[name] for name in ("run", "query", "answer", "event", "metric"))

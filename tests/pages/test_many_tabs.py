@@ -6,8 +6,8 @@ import pytest
 from fastapi import FastAPI
 from playwright.sync_api import expect
 
-from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.progress import report_progress
 from parenting.server.runs import Claim
 from tests.lengths import length
 from tests.pages.browser_tabs import BrowserTabs, given, until
@@ -35,7 +35,7 @@ def test_parents_windows_and_dashboards_of_one_browser_leave_connections_for_ans
     parent.keyboard.press("a")
     until(lambda: bool(given(db)))
     seen(parent, lambda: len(traffic.lying()) == LYING)
-    runs.report_progress(db, mine, tick=4321)
+    report_progress(db, mine, tick=4321)
     for page in dashboards:
         expect(page.locator("#now-tick")).to_have_text("4,321")
     dashboards[0].close()

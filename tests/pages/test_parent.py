@@ -19,6 +19,7 @@ from parenting.server.audit.table import Kind
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
 from parenting.server.pages.texts import STATE_TEXTS
+from parenting.server.progress import report_progress
 from parenting.server.queue import answers, leases
 from parenting.server.runs import Claim
 from parenting.server.settings import Settings
@@ -214,7 +215,7 @@ def test_a_parent_ends_an_episode_that_stands_still(
     page, end = f"/runs/{life[0].public_id}/parent", f"/runs/{life[0].public_id}/parent/end-episode"
     assert client.post(end).headers["location"] == page
     assert rows(db, OperatorEvent) == [], "it acts: nothing is to be ended"
-    runs.report_progress(db, life[1], waiting=waiting)
+    report_progress(db, life[1], waiting=waiting)
     shown = client.get(page).text
     assert f'data-state="{waiting}"' in shown.partition("<main")[2].partition(">")[0]
     assert f'action="{end}"' in shown
@@ -231,7 +232,7 @@ def test_an_optimal_agent_is_announced(
 ) -> None:
     note = re.compile(r'<div id="optimal" class="note"( hidden)?>')
     assert note.search(look(client).text)[1] == " hidden"  # type: ignore[index]
-    runs.report_progress(db, life[1], optimal=True)
+    report_progress(db, life[1], optimal=True)
     assert note.search(look(client).text)[1] == " hidden", "nothing was answered yet"  # type: ignore[index]
     answers.answer(db, asked[0], "left", ME, "human")
     assert note.search(look(client).text)[1] is None  # type: ignore[index]

@@ -11,10 +11,11 @@ from sqlalchemy import select, update
 
 from parenting.drawing.query_view import DOUBTED
 from parenting.server.db import Database
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import get_query
 from parenting.server.queue.skips import skip
 from parenting.server.queue.worker_side import post_query, take_answer
-from parenting.server.runs import Claim, report_progress
+from parenting.server.runs import Claim
 from parenting.server.tables import Answer, Run
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs, until

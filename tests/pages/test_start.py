@@ -17,9 +17,10 @@ from parenting.server.new_run import NewRun, plan, start
 from parenting.server.pages.levels import beginning
 from parenting.server.pages.options import OPTIONS, Option
 from parenting.server.pages.run_list import PAGE
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer
 from parenting.server.run_form import read_form
-from parenting.server.runs import get_run, let_go, list_runs, report_progress, set_goal, set_status
+from parenting.server.runs import get_run, let_go, list_runs, set_goal, set_status
 from parenting.server.statuses import RunStatus
 from tests.pages import island_fixtures as fixtures
 from tests.pages.parent_page import address

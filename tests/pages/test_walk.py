@@ -11,8 +11,9 @@ import httpx2
 import pytest
 from playwright.sync_api import Page, expect
 
-from parenting.server import jobs, metrics, runs
+from parenting.server import jobs, metrics
 from parenting.server.db import Database, connect
+from parenting.server.progress import report_progress
 from parenting.server.queue.worker_side import high_water
 from parenting.server.runs import Claim, get_run
 from parenting.server.settings import Settings
@@ -134,7 +135,7 @@ def test_the_waiting_page_shows_growth_a_walk_and_a_milestone_once(
         "before": [0.25] * 4,
         "after": [0.1, 0.1, 0.7, 0.1],
     }
-    runs.report_progress(db, mine, tick=3, milestones={"goal": 2}, lesson=lesson)
+    report_progress(db, mine, tick=3, milestones={"goal": 2}, lesson=lesson)
     expect(page.locator(".news")).to_have_text("It reached the goal for the first time.")
     growth = page.locator("#waiting .growth")
     expect(growth).to_contain_text("After 2 answers it reaches the goal safely from 75 % of 12 cells.")

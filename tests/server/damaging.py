@@ -21,10 +21,11 @@ from parenting.server.checkpoints import save_checkpoint
 from parenting.server.columns import Checked, Json, Whole
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.public_ids import public_id
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query, take_answer, take_operator_events
-from parenting.server.runs import claim, report_progress
+from parenting.server.runs import claim
 from parenting.server.store.sqlite import sqlite_module
 from parenting.server.tables import Effect, Identity, Moves, Person, PersonName, Reason, Table
 from parenting.server.tombstone_table import Tombstone

@@ -10,8 +10,9 @@ from parenting.envs import registry
 from parenting.server.db import Database
 from parenting.server.log import set_up_log
 from parenting.server.metrics import write_metrics
+from parenting.server.progress import report_progress
 from parenting.server.queue.worker_side import take_operator_events
-from parenting.server.runs import Claim, get_run, report_progress
+from parenting.server.runs import Claim, get_run
 from parenting.server.settings import Settings
 from parenting.server.tables import Run
 from tests.server.conftest import Clock

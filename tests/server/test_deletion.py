@@ -18,10 +18,11 @@ from parenting.server.identity import database_id
 from parenting.server.metrics import write_metrics
 from parenting.server.new_run import NewRun, start
 from parenting.server.operator_events import add_operator_event
+from parenting.server.progress import report_progress
 from parenting.server.queue import answers, leases, revisions, worker_side
 from parenting.server.queue.names import Names
 from parenting.server.reads.listing import Wanted, find_runs
-from parenting.server.runs import Claim, claim, get_run, report_progress, set_status
+from parenting.server.runs import Claim, claim, get_run, set_status
 from parenting.server.settings import Settings
 from parenting.server.sizes import sizes, tables_of_runs
 from parenting.server.statuses import RunStatus

@@ -24,6 +24,7 @@ from parenting.server.machine import write as write_notes
 from parenting.server.metrics import write_metrics
 from parenting.server.moves import MovesWriter
 from parenting.server.operator_events import add_operator_event
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer, get_query
 from parenting.server.queue.corrections import take_correction, withdraw_guidance
 from parenting.server.queue.repairs import repair
@@ -55,7 +56,7 @@ WORKERS = {
     "queue.worker_side.take_operator_events": "event",
     "runs.finish": "end",
     "runs.let_go": "release",
-    "runs.report_progress": "progress",
+    "progress.report_progress": "progress",
     "weights.put_bytes": "weights",
     "why.Why.write": "why",
 }
@@ -196,7 +197,7 @@ TRIALS: dict[str, list[Callable[[Database, Claim], Any]]] = {
     "metrics": [lambda db, mine: write_metrics(db, mine, {5: {"loss": 0.5}})],
     "moves": [moves],
     "parts": [lambda db, mine: write_parts(db, mine, b"stale"), sweep_parts],
-    "progress": [lambda db, mine: runs.report_progress(db, mine, tick=9)],
+    "progress": [lambda db, mine: report_progress(db, mine, tick=9)],
     "question": [lambda db, mine: post_query(db, mine, 9, "guidance", 1, CLIPS)],
     "repair": [repaired],
     "why": [why],

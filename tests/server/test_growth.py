@@ -9,11 +9,12 @@ from parenting.agent.init import network_of
 from parenting.agent.query import Answer, Choice, empty
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import local_state
-from parenting.server import metrics, runs
+from parenting.server import metrics
 from parenting.server.db import Database
 from parenting.server.lesson import Lesson
 from parenting.server.milestones import CALM, CALM_TICKS, GOAL
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.queue import worker_side
 from parenting.server.queue.answers import answer
 from parenting.server.reads.growth import MILESTONES, growth_of, lesson_of, milestones_of
@@ -131,7 +132,7 @@ def test_milestones_and_lessons_are_told_in_sentences(db: Database, mine: Claim)
     assert (milestones_of(get_run(db, mine.run_id)), lesson_of(get_run(db, mine.run_id))) == ({}, None)
     lesson = {"tick": 3, "kind": "guidance", "cell": [1, 1], "before": [0.25] * 4}
     lesson |= {"after": [0.248, 0.25, 0.25, 0.252]}
-    runs.report_progress(db, mine, milestones={CALM: 180, GOAL: 300}, lesson=lesson)
+    report_progress(db, mine, milestones={CALM: 180, GOAL: 300}, lesson=lesson)
     run = get_run(db, mine.run_id)
     assert list(milestones_of(run)) == [CALM, GOAL]
     assert (

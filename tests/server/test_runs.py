@@ -5,18 +5,11 @@ import pytest
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import get_query
 from parenting.server.queue.worker_side import post_query
 from parenting.server.runs import Claim as ClaimOf
-from parenting.server.runs import (
-    claim,
-    finish,
-    get_run,
-    let_go,
-    list_runs,
-    report_progress,
-    set_status,
-)
+from parenting.server.runs import claim, finish, get_run, let_go, list_runs, set_status
 from parenting.server.statuses import OVER, RunStatus
 from parenting.server.tables import Run
 from parenting.server.workers import sign

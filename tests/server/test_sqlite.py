@@ -18,10 +18,11 @@ from parenting.server.checkpoints import save_checkpoint
 from parenting.server.db import Database, connect
 from parenting.server.errors import BusyError, DiskFullError, SetupError
 from parenting.server.operator_events import add_operator_event
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease
 from parenting.server.queue.worker_side import post_query, take_answer
-from parenting.server.runs import Claim, report_progress
+from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 from parenting.server.store import sqlite
 from parenting.server.store.sqlite import sqlite_module

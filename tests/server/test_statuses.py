@@ -12,6 +12,7 @@ from parenting.server import runs, workers
 from parenting.server.db import Database
 from parenting.server.errors import BusyError
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import post_query
 from parenting.server.reads.schemas import FORGIVEN, SILENT_AFTER, run_schema, run_schemas
@@ -56,7 +57,7 @@ def test_the_database_refuses_an_unknown_status(db: Database, guidance: int, col
 
 
 def test_statuses_come_back_as_members(db: Database, mine: Claim) -> None:
-    runs.report_progress(db, mine, waiting="stuck")
+    report_progress(db, mine, waiting="stuck")
     run = runs.get_run(db, mine.run_id)
     assert run.status is RunStatus.ACTIVE
     assert run.waiting is Waiting.STUCK
@@ -68,7 +69,7 @@ def state(db: Database, run: int = 1) -> RunState:
 
 def test_each_state_hides_those_behind_it(db: Database, mine: Claim) -> None:
     assert state(db) is RunState.EXPLORING
-    runs.report_progress(db, mine, waiting="stuck")
+    report_progress(db, mine, waiting="stuck")
     assert state(db) is RunState.STUCK
     query = post_query(db, mine, 12, "preference", 1, CLIPS)
     runs.let_go(db, [mine])

@@ -19,12 +19,13 @@ from parenting.server.db import Database
 from parenting.server.metrics import write_metrics
 from parenting.server.new_run import NewRun, start
 from parenting.server.notify import Notifier
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer, get_query
 from parenting.server.queue.leases import lease
 from parenting.server.queue.presence import holder, leave
 from parenting.server.queue.worker_side import post_query
 from parenting.server.reads.watching import look, told_runs
-from parenting.server.runs import Claim, claim, report_progress
+from parenting.server.runs import Claim, claim
 from parenting.server.settings import Settings
 from parenting.server.streams import POLL_SECONDS, Streams
 from parenting.server.tables import Run

@@ -5,6 +5,7 @@ import pytest
 from parenting.server.db import Database
 from parenting.server.errors import LostClaimError
 from parenting.server.operator_events import add_operator_event
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer, get_query
 from parenting.server.queue.corrections import take_correction, withdraw_guidance
 from parenting.server.queue.queries import open_counts
@@ -16,7 +17,7 @@ from parenting.server.queue.worker_side import (
     take_operator_events,
     watch,
 )
-from parenting.server.runs import Claim, claim, get_run, report_progress, set_status
+from parenting.server.runs import Claim, claim, get_run, set_status
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock

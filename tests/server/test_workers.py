@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from parenting.server import runs
 from parenting.server.checkpoints import load_checkpoints
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
 from parenting.server.new_run import NewRun, start
 from parenting.server.operator_events import add_operator_event
+from parenting.server.progress import report_progress
 from parenting.server.queue import worker_side
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease, lease_ahead, may_lease
@@ -130,7 +130,7 @@ def test_a_run_that_is_over_takes_neither(db: Database, run: Run, verb: object) 
 
 def test_the_last_stage_never_ends(db: Database, mine: Claim) -> None:
     add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
-    runs.report_progress(db, mine, maturity=2)
+    report_progress(db, mine, maturity=2)
     with pytest.raises(Conflict, match="is in its last stage, T = 2"):
         add_operator_event(db, mine.run_id, "mature", {"kind": "mature"})
 

@@ -16,11 +16,12 @@ from parenting.server.db import Database, connect
 from parenting.server.errors import LostClaimError
 from parenting.server.migrate import downgrade, upgrade
 from parenting.server.new_run import NewRun, start
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease, may_lease
 from parenting.server.queue.worker_side import post_query
 from parenting.server.reads.schemas import run_schema
-from parenting.server.runs import claim, report_progress
+from parenting.server.runs import claim
 from parenting.server.settings import Settings
 from parenting.server.store import clock as store_clock
 from parenting.server.store.clock import SLACK, Mark, boot_mark

@@ -13,10 +13,11 @@ from parenting.server.db import Database, connect
 from parenting.server.errors import BusyError, GoneError, RefusedError, SetupError
 from parenting.server.migrate import downgrade, require_current, upgrade
 from parenting.server.operator_events import add_operator_event
+from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer
 from parenting.server.queue.leases import lease
 from parenting.server.queue.worker_side import post_query, take_answer
-from parenting.server.runs import Claim, report_progress
+from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql
 from parenting.server.tables import Run
