@@ -19,6 +19,8 @@ from parenting.server.store import postgresql, sqlite
 from parenting.server.store.guard import confirm
 
 Seen = TypeVar("Seen")
+CLOSE_SECONDS = 0.5
+"""Seconds that an end waits for a transaction that goes on."""
 
 
 @contextmanager
@@ -87,13 +89,17 @@ class Commits:
                     self._last = (version, *self._last[1:])
 
     def close(self) -> None:
-        """Close the connection that watches."""
-        with self._lock:
+        """Close the connection that watches; one in use, which a store may hold, ends with its process."""
+        if not self._lock.acquire(timeout=CLOSE_SECONDS):
+            return
+        try:
             if self._watcher is not None:
                 self._watcher.close()
             if self._connection is not None:
                 self._connection.close()
             self._watcher = self._connection = None
+        finally:
+            self._lock.release()
 
     def _open(self) -> PoolProxiedConnection:
         if self._watcher is None and self._sqlite:

@@ -1,5 +1,6 @@
 """Polls look where somebody has committed; a worker's own sign of life is passed over."""
 
+import threading
 from collections.abc import Iterator
 from contextlib import closing
 
@@ -10,6 +11,7 @@ from parenting.server import workers
 from parenting.server.db import Database, connect
 from parenting.server.new_run import NewRun, start
 from parenting.server.settings import Settings
+from tests.database import migrated
 from tests.server.conftest import Clock
 
 
@@ -94,3 +96,23 @@ def test_a_transaction_that_fails_leaves_nothing_and_the_next_poll_looks(db: Dat
     seen = looks()
     sign(db, clock)
     assert looks() == seen
+
+
+def test_an_end_does_not_wait_for_a_transaction_that_the_store_holds(settings: Settings) -> None:
+    migrated(settings).close()
+    db, begun, gate = connect(settings), threading.Event(), threading.Event()
+
+    def hang() -> None:
+        with db.write_unseen():
+            begun.set()
+            assert gate.wait(60)
+
+    thread = threading.Thread(target=hang)
+    thread.start()
+    assert begun.wait(60)
+    closed = threading.Thread(target=db.close)
+    closed.start()
+    closed.join(30)
+    assert not closed.is_alive(), "it would wait for the gate"
+    gate.set()
+    thread.join(60)
