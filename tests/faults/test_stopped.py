@@ -67,9 +67,8 @@ def test_client_learns_the_truth_after_a_lost_reply(
         house.keep()
         house.url = proxy.url
         house.move_in(runs, 2, rng)
-        while proxy.dropped < DROPPED:
-            house.until_told(1)
+        while proxy.dropped < DROPPED or not sum(parent.resent for parent in house.parents):
+            house.until_told(1)  # a lost reply to a request for a question has no answer to send again
         house.move_out()
         figures.count("replies dropped after delivery", "of all requests", proxy.dropped)
-        assert sum(parent.resent for parent in house.parents) > 0
         hold(house, runs)
