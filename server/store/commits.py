@@ -110,9 +110,9 @@ class Commits:
         return self._watcher
 
     def _drop(self) -> None:
-        """Have the next poll connect again."""
+        """Have the next poll connect again, and look: each connection of SQLite counts commits for itself."""
         watcher, connection = self._watcher, self._connection
-        self._watcher = self._connection = None
+        self._watcher = self._connection = self._last = None
         if connection is not None:
             connection.invalidate()
             connection.close()
