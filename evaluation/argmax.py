@@ -94,6 +94,7 @@ class TabularEvaluation:
         self.local_state = local_state(self.observation, states.agent)
         self.distance = distance_to_goal(model)
         self.starts = torch.arange(len(world.levels), device=world.device)
+        self._best: dict[int, float] = {}
 
     def optimal(self, parameters: Float[Tensor, "N P"]) -> Bool[Tensor, "N"]:
         """Return whether the argmax policy reaches every level's goal by a shortest safe path.
@@ -140,6 +141,11 @@ class TabularEvaluation:
 
     def best(self, level: int = 0) -> float:
         """The discounted return of a shortest safe path: the line that the agent's return is to reach."""
+        if level not in self._best:
+            self._best[level] = self._walked(level)
+        return self._best[level]
+
+    def _walked(self, level: int) -> float:
         at, total = self.starts[level], 0.0
         for t in range(int(self.distance[at])):
             ahead = torch.where(

@@ -41,15 +41,28 @@ class Path(NamedTuple):
 
 
 def follow(model: Model, policy: TabularPolicy, start: Int64[Tensor, "N"], steps: int) -> Path:
-    """Follow a policy for `steps` steps. A finished walk stays at its last state."""
-    at, action = [start], []
-    for _ in range(steps):
-        action.append(policy(at[-1]))
-        at.append(model.next_state[at[-1], action[-1]])
-        if bool((at[-1] == at[-2]).all()):  # nobody will ever move again
+    """Follow a policy for `steps` steps. A finished walk stays at its last state.
+
+    A walk that comes back to a state goes round from then on. Once all walks do, the rest is copied.
+    """
+    trial, states, actions = torch.arange(len(start), device=start.device), [start], list[Tensor]()
+    first = torch.full((len(start), len(model.next_state)), -1, device=start.device)  # its step in a state
+    for step in range(steps):
+        at = states[-1]
+        met = first[trial, at]
+        if step and bool((met >= 0).all()):
             break
-    rest = steps - len(action)
-    return Path(torch.stack(at + at[-1:] * rest), torch.stack(action + action[-1:] * rest))
+        first[trial, at] = torch.where(met < 0, step, met)
+        actions.append(policy(at))
+        states.append(model.next_state[at, actions[-1]])
+    state, action, lived = torch.stack(states), torch.stack(actions), len(actions)
+    if lived == steps:
+        return Path(state, action)
+    later = torch.arange(lived, steps + 1, device=start.device)[:, None]
+    again = met + (later - met) % (lived - met)
+    return Path(
+        torch.cat([state[:lived], state.gather(0, again)]), torch.cat([action, action.gather(0, again[:-1])])
+    )
 
 
 def outcome(model: Model, distance: Int64[Tensor, "S"], path: Path) -> Int64[Tensor, "N"]:

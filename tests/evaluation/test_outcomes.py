@@ -110,16 +110,36 @@ def test_a_table_of_actions_is_walked_as_the_world_steps() -> None:
             assert not bool(model.terminal[seen[-1]])
 
 
-def test_walk_ends_early_when_nobody_moves_any_more() -> None:
-    """All that follows is the same, so that nothing more is asked of the policy."""
-    model, asked = model_of("unsafe-exploration"), []
+@pytest.mark.parametrize("steps", [1, 2, 400])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_rest_of_walks_that_go_round_is_as_the_model_steps(seed: int, steps: int) -> None:
+    """Each goes round in a circle of its own, and each begins to at another step."""
+    model = model_of("unsafe-exploration")
+    table = torch.randint(4, (30, len(model.terminal)), generator=torch.Generator().manual_seed(seed))
+    trial, asked = torch.arange(30), []
 
-    def up(at: torch.Tensor) -> torch.Tensor:
+    def act(at: torch.Tensor) -> torch.Tensor:
+        asked.append(at)
+        return table[trial, at]
+
+    path = follow(model, act, torch.randint(len(model.terminal), (30,)), steps)
+    assert (path.state.shape, path.action.shape) == ((steps + 1, 30), (steps, 30))
+    assert torch.equal(path.state[1:], model.next_state[path.state[:-1], path.action])
+    assert torch.equal(path.action, table[trial, path.state[:-1]])
+    assert len(asked) <= min(steps, 50)
+
+
+@pytest.mark.parametrize(("way", "once"), [("u", 1), ("rl" * 50, 2)])
+def test_walk_ends_early_when_all_comes_again(way: str, once: int) -> None:
+    """All that follows was there before, so that nothing more is asked of the policy."""
+    model, asked, act = model_of("unsafe-exploration"), [], spelled(way, way)
+
+    def counted(at: torch.Tensor) -> torch.Tensor:
         asked.append(1)
-        return torch.zeros_like(at)
+        return act(at)
 
-    path = follow(model, up, torch.zeros(2, dtype=torch.int64), 100)
-    assert (path.state.shape, path.action.shape, len(asked)) == ((101, 2), (100, 2), 1)
+    path = follow(model, counted, torch.zeros(2, dtype=torch.int64), 100)
+    assert (path.state.shape, path.action.shape, len(asked)) == ((101, 2), (100, 2), once)
 
 
 def test_counts() -> None:
