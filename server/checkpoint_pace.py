@@ -17,7 +17,7 @@ CHECKPOINT_SHARE, CHECKPOINT_SPEED = 0.05, 1e6
 """The share of a run's time that checkpoints take at most, and their bytes a second."""
 LARGE_SECONDS = 5.0
 """Checkpoints that are written at longer intervals count as large: the log tells of them."""
-QUIET_SECONDS = 10.0
+QUIET_SECONDS = 30.0
 """A small one is written after so long in any case, if a tick has passed."""
 
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import uuid
 
-from sqlalchemy import func, select
+from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session
 
 from parenting.server.columns import Damaged
 from parenting.server.db import Database
 from parenting.server.errors import DamagedRowError
-from parenting.server.tables import Identity, Query, Run
+from parenting.server.tables import Identity, Query, Run, Table
 
 UNREADABLE = (
     "The identity of this database cannot be read, so no answer can be held to be meant for it. "
@@ -70,10 +70,15 @@ def unused_number(session: Session, table: type[Run] | type[Query]) -> int | Non
     """
     if session.get_bind().dialect.name != "sqlite":
         return None
-    deleted = Identity.last_run if table is Run else Identity.last_query
-    largest = select(func.max(func.coalesce(select(func.max(table.id)).scalar_subquery(), 0), deleted))
-    number: int = session.execute(largest).scalar_one()
+    number: int = session.execute(_LARGEST[table.__tablename__]).scalar_one()
     return number + 1
 
 
+def _largest(table: str, deleted: str) -> Select[int]:
+    tables = Table.metadata.tables
+    kept = select(func.max(tables[table].c.id)).scalar_subquery()
+    return select(func.max(func.coalesce(kept, 0), tables[Identity.__tablename__].c[deleted]))
+
+
 _UUID = select(Identity.uuid)
+_LARGEST = {name: _largest(name, f"last_{name}") for name in ("run", "query")}

@@ -22,7 +22,7 @@ from parenting.server.failures import fail_if_damaged, note_failure, resume_in
 from parenting.server.queue.queries import withdraw_in
 from parenting.server.statuses import LIVING, OVER, RESUMABLE, VERBS, RunStatus
 from parenting.server.store.clock import holds, is_over
-from parenting.server.tables import Run, Worker
+from parenting.server.tables import Run, Table, Worker
 
 CLAIM_SECONDS = 5.0
 
@@ -37,8 +37,13 @@ class Claim:
 
 
 _LOCKED = select(Run.id).where(Run.id == bindparam("run_id"), Run.deleting.is_(None)).with_for_update()
-_CLAIMED = (Run.worker == bindparam("worker"), Run.fencing_token == bindparam("fencing_token"))
-_MINE = select(Run.status).where(Run.id == bindparam("run_id"), *_CLAIMED).with_for_update()
+_RUN = Table.metadata.tables[Run.__tablename__].c  # a statement on a table costs half of one on a class
+_MINE = select(_RUN.status).where(
+    _RUN.id == bindparam("run_id"),
+    _RUN.worker == bindparam("worker"),
+    _RUN.fencing_token == bindparam("fencing_token"),
+)
+_MINE = _MINE.with_for_update()
 
 
 def list_runs(db: Database, limit: int = 200) -> Sequence[Run]:

@@ -30,10 +30,12 @@ from parenting.server.growth import Growth
 from parenting.server.lived import Lived
 from parenting.server.machine import diverged, follow, take_up
 from parenting.server.metrics_row import NOTHING_LEARNT, Row, learnt, measure
+from parenting.server.pressure import ALONE, Pressure, PutOff
 from parenting.server.progress import report_progress
 from parenting.server.queue import worker_side
 from parenting.server.queue.queue_parent import QueueParent, ScriptedQueueParent
 from parenting.server.queue.worker_side import Watch
+from parenting.server.readiness import may_live_on
 from parenting.server.recall import recall
 from parenting.server.runs import Claim
 from parenting.server.snapshot import Snapshot, initial_weights, pack
@@ -54,7 +56,14 @@ farther than this asks seldom, and what it does is to be seen."""
 class RunSession:
     """A run that a worker raises, from tick 0 or its last checkpoint until something ends it."""
 
-    def __init__(self, db: Database, claim: Claim, run: Run, asked: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        db: Database,
+        claim: Claim,
+        run: Run,
+        asked: Callable[[], None],
+        pressure: Pressure = ALONE,
+    ) -> None:
         """Take up a run where its last good checkpoint left it, or at tick 0."""
         self.db, self.claim, self.run = db, claim, run
         config = Config.model_validate(run.config)
@@ -68,13 +77,13 @@ class RunSession:
         self.record_ends = self.parent.record_ends = worker_side.high_water(db, claim.run_id)
         self.growth = Growth(self.world, run, self.evaluation, self.saved.state, self.saved.tally)
         self.lived = Lived(self.world, db, claim, self.saved)
-        self.board = BoardWriter(self.world, db, claim, self.evaluation, self.saved)
+        self.board = BoardWriter(self.world, db, claim, self.evaluation, self.saved, pressure)
         self.why = Why(self.world, db, claim, self.saved, self.growth.lesson)
         self.finish = read_finish(run.finish)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
         self._saved_tick, self._measured_at, self._pace = self.last_tick, 0.0, CheckpointPace()
         self._measured_tick, self.lived_at, self._heard_at, self._look_cost = self.last_tick, 0.0, 0.0, 0.0
-        self._stuck_at, self._news = -1, False
+        self._stuck_at, self._news, self._rest = -1, False, PutOff(pressure)
         self.told: Callable[[int, Row], None] = lambda tick, row: None  # trackers take each row of metrics
         self.whole, self._told, self._told_at, self._learnt = True, False, 0.0, NOTHING_LEARNT
         sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
@@ -96,19 +105,7 @@ class RunSession:
 
     def ready(self, seen: Watch) -> bool:
         """Return whether the next tick may pass: an agent never outruns its parent (docs/queue.md)."""
-        if self.last_tick < self.record_ends:
-            return True
-        if seen.corrections:
-            return True
-        if seen.idle:
-            return False
-        if seen.events:
-            return True
-        if seen.open_guidance or seen.open_preferences > self.saved.config.max_open_preferences:
-            return False
-        return not bool(self.saved.state.waiting) or (
-            seen.answers > 0 and not bool(self.saved.state.all_refused)
-        )
+        return self.last_tick < self.record_ends or may_live_on(self.saved, seen)
 
     def report_waiting(self, seen: Watch) -> None:
         """Report who waits for whom, and save a checkpoint: no tick passes for a while."""
@@ -126,9 +123,7 @@ class RunSession:
         if reason != self.waiting or (reason is Waiting.STUCK and self.last_tick != self._stuck_at):
             self.waiting, self._stuck_at = reason, self.last_tick
             report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
-        self.why.write_if_due()
-        self.board.go_on(self.saved)
-        self.save_if_due()
+        self._do_the_rest()
 
     def rests_until(self) -> float:
         """Return when a run that waits has to report again though nothing has happened; `inf` for never."""
@@ -173,13 +168,17 @@ class RunSession:
         self._note(answer)
         at_once = not bool(state.waiting) and bool(query.kind[0] == QueryKind.NONE)
         hurried = at_once and self.lived_at - self._heard_at < HURRY_SECONDS
-        self._measure(at_once, hurried)
+        later = hurried or self._rest.may_wait()
+        self._measure(at_once, later)
         self.whole = True
-        if not hurried:
-            self.board.go_on(self.saved)
-            self.why.write_if_due()
-            self.save_if_due()
+        if not later:
+            self._do_the_rest()
         return at_once
+
+    def _do_the_rest(self) -> None:
+        self.board.go_on(self.saved)
+        self.why.write_if_due()
+        self.save_if_due()
 
     def _hold_to_the_record(self, query: Query) -> None:
         """Compare a replayed tick with its record, which another machine may have written.
@@ -208,7 +207,7 @@ class RunSession:
         if bool(self.saved.state.info.trained):
             self._learnt = learnt(self.saved)
 
-    def _measure(self, at_once: bool, hurried: bool = False) -> None:
+    def _measure(self, at_once: bool, later: bool = False) -> None:
         """Write a row of metrics after the parent was heard, and once a second besides.
 
         It waits until the next question is out: a person waits for that, and nobody for a row. Where a look
@@ -217,7 +216,7 @@ class RunSession:
         The tick that ends a stage has its row in any case: a stage is judged by what it ended with.
         """
         late, stage = time.monotonic() - self._measured_at, int(self.saved.state.maturity[0])
-        due = not hurried and (late >= METRIC_SECONDS or (self._news and not at_once))
+        due = not later and (late >= METRIC_SECONDS or (self._news and not at_once))
         if stage == self.stage and (not due or late < self._look_every):
             self._report_tick()
             return

@@ -195,6 +195,7 @@ class Worker:
             if self._may_begin(run_id):
                 begun += 1
                 seen = self.schedule.begin(run_id)
+                self.held.pressed(self.schedule.people_wait())
                 self.turns.begin(run_id, partial(self.held.turn, run_id, seen), seen.urgent)
                 self.jobs.begin(self.name)
         return False

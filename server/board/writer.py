@@ -27,13 +27,15 @@ from parenting.server.board.sweep import Policy, Sweep
 from parenting.server.counters import Counters
 from parenting.server.damage import damage
 from parenting.server.db import Database
+from parenting.server.pressure import Pressure
 from parenting.server.runs import Claim
 from parenting.server.snapshot import Snapshot
 
 GROWTH = 1.05
 """The next snapshot follows at this multiple of the tick of the last one, at the latest with a checkpoint."""
-SHARE = 0.02
-"""The share of time at most that snapshots take; those of checkpoints may take more where one is quick."""
+SHARE, SHARE_OF_ALL = 0.02, 0.1
+"""The shares of time at most that snapshots take, of one run and of all runs of a worker; those of
+checkpoints may take more where one is quick."""
 LAST_SECONDS = 2.0
 """For so long at most the end of a life waits for its last snapshot."""
 REST_SECONDS = 0.02
@@ -54,10 +56,16 @@ class BoardWriter:
     """The snapshots of one agent in a worker."""
 
     def __init__(
-        self, world: Gridworld, db: Database, mine: Claim, evaluation: Evaluation, saved: Snapshot
+        self,
+        world: Gridworld,
+        db: Database,
+        mine: Claim,
+        evaluation: Evaluation,
+        saved: Snapshot,
+        pressure: Pressure,
     ) -> None:
         """Begin after the last tick of `saved`, with the counts that were stored of that tick."""
-        self._db, self._mine = db, mine
+        self._db, self._mine, self._pressure = db, mine, pressure
         known = store.read_states(db, mine.run_id)
         model = evaluation.model if isinstance(evaluation, TabularEvaluation) else None
         self._states = KnownStates(world, model, known[0] if known else None)
@@ -178,7 +186,8 @@ class BoardWriter:
                 self._frozen_stored[early] = sweep.size
         self._store(found)
         self._written = now.tick
-        self._due = time.monotonic() + (sweep.seconds + time.monotonic() - began) / SHARE
+        share = min(SHARE, SHARE_OF_ALL / max(self._pressure.runs, 1))
+        self._due = time.monotonic() + (sweep.seconds + time.monotonic() - began) / share
 
     def _so_far(self, begun: Begun) -> Numbers:
         """Return a snapshot with the policy of the states that are through; the whole one replaces it."""

@@ -12,9 +12,9 @@ from sqlalchemy import BindParameter, bindparam, select
 from sqlalchemy.orm import Session
 
 from parenting.server.db import Database
+from parenting.server.queue.lived_ticks import closed
 from parenting.server.queue.queries import withdraw_guidance_in
 from parenting.server.queue.taken import Taken, heard_before, recorded_at, standing_at
-from parenting.server.queue.worker_side import closed
 from parenting.server.runs import Claim, held, held_status
 from parenting.server.statuses import QueryStatus
 from parenting.server.tables import Answer, Query

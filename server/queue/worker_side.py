@@ -18,20 +18,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import BindParameter, ColumnElement, ScalarSelect, bindparam, func, select
+from sqlalchemy import (
+    BindParameter,
+    ColumnElement,
+    ScalarSelect,
+    bindparam,
+    func,
+    insert,
+    select,
+    update,
+)
 from sqlalchemy.orm import Session
+from sqlalchemy.orm.attributes import set_committed_value
 
 from parenting.server.columns import Damaged
 from parenting.server.db import Database
 from parenting.server.identity import unused_number
 from parenting.server.notes import AGENT_KINDS
-from parenting.server.origins import rolled_back_to
+from parenting.server.queue.lived_ticks import closed, high
 from parenting.server.queue.queries import guidance_first, withdraw_guidance_in
 from parenting.server.queue.taken import Taken, heard_before, recorded_at
 from parenting.server.runs import Claim, held, held_status
 from parenting.server.statuses import LIVING, QueryStatus, RunStatus
 from parenting.server.store.relay import announce
-from parenting.server.tables import Answer, OperatorEvent, Query, Run
+from parenting.server.tables import Answer, OperatorEvent, Query, Run, Table
 
 
 @dataclass(frozen=True)
@@ -69,16 +79,10 @@ class Watch:
         return self.goal_reached and not self.answers
 
 
-# Statements that every tick needs are built once.
+# Statements that every tick needs are built once, of tables where no object of a class is wanted: that is
+# half of the work.
 _RUN: BindParameter[int] = bindparam("run_id")
-_HIGH = select(
-    select(func.max(Query.tick)).where(Query.run_id == _RUN).scalar_subquery(),
-    select(func.max(Answer.applied_tick)).where(Answer.run_id == _RUN).scalar_subquery(),
-    select(func.max(OperatorEvent.applied_tick))
-    .where(OperatorEvent.run_id == _RUN, OperatorEvent.kind.in_(AGENT_KINDS))
-    .scalar_subquery(),
-    select(Run.origin).where(Run.id == _RUN).scalar_subquery(),
-)
+_QUERY, _ANSWER = (Table.metadata.tables[name] for name in ("query", "answer"))
 _PENDING = (
     select(Answer, Query)
     .join(Query, Answer.query_id == Query.id)
@@ -86,7 +90,11 @@ _PENDING = (
     .order_by(guidance_first(), Query.tick)
     .limit(1)
 )
-_KNOWN = select(Query.id).where(Query.run_id == _RUN, Query.tick == bindparam("tick"))
+_HEARD = (
+    update(_ANSWER).where(_ANSWER.c.id == bindparam("answer")).values(applied_tick=bindparam("tick")),
+    update(_QUERY).where(_QUERY.c.id == bindparam("query")).values(status=QueryStatus.APPLIED),
+)
+_KNOWN = select(_QUERY.c.id).where(_QUERY.c.run_id == _RUN, _QUERY.c.tick == bindparam("tick"))
 
 
 def _number(*conditions: ColumnElement[bool]) -> ScalarSelect[int]:
@@ -147,7 +155,7 @@ def _watched(columns: dict[str, Any]) -> Watch:
 def high_water(db: Database, run_id: int) -> int:
     """Return the largest tick of any posted query, applied answer or applied event; -1 without any."""
     with db.read() as session:
-        return max(_high(session, run_id))
+        return max(high(session, run_id))
 
 
 def post_query(
@@ -180,18 +188,23 @@ def post_query(
         known = session.execute(_KNOWN, {"run_id": mine.run_id, "tick": tick}).scalar()
         if known is not None:
             return int(known)
+        stage, steps = policy or (None, None)
         number = unused_number(session, Query)
-        query = Query(id=number, run_id=mine.run_id, tick=tick, kind=kind, maturity=maturity, clips=clips)
-        query.policy_stage, query.policy_steps = policy or (None, None)
-        query.votes = votes
-        query.posted, query.status = (
-            db.clock(),
-            QueryStatus.OPEN if status in LIVING else QueryStatus.WITHDRAWN,
-        )
-        session.add(query)
-        session.flush()
+        asked = {
+            "run_id": mine.run_id,
+            "tick": tick,
+            "kind": kind,
+            "maturity": maturity,
+            "clips": clips,
+            "policy_stage": stage,
+            "policy_steps": steps,
+            "votes": votes,
+            "posted": db.clock(),
+            "status": QueryStatus.OPEN if status in LIVING else QueryStatus.WITHDRAWN,
+        }
+        stored = session.execute(insert(_QUERY), asked if number is None else asked | {"id": number})
         announce(session, "web")
-        return query.id
+        return int(stored.inserted_primary_key[0])
 
 
 def asked_at(db: Database, run_id: int, tick: int) -> Query | None:
@@ -223,7 +236,7 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
         held_status(session, mine)
         found = _pending(session, mine.run_id)
         if found is not None:
-            found.answer.applied_tick, found.query.status = tick, QueryStatus.APPLIED
+            _hear(session, found, tick)
             db.outlive_crash(session)
         return found
 
@@ -245,7 +258,7 @@ def take_operator_events(db: Database, mine: Claim, tick: int) -> Sequence[Opera
     recorded = mine_only.where(OperatorEvent.applied_tick == tick)
     fresh = mine_only.where(OperatorEvent.applied_tick.is_(None))
     with db.read() as session:
-        if max(_high(session, mine.run_id)) >= tick:
+        if max(high(session, mine.run_id)) >= tick:
             return session.scalars(recorded).all()
         if session.scalars(fresh.limit(1)).first() is None:
             return []
@@ -260,16 +273,11 @@ def take_operator_events(db: Database, mine: Claim, tick: int) -> Sequence[Opera
         return events
 
 
-def _high(session: Session, run_id: int) -> tuple[int, int, int]:
-    *found, origin = session.execute(_HIGH, {"run_id": run_id}).one()
-    query, answer, event = (-1 if tick is None else tick for tick in found)
-    return max(query, rolled_back_to(origin)), answer, event
-
-
-def closed(session: Session, run_id: int, tick: int) -> bool:
-    """Return whether a tick was lived already, so that nothing new is heard in it."""
-    query, answer, event = _high(session, run_id)
-    return query >= tick or answer >= tick or event > tick
+def _hear(session: Session, found: Taken, tick: int) -> None:
+    session.execute(_HEARD[0], {"answer": found.answer.id, "tick": tick})
+    session.execute(_HEARD[1], {"query": found.query.id})
+    set_committed_value(found.answer, "applied_tick", tick)
+    set_committed_value(found.query, "status", QueryStatus.APPLIED)
 
 
 def _pending(session: Session, run_id: int) -> Taken | None:

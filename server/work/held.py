@@ -12,6 +12,7 @@ import structlog
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.errors import LostClaimError, StoreError
+from parenting.server.pressure import Pressure
 from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
 from parenting.server.session import RunSession
@@ -54,9 +55,13 @@ class HeldRuns:
         self.tracked = TrackedRuns(db, told or Feeds([]))
         self.claims: dict[int, Claim] = {}
         self.sessions: dict[int, RunSession] = {}
-        self.lives = Lives(self.sessions, most, most_bytes)
+        self.lives, self.pressure = Lives(self.sessions, most, most_bytes), Pressure()
         self.surplus: set[int] = set()
         self._refusals: dict[int, int] = {}
+
+    def pressed(self, people_wait: bool) -> None:
+        """Take note of what other runs ask of this worker, before a turn begins."""
+        self.pressure.waiting, self.pressure.runs = people_wait, len(self.sessions)
 
     def turn(self, run_id: int, seen: Watch) -> float:
         """Give one run its turn, and return when the next is due. A store error never fails a run."""
@@ -121,7 +126,7 @@ class HeldRuns:
 
     def _begin(self, run_id: int) -> RunSession:
         run = runs.get_run(self.db, run_id)
-        self.sessions[run_id] = RunSession(self.db, self.claims[run_id], run, self._asked)
+        self.sessions[run_id] = RunSession(self.db, self.claims[run_id], run, self._asked, self.pressure)
         self.sessions[run_id].told = self.tracked.begin(run)
         log.info("run taken up", run=run_id, tick=self.sessions[run_id].last_tick)
         return self.sessions[run_id]

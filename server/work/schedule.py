@@ -25,6 +25,7 @@ class Schedule:
         self._resting: set[int] = set()
         self._since: dict[int, float] = {}
         self._longest = 0.0
+        self._urgent: set[int] = set()
 
     def news(self, found: Mapping[int, Watch]) -> None:
         """Take note of what is new: a run is due if anything of it has changed."""
@@ -55,7 +56,8 @@ class Schedule:
         now = time.monotonic()
         due = [run_id for run_id, at in self._at.items() if at <= now]
         due.sort(key=lambda run_id: (not self.seen[run_id].urgent, self._since.get(run_id, now)))
-        urgent = sum(self.seen[run_id].urgent for run_id in due)
+        self._urgent = {run_id for run_id in due if self.seen[run_id].urgent}
+        urgent = len(self._urgent)
         if 1 < urgent < len(due) and self._waits(due[urgent], now) > OVERDUE_SECONDS:
             due.insert(1, due.pop(urgent))
         return due
@@ -64,8 +66,13 @@ class Schedule:
         """Take note that a run's turn begins; return what was seen of the run."""
         self._longest = max(self._longest, self._waits(run_id, time.monotonic()))
         self._since.pop(run_id, None)
+        self._urgent.discard(run_id)
         self._given[run_id] = self.seen[run_id]
         return self.seen[run_id]
+
+    def people_wait(self) -> bool:
+        """Return whether a person waits for a turn that was due at the last `due` and has not begun."""
+        return bool(self._urgent)
 
     def ended(self, turns: Mapping[int, float]) -> bool:
         """Take note of turns that have ended, and return whether another one of such a run is due at once.
