@@ -13,13 +13,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypedDict
 
-from sqlalchemy import ColumnElement, and_, delete, func, or_, select
+from sqlalchemy import and_, bindparam, delete, func, insert, or_, select
 from sqlalchemy.orm import Session, defer
 
 from parenting.server.board_tables import BoardSnapshot, BoardStates
 from parenting.server.columns import UNREADABLE, Damaged
 from parenting.server.db import Database
 from parenting.server.runs import Claim, held_status
+from parenting.server.table_root import Table
 
 MOST_BYTES = 2_000_000
 """Bytes of all snapshots of a run, its states included."""
@@ -73,46 +74,39 @@ def write(
     """
     with db.write(durable=False) as session:
         held_status(session, mine)
-        run_id = mine.run_id
+        mine_only = {"run": mine.run_id}
         if after is not None:
-            later = delete(BoardSnapshot).where(BoardSnapshot.run_id == run_id, BoardSnapshot.tick > after)
-            session.execute(later)
+            session.execute(_LATER, mine_only | {"after": after})
         if states is not None:
-            session.execute(delete(BoardStates).where(BoardStates.run_id == run_id))
+            session.execute(_STATES, mine_only)
             blob = zlib.compress(json.dumps(states).encode(), 6)
             count = len(states["cells"])
-            session.add(BoardStates(run_id=run_id, states=count, complete=complete, blob=blob))
+            row = {"run_id": mine.run_id, "states": count, "complete": complete, "blob": blob}
+            session.execute(insert(_KNOWN), row)
         for one in found:
-            _replace(session, run_id, one)
-        session.flush()
-        _thin(session, run_id)
+            _replace(session, mine.run_id, one)
+        _thin(session, mine.run_id)
 
 
 def _replace(session: Session, run_id: int, one: Numbers) -> None:
-    mine = BoardSnapshot.run_id == run_id, BoardSnapshot.stage == one.stage
-    at: ColumnElement[bool] = BoardSnapshot.tick == one.tick
+    here = {"run": run_id, "of_stage": one.stage}
     if one.frozen:
-        older = select(BoardSnapshot.tick).where(*mine, BoardSnapshot.frozen, BoardSnapshot.tick != one.tick)
-        newest = older.order_by(BoardSnapshot.tick.desc()).limit(COUNTS_KEPT - 1)
-        kept = session.scalars(newest).all() if one.stage == COUNTS_ALONE else ()
-        at = and_(BoardSnapshot.frozen, BoardSnapshot.tick.not_in(kept))
-    session.execute(delete(BoardSnapshot).where(*mine, at))
-    session.add(BoardSnapshot(run_id=run_id, size=len(one.blob), **vars(one)))
+        older = session.execute(_FROZEN, here | {"but": one.tick}).scalars()
+        kept = list(older)[: COUNTS_KEPT - 1] if one.stage == COUNTS_ALONE else []
+        session.execute(_FROZEN_BEFORE, here | {"kept": kept})
+    else:
+        session.execute(_SAME, here | {"at": one.tick})
+    session.execute(insert(_SNAPSHOT), {"run_id": run_id, "size": len(one.blob), **vars(one)})
 
 
 def _thin(session: Session, run_id: int) -> None:
-    rows = session.execute(
-        select(BoardSnapshot.tick, BoardSnapshot.size)
-        .where(BoardSnapshot.run_id == run_id, ~BoardSnapshot.frozen)
-        .order_by(BoardSnapshot.tick)
-    ).all()
-    size = select(BoardSnapshot.size).where(BoardSnapshot.run_id == run_id, BoardSnapshot.frozen)
-    states = select(func.length(BoardStates.blob)).where(BoardStates.run_id == run_id)
-    beside = sum(session.scalars(size)) + (session.scalar(states) or 0)
-    dropped = to_drop([(row.tick, row.size) for row in rows], MOST_BYTES - beside)
+    rows = session.execute(_SIZES, {"run": run_id}).all()
+    states = session.execute(_STATES_SIZE, {"run": run_id}).scalar() or 0
+    beside = states + sum(row.size for row in rows if row.frozen is True)
+    live = [(row.tick, row.size) for row in rows if row.frozen is False]
+    dropped = to_drop(live, MOST_BYTES - beside)
     if dropped:
-        mine = BoardSnapshot.run_id == run_id, BoardSnapshot.tick.in_(dropped), ~BoardSnapshot.frozen
-        session.execute(delete(BoardSnapshot).where(*mine))
+        session.execute(_THINNED, {"run": run_id, "ticks": dropped})
 
 
 def to_drop(rows: Sequence[tuple[int, int]], most_bytes: int) -> list[int]:
@@ -182,3 +176,22 @@ def read_frozen(db: Database, run_id: int, stage: int) -> BoardSnapshot | None:
     rows = select(BoardSnapshot).where(BoardSnapshot.run_id == run_id, BoardSnapshot.stage == stage)
     with db.read() as session:
         return session.scalars(rows.where(BoardSnapshot.frozen)).first()
+
+
+_SNAPSHOT, _KNOWN = (Table.metadata.tables[one.__tablename__] for one in (BoardSnapshot, BoardStates))
+_OF_RUN = _SNAPSHOT.c.run_id == bindparam("run")
+_OF_STAGE = and_(_OF_RUN, _SNAPSHOT.c.stage == bindparam("of_stage"))
+_LATER = delete(_SNAPSHOT).where(_OF_RUN, _SNAPSHOT.c.tick > bindparam("after"))
+_SAME = delete(_SNAPSHOT).where(_OF_STAGE, _SNAPSHOT.c.tick == bindparam("at"))
+_FROZEN = select(_SNAPSHOT.c.tick).where(_OF_STAGE, _SNAPSHOT.c.frozen, _SNAPSHOT.c.tick != bindparam("but"))
+_FROZEN = _FROZEN.order_by(_SNAPSHOT.c.tick.desc())
+_FROZEN_BEFORE = delete(_SNAPSHOT).where(
+    _OF_STAGE, _SNAPSHOT.c.frozen, _SNAPSHOT.c.tick.not_in(bindparam("kept", expanding=True))
+)
+_SIZES = select(_SNAPSHOT.c.tick, _SNAPSHOT.c.size, _SNAPSHOT.c.frozen).where(_OF_RUN)
+_SIZES = _SIZES.order_by(_SNAPSHOT.c.tick)
+_THINNED = delete(_SNAPSHOT).where(
+    _OF_RUN, _SNAPSHOT.c.tick.in_(bindparam("ticks", expanding=True)), ~_SNAPSHOT.c.frozen
+)
+_STATES = delete(_KNOWN).where(_KNOWN.c.run_id == bindparam("run"))
+_STATES_SIZE = select(func.length(_KNOWN.c.blob)).where(_KNOWN.c.run_id == bindparam("run"))

@@ -41,7 +41,7 @@ from parenting.server.queue.taken import Taken, heard_before, recorded_at
 from parenting.server.runs import Claim, held, held_status
 from parenting.server.statuses import LIVING, QueryStatus, RunStatus
 from parenting.server.store.relay import announce
-from parenting.server.tables import Answer, OperatorEvent, Query, Run, Table
+from parenting.server.tables import Answer, OperatorEvent, Query, Table
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,8 @@ class Watch:
 # Statements that every tick needs are built once, of tables where no object of a class is wanted: that is
 # half of the work.
 _RUN: BindParameter[int] = bindparam("run_id")
-_QUERY, _ANSWER = (Table.metadata.tables[name] for name in ("query", "answer"))
+_NAMES = ("run", "query", "answer", "event")
+_RUNS, _QUERY, _ANSWER, _EVENT = (Table.metadata.tables[name] for name in _NAMES)
 _PENDING = (
     select(Answer, Query)
     .join(Query, Answer.query_id == Query.id)
@@ -98,36 +99,32 @@ _KNOWN = select(_QUERY.c.id).where(_QUERY.c.run_id == _RUN, _QUERY.c.tick == bin
 
 
 def _number(*conditions: ColumnElement[bool]) -> ScalarSelect[int]:
-    return select(func.count()).where(*conditions).correlate(Run).scalar_subquery()
+    return select(func.count()).where(*conditions).correlate(_RUNS).scalar_subquery()
 
 
-_WATCH = select(
-    Run.id.label("run_id"),
-    Run.status,
-    Run.fencing_token,
-    Run.worker,
-    _number(Query.run_id == Run.id, Query.status == QueryStatus.OPEN, Query.kind == "guidance").label(
-        "open_guidance"
-    ),
-    _number(Query.run_id == Run.id, Query.status == QueryStatus.OPEN, Query.kind == "preference").label(
-        "open_preferences"
-    ),
-    _number(Query.run_id == Run.id, Query.status == QueryStatus.ANSWERED).label("answers"),
-    Run.answers.label("answered"),
-    Run.retracted,
-    Run.goal,
-    Run.pace,
-    _number(OperatorEvent.run_id == Run.id, OperatorEvent.applied_tick.is_(None)).label("events"),
+def _asked(status: QueryStatus, *conditions: ColumnElement[bool]) -> ScalarSelect[int]:
+    return _number(_QUERY.c.run_id == _RUNS.c.id, _QUERY.c.status == status, *conditions)
+
+
+_CORRECTIONS = (
     select(func.count())
-    .select_from(Answer)
-    .join(Query, Answer.query_id == Query.id)
-    .where(Answer.run_id == Run.id, Answer.applied_tick.is_(None), Answer.standing)
-    .where(Query.status == QueryStatus.APPLIED)
-    .correlate(Run)
+    .select_from(_ANSWER.join(_QUERY, _ANSWER.c.query_id == _QUERY.c.id))
+    .where(_ANSWER.c.run_id == _RUNS.c.id, _ANSWER.c.applied_tick.is_(None), _ANSWER.c.standing)
+    .where(_QUERY.c.status == QueryStatus.APPLIED)
+    .correlate(_RUNS)
     .scalar_subquery()
-    .label("corrections"),
-    (Run.parent == "human").label("person"),
-).where(Run.id.in_(bindparam("run_ids", expanding=True)))
+)
+_WATCH = select(
+    _RUNS.c.id.label("run_id"),
+    *(_RUNS.c[name] for name in ("status", "fencing_token", "worker", "retracted", "goal", "pace")),
+    _RUNS.c.answers.label("answered"),
+    _asked(QueryStatus.OPEN, _QUERY.c.kind == "guidance").label("open_guidance"),
+    _asked(QueryStatus.OPEN, _QUERY.c.kind == "preference").label("open_preferences"),
+    _asked(QueryStatus.ANSWERED).label("answers"),
+    _number(_EVENT.c.run_id == _RUNS.c.id, _EVENT.c.applied_tick.is_(None)).label("events"),
+    _CORRECTIONS.label("corrections"),
+    (_RUNS.c.parent == "human").label("person"),
+).where(_RUNS.c.id.in_(bindparam("run_ids", expanding=True)))
 
 
 def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
