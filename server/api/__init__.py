@@ -23,6 +23,7 @@ from parenting.server.api import (
 
 router = APIRouter(prefix="/api/v1")
 PARTS = (
+    queries,  # first, as a request is compared with one route after the other, and most of them come here
     runs,
     policies,
     keeping,
@@ -30,7 +31,6 @@ PARTS = (
     board,
     operator,
     audit,
-    queries,
     presence,
     revisions,
     jobs,
