@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,9 @@ from fastapi.testclient import TestClient
 
 from parenting.commands.answering import Answering, Order
 from parenting.commands.client import Client, RefusedError
-from parenting.commands.judge import Judge
+from parenting.commands.judge import Judge, Knowledge, shared_knowledge
+from parenting.parents.fallible import FallibleRule
+from parenting.parents.grammar import SCRIPTED, read_parent
 from parenting.server import operator_events, runs
 from parenting.server.app import create_app
 from parenting.server.db import Database
@@ -141,3 +144,49 @@ def test_a_server_that_stays_away_is_given_up() -> None:
     assert ending.kind == "silent"
     assert ending.sentence.startswith("No server answers at http://127.0.0.1:")
     assert ending.sentence.endswith("Nothing was asked for 0.2 s.")
+
+
+def leased(db: Database, web: httpx2.Client) -> dict[str, Any]:
+    """The first question of a life, as a command has it."""
+    begin(db)
+    (mine,) = runs.claim(db, "test")
+    life = RunSession(db, mine, runs.get_run(db, mine.run_id), lambda: None)
+    while not (seen := watch(db, [mine.run_id])[mine.run_id]).open_guidance:
+        life.tick(seen)
+    reply = web.post(f"/api/v1/runs/{mine.run_id}/queries/lease", json={"client_id": "test"})
+    question: dict[str, Any] = reply.json()
+    return question
+
+
+def test_parents_who_do_not_err_share_their_answers_and_others_do_not(
+    db: Database, web: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second judge computes nothing; one who errs draws each answer."""
+    judged = Counter[bool]()
+    answer = FallibleRule.answer
+
+    def counted(rule: FallibleRule, *said: Any) -> Any:
+        judged[rule.spec.errs] += 1
+        return answer(rule, *said)
+
+    monkeypatch.setattr(FallibleRule, "answer", counted)
+    shared_knowledge.cache_clear()
+    question = leased(db, web)
+    (choice,) = {Judge(seed=seed).choice(question) for seed in range(5)}
+    assert judged == {False: 1}
+    changed = question | {"left": question["right"], "right": question["left"]}
+    swapped = {"left": "right", "right": "left"}
+    assert Judge().choice(changed) == swapped.get(choice, choice)
+    assert judged == {False: 2}
+    noisy = Judge(read_parent("noisy:0.5"))
+    assert len({noisy.choice(question | {"tick": tick}) for tick in range(20)}) > 1
+    assert judged == {False: 2, True: 20}
+
+
+def test_the_memory_of_answers_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("parenting.commands.judge.MOST_FOUND", 3)
+    known = Knowledge("unsafe-exploration", None, 0.9, "up-down", SCRIPTED)
+    for number in range(10):
+        known.keep(str(number), "left")
+        assert str(number) in known.found
+        assert len(known.found) <= 3
