@@ -51,6 +51,19 @@ def test_the_answer_of_a_person_goes_before_all_of_them(now: list[float]) -> Non
     assert schedule.due()[-1] == PERSON, "nobody waits: it has its turn like the others"
 
 
+def test_it_is_known_whether_people_wait_for_other_turns(now: list[float]) -> None:
+    schedule = Schedule()
+    schedule.news({1: watch(1), 2: watch(2, person=True), PERSON: watch(PERSON, person=True)})
+    assert not schedule.people_wait(), "nobody has looked yet"
+    first, second, script = schedule.due()
+    schedule.begin(first)
+    assert schedule.people_wait()
+    schedule.begin(second)
+    assert not schedule.people_wait()
+    schedule.begin(script)
+    assert not schedule.people_wait()
+
+
 def test_people_do_not_keep_a_script_from_its_turns(now: list[float]) -> None:
     """Where a round is over after two turns, one of these is a script's after a second."""
     schedule, script, people = Schedule(), 1, range(2, 40)

@@ -1,0 +1,123 @@
+"""What nobody waits for is left for later while people wait for other runs, and is lost never."""
+
+from __future__ import annotations
+
+import pytest
+from sqlalchemy import func, select
+
+from parenting.server.board.writer import SHARE, SHARE_OF_ALL
+from parenting.server.board_tables import BoardSnapshot
+from parenting.server.db import Database
+from parenting.server.new_run import NewRun, start
+from parenting.server.pressure import PUT_OFF_SECONDS, Pressure, PutOff
+from parenting.server.queue import answers
+from parenting.server.queue.worker_side import watch
+from parenting.server.runs import claim
+from parenting.server.session import RunSession
+from parenting.server.tables import Checkpoint, Metric, Query, Reason
+
+
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    clock = [100.0]
+    monkeypatch.setattr("parenting.server.pressure.time.monotonic", lambda: clock[0])
+    return clock
+
+
+def test_it_is_put_off_for_a_bounded_time(now: list[float]) -> None:
+    pressure = Pressure()
+    rest = PutOff(pressure)
+    assert not rest.may_wait(), "nobody waits for another run"
+    pressure.waiting = True
+    for _ in range(3):
+        now[0] += PUT_OFF_SECONDS / 4
+        assert rest.may_wait()
+    now[0] += PUT_OFF_SECONDS / 4
+    assert not rest.may_wait(), "it was put off for long enough"
+    assert rest.may_wait(), "and has just been done"
+    pressure.waiting = False
+    assert not rest.may_wait()
+
+
+def begin(db: Database, pressure: Pressure) -> RunSession:
+    run = start(db, NewRun(world="unsafe-exploration", parent="human", seed=3, config={"p_guid": 0.9}))
+    (mine,) = claim(db, "test")
+    return RunSession(db, mine, run, lambda: None, pressure)
+
+
+def ask(life: RunSession) -> int:
+    """Live until the agent waits for guidance, and return the question's number."""
+    run_id = life.claim.run_id
+    while not (seen := watch(life.db, [run_id])[run_id]).open_guidance:
+        life.tick(seen)
+    with life.db.read() as session:
+        return session.execute(select(func.max(Query.id)).where(Query.run_id == run_id)).scalar_one()
+
+
+def rows(db: Database) -> dict[str, int]:
+    with db.read() as session:
+        tables = (Query, Metric, Reason, BoardSnapshot, Checkpoint)
+        found = {one.__tablename__: session.scalar(select(func.count()).select_from(one)) for one in tables}
+    return {name: number or 0 for name, number in found.items()}
+
+
+def test_a_question_waits_for_nothing_else_and_the_rest_comes_with_the_next_turn(
+    db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("parenting.server.why.WRITE_SECONDS", 0.0)
+    monkeypatch.setattr("parenting.server.pressure.PUT_OFF_SECONDS", 1e9)
+    pressure = Pressure(waiting=True)
+    life, run_id = begin(db, pressure), 1
+    before = rows(db)
+    for _ in range(3):
+        answers.answer(db, ask(life), "either", "somebody", "human")
+        life.tick(watch(db, [run_id])[run_id])
+    ask(life)
+    asked = rows(db)
+    assert asked["query"] >= 4
+    assert asked == before | {"query": asked["query"]}, "nothing but questions"
+    pressure.waiting = False
+    life.report_waiting(watch(db, [run_id])[run_id])
+    found = rows(db)
+    assert found["reason"] == found["query"], "the reasons of all of them"
+    assert (found["metric"], found["board_snapshot"]) == (1, 1)
+    with db.read() as session:
+        (row,) = session.scalars(select(Metric))
+    assert (row.tick, row.values["either"]) == (life.last_tick, 3)
+    life.save()
+    assert rows(db)["checkpoint"] == before["checkpoint"] + 1
+
+
+class Clock:
+    """A clock that goes on by a millisecond whenever somebody looks at it."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        self.now += 0.001
+        return self.now
+
+
+def test_snapshots_of_all_runs_of_a_worker_take_a_bounded_share_of_its_time(
+    db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("parenting.server.board.writer.time.monotonic", clock := Clock())
+    pressure = Pressure()
+    life = begin(db, pressure)
+    waits = dict[int, float]()
+    for runs in (1, 5, 50):
+        pressure.runs, pressure.waiting = runs, False
+        clock.now += 1000
+        answers.answer(db, ask(life), "either", "somebody", "human")
+        life.tick(watch(db, [1])[1])  # a snapshot
+        pressure.waiting = True
+        answers.answer(db, ask(life), "either", "somebody", "human")
+        life.tick(watch(db, [1])[1])  # none
+        known, began = rows(db)["board_snapshot"], clock.now
+        while rows(db)["board_snapshot"] == known:
+            clock.now += 0.01
+            life.board.go_on(life.saved)
+        waits[runs] = clock.now - began
+    assert waits[5] == pytest.approx(waits[1], rel=0.2)
+    assert waits[50] == pytest.approx(waits[1] * SHARE / (SHARE_OF_ALL / 50), rel=0.2)
