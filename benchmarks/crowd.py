@@ -3,6 +3,7 @@
     python -m benchmarks.crowd                              every part, both stores, about fifteen minutes
     python -m benchmarks.crowd people flat --quick          two parts, shorter
     python -m benchmarks.crowd --store sqlite --workers 3
+    python -m benchmarks.crowd people --people 20           how many people these cores carry
 
 | part | what it does | bars |
 |---|---|---|
@@ -252,18 +253,20 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", help=f"{', '.join(PARTS)} [default: all]")
     parser.add_argument("--store", choices=STORES, action="append", help="repeatable [default: both]")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--people", type=int, default=Size().people, help="in part people [default: 50]")
     parser.add_argument("--quick", action="store_true", help="shorter, and fewer runs that wait")
     said = parser.parse_args()
     unknown = set(said.parts) - set(PARTS)
     if unknown:
         parser.error(f"There is no part {min(unknown)!r}. There are {', '.join(PARTS)}.")
+    size = (QUICK if said.quick else Size())._replace(people=said.people)
     for store in said.store or STORES:
         if store == "postgresql":
             cluster()
         for part in said.parts or PARTS:
             load = os.getloadavg()[0]
             print(f"{part}, {store}, {os.cpu_count()} cores, load average {load:.1f}", flush=True)
-            PARTS[part](store, QUICK if said.quick else Size(), said.workers)
+            PARTS[part](store, size, said.workers)
 
 
 if __name__ == "__main__":

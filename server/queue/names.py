@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 from parenting.drawing.sentences import mark
 from parenting.server.errors import DamagedRowError, ElsewhereError, NotFound
 from parenting.server.identity import UNREADABLE, stated
-from parenting.server.tables import Identity, Query, Run
+from parenting.server.tables import Identity, Query, Run, Table
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,14 @@ def _differs(row: Row[str, int, int, str, str], names: Names) -> bool:
 
 # Statements that every answer needs are built once. They join the only row of `Identity`, and no run that is
 # being deleted: what is answered there would go with it.
+_IDENTITY, _QUERY, _RUN = (Table.metadata.tables[one.__tablename__] for one in (Identity, Query, Run))
 _PLACE = select(
-    Identity.uuid.label("database"),
-    Query.id.label("query"),
-    Query.run_id.label("run"),
-    Run.public_id.label("run_public_id"),
-    Query.public_id.label("query_public_id"),
-).select_from(Identity)
-_ITS_RUN = and_(Run.id == Query.run_id, Run.deleting.is_(None))
-_BY_NUMBER = _PLACE.outerjoin(Query, Query.id == bindparam("query")).outerjoin(Run, _ITS_RUN)
-_BY_PUBLIC_ID = _PLACE.outerjoin(Query, Query.public_id == bindparam("query")).outerjoin(Run, _ITS_RUN)
+    _IDENTITY.c.uuid.label("database"),
+    _QUERY.c.id.label("query"),
+    _QUERY.c.run_id.label("run"),
+    _RUN.c.public_id.label("run_public_id"),
+    _QUERY.c.public_id.label("query_public_id"),
+).select_from(_IDENTITY)
+_ITS_RUN = and_(_RUN.c.id == _QUERY.c.run_id, _RUN.c.deleting.is_(None))
+_BY_NUMBER = _PLACE.outerjoin(_QUERY, _QUERY.c.id == bindparam("query")).outerjoin(_RUN, _ITS_RUN)
+_BY_PUBLIC_ID = _PLACE.outerjoin(_QUERY, _QUERY.c.public_id == bindparam("query")).outerjoin(_RUN, _ITS_RUN)

@@ -39,7 +39,7 @@ from parenting.server.schemas import (
 from parenting.server.statuses import OVER, QueryStatus, RunState, RunStatus, Waiting
 from parenting.server.store.clock import Mark
 from parenting.server.store.patience import patience
-from parenting.server.tables import KINDS, Answer, Identity, Metric, Query, Run
+from parenting.server.tables import KINDS, Answer, Identity, Metric, Query, Run, Table
 from parenting.server.workers import alive, last_signs
 
 Sign = Literal["alive", "silent", "done"]
@@ -258,14 +258,15 @@ def _signed(run: Run, now: Mark, within: timedelta, last: Mapping[str, Mark]) ->
 
 
 # What every leased question needs is built once.
+_IDENTITY, _QUERY, _RUN = (Table.metadata.tables[one.__tablename__] for one in (Identity, Query, Run))
 _PROGRESS = select(
-    Run.public_id,
-    Run.answers,
-    Run.retracted,
+    _RUN.c.public_id,
+    _RUN.c.answers,
+    _RUN.c.retracted,
     select(func.count())
-    .where(Query.run_id == Run.id, Query.status == QueryStatus.OPEN, Query.kind.in_(KINDS))
-    .correlate(Run)
+    .where(_QUERY.c.run_id == _RUN.c.id, _QUERY.c.status == QueryStatus.OPEN, _QUERY.c.kind.in_(KINDS))
+    .correlate(_RUN)
     .scalar_subquery()
     .label("open"),
-    select(Identity.uuid).scalar_subquery().label("database"),
-).where(Run.id == bindparam("run_id"))
+    select(_IDENTITY.c.uuid).scalar_subquery().label("database"),
+).where(_RUN.c.id == bindparam("run_id"))
