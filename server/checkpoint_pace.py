@@ -11,22 +11,25 @@ import math
 import time
 from collections.abc import Callable
 
+from parenting.server.pressure import ALONE, Pressure
+
 CHECKPOINT_SECONDS, LONGEST_CHECKPOINT_SECONDS = 2.0, 120.0
 """Seconds between two checkpoints: at least, and at most on account of their size."""
 CHECKPOINT_SHARE, CHECKPOINT_SPEED = 0.05, 1e6
 """The share of a run's time that checkpoints take at most, and their bytes a second."""
 LARGE_SECONDS = 5.0
 """Checkpoints that are written at longer intervals count as large: the log tells of them."""
-QUIET_SECONDS = 30.0
-"""A small one is written after so long in any case, if a tick has passed."""
+QUIET_SECONDS, QUIET_EACH = 10.0, 1.0
+"""A small one is written after so long in any case, if a tick has passed; in a worker of many runs after so
+long for each of them, so that those of all come once a second."""
 
 
 class CheckpointPace:
     """The pace of one run's checkpoints."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic, pressure: Pressure = ALONE) -> None:
         """Begin now, with nothing to save."""
-        self._clock, self._saved_at = clock, clock()
+        self._clock, self._saved_at, self._pressure = clock, clock(), pressure
         self.every = CHECKPOINT_SECONDS
         self.work, self._enough = 0.0, 0.0  # seconds that ticks took since then, and that make one due
 
@@ -40,7 +43,8 @@ class CheckpointPace:
         """Return when the next checkpoint is due, if no further tick passes; `inf` for never."""
         if self.work >= (self.every if self.large else self._enough):
             return self._saved_at + self.every
-        return math.inf if self.large else self._saved_at + max(self.every, QUIET_SECONDS)
+        quiet = min(max(QUIET_SECONDS, QUIET_EACH * self._pressure.runs), LONGEST_CHECKPOINT_SECONDS)
+        return math.inf if self.large else self._saved_at + max(self.every, quiet)
 
     @property
     def due(self) -> bool:

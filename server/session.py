@@ -81,7 +81,8 @@ class RunSession:
         self.why = Why(self.world, db, claim, self.saved, self.growth.lesson)
         self.finish = read_finish(run.finish)
         self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
-        self._saved_tick, self._measured_at, self._pace = self.last_tick, 0.0, CheckpointPace()
+        self._pace = CheckpointPace(pressure=pressure)
+        self._saved_tick, self._measured_at = self.last_tick, 0.0
         self._measured_tick, self.lived_at, self._heard_at, self._look_cost = self.last_tick, 0.0, 0.0, 0.0
         self._stuck_at, self._news, self._rest = -1, False, PutOff(pressure)
         self.told: Callable[[int, Row], None] = lambda tick, row: None  # trackers take each row of metrics
@@ -268,12 +269,12 @@ class RunSession:
         """Return whether a tick has passed since the last checkpoint."""
         return self.last_tick != self._saved_tick
 
-    def end(self) -> None:
-        """Measure what the last tick has changed, and save."""
+    def end(self, last: bool = True) -> None:
+        """Measure what the last tick has changed, and save; see `save` for `last`."""
         if self._news:
             self._measured_at = 0.0  # whatever a look costs: it is the last
             self._measure(at_once=False)
-        self.save(last=True)
+        self.save(last)
 
     def save_if_due(self) -> None:
         """Save a checkpoint if the last one is old and a tick has passed since."""

@@ -157,7 +157,7 @@ class HeldRuns:
         if session is not None and run_id not in self.surplus and session.board.completes(session.saved):
             return NOW
         if session is not None and session.unsaved:
-            session.save(last=True)
+            session.end()
         runs.let_go(self.db, [self.claims[run_id]])
         self.drop(run_id)
         return AT_NEWS
@@ -178,6 +178,6 @@ class HeldRuns:
                 log.warning("not all runs could be saved in time; they go on from their checkpoints")
                 return
             try:
-                session.save()
+                session.end(last=False)
             except LostClaimError:
                 self.drop(run_id)

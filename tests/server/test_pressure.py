@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 from sqlalchemy import func, select
 
@@ -15,6 +17,8 @@ from parenting.server.queue.worker_side import watch
 from parenting.server.runs import claim
 from parenting.server.session import RunSession
 from parenting.server.tables import Checkpoint, Metric, Query, Reason
+from parenting.server.work.held import HeldRuns
+from parenting.server.work.patience import Patience
 
 
 @pytest.fixture
@@ -86,6 +90,22 @@ def test_a_question_waits_for_nothing_else_and_the_rest_comes_with_the_next_turn
     assert (row.tick, row.values["either"]) == (life.last_tick, 3)
     life.save()
     assert rows(db)["checkpoint"] == before["checkpoint"] + 1
+
+
+def test_a_worker_that_ends_does_what_it_has_put_off(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("parenting.server.pressure.PUT_OFF_SECONDS", 1e9)
+    held = HeldRuns(db, Patience(), lambda: None)
+    life = begin(db, held.pressure)
+    held.claims[1], held.sessions[1] = life.claim, life
+    held.pressed(people_wait=True)
+    answers.answer(db, ask(life), "either", "somebody", "human")
+    ask(life)
+    before = rows(db)
+    held.save((), time.monotonic() + 60)
+    found = rows(db)
+    assert found["metric"] == before["metric"] + 1
+    assert found["reason"] == found["query"] == 2
+    assert found["checkpoint"] == before["checkpoint"] + 1
 
 
 class Clock:

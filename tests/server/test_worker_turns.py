@@ -66,6 +66,7 @@ def test_a_run_that_takes_long_holds_up_no_other(
     """The others come to their questions, and signs of life go on."""
     monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 0.0)
     monkeypatch.setattr("parenting.server.checkpoint_pace.QUIET_SECONDS", 0.0)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.QUIET_EACH", 0.0)
     held, *others = begin(db, 3)
     slow(monkeypatch, name, held, gate)
     rounds(worker, lambda: all(get_run(db, run).waiting == "guidance" for run in others))

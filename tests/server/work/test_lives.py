@@ -34,6 +34,7 @@ def brisk(monkeypatch: pytest.MonkeyPatch) -> None:
     """Checkpoints follow each tick, so that a run that waits is at rest at once."""
     monkeypatch.setattr("parenting.server.checkpoint_pace.CHECKPOINT_SECONDS", 0.0)
     monkeypatch.setattr("parenting.server.checkpoint_pace.QUIET_SECONDS", 0.0)
+    monkeypatch.setattr("parenting.server.checkpoint_pace.QUIET_EACH", 0.0)
     monkeypatch.setattr("parenting.server.why.WRITE_SECONDS", 0.0)
 
 
@@ -129,7 +130,7 @@ def test_lives_leave_before_their_next_checkpoint_is_due(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else a thousand runs that have just asked would all be in memory until each has saved."""
-    for name in ("CHECKPOINT_SECONDS", "QUIET_SECONDS"):
+    for name in ("CHECKPOINT_SECONDS", "QUIET_SECONDS", "QUIET_EACH"):
         monkeypatch.setattr(f"parenting.server.checkpoint_pace.{name}", 3600.0)
     runs, worker = begin(db, 3), Worker(db, few(settings, 1))
     rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
