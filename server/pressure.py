@@ -6,12 +6,12 @@ import time
 from dataclasses import dataclass
 
 PUT_OFF_SECONDS = 5.0
-"""What nobody waits for is put off for so long at most while people wait for other runs."""
+"""Work for which nobody waits is put off for so long at most while people wait for other runs."""
 
 
 @dataclass
 class Pressure:
-    """What the main thread of a worker knows, and turns in other threads read."""
+    """The state that the main thread of a worker writes, and turns in other threads read."""
 
     waiting: bool = False
     """People wait for turns of other runs."""

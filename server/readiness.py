@@ -1,4 +1,4 @@
-"""Whether an agent may live its next tick: it never outruns its parent (docs/queue.md)."""
+"""The right of an agent to its next tick: it never outruns its parent (docs/queue.md)."""
 
 from __future__ import annotations
 

@@ -41,8 +41,8 @@ CLAIM_SECONDS = 1.0
 PATIENCE = length(60.0, 900.0)
 WIDTHS = (1280, 390)
 SPEED = {
-    "parenting.server.session.CHECKPOINT_SECONDS": 0.2,
-    "parenting.server.session.CHECKPOINT_SPEED": 1e12,
+    "parenting.server.checkpoint_pace.CHECKPOINT_SECONDS": 0.2,
+    "parenting.server.checkpoint_pace.CHECKPOINT_SPEED": 1e12,
 }
 
 

@@ -125,6 +125,7 @@ def _run(
     os.environ.update(environment | {VARIABLE: str(lifeline.fileno())})
     for name, value in patches.items():
         module, _, variable = name.rpartition(".")
+        assert hasattr(sys.modules[module], variable), f"{name} is not there to be replaced"
         setattr(sys.modules[module], variable, value)
     if prepare is not None:
         prepare()

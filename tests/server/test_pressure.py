@@ -1,4 +1,4 @@
-"""What nobody waits for is left for later while people wait for other runs, and is lost never."""
+"""Work for which nobody waits is left for later while people wait for other runs, and is never lost."""
 
 from __future__ import annotations
 
