@@ -4,7 +4,7 @@
     python -m benchmarks.waiting_runs --runs 300 --answers 50
 
 One worker raises so many runs on the island, each with a question that nobody answers. *Settling* is the
-processor time of the worker in the first 15 s after all have asked, in which the last of them write their
+processor time of the worker in the first 35 s after all have asked, in which the last of them write their
 checkpoints, and *at rest* that of the time after it, also as a share of a core. *Memory* is the resident size
 of the worker then, and at the most. *Next question* is the time from an answer's commit to the commit of the
 same run's next question, for one person who answers one run; *first question* is the same for runs that
@@ -42,7 +42,7 @@ from tests.server.processes import Command
 CLIENT = "benchmark"
 WORLD = "unsafe-exploration"
 PATIENCE = 3600.0
-SETTLES = 15.0
+SETTLES = 35.0
 LOOK_SECONDS = 0.001
 HEAD = f"{'':28}{'n':>6}{'p50':>9}{'p95':>9}{'p99':>9}{'max':>9}  ms"
 

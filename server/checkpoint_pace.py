@@ -19,9 +19,9 @@ CHECKPOINT_SHARE, CHECKPOINT_SPEED = 0.05, 1e6
 """The share of a run's time that checkpoints take at most, and their bytes a second."""
 LARGE_SECONDS = 5.0
 """Checkpoints that are written at longer intervals count as large: the log tells of them."""
-QUIET_SECONDS, QUIET_EACH = 10.0, 1.0
+QUIET_SECONDS, QUIET_EACH, LONGEST_QUIET_SECONDS = 10.0, 1.0, 30.0
 """A small one is written after so long in any case, if a tick has passed; in a worker of many runs after so
-long for each of them, so that those of all come once a second."""
+long for each of them, so that those of up to thirty runs come once a second."""
 
 
 class CheckpointPace:
@@ -43,7 +43,7 @@ class CheckpointPace:
         """Return when the next checkpoint is due, if no further tick passes; `inf` for never."""
         if self.work >= (self.every if self.large else self._enough):
             return self._saved_at + self.every
-        quiet = min(max(QUIET_SECONDS, QUIET_EACH * self._pressure.runs), LONGEST_CHECKPOINT_SECONDS)
+        quiet = min(max(QUIET_SECONDS, QUIET_EACH * self._pressure.runs), LONGEST_QUIET_SECONDS)
         return math.inf if self.large else self._saved_at + max(self.every, quiet)
 
     @property

@@ -18,7 +18,7 @@ from parenting.server.errors import LostClaimError, ServerError
 
 log = structlog.get_logger()
 
-LOOK_SECONDS = 0.5
+LOOK_SECONDS = 1.0
 """Seconds between two looks for a chore, at the least."""
 AGAIN_SECONDS = 10.0
 """Seconds after which a deletion of a person's data is tried again."""

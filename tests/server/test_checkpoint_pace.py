@@ -10,7 +10,7 @@ from parenting.server.checkpoint_pace import (
     QUIET_SECONDS,
     CheckpointPace,
 )
-from parenting.server.checkpoint_pace import LONGEST_CHECKPOINT_SECONDS as MOST
+from parenting.server.checkpoint_pace import LONGEST_QUIET_SECONDS as MOST
 from parenting.server.pressure import Pressure
 
 
@@ -72,11 +72,11 @@ def test_a_quiet_run_is_saved_once_and_a_large_one_by_its_work_alone() -> None:
 
 
 def test_the_quiet_runs_of_a_worker_together_are_saved_once_a_second() -> None:
-    """A hundred runs that answer now and then would else write ten checkpoints in each."""
+    """Twenty-five runs that answer now and then would otherwise write two or three in each."""
     clock, pressure = Time(), Pressure()
     pace = CheckpointPace(clock, pressure)
     pace.saved(0.02, 300_000)
     pace.work = 0.01
-    for runs, seconds in ((1, QUIET_SECONDS), (10, QUIET_SECONDS), (50, 50.0), (1000, MOST)):
+    for runs, seconds in ((1, QUIET_SECONDS), (10, QUIET_SECONDS), (25, 25.0), (1000, MOST)):
         pressure.runs = runs
         assert pace.next == seconds
