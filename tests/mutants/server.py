@@ -87,6 +87,21 @@ QUEUE = [
         f"{WORKER}::test_replay_gives_back_what_was_recorded",
     ),
     Mutant(
+        "a question's person waits for what nobody waits for",
+        "server/pressure.py",
+        "if self._pressure.waiting and now - self._done_at < PUT_OFF_SECONDS:",
+        "if now < self._done_at:",
+        "tests/server/test_pressure.py::"
+        "test_a_question_waits_for_nothing_else_and_the_rest_comes_with_the_next_turn",
+    ),
+    Mutant(
+        "what was put off is lost with the worker",
+        "server/work/held.py",
+        "session.end(last=False)",
+        "session.save()",
+        "tests/server/test_pressure.py::test_a_worker_that_ends_does_what_it_has_put_off",
+    ),
+    Mutant(
         "a replayed tick asks a second time",
         "server/queue/worker_side.py",
         "if known is not None:",
