@@ -95,6 +95,7 @@ _HEARD = (
     update(_ANSWER).where(_ANSWER.c.id == bindparam("answer")).values(applied_tick=bindparam("tick")),
     update(_QUERY).where(_QUERY.c.id == bindparam("query")).values(status=QueryStatus.APPLIED),
 )
+_POSTED = insert(_QUERY).returning(_QUERY.c.id)
 _KNOWN = select(_QUERY.c.id).where(_QUERY.c.run_id == _RUN, _QUERY.c.tick == bindparam("tick"))
 
 
@@ -199,9 +200,11 @@ def post_query(
             "posted": db.clock(),
             "status": QueryStatus.OPEN if status in LIVING else QueryStatus.WITHDRAWN,
         }
-        stored = session.execute(insert(_QUERY), asked if number is None else asked | {"id": number})
+        if number is not None:
+            asked["id"] = number
+        stored: int = session.execute(_POSTED, asked).scalar_one()
         announce(session, "web")
-        return int(stored.inserted_primary_key[0])
+        return stored
 
 
 def asked_at(db: Database, run_id: int, tick: int) -> Query | None:
