@@ -6,6 +6,7 @@ same moves are asked about again and again.
 
 from __future__ import annotations
 
+import hashlib
 import json
 from functools import lru_cache
 from typing import Any
@@ -37,9 +38,9 @@ class Knowledge:
         """Compute the exact values of the world."""
         self.world = registry.make(name, text)
         self.rule = FallibleRule(self.world, spec, gamma, inside)
-        self.found: dict[str, str] = {}
+        self.found: dict[bytes, str] = {}  # by a digest of what was shown
 
-    def keep(self, shown: str, choice: str) -> None:
+    def keep(self, shown: bytes, choice: str) -> None:
         """Keep an answer; a full memory is emptied first."""
         if len(self.found) >= MOST_FOUND:
             self.found.clear()
@@ -69,7 +70,7 @@ class Judge:
         """
         try:
             known = self._knowledge(question["world"], question["parent"])
-            shown = "" if self.spec.errs else json.dumps([question.get(name) for name in SHOWN])
+            shown = b"" if self.spec.errs else _digest(question)
             if shown in known.found:
                 return known.found[shown]
             query = _decoded(known.world, question)
@@ -91,6 +92,11 @@ class Judge:
         if self._own is None:
             self._own = Knowledge(*told)
         return self._own
+
+
+def _digest(question: dict[str, Any]) -> bytes:
+    shown = json.dumps([question.get(name) for name in SHOWN])
+    return hashlib.blake2b(shown.encode(), digest_size=16).digest()
 
 
 def _decoded(world: Gridworld, question: dict[str, Any]) -> Query:

@@ -46,7 +46,8 @@ def follow(model: Model, policy: TabularPolicy, start: Int64[Tensor, "N"], steps
     A walk that comes back to a state goes round from then on. Once all walks do, the rest is copied.
     """
     trial, states, actions = torch.arange(len(start), device=start.device), [start], list[Tensor]()
-    first = torch.full((len(start), len(model.next_state)), -1, device=start.device)  # its step in a state
+    size = (len(start), len(model.next_state))
+    first = torch.full(size, -1, dtype=torch.int32, device=start.device)  # its first step in a state
     for step in range(steps):
         at = states[-1]
         met = first[trial, at]
@@ -59,7 +60,7 @@ def follow(model: Model, policy: TabularPolicy, start: Int64[Tensor, "N"], steps
     if lived == steps:
         return Path(state, action)
     later = torch.arange(lived, steps + 1, device=start.device)[:, None]
-    again = met + (later - met) % (lived - met)
+    again = met.long() + (later - met) % (lived - met)
     return Path(
         torch.cat([state[:lived], state.gather(0, again)]), torch.cat([action, action.gather(0, again[:-1])])
     )

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 
 PUT_OFF_SECONDS = 5.0
-"""Work for which nobody waits is put off for so long at most while people wait for other runs."""
+"""A turn that comes so long after the last such work does it even while people wait for other runs."""
 
 
 @dataclass

@@ -35,7 +35,7 @@ from parenting.server.progress import report_progress
 from parenting.server.queue import worker_side
 from parenting.server.queue.queue_parent import QueueParent, ScriptedQueueParent
 from parenting.server.queue.worker_side import Watch
-from parenting.server.readiness import may_live_on
+from parenting.server.readiness import may_live_on, surely_waits_for, waits_for
 from parenting.server.recall import recall
 from parenting.server.runs import Claim
 from parenting.server.snapshot import Snapshot, initial_weights, pack
@@ -87,6 +87,7 @@ class RunSession:
         self._stuck_at, self._news, self._rest = -1, False, PutOff(pressure)
         self.told: Callable[[int, Row], None] = lambda tick, row: None  # trackers take each row of metrics
         self.whole, self._told, self._told_at, self._learnt = True, False, 0.0, NOTHING_LEARNT
+        self.over = False  # somebody has stopped it
         sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
         self.parent.follow_until = take_up(db, claim, run, self._recalled, self.record_ends)
 
@@ -112,19 +113,22 @@ class RunSession:
         """Report who waits for whom, and save a checkpoint: no tick passes for a while."""
         if self._news:
             self._measure(at_once=False)
-        reason: Waiting | None = None
-        if bool(self.saved.state.all_refused):
-            reason = Waiting.STUCK
-        elif bool(self.saved.state.unsure):
-            reason = Waiting.UNSURE
-        elif seen.open_guidance:
-            reason = Waiting.GUIDANCE
-        elif seen.open_preferences:
-            reason = Waiting.PREFERENCES
+        reason = waits_for(self.saved, seen)
         if reason != self.waiting or (reason is Waiting.STUCK and self.last_tick != self._stuck_at):
             self.waiting, self._stuck_at = reason, self.last_tick
             report_progress(self.db, self.claim, tick=self.last_tick, waiting=reason)
         self._do_the_rest()
+
+    def catch_up(self) -> None:
+        """Do what was put off, but for an expensive look at the policy, where no tick passes for a while."""
+        if self.unmeasured and not self.evaluation.refresh_seconds:
+            self._measure(at_once=False)
+        self.why.write_if_due()
+
+    @property
+    def unmeasured(self) -> bool:
+        """Return whether a row of metrics is still to come of what has happened."""
+        return self._news
 
     def rests_until(self) -> float:
         """Return when a run that waits has to report again though nothing has happened; `inf` for never."""
@@ -169,10 +173,12 @@ class RunSession:
         self._note(answer)
         at_once = not bool(state.waiting) and bool(query.kind[0] == QueryKind.NONE)
         hurried = at_once and self.lived_at - self._heard_at < HURRY_SECONDS
-        later = hurried or self._rest.may_wait()
-        self._measure(at_once, later)
+        later = not hurried and self._rest.may_wait()
+        unmeasured = later and self.finish.kind != "optimal"  # that one is seen by a row of metrics
+        self._news |= unmeasured  # its row comes with the next turn
+        self._measure(at_once, hurried or unmeasured)
         self.whole = True
-        if not later:
+        if not (hurried or later):
             self._do_the_rest()
         return at_once
 
@@ -227,19 +233,14 @@ class RunSession:
         row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed, **grown}
         optimal = bool(row["optimal"])
         shown: dict[str, Any] = {"maturity": row["maturity"], "speed": speed, "optimal": optimal}
-        reason = self._awaited()
+        sure = self.run.parent == "human" and not self.over
+        reason = surely_waits_for(self.saved) if sure else None
         shown |= {"tick": self.last_tick, "waiting": reason, **self.growth.news(self.saved.state)}
         metrics.write_metrics(self.db, self.claim, {self.last_tick: row}, shown)
         self.told(self.last_tick, row)
         self.optimal, self.waiting, self.stage, self._news = optimal, reason, stage, False
         self._measured_at, self._measured_tick = time.monotonic(), self.last_tick
         self._look_cost = self._measured_at - began
-
-    def _awaited(self) -> Waiting | None:
-        """Return whom the agent waits for, where that is sure before a look at the mailbox."""
-        state = self.saved.state
-        asks = bool(state.waiting) and not bool(state.all_refused) and not bool(state.unsure)
-        return Waiting.GUIDANCE if asks and self.run.parent == "human" else None
 
     def _report_tick(self) -> None:
         """Report the tick alone, once a second, where the next look at the policy is far off."""
@@ -269,12 +270,12 @@ class RunSession:
         """Return whether a tick has passed since the last checkpoint."""
         return self.last_tick != self._saved_tick
 
-    def end(self, last: bool = True) -> None:
-        """Measure what the last tick has changed, and save; see `save` for `last`."""
+    def end(self) -> None:
+        """Measure what the last tick has changed, and save."""
         if self._news:
             self._measured_at = 0.0  # whatever a look costs: it is the last
             self._measure(at_once=False)
-        self.save(last)
+        self.save(last=True)
 
     def save_if_due(self) -> None:
         """Save a checkpoint if the last one is old and a tick has passed since."""

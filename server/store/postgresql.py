@@ -117,7 +117,7 @@ def data_version(connection: PoolProxiedConnection) -> str:
     A commit ends a transaction that was in progress or had not begun in every earlier snapshot, so it changes
     them all. The position in the log would not do: it moves before a commit can be seen.
 
-    A worker polls twenty times a second, so libpq is called as directly as psycopg allows: a third of the
+    A worker polls ten times a second, so libpq is called as directly as psycopg allows: a third of the
     processor time of a cursor.
 
     Raises:

@@ -86,8 +86,10 @@ class HeldRuns:
         """Give one run its turn. A run that fails stops alone, with its reason."""
         try:
             if run_id in self.surplus or seen.status in OVER:
-                return self._last(run_id)
-            if seen.status is not RunStatus.ACTIVE or self.lives.sleeps(run_id, seen):
+                return self._last(run_id, seen.status in OVER)
+            if seen.status is not RunStatus.ACTIVE:
+                return self._paused(run_id)
+            if self.lives.sleeps(run_id, seen):
                 return AT_NEWS
             due = self._usual(run_id, seen)
             self.lives.used(run_id)
@@ -107,14 +109,21 @@ class HeldRuns:
             return self._finish(session)
         if not session.ready(seen):
             session.report_waiting(seen)
-            return session.rests_until()
+            return self._finish(session) if session.finished() else session.rests_until()
         if (delay := session.delay(seen.pace)) > 0:
+            session.catch_up()
             return time.monotonic() + delay
         go_on = session.tick(seen) and seen.pace is None and not seen.goal_reached
         until = time.monotonic() + SLICE_SECONDS
         while go_on and time.monotonic() < until and not session.finished():
             go_on = session.tick()
         return self._finish(session) if session.finished() else NOW
+
+    def _paused(self, run_id: int) -> float:
+        """Do what was put off of a run that somebody has paused."""
+        if (session := self.sessions.get(run_id)) is not None:
+            session.catch_up()
+        return AT_NEWS
 
     def _finish(self, session: RunSession) -> float:
         if session.board.completes(session.saved):
@@ -137,6 +146,7 @@ class HeldRuns:
         if session is None:
             return AT_NEWS
         try:
+            session.catch_up()
             if session.unsaved:
                 session.save()
         except LostClaimError as error:
@@ -148,7 +158,7 @@ class HeldRuns:
             self.lives.leave(run_id)
         return AT_NEWS
 
-    def _last(self, run_id: int) -> float:
+    def _last(self, run_id: int, over: bool) -> float:
         """Save what was ticked of a run that somebody stopped, or that another worker raises, and let go.
 
         A run that is resumed can so be claimed at once.
@@ -157,7 +167,9 @@ class HeldRuns:
         if session is not None and run_id not in self.surplus and session.board.completes(session.saved):
             return NOW
         if session is not None and session.unsaved:
-            session.end()
+            session.over = over  # it waits for nobody
+            session.catch_up()
+            session.save(last=True)
         runs.let_go(self.db, [self.claims[run_id]])
         self.drop(run_id)
         return AT_NEWS
@@ -170,14 +182,20 @@ class HeldRuns:
         self.claims.pop(run_id, None)
 
     def save(self, working: Collection[int], end: float) -> None:
-        """Save every run whose turn is not just going on, until the time is over."""
-        for run_id, session in list(self.sessions.items()):
-            if run_id in working or not session.whole or not session.unsaved:
-                continue
+        """Save every run whose turn is not just going on, until the time is over; then what was put off."""
+        mine = [run_id for run_id, one in self.sessions.items() if run_id not in working and one.whole]
+        for run_id in mine:
             if time.monotonic() > end:
                 log.warning("not all runs could be saved in time; they go on from their checkpoints")
                 return
-            try:
-                session.end(last=False)
-            except LostClaimError:
-                self.drop(run_id)
+            if self.sessions[run_id].unsaved:
+                self._unless_lost(run_id, self.sessions[run_id].save)
+        for run_id in mine:
+            if run_id in self.sessions and time.monotonic() <= end:
+                self._unless_lost(run_id, self.sessions[run_id].catch_up)
+
+    def _unless_lost(self, run_id: int, act: Callable[[], None]) -> None:
+        try:
+            act()
+        except LostClaimError:
+            self.drop(run_id)

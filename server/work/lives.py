@@ -126,8 +126,8 @@ class Lives:
 
         They can leave before their next checkpoint is due: leaving writes one.
         """
-        waiting = list(self.sessions.items())
-        return {run_id for run_id, one in waiting if one.whole and one.waiting is Waiting.GUIDANCE}
+        waiting = [(run_id, one) for run_id, one in list(self.sessions.items()) if one.whole]
+        return {i for i, one in waiting if one.waiting is Waiting.GUIDANCE and not one.unmeasured}
 
     def leave(self, run_id: int) -> None:
         """Let a life leave memory; its run still waits."""

@@ -56,8 +56,8 @@ class Schedule:
         now = time.monotonic()
         due = [run_id for run_id, at in self._at.items() if at <= now]
         due.sort(key=lambda run_id: (not self.seen[run_id].urgent, self._since.get(run_id, now)))
-        self._urgent = {run_id for run_id in due if self.seen[run_id].urgent}
-        urgent = len(self._urgent)
+        urgent = sum(self.seen[run_id].urgent for run_id in due)
+        self._urgent = set(due[:urgent]) - self._given.keys()
         if 1 < urgent < len(due) and self._waits(due[urgent], now) > OVERDUE_SECONDS:
             due.insert(1, due.pop(urgent))
         return due

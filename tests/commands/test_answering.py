@@ -187,6 +187,6 @@ def test_the_memory_of_answers_is_bounded(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr("parenting.commands.judge.MOST_FOUND", 3)
     known = Knowledge("unsafe-exploration", None, 0.9, "up-down", SCRIPTED)
     for number in range(10):
-        known.keep(str(number), "left")
-        assert str(number) in known.found
+        known.keep(bytes([number]), "left")
+        assert bytes([number]) in known.found
         assert len(known.found) <= 3

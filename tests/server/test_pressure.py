@@ -11,11 +11,13 @@ from parenting.server.board.writer import SHARE, SHARE_OF_ALL
 from parenting.server.board_tables import BoardSnapshot
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
+from parenting.server.operator_events import add_operator_event
 from parenting.server.pressure import PUT_OFF_SECONDS, Pressure, PutOff
 from parenting.server.queue import answers
 from parenting.server.queue.worker_side import watch
-from parenting.server.runs import claim
+from parenting.server.runs import claim, get_run, set_status
 from parenting.server.session import RunSession
+from parenting.server.statuses import RunStatus, Waiting
 from parenting.server.tables import Checkpoint, Metric, Query, Reason
 from parenting.server.work.held import HeldRuns
 from parenting.server.work.patience import Patience
@@ -43,8 +45,9 @@ def test_it_is_put_off_for_a_bounded_time(now: list[float]) -> None:
     assert not rest.may_wait()
 
 
-def begin(db: Database, pressure: Pressure) -> RunSession:
-    run = start(db, NewRun(world="unsafe-exploration", parent="human", seed=3, config={"p_guid": 0.9}))
+def begin(db: Database, pressure: Pressure, finish: str | None = None) -> RunSession:
+    config = {"p_guid": 0.9}
+    run = start(db, NewRun(world="unsafe-exploration", parent="human", seed=3, config=config, finish=finish))
     (mine,) = claim(db, "test")
     return RunSession(db, mine, run, lambda: None, pressure)
 
@@ -54,8 +57,12 @@ def ask(life: RunSession) -> int:
     run_id = life.claim.run_id
     while not (seen := watch(life.db, [run_id])[run_id]).open_guidance:
         life.tick(seen)
-    with life.db.read() as session:
-        return session.execute(select(func.max(Query.id)).where(Query.run_id == run_id)).scalar_one()
+    return last_question(life.db)
+
+
+def last_question(db: Database) -> int:
+    with db.read() as session:
+        return session.execute(select(func.max(Query.id))).scalar_one()
 
 
 def rows(db: Database) -> dict[str, int]:
@@ -92,20 +99,91 @@ def test_a_question_waits_for_nothing_else_and_the_rest_comes_with_the_next_turn
     assert rows(db)["checkpoint"] == before["checkpoint"] + 1
 
 
-def test_a_worker_that_ends_does_what_it_has_put_off(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def held(db: Database, monkeypatch: pytest.MonkeyPatch) -> HeldRuns:
+    """A worker's run 1, which has heard an answer and asked again while people wait for other runs."""
     monkeypatch.setattr("parenting.server.pressure.PUT_OFF_SECONDS", 1e9)
-    held = HeldRuns(db, Patience(), lambda: None)
-    life = begin(db, held.pressure)
-    held.claims[1], held.sessions[1] = life.claim, life
-    held.pressed(people_wait=True)
+    found = HeldRuns(db, Patience(), lambda: None)
+    life = begin(db, found.pressure)
+    found.claims[1], found.sessions[1] = life.claim, life
+    found.pressed(people_wait=True)
     answers.answer(db, ask(life), "either", "somebody", "human")
     ask(life)
+    assert rows(db)["metric"] == 0
+    return found
+
+
+def turn(held: HeldRuns, db: Database) -> None:
+    held.turn(1, watch(db, [1])[1])
+
+
+def stored(db: Database) -> tuple[int, int, Waiting | None]:
+    """The rows of metrics, and the tick and the wait that the run reports."""
+    run = get_run(db, 1)
+    return rows(db)["metric"], run.tick or 0, run.waiting
+
+
+def test_a_worker_that_ends_does_what_it_has_put_off(held: HeldRuns, db: Database) -> None:
     before = rows(db)
     held.save((), time.monotonic() + 60)
     found = rows(db)
-    assert found["metric"] == before["metric"] + 1
+    assert stored(db) == (1, held.sessions[1].last_tick, Waiting.GUIDANCE)
     assert found["reason"] == found["query"] == 2
     assert found["checkpoint"] == before["checkpoint"] + 1
+
+
+def test_a_paused_run_has_its_row(held: HeldRuns, db: Database) -> None:
+    set_status(db, 1, RunStatus.PAUSED)
+    turn(held, db)
+    assert stored(db) == (1, held.sessions[1].last_tick, Waiting.GUIDANCE)
+
+
+def test_a_stopped_run_has_its_row_and_waits_for_nobody(held: HeldRuns, db: Database) -> None:
+    tick = held.sessions[1].last_tick
+    set_status(db, 1, RunStatus.STOPPED)
+    turn(held, db)
+    assert not held.sessions
+    assert stored(db) == (1, tick, None)
+
+
+def test_a_life_leaves_memory_after_its_row(held: HeldRuns, db: Database) -> None:
+    assert not held.lives.guided(), "it has not reported that it waits"
+    turn(held, db)
+    assert held.lives.guided() == {1}
+    assert stored(db) == (1, held.sessions[1].last_tick, Waiting.GUIDANCE)
+    answers.answer(db, last_question(db), "either", "somebody", "human")
+    ask(held.sessions[1])
+    tick = held.sessions[1].last_tick
+    assert not held.lives.guided()
+    held.rest(1)
+    assert not held.sessions
+    assert stored(db) == (2, tick, Waiting.GUIDANCE)
+
+
+def test_a_run_that_ends_when_its_policy_is_optimal_is_measured_at_once(
+    db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("parenting.server.pressure.PUT_OFF_SECONDS", 1e9)
+    life = begin(db, Pressure(waiting=True), finish="optimal")
+    answers.answer(db, ask(life), "either", "somebody", "human")
+    ask(life)
+    found = rows(db)
+    assert found["metric"] == 2, "one for the tick of each question"
+    assert (found["reason"], found["board_snapshot"]) == (0, 0)
+
+
+def test_a_tick_without_an_answer_has_its_row(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("parenting.server.pressure.PUT_OFF_SECONDS", 1e9)
+    pressure = Pressure()
+    life = begin(db, pressure)
+    ask(life)
+    life.report_waiting(watch(db, [1])[1])
+    known, pressure.waiting = rows(db)["metric"], True
+    add_operator_event(db, 1, "end_episode", {})
+    life.tick(watch(db, [1])[1])
+    assert rows(db)["metric"] == known
+    life.report_waiting(watch(db, [1])[1])
+    assert stored(db)[:2] == (known + 1, life.last_tick)
 
 
 class Clock:

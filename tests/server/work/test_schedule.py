@@ -62,6 +62,8 @@ def test_it_is_known_whether_people_wait_for_other_turns(now: list[float]) -> No
     assert not schedule.people_wait()
     schedule.begin(script)
     assert not schedule.people_wait()
+    schedule.due()
+    assert not schedule.people_wait(), "their turns go on"
 
 
 def test_people_do_not_keep_a_script_from_its_turns(now: list[float]) -> None:
