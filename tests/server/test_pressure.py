@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import pytest
 from sqlalchemy import func, select
@@ -46,7 +47,7 @@ def test_it_is_put_off_for_a_bounded_time(now: list[float]) -> None:
 
 
 def begin(db: Database, pressure: Pressure, finish: str | None = None) -> RunSession:
-    config = {"p_guid": 0.9}
+    config: dict[str, Any] = {"p_guid": 0.9}
     run = start(db, NewRun(world="unsafe-exploration", parent="human", seed=3, config=config, finish=finish))
     (mine,) = claim(db, "test")
     return RunSession(db, mine, run, lambda: None, pressure)
