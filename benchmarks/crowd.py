@@ -256,6 +256,8 @@ def main() -> None:
     parser.add_argument("--people", type=int, default=Size().people, help="in part people [default: 50]")
     parser.add_argument("--quick", action="store_true", help="shorter, and fewer runs that wait")
     said = parser.parse_args()
+    if said.people < 1:
+        parser.error(f"--people: {said.people} is less than 1.")
     unknown = set(said.parts) - set(PARTS)
     if unknown:
         parser.error(f"There is no part {min(unknown)!r}. There are {', '.join(PARTS)}.")

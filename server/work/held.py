@@ -183,16 +183,17 @@ class HeldRuns:
 
     def save(self, working: Collection[int], end: float) -> None:
         """Save every run whose turn is not just going on, until the time is over; then what was put off."""
-        mine = [run_id for run_id, one in self.sessions.items() if run_id not in working and one.whole]
-        for run_id in mine:
+        here = list(self.sessions.items())  # a turn that goes on may drop its own meanwhile
+        mine = {run_id: one for run_id, one in here if run_id not in working and one.whole}
+        for run_id, session in mine.items():
             if time.monotonic() > end:
                 log.warning("not all runs could be saved in time; they go on from their checkpoints")
                 return
-            if self.sessions[run_id].unsaved:
-                self._unless_lost(run_id, self.sessions[run_id].save)
-        for run_id in mine:
+            if session.unsaved:
+                self._unless_lost(run_id, session.save)
+        for run_id, session in mine.items():
             if run_id in self.sessions and time.monotonic() <= end:
-                self._unless_lost(run_id, self.sessions[run_id].catch_up)
+                self._unless_lost(run_id, session.catch_up)
 
     def _unless_lost(self, run_id: int, act: Callable[[], None]) -> None:
         try:

@@ -97,7 +97,7 @@ QUEUE = [
     Mutant(
         "what was put off is lost with the worker",
         "server/work/held.py",
-        "self._unless_lost(run_id, self.sessions[run_id].catch_up)",
+        "self._unless_lost(run_id, session.catch_up)",
         "pass",
         "tests/server/test_pressure.py::test_a_worker_that_ends_does_what_it_has_put_off",
     ),
