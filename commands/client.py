@@ -76,7 +76,7 @@ class Client:
         except httpx2.TransportError as error:
             raise self.away(error) from error
 
-    def away(self, error: httpx2.TransportError) -> UnavailableError:
+    def away(self, error: Exception) -> UnavailableError:
         """Return the error for a request that nobody answered."""
         return UnavailableError(f"No server answers at {self.url} ({_reason(error)}).")
 
@@ -123,5 +123,5 @@ def credentials() -> Credentials:
 _EXAMPLE = "Write it as http://localhost:8765; `parenting up` says which it is."
 
 
-def _reason(error: httpx2.TransportError) -> str:
+def _reason(error: Exception) -> str:
     return str(error) or type(error).__name__

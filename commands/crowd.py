@@ -11,20 +11,18 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from ssl import SSLContext
 from typing import TYPE_CHECKING, Any, Literal
 
-import httpx2
-
-from parenting.commands.client import SECONDS, Client, RefusedError, UnavailableError
+from parenting.commands.client import Client, RefusedError, UnavailableError
 from parenting.commands.crowd_figures import Figures
+from parenting.commands.crowd_person import WAIT, Person, trust
 from parenting.commands.errors import UsageError
 
 if TYPE_CHECKING:
     from parenting.commands.judge import Judge
 
 Thinking = Literal["exponential", "fixed"]
-WAIT = 5.0
-"""Seconds for which a request for a question lies at the server."""
 PAUSE = 0.2
 """Seconds before a request that was not served is sent again."""
 SHOW_SECONDS = 2.0
@@ -65,6 +63,7 @@ class Crowd:
     figures: Figures = field(default_factory=Figures)
     began: float = 0.0
     why: str = ""
+    _tls: SSLContext | None = None
     _done: asyncio.Event = field(default_factory=asyncio.Event)
     _answered_at: float = 0.0
     _here: Counter[str] = field(default_factory=Counter)
@@ -76,6 +75,7 @@ class Crowd:
             UsageError: the server refuses a request for good.
         """
         self.began = self._answered_at = time.monotonic()
+        self._tls = trust(self.client)
         loop = asyncio.get_running_loop()
         with suppress(ValueError, RuntimeError):  # in another thread than the main one there is no Ctrl-C
             loop.add_signal_handler(signal.SIGINT, self.end, "Stopped.")
@@ -125,11 +125,9 @@ class Crowd:
     async def _live(self, at: int) -> None:
         """Live one person's life: lease, think, answer, and go to another run where one's own is over."""
         name = f"crowd-{secrets.token_urlsafe(8)}"
-        cookies = {"parenting_client": name}
         draws = random.Random(at)
         home: Home | None = self.homes[at % len(self.homes)]
-        async with _connection(self.client, cookies) as http:
-            person = Person(self.client, http, name)
+        async with Person(self.client, name, self._tls) as person:
             while home is not None:
                 home.people += 1
                 self._here[home.public_id] += 1
@@ -201,37 +199,6 @@ class Crowd:
         if not home.over and run["waiting"] == "stuck" and self.plan.end_episodes:
             await person.post(f"runs/{home.public_id}/end-episode")
             self.figures.episodes += 1
-
-
-class Person:
-    """One person's connection to the server."""
-
-    def __init__(self, client: Client, http: httpx2.AsyncClient, name: str) -> None:
-        self.client, self.http, self.name = client, http, name
-
-    def said(self, **body: Any) -> dict[str, Any]:
-        """Return a body in this person's name."""
-        return {"client_id": self.name, **body}
-
-    async def get(self, path: str) -> Any:
-        """Return the reply to a GET; raises as `Client.get`."""
-        return await self._send("GET", path, None)
-
-    async def post(self, path: str, body: dict[str, Any] | None = None) -> Any:
-        """Return the reply to a POST; raises as `Client.post`."""
-        return await self._send("POST", path, body)
-
-    async def _send(self, method: str, path: str, body: Any) -> Any:
-        try:
-            reply = await self.http.request(method, f"{self.client.url}/api/v1/{path}", json=body)
-        except httpx2.TransportError as error:
-            raise self.client.away(error) from None
-        return self.client.read(reply)
-
-
-def _connection(client: Client, cookies: dict[str, str]) -> httpx2.AsyncClient:
-    auth = client.http.auth
-    return httpx2.AsyncClient(cookies=cookies, timeout=WAIT + SECONDS, trust_env=False, auth=auth)
 
 
 def chosen_runs(text: str) -> list[int]:

@@ -1,0 +1,99 @@
+"""One person of a crowd, with a name and a connection.
+
+A crowd sends a hundred requests a second from one process. The models of requests and redirects of httpx
+would take half of its processor time, so its connections send by httpcore, on which httpx stands. The headers
+are those that httpx would send, and httpx reads the replies.
+"""
+
+from __future__ import annotations
+
+import json
+from ssl import SSLContext
+from types import TracebackType
+from typing import Any
+
+import httpcore2
+import httpx2
+
+from parenting.commands.client import SECONDS, Client
+
+WAIT = 5.0
+"""Seconds for which a request for a question lies at the server."""
+PATIENCE = {"timeout": {"connect": SECONDS, "read": WAIT + SECONDS, "write": SECONDS, "pool": SECONDS}}
+IDLE = 5.0
+"""Seconds for which a connection stays open unused."""
+JSON = (b"Content-Type", b"application/json")
+COOKIE = "parenting_client"
+
+
+class Person:
+    """One person's connection to the server, which opens at the first request."""
+
+    def __init__(self, client: Client, name: str, tls: SSLContext | None) -> None:
+        """Prepare a connection to the server of `client`, with its credentials.
+
+        Args:
+            client: A client of the same server.
+            name: The person's name, as a browser's cookie has it.
+            tls: What is trusted, for an address with https; the people of a crowd share it.
+        """
+        self.client, self.name = client, name
+        self._request = _request(client, name)
+        self._pool = httpcore2.AsyncConnectionPool(tls, max_connections=1, keepalive_expiry=IDLE)
+
+    async def __aenter__(self) -> Person:
+        """Return this person."""
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the connection."""
+        await self._pool.aclose()
+
+    def said(self, **body: Any) -> dict[str, Any]:
+        """Return a body in this person's name."""
+        return {"client_id": self.name, **body}
+
+    async def get(self, path: str) -> Any:
+        """Return the reply to a GET; raises as `Client.get`."""
+        return await self._send("GET", path, None)
+
+    async def post(self, path: str, body: dict[str, Any] | None = None) -> Any:
+        """Return the reply to a POST; raises as `Client.post`."""
+        return await self._send("POST", path, body)
+
+    async def _send(self, method: str, path: str, body: dict[str, Any] | None) -> Any:
+        content = None if body is None else json.dumps(body).encode()
+        if method == "POST":
+            content = content or b""  # httpcore tells its length
+        headers = [*self._request.headers.raw, *([JSON] if content else [])]
+        try:
+            reply = await self._pool.request(
+                method, self._address(path), headers=headers, content=content, extensions=PATIENCE
+            )
+        except (httpcore2.TimeoutException, httpcore2.NetworkError, httpcore2.ProtocolError) as error:
+            raise self.client.away(error) from None
+        head, content = reply.headers, reply.content
+        return self.client.read(
+            httpx2.Response(reply.status, headers=head, content=content, request=self._request)
+        )
+
+    def _address(self, path: str) -> httpcore2.URL:
+        """Return where a path of the API is, without another look at what was looked at before."""
+        url = self._request.url
+        target = url.raw_path + path.encode()
+        return httpcore2.URL(scheme=url.raw_scheme, host=url.raw_host, port=url.port, target=target)
+
+
+def trust(client: Client) -> SSLContext | None:
+    """Return what a connection to an address with https trusts; None for one without."""
+    return httpx2.create_ssl_context(trust_env=False) if client.url.startswith("https:") else None
+
+
+def _request(client: Client, name: str) -> httpx2.Request:
+    """Return a request for the API as httpx makes it, credentials included."""
+    request = client.http.build_request("GET", f"{client.url}/api/v1/", cookies={COOKIE: name})
+    if client.http.auth is not None:
+        next(client.http.auth.auth_flow(request))
+    return request
