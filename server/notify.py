@@ -1,8 +1,9 @@
 """Notifications between processes: a Unix datagram after a commit wakes the process at the other end.
 
-Each process that waits binds a socket of its own in the data folder; a notification sends one byte to each
-socket. Nothing is queued: ten notifications wake a listener once. A notification is only a hint. Every
-listener polls the database as well, so a lost one costs one poll and never an answer.
+Each process that waits binds a socket of its own in the data folder; a notification sends a word to each
+socket: the number of the run that has news, or a mark where it is not one run. Ten notifications wake a
+listener once. A notification is only a hint. Every listener polls the database as well, so a lost one costs
+one poll and never an answer.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 MAX_PATH_BYTES = 100
 """The longest path of a Unix socket that we use; the operating systems allow 104 to 108 bytes."""
@@ -23,6 +25,15 @@ MAX_PATH_BYTES = 100
 
 SOCKETS = "sockets"
 """The folder of all channels in a data folder."""
+FULL = 10
+"""Notifications after which others may have been lost: Linux lets so few wait at a socket."""
+
+
+class News(NamedTuple):
+    """What notifications have told."""
+
+    runs: frozenset[int]  # that have news
+    others: bool  # something else may have, too
 
 
 class Notifier:
@@ -36,19 +47,26 @@ class Notifier:
         self._listener: socket.socket | None = None
         self._path: Path | None = None
 
-    def notify(self) -> None:
-        """Wake every listener. Never blocks and never fails; removes sockets that no process holds."""
+    def notify(self, run: int | None = None) -> None:
+        """Wake every listener, and tell it which run has news, if it is one.
+
+        Never blocks and never fails; removes sockets that no process holds.
+        """
         try:
             paths = list(self.folder.iterdir())
         except OSError:
             return  # nobody has listened yet
         for path in paths:
-            _send(path)
+            _send(path, "" if run is None else str(run))
 
-    def wake(self) -> None:
-        """Wake this process's own `wait`, from another thread. Never blocks and never fails."""
+    def wake(self, run: str = "") -> None:
+        """Wake this process's own `wait`, from another thread. Never blocks and never fails.
+
+        Args:
+            run: The number of the run that has news; anything else says that others have.
+        """
         if self._path is not None:
-            _send(self._path)
+            _send(self._path, run)
 
     def listeners(self) -> int:
         """Return the number of processes that listen, those that were stopped by a signal included."""
@@ -85,14 +103,14 @@ class Notifier:
             self._listener, self._path = _bound(path), path
         return self._listener
 
-    def drain(self) -> None:
-        """Discard every notification received so far."""
-        listener = self.listen()
-        try:
-            while listener.recv(16):
-                pass
-        except BlockingIOError:
-            return
+    def drain(self) -> News:
+        """Take every notification received so far, and return what they told."""
+        listener, words = self.listen(), list[bytes]()
+        with suppress(BlockingIOError):
+            while word := listener.recv(32):
+                words.append(word)
+        named = [int(word) for word in words if word.isdigit()]
+        return News(frozenset(named), len(named) < len(words) or len(words) >= FULL)
 
     def close(self) -> None:
         """Stop listening and remove the socket; with the last one, its folder in the temporary folder."""
@@ -129,12 +147,12 @@ def _held(path: Path) -> bool:
     return True
 
 
-def _send(path: Path) -> None:
-    """Send a byte to a socket; one that no process holds is removed."""
+def _send(path: Path, word: str) -> None:
+    """Send a word to a socket; one that no process holds is removed."""
     with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
         out.setblocking(False)
         try:
-            out.sendto(b"!", str(path))
+            out.sendto(word.encode() or b"!", str(path))
         except (ConnectionRefusedError, FileNotFoundError):
             path.unlink(missing_ok=True)
         # any other error: its buffer is full, so that it wakes anyway; or the folder cannot be written

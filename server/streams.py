@@ -1,9 +1,10 @@
 """Live streams: browsers follow runs by server-sent events, and requests for a question lie here.
 
 However many follow however many runs, one task looks at all of them with one read of the database, four times
-a second and after each notification of a worker. Who waits for a question is told at once, everything else at
-most once in 250 ms, and what is told of a run is written once for all of its streams. Where many streams are
-open, each is told less often. Streams end at once when the server stops.
+a second and after a worker's notification of a run that has streams. Who waits for a question of the run asks
+for it at once, without that look. All else is told at most once in 250 ms, and what is told of a run is written
+once for all of its streams. Where many streams are open, each is told less often. Streams end at once when the
+server stops.
 """
 
 from __future__ import annotations
@@ -248,8 +249,13 @@ class Streams:
         self._news = asyncio.Event()
 
     def _on_notification(self) -> None:
-        self.notifier.drain()
-        self._wake_watcher()
+        """Have who waits for a run's question ask for it at once; the watcher looks for everybody else."""
+        news = self.notifier.drain()
+        named = [one for one in map(self.subscriptions.get, news.runs) if one is not None]
+        for one in named:
+            one.offer()
+        if news.others or any(one.streams for one in named):
+            self._wake_watcher()
 
     def _wake_all(self) -> None:
         self._wake_watcher()

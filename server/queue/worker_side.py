@@ -203,7 +203,7 @@ def post_query(
         if number is not None:
             asked["id"] = number
         stored: int = session.execute(_POSTED, asked).scalar_one()
-        announce(session, "web")
+        announce(session, "web", mine.run_id)
         return stored
 
 

@@ -27,16 +27,23 @@ CLOSE_SECONDS = 1.0
 """Seconds that an end waits for a relay; one that cannot reach the server ends with its process."""
 
 
-def announce(session: Session, channel: Channel) -> None:
-    """Wake the processes of a channel on every machine, once this transaction commits."""
+def announce(session: Session, channel: Channel, run: int | None = None) -> None:
+    """Wake the processes of a channel on every machine, once this transaction commits.
+
+    It tells them which run has news, if it is one.
+    """
     if session.get_bind().dialect.name == "postgresql":
-        session.execute(text(f"NOTIFY parenting_{channel}"))
+        told = {"channel": f"parenting_{channel}", "word": "" if run is None else str(run)}
+        session.execute(text("SELECT pg_notify(:channel, :word)"), told)
 
 
 class Relay:
-    """A thread that calls a function after each notification of a channel, of whatever machine."""
+    """A thread that calls a function after each notification of a channel, of whatever machine.
 
-    def __init__(self, engine: Engine, channel: Channel, wake: Callable[[], None]) -> None:
+    It receives the number of the run that has news, and nothing where others may have.
+    """
+
+    def __init__(self, engine: Engine, channel: Channel, wake: Callable[[str], None]) -> None:
         self.engine, self.channel, self.wake = engine, channel, wake
         self._told = threading.Event()
         self._thread: threading.Thread | None = None
@@ -74,10 +81,10 @@ class Relay:
         try:
             driver: Any = connection.dbapi_connection
             driver.execute(f"LISTEN parenting_{self.channel}")
-            self.wake()  # what was announced before nobody heard
+            self.wake("")  # what was announced before nobody heard
             while not self._told.is_set():
                 select.select([driver, ear], [], [])
-                for _ in driver.notifies(timeout=0):
-                    self.wake()
+                for told in driver.notifies(timeout=0):
+                    self.wake(told.payload)
         finally:
             connection.close()

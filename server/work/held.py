@@ -6,6 +6,7 @@ import math
 import time
 import traceback
 from collections.abc import Callable, Collection
+from functools import partial
 
 import structlog
 
@@ -36,7 +37,7 @@ class HeldRuns:
         self,
         db: Database,
         patience: Patience,
-        asked: Callable[[], None],
+        asked: Callable[[int], None],
         told: Feeds | None = None,
         most: float = math.inf,
         most_bytes: float = math.inf,
@@ -46,7 +47,7 @@ class HeldRuns:
         Args:
             db: The database.
             patience: The state of the store.
-            asked: Called after each question.
+            asked: Called with the number of a run after each of its questions.
             told: The trackers.
             most: Lives that stay in memory, as far as the others wait.
             most_bytes: Bytes of those lives.
@@ -135,7 +136,8 @@ class HeldRuns:
 
     def _begin(self, run_id: int) -> RunSession:
         run = runs.get_run(self.db, run_id)
-        self.sessions[run_id] = RunSession(self.db, self.claims[run_id], run, self._asked, self.pressure)
+        asked = partial(self._asked, run_id)
+        self.sessions[run_id] = RunSession(self.db, self.claims[run_id], run, asked, self.pressure)
         self.sessions[run_id].told = self.tracked.begin(run)
         log.info("run taken up", run=run_id, tick=self.sessions[run_id].last_tick)
         return self.sessions[run_id]

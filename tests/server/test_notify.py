@@ -50,6 +50,35 @@ def test_silence_ends_at_the_timeout(tmp_path: Path) -> None:
     notifier.close()
 
 
+def test_listeners_are_told_which_runs_have_news(tmp_path: Path) -> None:
+    listener, sender = Notifier(tmp_path, "web"), Notifier(tmp_path, "web")
+    listener.listen()
+    assert listener.drain() == (set(), False)
+    for run in (7, 2**63 - 1, 7):
+        sender.notify(run)
+    assert listener.drain() == ({7, 2**63 - 1}, False)
+    sender.notify(7)
+    sender.notify()
+    assert listener.drain() == ({7}, True)
+    listener.wake("8")
+    assert listener.drain() == ({8}, False)
+    for word in ("", "a word of another version"):
+        listener.wake(word)
+        assert listener.drain() == (set(), True)
+    listener.close()
+
+
+def test_where_some_may_be_lost_others_may_have_news(tmp_path: Path) -> None:
+    listener, sender = Notifier(tmp_path, "web"), Notifier(tmp_path, "web")
+    listener.listen()
+    for run in range(1, 1001):
+        sender.notify(run)
+    runs, others = listener.drain()
+    assert runs < set(range(1, 1001)), "a socket keeps few of them"
+    assert others
+    listener.close()
+
+
 def test_many_notifications_wake_once(tmp_path: Path) -> None:
     notifier = Notifier(tmp_path, "worker")
     notifier.listen()

@@ -110,6 +110,43 @@ def test_who_waits_alone_takes_the_question_at_once(
     assert called == ["look", "sure"]
 
 
+@pytest.mark.only(
+    "sqlite", "PostgreSQL notifies by the commit itself, as tests/server/store/test_relay.py sees"
+)
+def test_a_notification_of_a_run_brings_its_question_without_a_look_of_the_watcher(
+    settings: Settings, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The watcher is asleep for an hour; a notification of another run wakes nobody."""
+    for name in ("AGAIN_SECONDS", "POLL_SECONDS"):
+        monkeypatch.setattr(f"parenting.server.streams.{name}", 3600)
+    streams, called = Streams(db, Notifier(settings.data, "web"), 2, Admission()), list[str]()
+
+    async def call(name: str) -> Any:
+        called.append(name)
+        return await asyncio.to_thread(lease, db, mine.run_id, "a")
+
+    async def here() -> bool:
+        return False
+
+    async def wait() -> Any:
+        streams.open()
+        waits = streams.wait_for(mine.run_id, lambda: call("look"), 60, here, lambda: call("sure"))
+        waiting = asyncio.ensure_future(waits)
+        while not streams.subscriptions or streams.subscriptions[mine.run_id].offers is None:
+            await asyncio.sleep(0.01)
+        await asyncio.to_thread(post_query, db, mine, 1, "guidance", 1, CLIPS)
+        Notifier(settings.data, "web").notify(mine.run_id + 1)
+        await asyncio.sleep(0.2)
+        assert called == ["look"]
+        Notifier(settings.data, "web").notify(mine.run_id)
+        found = await asyncio.wait_for(waiting, 60)
+        streams.end()
+        return found
+
+    assert asyncio.run(wait()).run_id == mine.run_id
+    assert called == ["look", "sure"]
+
+
 def test_followed_runs_and_asked_ones_are_looked_at_together(
     db: Database, run: Run, mine: Claim, guidance: int
 ) -> None:

@@ -21,11 +21,24 @@ SECONDS = 30
 """Longer than anything takes here."""
 
 
+class Heard(threading.Event):
+    """An event that is set once something new is heard, and what was told."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.told: list[str] = []
+
+    def hear(self, word: str) -> None:
+        """Hear a word."""
+        self.told.append(word)
+        self.set()
+
+
 @contextmanager
-def elsewhere(db: Database, channel: Channel) -> Iterator[threading.Event]:
-    """A process on another machine; the event is set once it hears something new."""
-    heard = threading.Event()
-    relay = Relay(db.engine, channel, heard.set)
+def elsewhere(db: Database, channel: Channel) -> Iterator[Heard]:
+    """A process on another machine."""
+    heard = Heard()
+    relay = Relay(db.engine, channel, heard.hear)
     relay.start()
     assert heard.wait(SECONDS), "it listens"
     heard.clear()
@@ -50,6 +63,7 @@ def test_events_are_heard_by_workers_and_questions_by_the_web(db: Database, mine
         assert not web.is_set()
         post_query(db, mine, 7, "preference", 1, CLIPS)
         assert web.wait(SECONDS)
+        assert web.told == ["", str(mine.run_id)], "it listens, and this run has news"
 
 
 @pytest.mark.only("postgresql", "SQLite has one machine")
@@ -79,7 +93,7 @@ def test_a_connection_that_was_lost_is_made_again(
 
 @pytest.mark.only("sqlite", "PostgreSQL is heard, see above")
 def test_sqlite_has_nobody_else_to_tell(db: Database, guidance: int, tmp_path: Path) -> None:
-    relay = Relay(db.engine, "worker", lambda: pytest.fail("it was called"))
+    relay = Relay(db.engine, "worker", lambda run: pytest.fail("it was called"))
     relay.start()
     answer(db, guidance, "left", "a", "human")
     relay.close()
