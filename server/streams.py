@@ -1,9 +1,9 @@
 """Live streams: browsers follow runs by server-sent events, and requests for a question lie here.
 
 However many follow however many runs, one task looks at all of them with one read of the database, four times
-a second and after a worker's notification of a run that has streams. Who waits for a question of the run asks
-for it at once, without that look. All else is told at most once in 250 ms, and what is told of a run is written
-once for all of its streams. Where many streams are open, each is told less often. Streams end at once when the
+a second and after a notification of a run that has streams. Who waits for a question of the run asks for it
+at once, without that look. All else is told at most once in 250 ms, and what is told of a run is written once
+for all of its streams. Where many streams are open, each is told less often. Streams end at once when the
 server stops.
 """
 

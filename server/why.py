@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jaxtyping import Float, UInt8
-from sqlalchemy import BindParameter, bindparam, insert, select
+from sqlalchemy import select
+from sqlalchemy.dialects import postgresql, sqlite
 from torch import Tensor
 
 from parenting.agent import familiarity
@@ -37,11 +38,11 @@ TICKS = (1, 10, 100)
 
 
 _REASON, _EFFECT = (Table.metadata.tables[one.__tablename__] for one in (Reason, Effect))
-_RUN: BindParameter[int] = bindparam("run")
-_TICKS: BindParameter[int] = bindparam("ticks", expanding=True)
-_KNOWN = select(_REASON.c.tick).where(_REASON.c.run_id == _RUN, _REASON.c.tick.in_(_TICKS))
-_MEASURED = select(_EFFECT.c.tick, _EFFECT.c.ticks)
-_MEASURED = _MEASURED.where(_EFFECT.c.run_id == _RUN, _EFFECT.c.tick.in_(_TICKS))
+_NEW = {
+    name: tuple(dialect.insert(table).on_conflict_do_nothing() for table in (_REASON, _EFFECT))
+    for name, dialect in (("sqlite", sqlite), ("postgresql", postgresql))
+}
+"""New reasons and effects; a row that is there stays."""
 WRITE_SECONDS = 0.5
 """Rows wait so long for others, and for the question that may follow at once."""
 
@@ -110,22 +111,14 @@ class Why:
         with self._db.write(durable=False) as session:
             held_status(session, self._mine)
             run_id = self._mine.run_id
-            asked, heard = list(self._reasons), [tick for tick, _ in self._effects]
-            known = set(session.scalars(_KNOWN, {"run": run_id, "ticks": asked}))
-            measured = set(map(tuple, session.execute(_MEASURED, {"run": run_id, "ticks": heard})))
-            reasons = [
-                {"run_id": run_id, "tick": tick, "why": why}
-                for tick, why in self._reasons.items()
-                if tick not in known
-            ]
+            reasons = [{"run_id": run_id, "tick": tick, "why": why} for tick, why in self._reasons.items()]
             effects = [
                 {"run_id": run_id, "tick": tick, "ticks": ticks, "policy": policy}
                 for (tick, ticks), policy in self._effects.items()
-                if (tick, ticks) not in measured
             ]
-            for table, rows in ((_REASON, reasons), (_EFFECT, effects)):
+            for new, rows in zip(_NEW[session.get_bind().dialect.name], (reasons, effects), strict=True):
                 if rows:
-                    session.execute(insert(table), rows)
+                    session.execute(new, rows)
         self._reasons, self._effects = {}, {}
 
     def _guidance(self, saved: Snapshot) -> dict[str, Any]:

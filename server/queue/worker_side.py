@@ -69,6 +69,12 @@ class Watch:
         return self.person and bool(self.answers or self.corrections or not asked)
 
     @property
+    def at_leisure(self) -> bool:
+        """Return whether a person has guidance to give and the agent nothing to hear: only rows are due."""
+        news = self.answers or self.corrections or self.events
+        return self.person and self.status is RunStatus.ACTIVE and bool(self.open_guidance and not news)
+
+    @property
     def goal_reached(self) -> bool:
         """Return whether the goal of answers is reached; the worker then looks before each tick."""
         return self.goal is not None and self.answered >= self.goal
@@ -136,7 +142,12 @@ def watch(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
 def look(db: Database, run_ids: Sequence[int]) -> dict[int, Watch]:
     """Return the state of some runs as it is now, by id."""
     with db.read() as session:
-        rows = session.execute(_WATCH, {"run_ids": run_ids}).all()
+        return look_in(session, run_ids)
+
+
+def look_in(session: Session, run_ids: Sequence[int]) -> dict[int, Watch]:
+    """Return the state of some runs, by id, in an open transaction."""
+    rows = session.execute(_WATCH, {"run_ids": run_ids}).all()
     seen = {row.run_id: _watched(dict(row._mapping)) for row in rows}
     return {run_id: seen[run_id] for run_id in run_ids if run_id in seen}
 

@@ -12,6 +12,9 @@ NOW, AT_NEWS = 0.0, math.inf
 """When the next turn of a run is due: at once, or when something is new for it."""
 OVERDUE_SECONDS = 1.0
 """A turn that is due for so long is overdue: not all others for which a person waits go before it."""
+LEISURE_SECONDS = 5.0
+"""Seconds that a turn is due later where it only writes down what has happened (`Watch.at_leisure`). It comes
+before that where nobody waits for another one."""
 
 
 class Schedule:
@@ -42,10 +45,11 @@ class Schedule:
             self._resting.discard(run_id)
 
     def hurry(self, run_ids: Iterable[int]) -> None:
-        """Let these runs have a turn at once."""
+        """Let these runs have a turn at once, like others that have something to do."""
         for run_id in run_ids:
             if run_id in self.seen:
                 self._set(run_id, NOW)
+                self._since[run_id] = min(self._since[run_id], time.monotonic())
 
     def due(self) -> Sequence[int]:
         """Return the runs whose turn is due: those for which a person waits, then the longest due.
@@ -124,4 +128,5 @@ class Schedule:
             self._since.pop(run_id, None)
         else:
             self._resting.discard(run_id)
-            self._at[run_id], self._since[run_id] = at, max(at, time.monotonic())
+            leisure = LEISURE_SECONDS if self.seen[run_id].at_leisure else 0.0
+            self._at[run_id], self._since[run_id] = at, max(at, time.monotonic() + leisure)

@@ -62,13 +62,13 @@ class Watching:
         own = set(self._own)
         with self.db.read() as session:
             rows = session.execute(_MARKS, {"worker": worker}).all()
-        marks: dict[int, tuple[Any, ...]] = {row[0]: tuple(row) for row in rows}
-        asked = [
-            run_id
-            for run_id in claims
-            if run_id not in marks or run_id in own or marks[run_id] != self._marks.get(run_id)
-        ]
-        found = worker_side.look(self.db, asked) if asked else {}
+            marks: dict[int, tuple[Any, ...]] = {row[0]: tuple(row) for row in rows}
+            asked = [
+                run_id
+                for run_id in claims
+                if run_id not in marks or run_id in own or marks[run_id] != self._marks.get(run_id)
+            ]
+            found = worker_side.look_in(session, asked) if asked else {}
         lost = {run_id for run_id in asked if run_id not in found}
         lost |= {run_id for run_id, seen in found.items() if _is_lost(seen, claims[run_id])}
         unknown = [Claim(run_id, worker, marks[run_id][1]) for run_id in marks.keys() - claims.keys()]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from parenting.server.queue.worker_side import Watch
 from parenting.server.statuses import RunStatus
-from parenting.server.work.schedule import AT_NEWS, NOW, Schedule
+from parenting.server.work.schedule import AT_NEWS, LEISURE_SECONDS, NOW, OVERDUE_SECONDS, Schedule
 from parenting.server.work.turns import LONG_AT_ONCE, QUICK_AT_ONCE, URGENT_AT_ONCE, Turns
 
 BUSY = range(1, 41)
@@ -80,6 +82,39 @@ def test_people_do_not_keep_a_script_from_its_turns(now: list[float]) -> None:
             given.append(run_id)
     assert 3 <= given.count(script) <= 4
     assert len(set(given)) == 39
+
+
+def test_what_is_only_written_down_keeps_nobody_waiting_for_five_seconds(now: list[float]) -> None:
+    """A run whose person has guidance to give is passed over while people wait for other runs."""
+    schedule, done = Schedule(), 99
+    schedule.news({done: watch(done, answers=0, person=True, asked=1)})
+    assert schedule.due() == [done], "nobody waits for another one"
+    assert schedule.waited() == 0.0
+    for second in range(1, 10):
+        now[0] += 1
+        schedule.news({run_id: watch(run_id, person=True) for run_id in BUSY})
+        first, second_of_all, *_ = schedule.due()
+        assert first != done
+        assert (second_of_all == done) == (second > LEISURE_SECONDS + OVERDUE_SECONDS)
+        for run_id in BUSY:
+            schedule.begin(run_id)
+            schedule.ended({run_id: AT_NEWS})
+            schedule.news({run_id: watch(run_id, answers=0, person=True, asked=1)})
+            schedule.begin(run_id)
+            schedule.ended({run_id: AT_NEWS})
+    schedule.hurry([done])
+    assert schedule.due() == [done]
+
+
+@pytest.mark.parametrize("status", [RunStatus.ACTIVE, RunStatus.PAUSED, RunStatus.STOPPED])
+@pytest.mark.parametrize("news", ["answers", "corrections", "events", None])
+def test_only_a_run_with_nothing_new_for_its_agent_is_at_leisure(status: RunStatus, news: str | None) -> None:
+    asked = replace(watch(1, answers=0, person=True, asked=1), status=status)
+    new: dict[str, Any] = {news: 1} if news else {}
+    seen = replace(asked, **new)
+    assert seen.at_leisure == (status is RunStatus.ACTIVE and news is None)
+    assert not replace(seen, person=False).at_leisure, "a script answers at once"
+    assert not replace(seen, open_guidance=0, open_preferences=1).at_leisure, "the agent may go on"
 
 
 def test_it_tells_how_long_turns_have_waited(now: list[float]) -> None:
