@@ -30,7 +30,7 @@ FULL = 10
 
 
 class News(NamedTuple):
-    """What notifications have told."""
+    """The news that notifications have told."""
 
     runs: frozenset[int]  # that have news
     others: bool  # something else may have, too
