@@ -17,7 +17,7 @@ from tests.tree import ROOT
 LISTEN = """
 import os, pathlib
 os.getpid = lambda: 1
-from parenting.server.notify import Notifier
+from parenting.server.notify import News, Notifier
 notifier = Notifier(pathlib.Path({!r}), "worker")
 notifier.listen()
 print("listening", flush=True)
@@ -53,18 +53,18 @@ def test_silence_ends_at_the_timeout(tmp_path: Path) -> None:
 def test_listeners_are_told_which_runs_have_news(tmp_path: Path) -> None:
     listener, sender = Notifier(tmp_path, "web"), Notifier(tmp_path, "web")
     listener.listen()
-    assert listener.drain() == (set(), False)
+    assert listener.drain() == News(frozenset(), others=False)
     for run in (7, 2**63 - 1, 7):
         sender.notify(run)
-    assert listener.drain() == ({7, 2**63 - 1}, False)
+    assert listener.drain() == News(frozenset({7, 2**63 - 1}), others=False)
     sender.notify(7)
     sender.notify()
-    assert listener.drain() == ({7}, True)
+    assert listener.drain() == News(frozenset({7}), others=True)
     listener.wake("8")
-    assert listener.drain() == ({8}, False)
+    assert listener.drain() == News(frozenset({8}), others=False)
     for word in ("", "a word of another version"):
         listener.wake(word)
-        assert listener.drain() == (set(), True)
+        assert listener.drain() == News(frozenset(), others=True)
     listener.close()
 
 

@@ -104,7 +104,7 @@ def test_a_question_waits_for_nothing_else_and_the_rest_comes_with_the_next_turn
 def held(db: Database, monkeypatch: pytest.MonkeyPatch) -> HeldRuns:
     """A worker's run 1, which has heard an answer and asked again while people wait for other runs."""
     monkeypatch.setattr("parenting.server.pressure.PUT_OFF_SECONDS", 1e9)
-    found = HeldRuns(db, Patience(), lambda: None)
+    found = HeldRuns(db, Patience(), lambda run: None)
     life = begin(db, found.pressure)
     found.claims[1], found.sessions[1] = life.claim, life
     found.pressed(people_wait=True)

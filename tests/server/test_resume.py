@@ -164,7 +164,7 @@ def test_a_migration_knows_the_guidance_of_episodes_that_were_ended(db: Database
 
 def end_and_let_the_worker_hear(life: RunSession) -> None:
     runs.set_status(life.db, RUN, RunStatus.STOPPED, "Stopped by the operator.")
-    held = HeldRuns(life.db, Patience(), lambda: None)
+    held = HeldRuns(life.db, Patience(), lambda run: None)
     held.claims[RUN], held.sessions[RUN] = life.claim, life
     held.turn(RUN, worker_side.watch(life.db, [RUN])[RUN])
 

@@ -191,7 +191,7 @@ def test_a_life_that_ends_before_its_first_snapshot_is_whole_completes_it_betwee
     life = begin(db, "unsafe-exploration")
     number = life.claim.run_id
     live(life, 2)
-    held = HeldRuns(db, Patience(), lambda: None)
+    held = HeldRuns(db, Patience(), lambda run: None)
     held.claims[number], held.sessions[number] = life.claim, life
     if ends == "finished":
         monkeypatch.setattr(life, "finished", lambda: True)
