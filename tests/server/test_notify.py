@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from parenting.server.notify import Notifier
+from parenting.server.notify import News, Notifier
 from tests.tree import ROOT
 
 LISTEN = """
 import os, pathlib
 os.getpid = lambda: 1
-from parenting.server.notify import News, Notifier
+from parenting.server.notify import Notifier
 notifier = Notifier(pathlib.Path({!r}), "worker")
 notifier.listen()
 print("listening", flush=True)
