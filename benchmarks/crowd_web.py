@@ -74,7 +74,7 @@ class Workers(threading.Thread):
         """Post the next question of a run."""
         self.ticks[run] += 2
         post_query(self.db, self.claims[run], self.ticks[run], "guidance", 1, CLIPS)
-        self.notifier.notify()
+        self.notifier.notify(run)
 
 
 class Crowd:

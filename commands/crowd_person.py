@@ -22,6 +22,7 @@ WAIT = 5.0
 PATIENCE = {"timeout": {"connect": SECONDS, "read": WAIT + SECONDS, "write": SECONDS, "pool": SECONDS}}
 IDLE = 5.0
 """Seconds for which a connection stays open unused."""
+AWAY = (httpcore2.TimeoutException, httpcore2.NetworkError, httpcore2.ProtocolError, httpx2.DecodingError)
 JSON = (b"Content-Type", b"application/json")
 COOKIE = "parenting_client"
 
@@ -64,7 +65,7 @@ class Person:
         return await self._send("POST", path, body)
 
     async def _send(self, method: str, path: str, body: dict[str, Any] | None) -> Any:
-        content = None if body is None else json.dumps(body).encode()
+        content = None if body is None else json.dumps(body, separators=(",", ":")).encode()
         if method == "POST":
             content = content or b""  # httpcore tells its length
         headers = [*self._request.headers.raw, *([JSON] if content else [])]
@@ -72,12 +73,14 @@ class Person:
             reply = await self._pool.request(
                 method, self._address(path), headers=headers, content=content, extensions=PATIENCE
             )
-        except (httpcore2.TimeoutException, httpcore2.NetworkError, httpcore2.ProtocolError) as error:
+            read = httpx2.Response(reply.status, headers=reply.headers, content=reply.content)
+        except AWAY as error:
             raise self.client.away(error) from None
-        head, content = reply.headers, reply.content
-        return self.client.read(
-            httpx2.Response(reply.status, headers=head, content=content, request=self._request)
-        )
+        if not read.is_success:
+            read.request = httpx2.Request(
+                method, f"{self.client.url}/api/v1/{path}"
+            )  # for what is told of it
+        return self.client.read(read)
 
     def _address(self, path: str) -> httpcore2.URL:
         """Return where a path of the API is, without another look at what was looked at before."""
@@ -88,7 +91,8 @@ class Person:
 
 def trust(client: Client) -> SSLContext | None:
     """Return what a connection to an address with https trusts; None for one without."""
-    return httpx2.create_ssl_context(trust_env=False) if client.url.startswith("https:") else None
+    secure = httpx2.URL(client.url).scheme == "https"
+    return httpx2.create_ssl_context(trust_env=False) if secure else None
 
 
 def _request(client: Client, name: str) -> httpx2.Request:

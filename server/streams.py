@@ -40,7 +40,7 @@ STREAM_SECONDS, SELDOM_SECONDS = 0.005, 1.0
 each costs the processor a fraction of a millisecond, which answers would have."""
 AGAIN_SECONDS = 5.0
 """Seconds after which who waits for a question asks again, whether anything was seen to change or not: a
-precaution only, as the watcher sees each commit."""
+precaution only, as the watcher sees each commit within a quarter of a second."""
 GONE_SECONDS = 1.0
 """Seconds between two looks at whether who waits for a question is still there."""
 

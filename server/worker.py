@@ -218,6 +218,7 @@ class Worker:
         lives = self.held.lives
         if not lives.crowded(coming):
             return
+        self.schedule.end_leisure()
         guided = lives.guided() & set(self.schedule.not_due())  # else an answer would be passed over
         for run_id in lives.too_many(guided | set(self.schedule.at_rest()), coming):
             if self.turns.may_begin(run_id, new=False, urgent=True):  # others wait for that memory

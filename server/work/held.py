@@ -22,7 +22,7 @@ from parenting.server.trackers.feed import Feeds
 from parenting.server.trackers.stored import TrackedRuns
 from parenting.server.work.lives import Lives
 from parenting.server.work.patience import Patience, back_off
-from parenting.server.work.schedule import AT_NEWS, NOW
+from parenting.server.work.schedule import AT_LEISURE, AT_NEWS, NOW
 
 log = structlog.get_logger()
 
@@ -118,7 +118,9 @@ class HeldRuns:
         until = time.monotonic() + SLICE_SECONDS
         while go_on and time.monotonic() < until and not session.finished():
             go_on = session.tick()
-        return self._finish(session) if session.finished() else NOW
+        if session.finished():
+            return self._finish(session)
+        return NOW if go_on or seen.pace is not None or not session.unmeasured else AT_LEISURE
 
     def _paused(self, run_id: int) -> float:
         """Do what was put off of a run that somebody has paused."""

@@ -8,13 +8,13 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from parenting.server.queue.worker_side import Watch
 
-NOW, AT_NEWS = 0.0, math.inf
-"""When the next turn of a run is due: at once, or when something is new for it."""
+NOW, AT_NEWS, AT_LEISURE = 0.0, math.inf, -1.0
+"""When the next turn of a run is due: at once, when something is new for it, or at once if nobody waits for
+another one, as it only writes down what has happened."""
 OVERDUE_SECONDS = 1.0
 """A turn that is due for so long is overdue: not all others for which a person waits go before it."""
 LEISURE_SECONDS = 5.0
-"""Seconds that a turn is due later where it only writes down what has happened (`Watch.at_leisure`). It comes
-before that where nobody waits for another one."""
+"""Seconds after which a turn at leisure is due like any other."""
 
 
 class Schedule:
@@ -26,6 +26,7 @@ class Schedule:
         self._given: dict[int, Watch] = {}
         self._at: dict[int, float] = {}  # of runs that do not wait for news
         self._resting: set[int] = set()
+        self._leisurely: set[int] = set()
         self._since: dict[int, float] = {}
         self._longest = 0.0
         self._urgent: set[int] = set()
@@ -35,7 +36,8 @@ class Schedule:
         for run_id, seen in found.items():
             if self.seen.get(run_id) != seen:
                 self.seen[run_id] = seen
-                self._set(run_id, NOW)
+                if run_id not in self._leisurely or not seen.at_leisure:
+                    self._set(run_id, NOW)
 
     def keep(self, run_ids: Collection[int]) -> None:
         """Forget all other runs."""
@@ -43,13 +45,17 @@ class Schedule:
             for table in (self.seen, self._at, self._since):
                 table.pop(run_id, None)
             self._resting.discard(run_id)
+            self._leisurely.discard(run_id)
 
     def hurry(self, run_ids: Iterable[int]) -> None:
-        """Let these runs have a turn at once, like others that have something to do."""
+        """Let these runs have a turn at once."""
         for run_id in run_ids:
             if run_id in self.seen:
                 self._set(run_id, NOW)
-                self._since[run_id] = min(self._since[run_id], time.monotonic())
+
+    def end_leisure(self) -> None:
+        """Have the turns at leisure due like any other: somebody waits for what they hold."""
+        self.hurry(list(self._leisurely))
 
     def due(self) -> Sequence[int]:
         """Return the runs whose turn is due: those for which a person waits, then the longest due.
@@ -71,6 +77,7 @@ class Schedule:
         self._longest = max(self._longest, self._waits(run_id, time.monotonic()))
         self._since.pop(run_id, None)
         self._urgent.discard(run_id)
+        self._leisurely.discard(run_id)
         self._given[run_id] = self.seen[run_id]
         return self.seen[run_id]
 
@@ -88,9 +95,10 @@ class Schedule:
         for run_id, due in turns.items():
             given = self._given.pop(run_id)
             if run_id in self.seen:
-                due = due if self.seen[run_id] is given else NOW
+                seen = self.seen[run_id]
+                due = due if seen is given or (due == AT_LEISURE and seen.at_leisure) else NOW
                 self._set(run_id, due)
-                at_once |= due == NOW
+                at_once |= due in (NOW, AT_LEISURE)
         return at_once
 
     def soonest(self, most: float) -> float:
@@ -100,7 +108,7 @@ class Schedule:
 
     def busy_first(self, run_ids: Collection[int]) -> Sequence[int]:
         """Return runs by the time of their next turn."""
-        return sorted(run_ids, key=lambda run_id: (self._at.get(run_id, AT_NEWS), run_id))
+        return sorted(run_ids, key=lambda run_id: (max(NOW, self._at.get(run_id, AT_NEWS)), run_id))
 
     def at_rest(self) -> Sequence[int]:
         """Return the runs that wait for news."""
@@ -122,11 +130,15 @@ class Schedule:
         return max(0.0, now - self._since.get(run_id, now))
 
     def _set(self, run_id: int, at: float) -> None:
+        self._resting.discard(run_id)
+        self._leisurely.discard(run_id)
         if at == AT_NEWS:
             self._resting.add(run_id)
             self._at.pop(run_id, None)
             self._since.pop(run_id, None)
-        else:
-            self._resting.discard(run_id)
-            leisure = LEISURE_SECONDS if self.seen[run_id].at_leisure else 0.0
-            self._at[run_id], self._since[run_id] = at, max(at, time.monotonic() + leisure)
+            return
+        now, before = time.monotonic(), self._since.get(run_id, math.inf)
+        self._at[run_id], self._since[run_id] = at, max(at, min(before, now))
+        if at == AT_LEISURE:
+            self._leisurely.add(run_id)
+            self._since[run_id] = now + LEISURE_SECONDS

@@ -81,7 +81,7 @@ def test_requests_carry_name_credentials_and_body_over_one_connection(answering:
         assert any(line.startswith(b"accept-encoding: gzip") for line in lines), "as a browser asks"
     assert b"content-length" not in asked.lower()
     head, body = told.split(b"\r\n\r\n")
-    assert body == b'{"client_id": "ann", "choice": "left"}'
+    assert body == b'{"client_id":"ann","choice":"left"}'
     assert f"content-length: {len(body)}".encode() in head.lower()
     assert b"content-type: application/json" in head.lower()
 
@@ -89,7 +89,7 @@ def test_requests_carry_name_credentials_and_body_over_one_connection(answering:
 @pytest.mark.parametrize(
     ("answering", "error", "sentence"),
     [
-        (("404 Not Found", b"nothing"), UsageError, "not a server of Parenting: it answers 404"),
+        (("404 Not Found", b"nothing"), UsageError, "it answers 404 at /under/api/v1/runs/1."),
         (("409 Conflict", b'{"error": {"message": "Too late."}}'), RefusedError, "Too late."),
         (("503 Busy", b"{}"), UnavailableError, "answers 503"),
     ],

@@ -10,7 +10,14 @@ import pytest
 
 from parenting.server.queue.worker_side import Watch
 from parenting.server.statuses import RunStatus
-from parenting.server.work.schedule import AT_NEWS, LEISURE_SECONDS, NOW, OVERDUE_SECONDS, Schedule
+from parenting.server.work.schedule import (
+    AT_LEISURE,
+    AT_NEWS,
+    LEISURE_SECONDS,
+    NOW,
+    OVERDUE_SECONDS,
+    Schedule,
+)
 from parenting.server.work.turns import LONG_AT_ONCE, QUICK_AT_ONCE, URGENT_AT_ONCE, Turns
 
 BUSY = range(1, 41)
@@ -84,26 +91,67 @@ def test_people_do_not_keep_a_script_from_its_turns(now: list[float]) -> None:
     assert len(set(given)) == 39
 
 
-def test_what_is_only_written_down_keeps_nobody_waiting_for_five_seconds(now: list[float]) -> None:
-    """A run whose person has guidance to give is passed over while people wait for other runs."""
-    schedule, done = Schedule(), 99
-    schedule.news({done: watch(done, answers=0, person=True, asked=1)})
-    assert schedule.due() == [done], "nobody waits for another one"
-    assert schedule.waited() == 0.0
-    for second in range(1, 10):
+ASKED = watch(PERSON, answers=0, person=True, asked=1)
+
+
+def at_leisure(schedule: Schedule) -> None:
+    """A person's answer is heard, the next question is out, and rows are put off."""
+    schedule.news({PERSON: watch(PERSON, person=True)})
+    schedule.begin(PERSON)
+    schedule.ended({PERSON: AT_LEISURE})
+    schedule.news({PERSON: ASKED})  # of its own question
+
+
+def turns_until(schedule: Schedule, now: list[float], seconds: int) -> list[int]:
+    """Return the seconds in which that run was the second of all, while people wait for forty others."""
+    found = []
+    for second in range(1, seconds + 1):
         now[0] += 1
-        schedule.news({run_id: watch(run_id, person=True) for run_id in BUSY})
+        schedule.news({run_id: watch(run_id, answers=second, person=True) for run_id in BUSY})
         first, second_of_all, *_ = schedule.due()
-        assert first != done
-        assert (second_of_all == done) == (second > LEISURE_SECONDS + OVERDUE_SECONDS)
-        for run_id in BUSY:
-            schedule.begin(run_id)
-            schedule.ended({run_id: AT_NEWS})
-            schedule.news({run_id: watch(run_id, answers=0, person=True, asked=1)})
-            schedule.begin(run_id)
-            schedule.ended({run_id: AT_NEWS})
-    schedule.hurry([done])
-    assert schedule.due() == [done]
+        assert first != PERSON
+        if second_of_all == PERSON:
+            found.append(second)
+    return found
+
+
+def test_what_is_only_written_down_keeps_nobody_waiting_for_six_seconds(now: list[float]) -> None:
+    schedule = Schedule()
+    at_leisure(schedule)
+    assert schedule.due() == [PERSON], "nobody waits for another one"
+    assert schedule.waited() == 0.0
+    assert min(turns_until(schedule, now, 9)) == LEISURE_SECONDS + OVERDUE_SECONDS + 1
+
+
+@pytest.mark.parametrize("end", ["news", "a turn that goes on", "somebody else", "no room"])
+def test_leisure_ends_with_what_others_wait_for(now: list[float], end: str) -> None:
+    """It is due like any other then, however often that is said again."""
+    schedule = Schedule()
+    at_leisure(schedule)
+    if end == "news":
+        schedule.news({PERSON: watch(PERSON, answers=0, asked=1)})
+    if end == "a turn that goes on":  # such as one that replays its record
+        schedule.begin(PERSON)
+        schedule.ended({PERSON: NOW})
+    for _ in range(3):
+        if end == "somebody else":
+            schedule.hurry([PERSON])
+        if end == "no room":
+            schedule.end_leisure()
+        now[0] += 0.3
+    assert schedule.waited() == pytest.approx(0.9)
+    assert min(turns_until(schedule, now, 3)) == 1
+
+
+def test_news_of_a_run_that_is_due_do_not_put_it_behind_others(now: list[float]) -> None:
+    schedule = Schedule()
+    schedule.news({1: watch(1)})
+    now[0] += 1
+    schedule.news({2: watch(2)})
+    now[0] += 1
+    schedule.news({1: watch(1, answers=2)})
+    assert schedule.due() == [1, 2]
+    assert schedule.waited() == 2
 
 
 @pytest.mark.parametrize("status", [RunStatus.ACTIVE, RunStatus.PAUSED, RunStatus.STOPPED])
