@@ -7,6 +7,7 @@ from tests.mutants.mutant import Mutant
 ANSWERS, WORKER = "tests/server/test_answers.py", "tests/server/test_worker_side.py"
 RUNS, SECURITY = "tests/server/test_runs.py", "tests/server/test_security.py"
 ENTRANCE = "tests/server/test_entrance.py"
+SCHEDULE, OFFERING = "tests/server/work/test_schedule.py", "tests/server/test_offering.py"
 
 QUEUE = [
     Mutant(
@@ -29,6 +30,20 @@ QUEUE = [
         "Worker.mark + seconds)",
         "Worker.mark)",
         f"{RUNS}::test_a_sign_of_life_keeps_every_claim_of_its_worker",
+    ),
+    Mutant(
+        "a person waits for rows of another run",
+        "server/work/schedule.py",
+        "self._since[run_id] = now + LEISURE_SECONDS",
+        "self._since[run_id] = now",
+        f"{SCHEDULE}::test_what_is_only_written_down_keeps_nobody_waiting_for_six_seconds",
+    ),
+    Mutant(
+        "a question waits for the next look of the watcher",
+        "server/streams.py",
+        "        for one in named:\n            one.offer()\n",
+        "",
+        f"{OFFERING}::test_a_notification_of_a_run_brings_its_question_without_a_look_of_the_watcher[sqlite]",
     ),
     Mutant(
         "a lease never ends",
