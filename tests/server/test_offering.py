@@ -130,7 +130,7 @@ def test_a_notification_of_a_run_brings_its_question_without_a_look_of_the_watch
 
     async def wait() -> Any:
         streams.open()
-        waits = streams.wait_for(mine.run_id, lambda: call("look"), 60, here, lambda: call("sure"))
+        waits = streams.wait_for(mine.run_id, lambda: call("look"), 10, here, lambda: call("sure"))
         waiting = asyncio.ensure_future(waits)
         while not streams.subscriptions or streams.subscriptions[mine.run_id].offers is None:
             await asyncio.sleep(0.01)
