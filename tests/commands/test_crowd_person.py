@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socketserver
+import ssl
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -100,6 +101,15 @@ def test_refusals_are_told_as_to_other_commands(
 ) -> None:
     with pytest.raises(error, match=sentence):
         sent(answering.url, "runs/1/end-episode", None)
+
+
+@pytest.mark.parametrize(("scheme", "secure"), [("http", False), ("https", True), ("HTTPS", True)])
+def test_certificates_are_checked_by_what_httpx_trusts(scheme: str, secure: bool) -> None:
+    found = trust(client_of(f"{scheme}://a-server"))
+    assert (found is not None) == secure
+    if found is not None:
+        assert found.check_hostname
+        assert found.verify_mode is ssl.CERT_REQUIRED
 
 
 @pytest.mark.parametrize("scheme", ["http", "https"])
