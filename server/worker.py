@@ -176,7 +176,8 @@ class Worker:
         self._look()
         self.jobs.begin(self.name)
         due = self.schedule.due()
-        self._make_room(len(set(due) - self.sessions.keys() - self.held.lives.asleep))
+        away, seen = set(due) - self.sessions.keys(), self.schedule.seen
+        self._make_room(sum(self.held.lives.comes(run_id, seen[run_id]) for run_id in away))
         late = bool(due) and self._begin_turns(due)
         ticked = self._end_turns()
         self._soonest = self.schedule.soonest(POLL_SECONDS)

@@ -120,7 +120,9 @@ class HeldRuns:
             go_on = session.tick()
         if session.finished():
             return self._finish(session)
-        return NOW if go_on or seen.pace is not None or not session.unmeasured else AT_LEISURE
+        replays = session.last_tick <= session.record_ends  # which changes nothing that `seen` tells
+        at_once = go_on or replays or seen.pace is not None or not session.unmeasured
+        return NOW if at_once else AT_LEISURE
 
     def _paused(self, run_id: int) -> float:
         """Do what was put off of a run that somebody has paused."""

@@ -55,6 +55,10 @@ class Lives:
         self.asleep.discard(run_id)
         return False
 
+    def comes(self, run_id: int, seen: Watch) -> bool:
+        """Return whether a run that has no life in memory needs one."""
+        return run_id not in self.asleep or not _waits(seen)
+
     def too_many(self, at_rest: Collection[int], coming: int = 0) -> Sequence[int]:
         """Return the lives that should leave memory, of those at rest, the least recently used first.
 

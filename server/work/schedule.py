@@ -97,6 +97,7 @@ class Schedule:
             if run_id in self.seen:
                 seen = self.seen[run_id]
                 due = due if seen is given or (due == AT_LEISURE and seen.at_leisure) else NOW
+                self._since.pop(run_id, None)  # it has not waited while its own turn went on
                 self._set(run_id, due)
                 at_once |= due in (NOW, AT_LEISURE)
         return at_once

@@ -22,6 +22,7 @@ from parenting.server.statuses import RunStatus, Waiting
 from parenting.server.tables import Checkpoint, Metric, Query, Reason
 from parenting.server.work.held import HeldRuns
 from parenting.server.work.patience import Patience
+from parenting.server.work.schedule import AT_LEISURE, NOW
 
 
 @pytest.fixture
@@ -116,6 +117,19 @@ def held(db: Database, monkeypatch: pytest.MonkeyPatch) -> HeldRuns:
 
 def turn(held: HeldRuns, db: Database) -> None:
     held.turn(1, watch(db, [1])[1])
+
+
+@pytest.mark.parametrize(("behind", "due"), [(-1, AT_LEISURE), (0, NOW), (9, NOW)])
+def test_a_turn_with_rows_to_write_is_at_leisure_unless_it_replays(
+    held: HeldRuns, db: Database, monkeypatch: pytest.MonkeyPatch, behind: int, due: float
+) -> None:
+    """A tick that is lived again changes nothing that tells the worker of the next one."""
+    life = held.sessions[1]
+    monkeypatch.setattr(life, "tick", lambda seen: False)
+    monkeypatch.setattr(life, "ready", lambda seen: True)
+    monkeypatch.setattr(life, "record_ends", life.last_tick + behind)
+    assert life.unmeasured
+    assert held.turn(1, watch(db, [1])[1]) == due
 
 
 def stored(db: Database) -> tuple[int, int, Waiting | None]:

@@ -165,6 +165,16 @@ def test_runs_that_cannot_leave_hold_up_no_other(
     worker._close()
 
 
+def test_a_run_that_sleeps_comes_for_an_event_though_memory_is_full(db: Database, settings: Settings) -> None:
+    runs, worker = begin(db, 2), Worker(db, few(settings, 1))
+    rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
+    rounds(worker, lambda: len(worker.sessions) == 1 and len(worker.held.lives.asleep) == 1)
+    (asleep,) = worker.held.lives.asleep
+    add_operator_event(db, asleep, "end_episode", {"kind": "end_episode"})
+    rounds(worker, lambda: not look(db, [asleep])[asleep].events)
+    worker._close()
+
+
 def test_a_life_with_an_answer_to_hear_stays(db: Database, settings: Settings) -> None:
     """It waits for its turn. Put to rest, it would hear the answer only after some other news."""
     (run,) = begin(db, 1)

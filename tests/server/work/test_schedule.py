@@ -143,6 +143,19 @@ def test_leisure_ends_with_what_others_wait_for(now: list[float], end: str) -> N
     assert min(turns_until(schedule, now, 3)) == 1
 
 
+def test_a_run_has_not_waited_while_its_own_turn_went_on(now: list[float]) -> None:
+    schedule = Schedule()
+    schedule.news({1: watch(1)})
+    schedule.begin(1)
+    now[0] += 0.1
+    schedule.news({1: watch(1, answers=0)})  # of what its turn has stored
+    now[0] += 1.4
+    assert schedule.ended({1: NOW})
+    assert schedule.waited() == 0
+    now[0] += 0.2
+    assert schedule.waited() == pytest.approx(0.2)
+
+
 def test_news_of_a_run_that_is_due_do_not_put_it_behind_others(now: list[float]) -> None:
     schedule = Schedule()
     schedule.news({1: watch(1)})
