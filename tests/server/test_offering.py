@@ -1,6 +1,8 @@
 """The offers of a run to those who wait for its next question, and the readers whom the watcher wakes."""
 
 import asyncio
+from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -81,70 +83,70 @@ def test_a_run_that_is_deleted_ends_the_wait() -> None:
     assert before.is_set()
 
 
-def test_who_waits_alone_takes_the_question_at_once(
-    settings: Settings, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """One look when they come; after the offer no look that only reads."""
-    monkeypatch.setattr("parenting.server.streams.AGAIN_SECONDS", 3600)
-    streams, called = Streams(db, Notifier(settings.data, "web"), 2, Admission()), list[str]()
+class Waiting:
+    """Somebody who waits for a question of a run while it is posted, and how it was looked for."""
 
-    async def call(name: str) -> Any:
-        called.append(name)
-        return await asyncio.to_thread(lease, db, mine.run_id, "a")
+    def __init__(self, settings: Settings, db: Database, mine: Claim) -> None:
+        self.db, self.mine, self.looked = db, mine, list[str]()
+        self.streams = Streams(db, Notifier(settings.data, "web"), 2, Admission())
 
-    async def here() -> bool:
+    async def look(self, name: str) -> Any:
+        """Look for it, in one of two ways."""
+        self.looked.append(name)
+        return await asyncio.to_thread(lease, self.db, self.mine.run_id, "a")
+
+    async def is_gone(self) -> bool:
+        """Return that somebody is still there."""
         return False
 
-    async def wait() -> Any:
+    async def wait(self, then: Callable[[], Awaitable[None]]) -> Any:
+        """Wait, post a question once the watcher has looked, do something, and return what is found."""
+        streams, run_id = self.streams, self.mine.run_id
         streams.open()
-        waits = streams.wait_for(mine.run_id, lambda: call("look"), 60, here, lambda: call("sure"))
-        waiting = asyncio.ensure_future(waits)
-        while not streams.subscriptions or streams.subscriptions[mine.run_id].offers is None:
+        ways = partial(self.look, "look"), partial(self.look, "sure")
+        waits = asyncio.ensure_future(streams.wait_for(run_id, ways[0], 10, self.is_gone, ways[1]))
+        while not streams.subscriptions or streams.subscriptions[run_id].offers is None:
             await asyncio.sleep(0.01)
-        await asyncio.to_thread(post_query, db, mine, 1, "guidance", 1, CLIPS)
-        found = await waiting
+        await asyncio.to_thread(post_query, self.db, self.mine, 1, "guidance", 1, CLIPS)
+        await then()
+        found = await waits
         streams.end()
+        assert self.looked == ["look", "sure"], (
+            "one look when they come; after the offer none that only reads"
+        )
         return found
 
-    assert asyncio.run(wait()).run_id == mine.run_id
-    assert called == ["look", "sure"]
+
+@pytest.fixture
+def somebody(settings: Settings, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch) -> Waiting:
+    monkeypatch.setattr("parenting.server.streams.AGAIN_SECONDS", 3600)
+    return Waiting(settings, db, mine)
+
+
+def test_who_waits_alone_takes_the_question_at_once(somebody: Waiting) -> None:
+    async def nothing() -> None:
+        pass
+
+    assert asyncio.run(somebody.wait(nothing)).run_id == somebody.mine.run_id
 
 
 @pytest.mark.only(
     "sqlite", "PostgreSQL notifies by the commit itself, as tests/server/store/test_relay.py sees"
 )
 def test_a_notification_of_a_run_brings_its_question_without_a_look_of_the_watcher(
-    settings: Settings, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
+    settings: Settings, somebody: Waiting, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The watcher is asleep for an hour; a notification of another run wakes nobody."""
-    for name in ("AGAIN_SECONDS", "POLL_SECONDS"):
-        monkeypatch.setattr(f"parenting.server.streams.{name}", 3600)
-    streams, called = Streams(db, Notifier(settings.data, "web"), 2, Admission()), list[str]()
+    monkeypatch.setattr("parenting.server.streams.POLL_SECONDS", 3600)
+    worker, run_id = Notifier(settings.data, "web"), somebody.mine.run_id
 
-    async def call(name: str) -> Any:
-        called.append(name)
-        return await asyncio.to_thread(lease, db, mine.run_id, "a")
-
-    async def here() -> bool:
-        return False
-
-    async def wait() -> Any:
-        streams.open()
-        waits = streams.wait_for(mine.run_id, lambda: call("look"), 10, here, lambda: call("sure"))
-        waiting = asyncio.ensure_future(waits)
-        while not streams.subscriptions or streams.subscriptions[mine.run_id].offers is None:
-            await asyncio.sleep(0.01)
-        await asyncio.to_thread(post_query, db, mine, 1, "guidance", 1, CLIPS)
-        Notifier(settings.data, "web").notify(mine.run_id + 1)
+    async def notify() -> None:
+        worker.notify(run_id + 1)
         await asyncio.sleep(0.2)
-        assert called == ["look"]
-        Notifier(settings.data, "web").notify(mine.run_id)
-        found = await asyncio.wait_for(waiting, 60)
-        streams.end()
-        return found
+        assert somebody.looked == ["look"]
+        worker.notify(run_id)
 
-    assert asyncio.run(wait()).run_id == mine.run_id
-    assert called == ["look", "sure"]
+    assert asyncio.run(somebody.wait(notify)).run_id == run_id
 
 
 def test_followed_runs_and_asked_ones_are_looked_at_together(
