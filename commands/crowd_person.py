@@ -39,7 +39,8 @@ class Person:
             tls: What is trusted, for an address with https; the people of a crowd share it.
         """
         self.client, self.name = client, name
-        self._request = _request(client, name)
+        url = f"{client.url}/api/v1/"
+        self._request = client.http.build_request("GET", url, cookies={COOKIE: name})
         self._pool = httpcore2.AsyncConnectionPool(tls, max_connections=1, keepalive_expiry=IDLE)
 
     async def __aenter__(self) -> Person:
@@ -68,7 +69,7 @@ class Person:
         content = None if body is None else json.dumps(body, separators=(",", ":")).encode()
         if method == "POST":
             content = content or b""  # httpcore tells its length
-        headers = [*self._request.headers.raw, *([JSON] if content else [])]
+        headers = [*self._known(), *([JSON] if content else [])]
         try:
             reply = await self._pool.request(
                 method, self._address(path), headers=headers, content=content, extensions=PATIENCE
@@ -82,6 +83,12 @@ class Person:
             )  # for what is told of it
         return self.client.read(read)
 
+    def _known(self) -> list[tuple[bytes, bytes]]:
+        """Return the headers of every request; a proof is good for minutes only, so each has its own."""
+        if self.client.http.auth is not None:
+            next(self.client.http.auth.auth_flow(self._request))
+        return self._request.headers.raw
+
     def _address(self, path: str) -> httpcore2.URL:
         """Return where a path of the API is, without another look at what was looked at before."""
         url = self._request.url
@@ -93,11 +100,3 @@ def trust(client: Client) -> SSLContext | None:
     """Return what a connection to an address with https trusts; None for one without."""
     secure = httpx2.URL(client.url).scheme == "https"
     return httpx2.create_ssl_context(trust_env=False) if secure else None
-
-
-def _request(client: Client, name: str) -> httpx2.Request:
-    """Return a request for the API as httpx makes it, credentials included."""
-    request = client.http.build_request("GET", f"{client.url}/api/v1/", cookies={COOKIE: name})
-    if client.http.auth is not None:
-        next(client.http.auth.auth_flow(request))
-    return request

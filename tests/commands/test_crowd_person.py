@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import socketserver
 import ssl
 import threading
@@ -17,6 +18,7 @@ from parenting.commands.client import Client, RefusedError, UnavailableError
 from parenting.commands.crowd_person import Person, trust
 from parenting.commands.errors import UsageError
 from parenting.server.access.credentials import Credentials
+from parenting.server.access.key import SECONDS, holds, make_key
 from tests.server.serving import free_port
 
 
@@ -85,6 +87,28 @@ def test_requests_carry_name_credentials_and_body_over_one_connection(answering:
     assert body == b'{"client_id":"ann","choice":"left"}'
     assert f"content-length: {len(body)}".encode() in head.lower()
     assert b"content-type: application/json" in head.lower()
+
+
+@pytest.mark.parametrize("answering", [("200 OK", b'{"a":1}')], indirect=True)
+def test_each_request_has_a_proof_of_its_own_time(
+    answering: Answering, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One proof would be too old after five minutes."""
+    key, clock = make_key(tmp_path), [1_800_000_000.0]
+    monkeypatch.setattr("parenting.server.access.key.time.time", lambda: clock[0])
+    client = Client(answering.url, httpx2.Client(trust_env=False, auth=Credentials(None, tmp_path)))
+
+    async def send() -> None:
+        async with Person(client, "ann", None) as person:
+            for _ in range(3):
+                await person.get("runs/1")
+                clock[0] += 2 * SECONDS
+
+    asyncio.run(send())
+    port = int(answering.server_address[1])
+    for number, request in enumerate(answering.heard):
+        (proof,) = re.findall(rb"(?i)authorization: bearer (\S+)", request)
+        assert holds(key, port, proof.decode(), 1_800_000_000.0 + 2 * SECONDS * number)
 
 
 @pytest.mark.parametrize(
