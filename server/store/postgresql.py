@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import URL, Connection, Engine, PoolProxiedConnection, create_engine, event
+from sqlalchemy import URL, Connection, Engine, PoolProxiedConnection, create_engine
 from sqlalchemy.orm import Session
 
 from parenting.server.errors import SetupError
+from parenting.server.store.connections import said, watch
 from parenting.server.store.sqlite import BUSY_SECONDS
 
 WRITERS = 16
@@ -54,8 +55,6 @@ def open_engine(url: URL, **options: Any) -> Engine:
         engine = create_engine(
             url,
             connect_args={**network, "options": " ".join([*limits, *named])},
-            isolation_level="READ COMMITTED",
-            pool_pre_ping=True,
             pool_size=KEPT,
             max_overflow=MORE,
             pool_timeout=BUSY_SECONDS,
@@ -66,7 +65,7 @@ def open_engine(url: URL, **options: Any) -> Engine:
             "PARENTING_DATABASE_URL: the driver of PostgreSQL is missing. "
             "Run: pip install 'parenting[postgres]'"
         ) from None
-    event.listen(engine, "begin", _begin)
+    watch(engine)
     return engine
 
 
@@ -78,7 +77,7 @@ def driven(url: URL) -> URL:
 
 def reading(engine: Engine) -> Engine:
     """Return the same engine for transactions that only read."""
-    return engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+    return engine.execution_options(reads=True)
 
 
 def begin_migration(connection: Connection) -> None:
@@ -117,20 +116,10 @@ def data_version(connection: PoolProxiedConnection) -> str:
     A commit ends a transaction that was in progress or had not begun in every earlier snapshot, so it changes
     them all. The position in the log would not do: it moves before a commit can be seen.
 
-    A worker polls ten times a second, so libpq is called as directly as psycopg allows: a third of the
-    processor time of a cursor.
-
     Raises:
         psycopg.Error: the server said no, or is gone.
     """
-    import psycopg  # an extra of its own: whoever has no PostgreSQL need not have it
-
-    driver: Any = connection.dbapi_connection
-    result = driver.pgconn.exec_(b"SELECT pg_current_snapshot()")
-    if result.status != psycopg.pq.ExecStatus.TUPLES_OK:
-        if result.error_field(psycopg.pq.DiagnosticField.SQLSTATE) is None:  # no word from the server
-            raise psycopg.OperationalError(result.error_message.decode(errors="replace"))
-        raise psycopg.errors.error_from_result(result)
+    result = said(connection.dbapi_connection, b"SELECT pg_current_snapshot()")
     snapshot: bytes = result.get_value(0, 0)
     return snapshot.decode("ascii")
 
@@ -148,8 +137,3 @@ def transaction_number(session: Session) -> int:
 def wait_for_log(session: Session) -> None:
     """Have this transaction's commit wait until the log is on the disk."""
     session.connection().exec_driver_sql("SET LOCAL synchronous_commit = on")
-
-
-def _begin(connection: Connection) -> None:
-    if connection.get_execution_options().get("synchronous") == "normal":
-        connection.exec_driver_sql("SET LOCAL synchronous_commit = off")

@@ -56,14 +56,12 @@ def db(settings: Settings, clock: Clocks) -> Iterator[Database]:
 
 
 def quickened(db: Database) -> None:
-    """Spare the machine three of four words with PostgreSQL's server: nobody else writes while it reads.
+    """Spare the machine two of three words with PostgreSQL's server: nobody else writes while it reads.
 
-    A connection is not asked whether it lives before each use, and a transaction that reads begins and ends
-    with its only statement.
+    A transaction that reads begins and ends with its only statement.
     """
     if not db.one_writer:
-        db._writing.pool._pre_ping = False
-        db._reading = db._reading.execution_options(isolation_level="AUTOCOMMIT", postgresql_readonly=False)
+        db._reading = db._reading.execution_options(isolation_level="AUTOCOMMIT")
 
 
 @pytest.mark.torture

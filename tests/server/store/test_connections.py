@@ -1,0 +1,123 @@
+"""PostgreSQL's connections: one message begins a transaction, and a kept one is asked only for a reason."""
+
+import time
+
+import pytest
+from sqlalchemy import text
+
+from parenting.server.db import Database, connect
+from parenting.server.errors import GoneError
+from parenting.server.settings import Settings
+from parenting.server.store import connections
+from parenting.server.tables import Run
+
+pytestmark = pytest.mark.only("postgresql", "connections of PostgreSQL")
+
+
+@pytest.fixture
+def sent(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return what is sent besides the statements of SQLAlchemy."""
+    found: list[str] = []
+    usual = connections.said
+
+    def said(driver: object, command: bytes) -> object:
+        found.append(command.decode())
+        return usual(driver, command)
+
+    monkeypatch.setattr(connections, "said", said)
+    return found
+
+
+def ids(db: Database) -> list[int]:
+    with db.read() as session:
+        return [session.execute(text("SELECT pg_backend_pid()")).scalar_one()]
+
+
+def end_all(db: Database) -> None:
+    """Have the server end every connection to this database but the one that says so."""
+    with db.engine.connect() as connection:
+        connection.execute(
+            text(
+                "SELECT pg_terminate_backend(pid, 5000) FROM pg_stat_activity "
+                "WHERE pid != pg_backend_pid() AND datname = current_database()"
+            )
+        )
+
+
+def test_a_transaction_begins_with_one_message(db: Database, run: Run, sent: list[str]) -> None:
+    ids(db)
+    with db.write():
+        pass
+    with db.write(durable=False):
+        pass
+    assert sent == [
+        "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY",
+        "BEGIN ISOLATION LEVEL READ COMMITTED",
+        "BEGIN ISOLATION LEVEL READ COMMITTED; SET LOCAL synchronous_commit = off",
+    ]
+
+
+def test_nothing_begins_where_each_statement_is_to_stand_alone(db: Database, sent: list[str]) -> None:
+    with db.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+        connection.execute(text("VACUUM run"))
+    assert sent == []
+    ids(db)
+    assert sent == ["BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"], "the same connection, as ever"
+
+
+def test_connection_that_was_quiet_is_asked(
+    db: Database, sent: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = ids(db)
+    monkeypatch.setattr(connections, "QUIET_SECONDS", 0.0)
+    sent.clear()
+    assert ids(db) == first
+    assert sent[0] == "SELECT 1"
+
+
+def test_connection_that_the_server_has_ended_is_not_given_out(db: Database, run: Run) -> None:
+    with db.read() as one, db.read() as other:  # so that the pool keeps two
+        for session in (one, other):
+            session.execute(text("SELECT 1"))
+    before = ids(db)
+    end_all(db)
+    assert ids(db) != before
+    with db.read() as one, db.read() as other:
+        for session in (one, other):
+            assert session.execute(text("SELECT 1")).scalar_one() == 1
+
+
+def test_connection_that_was_told_something_is_asked_and_goes_on(
+    db: Database, settings: Settings, sent: list[str]
+) -> None:
+    with db.engine.connect() as connection:
+        connection.execute(text("LISTEN news"))
+        connection.commit()
+    mine, other = ids(db), connect(settings)
+    with other.write() as session:
+        session.execute(text("NOTIFY news"))
+    time.sleep(0.1)
+    sent.clear()
+    assert ids(db) == mine
+    assert sent[0] == "SELECT 1"
+    other.close()
+
+
+def test_transaction_is_gone_with_its_connection_and_the_next_one_is_not(db: Database, run: Run) -> None:
+    def read() -> None:
+        with db.read() as session:
+            connection = session.connection()
+            end_all(db)
+            connection.execute(text("SELECT 1"))
+
+    with pytest.raises(GoneError):
+        read()
+    assert ids(db)
+
+
+def test_begin_says_what_the_server_said(db: Database) -> None:
+    with db.engine.connect() as connection:
+        driver = connection.connection.dbapi_connection
+        with pytest.raises(Exception, match="READ") as told:
+            connections.said(driver, b"BEGIN READ NOTHING")
+    assert type(told.value).__name__ == "SyntaxError"
