@@ -13,7 +13,7 @@ from sqlalchemy import URL, Connection, Engine, PoolProxiedConnection, create_en
 from sqlalchemy.orm import Session
 
 from parenting.server.errors import SetupError
-from parenting.server.store.connections import said, watch
+from parenting.server.store.postgresql_connections import said, watch
 from parenting.server.store.sqlite import BUSY_SECONDS
 
 WRITERS = 16
@@ -56,6 +56,7 @@ def open_engine(url: URL, **options: Any) -> Engine:
             url,
             connect_args={**network, "options": " ".join([*limits, *named])},
             pool_size=KEPT,
+            pool_use_lifo=True,  # what one connection has prepared, the others have not
             max_overflow=MORE,
             pool_timeout=BUSY_SECONDS,
             **options,

@@ -4,11 +4,12 @@ import time
 
 import pytest
 from sqlalchemy import text
+from sqlalchemy.exc import DBAPIError
 
 from parenting.server.db import Database, connect
 from parenting.server.errors import GoneError
 from parenting.server.settings import Settings
-from parenting.server.store import connections
+from parenting.server.store import postgresql_connections as connections
 from parenting.server.tables import Run
 
 pytestmark = pytest.mark.only("postgresql", "connections of PostgreSQL")
@@ -33,15 +34,17 @@ def ids(db: Database) -> list[int]:
         return [session.execute(text("SELECT pg_backend_pid()")).scalar_one()]
 
 
-def end_all(db: Database) -> None:
+def end_all(settings: Settings) -> None:
     """Have the server end every connection to this database but the one that says so."""
-    with db.engine.connect() as connection:
-        connection.execute(
+    other = connect(settings)
+    with other.read() as session:
+        session.execute(
             text(
                 "SELECT pg_terminate_backend(pid, 5000) FROM pg_stat_activity "
                 "WHERE pid != pg_backend_pid() AND datname = current_database()"
             )
         )
+    other.close()
 
 
 def test_a_transaction_begins_with_one_message(db: Database, run: Run, sent: list[str]) -> None:
@@ -52,6 +55,7 @@ def test_a_transaction_begins_with_one_message(db: Database, run: Run, sent: lis
         pass
     assert sent == [
         "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY",
+        "COMMIT",
         "BEGIN ISOLATION LEVEL READ COMMITTED",
         "BEGIN ISOLATION LEVEL READ COMMITTED; SET LOCAL synchronous_commit = off",
     ]
@@ -62,7 +66,9 @@ def test_nothing_begins_where_each_statement_is_to_stand_alone(db: Database, sen
         connection.execute(text("VACUUM run"))
     assert sent == []
     ids(db)
-    assert sent == ["BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"], "the same connection, as ever"
+    assert sent == ["BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY", "COMMIT"], (
+        "the same connection, as ever"
+    )
 
 
 def test_connection_that_was_quiet_is_asked(
@@ -75,12 +81,14 @@ def test_connection_that_was_quiet_is_asked(
     assert sent[0] == "SELECT 1"
 
 
-def test_connection_that_the_server_has_ended_is_not_given_out(db: Database, run: Run) -> None:
+def test_connection_that_the_server_has_ended_is_not_given_out(
+    db: Database, settings: Settings, run: Run
+) -> None:
     with db.read() as one, db.read() as other:  # so that the pool keeps two
         for session in (one, other):
             session.execute(text("SELECT 1"))
     before = ids(db)
-    end_all(db)
+    end_all(settings)
     assert ids(db) != before
     with db.read() as one, db.read() as other:
         for session in (one, other):
@@ -103,16 +111,38 @@ def test_connection_that_was_told_something_is_asked_and_goes_on(
     other.close()
 
 
-def test_transaction_is_gone_with_its_connection_and_the_next_one_is_not(db: Database, run: Run) -> None:
+def test_transaction_is_gone_with_its_connection_and_the_next_one_is_not(
+    db: Database, settings: Settings, run: Run
+) -> None:
     def read() -> None:
         with db.read() as session:
             connection = session.connection()
-            end_all(db)
+            end_all(settings)
             connection.execute(text("SELECT 1"))
 
     with pytest.raises(GoneError):
         read()
     assert ids(db)
+
+
+def test_what_was_prepared_outlives_a_transaction_that_reads(db: Database, run: Run) -> None:
+    """psycopg prepares a statement at its fifth use, and forgets all of them at a ROLLBACK."""
+
+    def prepared() -> int:
+        with db.read() as session:
+            return int(session.execute(text("SELECT count(*) FROM pg_prepared_statements")).scalar_one())
+
+    assert [prepared() for _ in range(12)][-1] > 0
+
+
+def test_failure_within_a_read_is_told_as_it_is(db: Database, run: Run) -> None:
+    def read(statement: str) -> None:
+        with db.read() as session:
+            session.execute(text(statement))
+
+    with pytest.raises(DBAPIError, match="nowhere"):
+        read("SELECT * FROM nowhere")
+    read("SELECT 1")
 
 
 def test_begin_says_what_the_server_said(db: Database) -> None:

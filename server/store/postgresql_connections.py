@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import select
 import time
+from contextlib import suppress
 from typing import Any
 
 from sqlalchemy import Connection, Engine, event
@@ -30,6 +31,7 @@ def watch(engine: Engine) -> None:
     event.listen(engine, "checkin", _left)
     event.listen(engine, "checkout", _require_alive)
     event.listen(engine, "begin", _begin)
+    event.listen(engine, "rollback", _end_reading)
 
 
 def said(driver: Any, command: bytes) -> Any:
@@ -85,3 +87,15 @@ def _begin(connection: Connection) -> None:
     mode = READING if options.get("reads") else WRITING
     hurried = "; SET LOCAL synchronous_commit = off" if options.get("synchronous") == "normal" else ""
     said(connection.connection.dbapi_connection, f"BEGIN {mode}{hurried}".encode())
+
+
+def _end_reading(connection: Connection) -> None:
+    """End a transaction that only read by COMMIT: at a ROLLBACK psycopg forgets what it has prepared."""
+    import psycopg
+
+    if connection.invalidated or not connection.get_execution_options().get("reads"):
+        return
+    driver: Any = connection.connection.dbapi_connection
+    if driver.pgconn.transaction_status == psycopg.pq.TransactionStatus.INTRANS:
+        with suppress(psycopg.Error):  # the connection is gone, as the ROLLBACK will see
+            said(driver, b"COMMIT")
