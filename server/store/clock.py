@@ -1,8 +1,9 @@
 """The clock of leases and claims: one that all processes of a database share and that nobody sets back.
 
 On SQLite that is the time since the machine was started, sleep included (CLOCK_BOOTTIME), with the machine's
-boot id; on PostgreSQL it is the server's own clock. The times that people see are those of the wall clock,
-and nothing is decided by them. So a wall clock that is an hour off, or jumps, changes nothing.
+boot id; on PostgreSQL it is the server's own clock, which a transaction is told as it begins. The times that
+people see are those of the wall clock, and nothing is decided by them. So a wall clock that is an hour off,
+or jumps, changes nothing.
 
 A lease or a claim holds from the mark at which it began to the mark at which it ends. One of another boot, or
 one that seems to begin in the future because PostgreSQL's clock was set back, is over.
@@ -27,6 +28,17 @@ LONGEST = 12
 BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 SYSCTL = ("sysctl", "-n", "kern.bootsessionuuid")
 _SERVER_TIME = text("SELECT CAST(extract(epoch FROM clock_timestamp()) AS double precision)")
+
+
+SERVER_TIME = "server time"
+"""The key of a connection's `info` under which its transaction keeps what it was told."""
+
+
+class ServerTime(NamedTuple):
+    """PostgreSQL's clock, and `since_boot` when it was heard."""
+
+    seconds: float
+    heard: float
 
 
 class Mark(NamedTuple):
@@ -55,13 +67,23 @@ def boot_mark(_session: Session | None = None) -> Mark:
     boot = _boot_id()
     if boot is None:
         return Mark("wall clock", time.time())
-    clock = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
-    return Mark(boot[-LONGEST:], time.clock_gettime(clock))
+    return Mark(boot[-LONGEST:], since_boot())
+
+
+def since_boot() -> float:
+    """Return the seconds since this machine was started, sleep included where it counts it."""
+    return time.clock_gettime(getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC))
 
 
 def server_mark(session: Session) -> Mark:
-    """Return the time of PostgreSQL's own clock."""
-    return Mark("postgresql", session.execute(_SERVER_TIME).scalar_one())
+    """Return the time of PostgreSQL's own clock: as the transaction began, and what has passed here since.
+
+    The server is asked where its word came late, or no transaction has begun.
+    """
+    told: ServerTime | None = session.connection().info.get(SERVER_TIME)
+    if told is None:
+        return Mark("postgresql", session.execute(_SERVER_TIME).scalar_one())
+    return Mark("postgresql", told.seconds + since_boot() - told.heard)
 
 
 def holds(epoch: Any, begin: Any, end: Any) -> ColumnElement[bool]:

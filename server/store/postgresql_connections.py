@@ -1,9 +1,9 @@
 """PostgreSQL's connections: how a transaction begins on one, and whether one that was kept still lives.
 
 Each word with the server costs both sides the processor. So a transaction begins by one message, which says
-all that is particular to it, and a kept connection is asked whether it lives only if there is a reason. A
-server that ends a connection says so on it, where libpq has not read it yet; a network that went silent says
-nothing, so after some seconds without use the server is asked.
+all that is particular to it and asks for the time, and a kept connection is asked whether it lives only if
+there is a reason. A server that ends a connection says so on it, where libpq has not read it yet; a network
+that went silent says nothing, so after some seconds without use the server is asked.
 """
 
 from __future__ import annotations
@@ -16,8 +16,13 @@ from typing import Any
 from sqlalchemy import Connection, Engine, event
 from sqlalchemy.exc import InvalidatePoolError
 
+from parenting.server.store.clock import SERVER_TIME, ServerTime, since_boot
+
 QUIET_SECONDS = 5.0
 """Seconds without use after which a connection is asked before it is used again."""
+PROMPT_SECONDS = 0.1
+"""What the server says of its clock counts if the reply took no longer: so it is right to so many seconds."""
+TIME = "SELECT extract(epoch FROM clock_timestamp())"
 WRITING = "ISOLATION LEVEL READ COMMITTED"
 READING = "ISOLATION LEVEL REPEATABLE READ READ ONLY"
 
@@ -81,12 +86,18 @@ def _was_told(driver: Any) -> bool:
 
 
 def _begin(connection: Connection) -> None:
+    connection.info.pop(SERVER_TIME, None)
     options = connection.get_execution_options()
     if options.get("isolation_level") == "AUTOCOMMIT":
         return
-    mode = READING if options.get("reads") else WRITING
-    hurried = "; SET LOCAL synchronous_commit = off" if options.get("synchronous") == "normal" else ""
-    said(connection.connection.dbapi_connection, f"BEGIN {mode}{hurried}".encode())
+    words = [f"BEGIN {READING if options.get('reads') else WRITING}", TIME]
+    if options.get("synchronous") == "normal":
+        words.insert(1, "SET LOCAL synchronous_commit = off")
+    sent = since_boot()
+    result = said(connection.connection.dbapi_connection, "; ".join(words).encode())
+    heard = since_boot()
+    if heard - sent < PROMPT_SECONDS:
+        connection.info[SERVER_TIME] = ServerTime(float(result.get_value(0, 0)), heard)
 
 
 def _end_reading(connection: Connection) -> None:

