@@ -9,7 +9,6 @@ that went silent says nothing, so after some seconds without use the server is a
 from __future__ import annotations
 
 import select
-import time
 from contextlib import suppress
 from typing import Any
 
@@ -58,7 +57,7 @@ def said(driver: Any, command: bytes) -> Any:
 
 
 def _left(_driver: Any, record: Any) -> None:
-    record.info["used"] = time.monotonic()
+    record.info["used"] = since_boot()
 
 
 def _require_alive(driver: Any, record: Any, _proxy: Any) -> None:
@@ -70,7 +69,7 @@ def _require_alive(driver: Any, record: Any, _proxy: Any) -> None:
     import psycopg
 
     used = record.info.get("used")
-    if used is None or (time.monotonic() - used < QUIET_SECONDS and not _was_told(driver)):
+    if used is None or (since_boot() - used < QUIET_SECONDS and not _was_told(driver)):
         return
     try:
         said(driver, b"SELECT 1")
@@ -94,14 +93,21 @@ def _begin(connection: Connection) -> None:
     if options.get("synchronous") == "normal":
         words.insert(1, "SET LOCAL synchronous_commit = off")
     sent = since_boot()
-    result = said(connection.connection.dbapi_connection, "; ".join(words).encode())
+    try:
+        result = said(connection.connection.dbapi_connection, "; ".join(words).encode())
+    except BaseException as error:
+        connection.invalidate(error)  # SQLAlchemy does so where a statement fails, but not here
+        raise
     heard = since_boot()
     if heard - sent < PROMPT_SECONDS:
         connection.info[SERVER_TIME] = ServerTime(float(result.get_value(0, 0)), heard)
 
 
 def _end_reading(connection: Connection) -> None:
-    """End a transaction that only read by COMMIT: at a ROLLBACK psycopg forgets what it has prepared."""
+    """End a transaction that only read by COMMIT: at a ROLLBACK psycopg forgets what it has prepared.
+
+    It could have done nothing that stays but SET and NOTIFY, which no reader of ours does.
+    """
     import psycopg
 
     if connection.invalidated or not connection.get_execution_options().get("reads"):

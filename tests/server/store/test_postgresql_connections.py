@@ -140,21 +140,26 @@ def server_time(session: Session) -> float:
     return float(session.execute(asked).scalar_one())
 
 
-@pytest.mark.parametrize("prompt", [connections.PROMPT_SECONDS, 0.0])
+@pytest.mark.parametrize("prompt", [60.0, 0.0])
 def test_time_of_the_server_goes_on_within_a_transaction(
     db: Database, monkeypatch: pytest.MonkeyPatch, prompt: float
 ) -> None:
     """The word that comes with BEGIN counts if it came promptly; else the server is asked."""
     monkeypatch.setattr(connections, "PROMPT_SECONDS", prompt)
     with db.read() as session:
+        assert (SERVER_TIME in session.connection().info) == (prompt > 0)
         session.execute(text("SELECT pg_sleep(0.3)"))
         before, mark, after = server_time(session), server_mark(session), server_time(session)
     assert mark.epoch == "postgresql"
     assert before - 0.1 <= mark.seconds <= after + 0.1
 
 
-def test_time_is_of_this_transaction_and_not_of_an_earlier_one(db: Database) -> None:
+def test_time_is_of_this_transaction_and_not_of_an_earlier_one(
+    db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connections, "PROMPT_SECONDS", 60.0)
     with db.read() as session:
+        assert SERVER_TIME in session.connection().info
         driver = session.connection().connection.dbapi_connection
     with db.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
         assert connection.connection.dbapi_connection is driver
@@ -162,14 +167,34 @@ def test_time_is_of_this_transaction_and_not_of_an_earlier_one(db: Database) -> 
         assert SERVER_TIME not in connection.info
 
 
-def test_failure_within_a_read_is_told_as_it_is(db: Database, run: Run) -> None:
+def test_failure_within_a_read_is_told_as_it_is(db: Database, sent: list[str]) -> None:
     def read(statement: str) -> None:
         with db.read() as session:
             session.execute(text(statement))
 
+    sent.clear()
     with pytest.raises(DBAPIError, match="nowhere"):
         read("SELECT * FROM nowhere")
+    assert "COMMIT" not in sent, "there is nothing to commit"
     read("SELECT 1")
+    assert "COMMIT" in sent
+
+
+def test_transaction_that_cannot_begin_is_gone_in_one_sentence(
+    db: Database,
+    settings: Settings,
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The server ended the connection as it was taken out of the pool."""
+    ids(db)
+    end_all(settings)
+    monkeypatch.setattr(connections, "_was_told", lambda _driver: False)
+    with pytest.raises(GoneError):
+        ids(db)
+    assert caplog.messages == []
+    assert ids(db)
 
 
 def test_begin_says_what_the_server_said(db: Database) -> None:
