@@ -22,8 +22,8 @@ from sqlalchemy import ColumnElement, and_, bindparam, or_, text
 from sqlalchemy.orm import Session
 
 SLACK = 1.0
-"""Seconds by which a mark may lie ahead: PostgreSQL's clock is corrected by fractions of a second, and processes
-may be a tenth of one behind it (`postgresql_connections.PROMPT_SECONDS`)."""
+"""Seconds by which a mark may lie ahead: PostgreSQL's clock is corrected by fractions of a second, and a
+process may be a tenth of one behind it (`postgresql_connections.PROMPT_SECONDS`)."""
 LONGEST = 12
 """Characters of a boot id that are kept: each question has one. The last group of a UUID has so many."""
 BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
