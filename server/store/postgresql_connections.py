@@ -1,9 +1,9 @@
 """PostgreSQL's connections: how a transaction begins on one, and whether one that was kept still lives.
 
-Each word with the server costs both sides the processor. So a transaction begins by one message, which says
-all that is particular to it and asks for the time, and a kept connection is asked whether it lives only if
-there is a reason. A server that ends a connection says so on it, where libpq has not read it yet; a network
-that went silent says nothing, so after some seconds without use the server is asked.
+Each message to the server and back costs both sides processor time. So a transaction begins by one message,
+which says all that is particular to it and asks for the time, and a kept connection is asked whether it lives
+only if there is a reason. A server that ends a connection says so on it, where libpq has not read it yet; a
+network that went silent says nothing, so after some seconds without use the server is asked.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from parenting.server.store.clock import SERVER_TIME, ServerTime, since_boot
 QUIET_SECONDS = 5.0
 """Seconds without use after which a connection is asked before it is used again."""
 PROMPT_SECONDS = 0.1
-"""What the server says of its clock counts if the reply took no longer: so it is right to so many seconds."""
+"""Seconds within which the server's reply must come for its clock to be right to so many."""
 TIME = "SELECT extract(epoch FROM clock_timestamp())"
 WRITING = "ISOLATION LEVEL READ COMMITTED"
 READING = "ISOLATION LEVEL REPEATABLE READ READ ONLY"
@@ -50,7 +50,7 @@ def said(driver: Any, command: bytes) -> Any:
 
     result = driver.pgconn.exec_(command)
     if result.status not in (psycopg.pq.ExecStatus.TUPLES_OK, psycopg.pq.ExecStatus.COMMAND_OK):
-        if result.error_field(psycopg.pq.DiagnosticField.SQLSTATE) is None:  # no word from the server
+        if result.error_field(psycopg.pq.DiagnosticField.SQLSTATE) is None:  # the server said nothing
             raise psycopg.OperationalError(result.error_message.decode(errors="replace"))
         raise psycopg.errors.error_from_result(result)
     return result
@@ -61,7 +61,7 @@ def _left(_driver: Any, record: Any) -> None:
 
 
 def _require_alive(driver: Any, record: Any, _proxy: Any) -> None:
-    """Have the pool connect anew where a connection is gone, and the others with it.
+    """Have the pool connect again where a connection is gone, and the others with it.
 
     Raises:
         InvalidatePoolError: it is gone.
@@ -89,12 +89,12 @@ def _begin(connection: Connection) -> None:
     options = connection.get_execution_options()
     if options.get("isolation_level") == "AUTOCOMMIT":
         return
-    words = [f"BEGIN {READING if options.get('reads') else WRITING}", TIME]
+    commands = [f"BEGIN {READING if options.get('reads') else WRITING}", TIME]
     if options.get("synchronous") == "normal":
-        words.insert(1, "SET LOCAL synchronous_commit = off")
+        commands.insert(1, "SET LOCAL synchronous_commit = off")
     sent = since_boot()
     try:
-        result = said(connection.connection.dbapi_connection, "; ".join(words).encode())
+        result = said(connection.connection.dbapi_connection, "; ".join(commands).encode())
     except BaseException as error:
         connection.invalidate(error)  # SQLAlchemy does so where a statement fails, but not here
         raise
