@@ -24,7 +24,7 @@ class Prospect(NamedTuple):
 
 
 def prospect(db: Database, worker: str, seconds: float) -> Prospect:
-    """Look at the runs and the other workers, in one statement: a waiting worker does it every two seconds.
+    """Look at the runs and the other workers, in one statement: a worker that waits asks every few seconds.
 
     A worker counts as living for `seconds` after its last sign, as long as a claim holds; so what a dead one
     raised is shared out when its claims lapse. This takes no lock.
