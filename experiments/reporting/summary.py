@@ -121,8 +121,9 @@ def _figure3(rows: Sequence[Comparison]) -> Line:
 
 def _theory(iteration: Sequence[Comparison], shifts: Sequence[Comparison]) -> Line:
     rows = _rows(iteration, lambda row: row.what.startswith("all worlds")) + _rows(shifts, lambda row: True)
+    pages = "[Sec. 4.1](docs/results/value-iteration.md) over all worlds, and [4.2](docs/results/figure4.md)"
     return Line(
-        "[Sec. 4.1](docs/results/value-iteration.md) over all worlds, and [4.2](docs/results/figure4.md): theory",
+        f"{pages}: theory",
         "holds",
         "does not hold" if any(row.agrees is False for row in rows) else "holds",
         rows,
