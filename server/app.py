@@ -52,11 +52,14 @@ from parenting.server.seats import Seats
 from parenting.server.security import SecurityMiddleware
 from parenting.server.settings import Settings
 from parenting.server.static import OthersFiles, OurFiles
+from parenting.server.store.patience import patience
 from parenting.server.streams import Streams
 from parenting.server.wrong_fields import messages
 
 LARGEST_BODY = 64 * 1024
 LARGER_BODIES = {"/api/v1/policies": POLICY_BYTES, "/policies": POLICY_BYTES + LARGEST_BODY}
+END_SECONDS = 1.0
+"""Seconds that the last write may wait for the store: a process that is told to end does so within five."""
 SMALL_BODY = 1024
 """Bytes below which a reply is sent as it is: it fits into one packet, compressed or not."""
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
@@ -172,7 +175,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     writing = asyncio.create_task(app.state.refusals.keep_writing())
     yield
     writing.cancel()
-    await run_in_threadpool(app.state.refusals.write)
+    with patience(END_SECONDS):
+        await run_in_threadpool(app.state.refusals.write)
     app.state.streams.end()
     if app.state.group_commit is not None:
         app.state.group_commit.close()

@@ -189,8 +189,8 @@ class Streams:
             try:
                 cost = await self._look()
                 await self._read()
-            except ServerError:
-                pass  # busy: the next look will tell
+            except ServerError:  # busy or gone: the next look will tell
+                cost = LONGEST_REST
             except Exception:
                 log.exception("the runs that are followed could not be looked at")
                 cost = LONGEST_REST

@@ -66,7 +66,7 @@ class Worker:
         self.told = SignalEvent()
         self.patience, self.turns = Patience(), Turns(self.notifier.wake, beside_after)
         self.jobs = Jobs(db, settings.claim_seconds, self.notifier.wake, self.turns.courtesy)
-        self.chores = Chores(db, settings.claim_seconds)
+        self.chores = Chores(db, settings.claim_seconds, self.turns.courtesy)
         self.held = HeldRuns(
             db,
             self.patience,

@@ -66,7 +66,8 @@ def open_engine(url: URL, **options: Any) -> Engine:
             "PARENTING_DATABASE_URL: the driver of PostgreSQL is missing. "
             "Run: pip install 'parenting[postgres]'"
         ) from None
-    watch(engine)
+    own = any("lock_timeout" in name for name in named)
+    watch(engine, None if own else BUSY_SECONDS)
     return engine
 
 

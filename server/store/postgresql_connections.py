@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import select
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from sqlalchemy import Connection, Engine, event
 from sqlalchemy.exc import InvalidatePoolError
 
 from parenting.server.store.clock import SERVER_TIME, ServerTime, since_boot
+from parenting.server.store.patience import remaining
 
 QUIET_SECONDS = 5.0
 """Seconds without use after which a connection is asked before it is used again."""
@@ -26,15 +28,18 @@ WRITING = "ISOLATION LEVEL READ COMMITTED"
 READING = "ISOLATION LEVEL REPEATABLE READ READ ONLY"
 
 
-def watch(engine: Engine) -> None:
+def watch(engine: Engine, lock_seconds: float | None) -> None:
     """Begin the transactions of an engine, and give out connections that live only.
+
+    A transaction waits for a lock no longer than its caller may (`server.store.patience`), if that is less
+    than `lock_seconds`, the connections' own limit; with None it is always the latter.
 
     The execution option `reads` begins those that only read, on one snapshot. With `synchronous` set to
     "normal" a commit does not wait for the disk. With AUTOCOMMIT none begins.
     """
     event.listen(engine, "checkin", _left)
     event.listen(engine, "checkout", _require_alive)
-    event.listen(engine, "begin", _begin)
+    event.listen(engine, "begin", partial(_begin, lock_seconds=lock_seconds))
     event.listen(engine, "rollback", _end_reading)
 
 
@@ -84,7 +89,7 @@ def _was_told(driver: Any) -> bool:
     return bool(poll.poll(0))
 
 
-def _begin(connection: Connection) -> None:
+def _begin(connection: Connection, lock_seconds: float | None) -> None:
     connection.info.pop(SERVER_TIME, None)
     options = connection.get_execution_options()
     if options.get("isolation_level") == "AUTOCOMMIT":
@@ -92,6 +97,8 @@ def _begin(connection: Connection) -> None:
     commands = [f"BEGIN {READING if options.get('reads') else WRITING}", TIME]
     if options.get("synchronous") == "normal":
         commands.insert(1, "SET LOCAL synchronous_commit = off")
+    if lock_seconds is not None and (left := remaining(lock_seconds)) < 0.9 * lock_seconds:
+        commands.insert(1, f"SET LOCAL lock_timeout = {max(int(1000 * left), 1)}")  # 0 would mean: no limit
     sent = since_boot()
     try:
         result = said(connection.connection.dbapi_connection, "; ".join(commands).encode())

@@ -1,7 +1,8 @@
 """Chores of a worker beside its runs: rows of deleted runs, data of people, older checkpoints.
 
-A chore is done in pieces, each a short transaction, between the rounds of the worker's loop. Several workers
-may do the same one: a piece that is gone already is passed over.
+A chore is done in pieces, each a short transaction, between the rounds of the worker's loop; only the
+deletion of a person's data has a thread of its own (`server.work.erasures`). Several workers may do the same
+one: a piece that is gone already is passed over.
 """
 
 from __future__ import annotations
@@ -11,32 +12,36 @@ import time
 
 import structlog
 
-from parenting.server import checkpoints, deletion, erasing, erasure, weights
+from parenting.server import checkpoints, deletion, erasure, weights
 from parenting.server.checkpoint_parts import LONGEST_REST, REST
 from parenting.server.db import Database
-from parenting.server.errors import LostClaimError, ServerError
+from parenting.server.work.courtesy import Courtesy
+from parenting.server.work.erasures import Erasures
 
 log = structlog.get_logger()
 
 LOOK_SECONDS = 1.0
 """Seconds between two looks for a chore, at the least."""
-AGAIN_SECONDS = 10.0
-"""Seconds after which a deletion of a person's data is tried again."""
 
 
 class Chores:
-    """The chores of a worker: one at a time."""
+    """The chores of a worker: one at a time, and the deletion of one person's data beside it."""
 
-    def __init__(self, db: Database, seconds: float) -> None:
-        """Nothing is to be done yet; `seconds` is how long a run's claim holds without a sign of life."""
+    def __init__(self, db: Database, seconds: float, courtesy: Courtesy | None = None) -> None:
+        """Nothing is to be done yet.
+
+        Args:
+            db: The database.
+            seconds: How long a run's claim holds without a sign of life.
+            courtesy: The turns of runs before which a deletion stands back.
+        """
         self.db, self.seconds = db, seconds
+        self.erasures = Erasures(db, courtesy)
         self._deleted: int | None = None
         self._thinned: int | None = None
         self._done: int | None = None
         self._kept: set[int] = set()
         self._swept = False
-        self._person: int | None = None
-        self._again = -math.inf
         self._news, self._due = True, -math.inf
 
     def news(self) -> None:
@@ -49,13 +54,11 @@ class Chores:
         if began < self._due:
             return
         if self._deleted is None and self._thinned is None:
-            self._look(began)
+            self._look()
         if self._deleted is not None:
             if deletion.piece(self.db, self._deleted):
                 log.info("run deleted", run=self._deleted)
                 self._deleted = None
-        elif self._person is not None:
-            self._erase(self._person)
         elif self._thinned is not None and not checkpoints.thin(self.db, self._thinned, self.seconds):
             self._done, self._thinned = self._thinned, None
         busy = self._deleted is not None or self._thinned is not None
@@ -63,26 +66,12 @@ class Chores:
         self._due = time.monotonic() + (rest if busy else LOOK_SECONDS if self._news else self.seconds / 2)
         self._news = False
 
-    def _erase(self, person_id: int) -> None:
-        """Delete a person's data; what does not succeed now is tried again later."""
-        self._person = None
-        try:
-            done = erasing.go_on(self.db, person_id)
-        except (LostClaimError, ServerError) as error:
-            self._again = time.monotonic() + AGAIN_SECONDS
-            log.warning("a person's data are not all deleted yet", why=error.message)
-            return
-        self._again = -math.inf if done else time.monotonic() + AGAIN_SECONDS
-        log.info("a person's data were deleted" if done else "the store's log holds a person's data still")
-
-    def _look(self, now: float) -> None:
+    def _look(self) -> None:
         self._deleted = next(iter(deletion.under_way(self.db)), None)
         if self._deleted is not None:
             return
-        waiting = erasure.under_way(self.db) if now >= self._again else ()
-        self._person = next((one.id for one in waiting), None)
-        if self._person is not None:
-            return
+        if self.erasures.may_begin() and (waiting := erasure.under_way(self.db)):
+            self.erasures.begin(waiting[0].id)
         self._thinned = checkpoints.ended_with_more(self.db, self.seconds, self._kept)
         if self._thinned is not None and self._thinned == self._done:  # its last one is damaged, so both stay
             self._kept.add(self._thinned)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 
 import httpx2
 
@@ -51,6 +52,8 @@ def chores(db: Database, mine: Claim) -> None:
         worker.news()
         worker._due = 0.0
         worker.go_on()
+        while not worker.erasures.may_begin():
+            time.sleep(0.01)
         if not erasure.under_way(db):
             return
     raise AssertionError(f"the deletion does not end; run {mine.run_id}")

@@ -11,8 +11,10 @@ from typing import Any
 import httpx2
 import pytest
 from fastapi import FastAPI
+from fastapi.testclient import TestClient
 
 from parenting.server import deletion, operator_events, runs
+from parenting.server.app import END_SECONDS, create_app
 from parenting.server.audit.acting import Actor, a_request, acting
 from parenting.server.audit.entries import COLUMNS, entries
 from parenting.server.audit.recording import record
@@ -21,7 +23,10 @@ from parenting.server.audit.table import AuditEntry, Kind
 from parenting.server.db import Database
 from parenting.server.errors import DiskFullError
 from parenting.server.public_ids import public_id
+from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
+from parenting.server.store.patience import remaining
+from parenting.server.store.sqlite import BUSY_SECONDS
 from parenting.server.tables import Run
 from tests.tree import ROOT
 
@@ -186,6 +191,17 @@ def test_it_leaves_whole_as_csv_without_formulas(client: httpx2.Client, db: Data
     head, *rows = csv.reader(io.StringIO(reply.text))
     assert tuple(head) == COLUMNS
     assert [row[3] for row in rows] == ["'=pace 0", "'=pace 1", "'=pace 2"]
+
+
+def test_a_locked_store_holds_up_the_end_for_a_second_at_most(
+    settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    allowed: list[float] = []
+    monkeypatch.setattr(Refusals, "write", lambda _self: allowed.append(remaining(BUSY_SECONDS)))
+    with TestClient(create_app(settings, db)):
+        pass
+    assert len(allowed) == 1
+    assert allowed[0] <= END_SECONDS
 
 
 def test_its_page_shows_the_newest_and_leads_to_older_ones(client: httpx2.Client, db: Database) -> None:

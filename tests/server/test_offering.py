@@ -1,6 +1,7 @@
 """The offers of a run to those who wait for its next question, and the readers whom the watcher wakes."""
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any
@@ -10,6 +11,7 @@ from sqlalchemy import event
 
 from parenting.server.admission import Admission
 from parenting.server.db import Database
+from parenting.server.errors import BusyError
 from parenting.server.new_run import NewRun, start
 from parenting.server.notify import Notifier
 from parenting.server.queue.answers import answer
@@ -19,7 +21,7 @@ from parenting.server.reads.offering import Offer
 from parenting.server.reads.watching import Look, look
 from parenting.server.runs import Claim
 from parenting.server.settings import Settings
-from parenting.server.streams import Streams
+from parenting.server.streams import LONGEST_REST, Streams
 from parenting.server.subscriptions import Subscription
 from parenting.server.tables import Run
 from tests.server.conftest import CLIPS, Clock
@@ -155,3 +157,26 @@ def test_followed_runs_and_asked_ones_are_looked_at_together(
     other = start(db, NewRun(world="unsafe-exploration")).id
     found: Look = look(db, [run.id], [other])
     assert (list(found.runs), list(found.offers)) == ([run.id], [other])
+
+
+@pytest.mark.only("sqlite", "the watcher alone")
+def test_the_watcher_rests_where_the_store_refuses(
+    settings: Settings, db: Database, mine: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lease has ended, so it has something to look at, again and again."""
+    streams, looks = Streams(db, Notifier(settings.data, "web"), 2, Admission()), list[float]()
+
+    async def refused() -> float:
+        looks.append(time.monotonic())
+        raise BusyError
+
+    async def watch() -> None:
+        streams.open()
+        with streams.joined(mine.run_id):
+            await asyncio.sleep(0.5)
+        streams.end()
+
+    monkeypatch.setattr(streams, "_look", refused)
+    monkeypatch.setattr(streams, "_ends", 0.0)
+    asyncio.run(watch())
+    assert 2 <= len(looks) <= (looks[-1] - looks[0]) / LONGEST_REST + 2

@@ -12,6 +12,7 @@ from parenting.server.errors import GoneError
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql_connections as connections
 from parenting.server.store.clock import SERVER_TIME, server_mark
+from parenting.server.store.patience import patience
 from parenting.server.tables import Run
 
 pytestmark = pytest.mark.only("postgresql", "connections of PostgreSQL")
@@ -133,6 +134,28 @@ def test_what_was_prepared_outlives_a_transaction_that_reads(db: Database, run: 
             return int(session.execute(text("SELECT count(*) FROM pg_prepared_statements")).scalar_one())
 
     assert [prepared() for _ in range(12)][-1] > 0
+
+
+def lock_ms(db: Database) -> int:
+    with db.write() as session:
+        shown = session.execute(text("SELECT setting FROM pg_settings WHERE name = 'lock_timeout'"))
+        return int(shown.scalar_one())
+
+
+def test_wait_for_a_lock_ends_with_the_patience_of_the_caller(db: Database) -> None:
+    with patience(2.0):
+        assert 0 < lock_ms(db) <= 2000
+    assert lock_ms(db) == 5000, "the same connection, for whoever may wait"
+    with patience(0.0):
+        assert lock_ms(db) == 1, "0 would mean: for ever"
+
+
+def test_limit_of_the_url_is_kept(db: Database, settings: Settings) -> None:
+    url = f"{settings.database_url}&options=-c%20lock_timeout%3D700ms"
+    other = connect(Settings(data=settings.data, database_url=url))
+    with patience(2.0):
+        assert lock_ms(other) == 700
+    other.close()
 
 
 def server_time(session: Session) -> float:
