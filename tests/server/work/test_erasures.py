@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
+import torch
 
 from parenting.server import erasing, erasure
 from parenting.server.db import Database
@@ -12,7 +13,6 @@ from parenting.server.errors import LostClaimError, ServerError
 from parenting.server.persons import pseudonyms
 from parenting.server.queue.answers import answer
 from parenting.server.runs import Claim
-from parenting.server.work import erasures
 from parenting.server.work.chores import Chores
 
 pytestmark = pytest.mark.only("sqlite", "threads of one worker")
@@ -75,7 +75,7 @@ def test_what_fails_is_tried_again_later(
 
 def test_it_takes_one_thread_of_torch(db: Database, ann: int, monkeypatch: pytest.MonkeyPatch) -> None:
     found = list[int]()
-    monkeypatch.setattr(erasures.torch, "set_num_threads", found.append)
+    monkeypatch.setattr(torch, "set_num_threads", found.append)
     chores = Chores(db, 0.0)
     chores.go_on()
     until_over(chores)
