@@ -8,10 +8,13 @@ the log says at which tick. Whoever is killed before has changed nothing.
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 
+import structlog
 import torch
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
@@ -26,9 +29,10 @@ from parenting.server.checkpoint_parts import sweep_parts
 from parenting.server.checkpoints import save_checkpoint
 from parenting.server.db import Database
 from parenting.server.erasure import ERASED
-from parenting.server.errors import LostClaimError
+from parenting.server.errors import LostClaimError, StoreError
 from parenting.server.notes import PersonErased, add_note
 from parenting.server.persons import AT_ONCE, find_person
+from parenting.server.progress import report_progress
 from parenting.server.queue.taken import Taken, standing_at
 from parenting.server.runs import CLAIM_SECONDS, Claim
 from parenting.server.session import RunSession
@@ -45,8 +49,12 @@ from parenting.server.tables import (
     Run,
 )
 
+log = structlog.get_logger()
+
 NAME = "deletion"
 """The name of whoever holds a run for so long."""
+SIGN_SECONDS = 1.0
+"""Seconds between two signs of life of a run that is held."""
 TRIES = 40
 """Times that a run is asked for which a worker, or another deletion, takes up meanwhile."""
 
@@ -88,7 +96,7 @@ def leave(db: Database, run_id: int, clients: Collection[str]) -> int:
         LostClaimError: a worker took the run up meanwhile; nothing was changed.
     """
     mine = _take_over(db, run_id)
-    try:
+    with _held(db, mine):
         life = RunSession(db, mine, runs.get_run(db, run_id), lambda: None)
         while life.last_tick < life.record_ends:
             life.tick()
@@ -100,8 +108,34 @@ def leave(db: Database, run_id: int, clients: Collection[str]) -> int:
         sweep_parts(db, mine)
         life.board.write(life.saved, last=True)
         return life.last_tick
+
+
+@contextmanager
+def _held(db: Database, mine: Claim) -> Iterator[None]:
+    """Hold a claim within the block, by signs of life from a thread of their own, and let go of it.
+
+    A worker gives one for all its runs. To relive a run, to rebuild X or to write a checkpoint may take
+    longer than a claim holds without.
+    """
+    over = threading.Event()
+    signs = threading.Thread(target=_sign, args=(db, mine, over), name="signs of a deletion", daemon=True)
+    signs.start()
+    try:
+        yield
     finally:
+        over.set()
+        signs.join()
         runs.let_go(db, [mine])
+
+
+def _sign(db: Database, mine: Claim, over: threading.Event) -> None:
+    while not over.wait(SIGN_SECONDS):
+        try:
+            report_progress(db, mine)
+        except LostClaimError:  # the next write says so
+            return
+        except StoreError as error:
+            log.warning("a deletion could not give a sign of life", why=error.message)
 
 
 def _take_over(db: Database, run_id: int) -> Claim:

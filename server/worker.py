@@ -93,6 +93,10 @@ class Worker:
         """Finish the ticks in hand, save everything and end."""
         self.told.set()
 
+    def working(self) -> bool:
+        """Return whether anything goes on in a thread for which the loop's end does not wait."""
+        return bool(self.turns.working()) or self.jobs.working() or self.chores.erasures.working()
+
     # The loop
 
     def work(self) -> None:

@@ -56,7 +56,7 @@ def main(settings: Settings) -> int:
     loop.join(STOP_SECONDS)
     if failed:
         raise failed[0]
-    if loop.is_alive() or worker.turns.working() or worker.jobs.working():
+    if loop.is_alive() or worker.working():
         sys.stderr.flush()
         os._exit(0)  # whatever goes on is lost, and done again from the last checkpoint
     worker.db.close()

@@ -36,8 +36,11 @@ class Erasures:
 
     def may_begin(self) -> bool:
         """Return whether none goes on, nor is one to be tried again later only."""
-        going_on = self._thread is not None and self._thread.is_alive()
-        return not going_on and time.monotonic() >= self._again
+        return not self.working() and time.monotonic() >= self._again
+
+    def working(self) -> bool:
+        """Return whether a deletion goes on."""
+        return self._thread is not None and self._thread.is_alive()
 
     def begin(self, person_id: int) -> None:
         """Begin to delete the data of a person who is marked."""

@@ -147,7 +147,7 @@ def test_wait_for_a_lock_ends_with_the_patience_of_the_caller(db: Database) -> N
         assert 0 < lock_ms(db) <= 2000
     assert lock_ms(db) == 5000, "the same connection, for whoever may wait"
     with patience(0.0):
-        assert lock_ms(db) == 1, "0 would mean: for ever"
+        assert lock_ms(db) == 1, "0 would mean: without a limit"
 
 
 def test_limit_of_the_url_is_kept(db: Database, settings: Settings) -> None:
