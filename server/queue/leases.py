@@ -89,7 +89,7 @@ class Wish:
         db = self.db
         if not db.one_writer:
             lock(session, self.asks["run_id"])
-        mark = db.mark(session)  # behind the lock: nobody else's lease begins later than by its slack
+        mark = db.mark(session)  # behind the lock: nobody else's lease begins more than SLACK later
         query = _first_readable(session, self.offer, {**self.asks, **mark.bound()})
         if query is not None:
             held = _columns(db, mark, self.asks["client_id"], self.seconds)

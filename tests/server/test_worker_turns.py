@@ -16,7 +16,7 @@ from parenting.server.runs import get_run
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.work.turns import HUNG_SECONDS
-from parenting.server.worker import Worker
+from parenting.server.worker import POLL_SECONDS, Worker
 from parenting.server.workers import alive
 from tests.server.conftest import Clock
 
@@ -176,3 +176,8 @@ def test_a_failure_that_cannot_be_noted_is_noted_later(
         assert get_run(db, run).status == "active"
     rounds(worker, lambda: get_run(db, run).status == "failed")
     assert get_run(db, run).reason == "The agent could not go on: no such policy"
+
+
+def test_a_poll_leaves_a_tick_its_part_of_the_tenth_of_a_second_that_is_promised() -> None:
+    """An answer whose notification was lost waits for one poll and a tick (C8)."""
+    assert POLL_SECONDS <= 0.08
