@@ -12,7 +12,7 @@ from parenting.commands.sizing import Sizing
 from parenting.server.damage import sound
 from parenting.server.db import Database
 from parenting.server.errors import StoreError
-from parenting.server.workers import Figures, living, worker_name
+from parenting.server.workers import Figures, is_here, living
 
 log = structlog.get_logger()
 
@@ -40,6 +40,6 @@ def follow_load(crew: Crew, db: Database, sizing: Sizing, told: threading.Event)
 
 def _said(crew: Crew, db: Database) -> list[Figures]:
     """Return what the workers of this crew say of themselves."""
-    mine = {worker_name(child.process.pid) for child in list(crew.children)}
-    rows = [row for row in living(db) if row.name in mine]
+    mine = [child.process.pid for child in list(crew.children)]
+    rows = [row for row in living(db) if any(is_here(row.name, pid) for pid in mine)]
     return [Figures(*(sound(row, name) for name in Figures._fields)) for row in rows]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from typing import Annotated
 
 import typer
@@ -17,7 +16,7 @@ from parenting.server.log import set_up_log
 from parenting.server.migrate import require_current
 from parenting.server.settings import Settings
 from parenting.server.store.private import make_files_private
-from parenting.server.workers import SILENT_SECONDS, alive
+from parenting.server.workers import SILENT_SECONDS, alive, is_here
 
 
 def worker(
@@ -55,7 +54,7 @@ def worker(
 def _check() -> int:
     """Return the exit code of a health check. Workers of other machines do not count."""
     with friendly_errors():
-        names = [name for name in _alive(settings()) if name.rpartition(":")[0] == socket.gethostname()]
+        names = [name for name in _alive(settings()) if is_here(name)]
     if not names:
         say(
             f"No worker of this machine has given a sign of life for {SILENT_SECONDS:g} s. "

@@ -85,6 +85,7 @@ class MovesWriter:
             session.add_all(
                 Moves(run_id=run_id, part=part, blob=zlib.compress(blob, 1)) for part, blob in rows.items()
             )
+            self._db.outlive_crash(session)  # what is forgotten below is nowhere else
         self._full, self._changed = {}, False
 
 

@@ -32,6 +32,7 @@ from parenting.server.finishes import PATTERN, never_met, usual
 from parenting.server.identity import unused_number
 from parenting.server.patterns import LINE
 from parenting.server.run_limits import require_room
+from parenting.server.store.relay import announce
 from parenting.server.tables import Run
 from parenting.server.weights import INHERITED, needed, put_in
 from parenting.server.weights import put as put_weights
@@ -157,6 +158,7 @@ def start(
         session.add(run)
         session.flush()
         fill(session, run)
+        announce(session, "worker")
         return run
 
 

@@ -24,6 +24,7 @@ from parenting.server.identity import database_id_in, unused_number
 from parenting.server.notes import AGENT_KINDS, MachineChanged, read
 from parenting.server.origins import ROLLED_BACK
 from parenting.server.public_ids import public_id
+from parenting.server.run_limits import require_room
 from parenting.server.runs import hold
 from parenting.server.statuses import QueryStatus
 from parenting.server.store.relay import announce
@@ -57,7 +58,7 @@ LEASE = ("leased", "leased_until", "leased_by", "lease_epoch", "lease_begin", "l
 LONGEST_NAME = 100
 
 
-def roll_back(db: Database, run_id: int, tick: int, name: str | None = None) -> Run:
+def roll_back(db: Database, run_id: int, tick: int, name: str | None = None, most: int | None = None) -> Run:
     """Add a run that goes on from a tick of another one.
 
     Args:
@@ -65,14 +66,18 @@ def roll_back(db: Database, run_id: int, tick: int, name: str | None = None) -> 
         run_id: The run whose record is copied.
         tick: The last tick that both have in common; 0 copies nothing but the settings.
         name: Its name; None names the original and the tick.
+        most: The number of runs that may live; None: any.
 
     Raises:
+        TooManyRunsError: as many live as may.
         NotFound: there is no such run.
         InvalidFieldsError: it has not come to this tick.
         Conflict: it is a trial of a batch.
         DamagedRowError: a row of the run cannot be read.
     """
     with db.write() as session:
+        if most is not None:
+            require_room(session, most)
         old = readable(hold(session, run_id))
         refuse_if_of_batch(old)
         if not 0 <= tick <= old.tick:

@@ -20,8 +20,10 @@ from parenting.server.db import Database
 from parenting.server.errors import Conflict, LostClaimError, NotFound
 from parenting.server.failures import fail_if_damaged, note_failure, resume_in
 from parenting.server.queue.queries import withdraw_in
+from parenting.server.run_limits import require_room
 from parenting.server.statuses import LIVING, OVER, RESUMABLE, VERBS, RunStatus
 from parenting.server.store.clock import holds, is_over
+from parenting.server.store.relay import announce
 from parenting.server.tables import Run, Table, Worker
 
 CLAIM_SECONDS = 5.0
@@ -72,18 +74,24 @@ def stored_run(db: Database, run_id: int) -> Run:
         return find(session, run_id)
 
 
-def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None = None) -> Run:
+def set_status(
+    db: Database, run_id: int, status: RunStatus, reason: str | None = None, most: int | None = None
+) -> Run:
     """Pause, resume (`active`) or stop a run, for the operator.
 
     A second call changes nothing. Stopping withdraws the open queries. A stopped or failed run goes on from
-    its last good checkpoint, its withdrawn queries are open again, and its log says so.
+    its last good checkpoint, its withdrawn queries are open again, and its log says so. `most` is the number
+    of runs that may live (None: any).
 
     Raises:
+        TooManyRunsError: it is over, and as many live as may.
         NotFound: there is no such run.
         Conflict: it is over for another reason.
         DamagedRowError: it was stopped or has failed, and its row cannot be read.
     """
     with db.write() as session:
+        if most is not None and status is RunStatus.ACTIVE and find(session, run_id).status in RESUMABLE:
+            require_room(session, most)  # before the run is locked, in the order of whoever starts one
         before = (run := hold(session, run_id)).status
         if before in RESUMABLE and status is RunStatus.ACTIVE:
             resume_in(session, db, run)
@@ -95,6 +103,7 @@ def set_status(db: Database, run_id: int, status: RunStatus, reason: str | None 
             become(session, run, status, reason)
         if before != status:
             operated(db, session, VERBS.get(status, status), run)
+            announce(session, "worker")
         return run
 
 
@@ -109,6 +118,7 @@ def set_goal(db: Database, run_id: int, goal: int | None) -> Run:
         run = living(session, run_id)
         run.goal = goal
         operated(db, session, f"goal {goal or 'none'}", run)
+        announce(session, "worker")
         return run
 
 
@@ -123,6 +133,7 @@ def set_pace(db: Database, run_id: int, pace: float | None) -> Run:
         run = living(session, run_id)
         run.pace = pace
         operated(db, session, f"pace {pace or 'none'}", run)
+        announce(session, "worker")
         return run
 
 

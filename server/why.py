@@ -119,6 +119,7 @@ class Why:
             for new, rows in zip(_NEW[session.get_bind().dialect.name], (reasons, effects), strict=True):
                 if rows:
                     session.execute(new, rows)
+            self._db.outlive_crash(session)  # what is forgotten below is nowhere else
         self._reasons, self._effects = {}, {}
 
     def _guidance(self, saved: Snapshot) -> dict[str, Any]:

@@ -40,6 +40,8 @@ log = structlog.get_logger()
 POLL_SECONDS = 0.075
 """An answer is heard within 100 ms even where its hint was lost (C8): after one poll at most, and a tick."""
 CLAIM_EVERY = 0.25
+QUIET_SECONDS = 2.5
+"""Seconds between two looks for runs where nobody commits: what a lost worker raised goes on within 5 s."""
 ROUND_SECONDS = 0.1
 """A round that has taken so long begins no third turn: somebody else may be more urgent by now."""
 CLOSE_SECONDS = 3.0
@@ -60,7 +62,7 @@ class Worker:
             beside_after: Seconds after which a turn goes on beside the others; None waits for its end.
         """
         self.db, self.settings = db, settings
-        self.name = workers.worker_name(os.getpid())
+        self.name = workers.new_name(os.getpid())
         self.notifier, self.web_notifier = Notifier(settings.data, "worker"), Notifier(settings.data, "web")
         self.relay = Relay(db.engine, "worker", self.notifier.wake)
         self.told = SignalEvent()
@@ -148,7 +150,7 @@ class Worker:
         Without a commit of anybody, nothing but time can have freed a run.
         """
         late = time.monotonic() - self._claimed_at
-        if late < (CLAIM_EVERY if self._committed else self.settings.claim_seconds / 2):
+        if late < (CLAIM_EVERY if self._committed else min(self.settings.claim_seconds / 2, QUIET_SECONDS)):
             return
         seconds = self.settings.claim_seconds
         most, free = prospect(self.db, self.name, seconds)
@@ -237,13 +239,14 @@ class Worker:
         self.watching.touched(working)
         news = self.watching.look(self.name, self.claims)
         if news is not self._found:
-            self._found, self._committed = news, True
+            self._committed = True
             self._lost.update(news.lost)
             self.jobs.news()
             self.chores.news()
+            self.schedule.news(news.found)
             if news.unknown:  # it was claimed, but nobody told: the store was gone before it could
                 runs.let_go(self.db, news.unknown)
-            self.schedule.news(news.found)
+            self._found = news  # at the end: where the store refused, all of this is done again
         for run_id in self._lost - working:  # a turn that goes on finds out itself, at its next write
             self.held.drop(run_id)
         self._lost &= working

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import socket
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
@@ -20,9 +21,19 @@ SILENT_SECONDS = 10.0
 evaluation of a large level."""
 
 
-def worker_name(pid: int) -> str:
-    """Return the name of a worker that is a process of this machine."""
-    return f"{socket.gethostname()}:{pid}"
+def new_name(pid: int) -> str:
+    """Return a name for a worker that is a process of this machine, which no other worker has.
+
+    Containers may have equal host names and process ids. Two workers of one name would take each other's
+    claims for their own that they do not know, and give them back.
+    """
+    return f"{socket.gethostname()}:{pid}:{secrets.token_hex(2)}"
+
+
+def is_here(name: str, pid: int | None = None) -> bool:
+    """Return whether a worker is a process of a machine of this name, and has this process id."""
+    host, _, rest = name.partition(":")
+    return host == socket.gethostname() and (pid is None or rest.partition(":")[0] == str(pid))
 
 
 class Figures(NamedTuple):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from fastapi import Request
 
 from parenting.agent.events import Change, EndEpisode, Event, Mature
@@ -10,7 +12,7 @@ from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import ChangeBody, GoalBody, PaceBody, RollBackBody
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import write_responses
-from parenting.server.deps import Db, notify_worker
+from parenting.server.deps import Db, SettingsOf, notify_worker, start_within_limits
 from parenting.server.operator_events import add_operator_event
 from parenting.server.reads.schemas import run_schema
 from parenting.server.rollback import roll_back
@@ -86,19 +88,20 @@ def change_run(request: Request, run_id: RunId, body: ChangeBody, db: Db) -> Run
     status_code=201,
     responses=write_responses(404, 409),
 )
-def roll_back_run(request: Request, run_id: RunId, body: RollBackBody, db: Db) -> RunSchema:
+def roll_back_run(
+    request: Request, run_id: RunId, body: RollBackBody, db: Db, settings: SettingsOf
+) -> RunSchema:
     """Start a new run from a tick of this one: its record up to that tick is copied, and this run stays.
 
     A worker lives the copied ticks again, bit for bit, and goes on from there. Questions whose answers the
     agent had not heard by then are asked again. `origin` of the new run names this one.
     """
-    new = roll_back(db, run_id, body.tick, body.name)
-    notify_worker(request)
-    return run_schema(db, new.id)
+    begin = partial(roll_back, db, run_id, body.tick, body.name, settings.runs)
+    return run_schema(db, start_within_limits(request, begin).id)
 
 
 def _become(request: Request, db: Db, run_id: int, status: RunStatus, reason: str | None = None) -> RunSchema:
-    runs.set_status(db, run_id, status, reason)
+    runs.set_status(db, run_id, status, reason, request.app.state.settings.runs)
     notify_worker(request)
     return run_schema(db, run_id)
 

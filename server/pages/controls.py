@@ -15,7 +15,7 @@ from parenting.agent.events import Change, EndEpisode, Mature, Probability
 from parenting.server import operator_events, runs
 from parenting.server.admission import admitted_router
 from parenting.server.api.names import RunId
-from parenting.server.deps import Db, notify_worker
+from parenting.server.deps import Db, SettingsOf, notify_worker
 from parenting.server.new_run import Goal, Pace
 from parenting.server.pages.dashboard import dashboard_page
 from parenting.server.pages.operator_log import PROBABILITIES, probabilities
@@ -45,12 +45,13 @@ def set_status(
     request: Request,
     run_id: RunId,
     db: Db,
+    settings: SettingsOf,
     status: Annotated[Literal["active", "paused", "stopped"], Form()],
     back: Back = "dashboard",
 ) -> Response:
     """Pause, resume or stop, then back to where the button was."""
     reason = "Stopped by the operator." if status == "stopped" else None
-    runs.set_status(db, run_id, RunStatus(status), reason)
+    runs.set_status(db, run_id, RunStatus(status), reason, settings.runs)
     return _back(request, back)
 
 

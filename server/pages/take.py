@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from fastapi import Request, Response
 from pydantic import TypeAdapter, ValidationError
 
 from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import Place
 from parenting.server.api.names import RunId
-from parenting.server.deps import Db, notify_worker
+from parenting.server.deps import Db, SettingsOf, start_within_limits
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.pages.dashboard import dashboard_page
 from parenting.server.pages.render import redirect
@@ -22,13 +24,15 @@ _TICK: TypeAdapter[int] = TypeAdapter(Place)
 
 
 @router.post("/runs/{run_id}/roll-back")
-def roll_run_back(request: Request, run_id: RunId, db: Db, form: FormFields) -> Response:
+def roll_run_back(
+    request: Request, run_id: RunId, db: Db, settings: SettingsOf, form: FormFields
+) -> Response:
     """Start a run that goes on from a tick of this one, and show it."""
     try:
-        new = roll_back(db, run_id, _TICK.validate_python(form.get("roll_back", "").strip()))
+        tick = _TICK.validate_python(form.get("roll_back", "").strip())
+        new = start_within_limits(request, partial(roll_back, db, run_id, tick, None, settings.runs))
     except ValidationError:
         return dashboard_page(db, run_id, form, {"roll_back": NO_TICK})
     except InvalidFieldsError as error:
         return dashboard_page(db, run_id, form, {"roll_back": error.fields[0][1]})
-    notify_worker(request)
     return redirect(f"/runs/{new.public_id}")

@@ -62,6 +62,7 @@ def take_correction(db: Database, mine: Claim, tick: int) -> Corrected | None:
         replaced = heard_before(session, found.answer)
         found.answer.applied_tick = tick
         session.flush()
+        db.outlive_crash(session)
         return None if replaced is None else _corrected(session, found, replaced, tick)
 
 

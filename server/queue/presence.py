@@ -69,7 +69,8 @@ def renew(
         questions: Their public ids.
         seconds: How long a lease is at most.
         idle: Seconds since the person's last sign of life.
-        attention: Seconds after a sign of life at which leases end. A lease that is held already is not cut.
+        attention: Seconds after a sign of life at which leases end. After that nothing is renewed, and what
+            is held already runs out by itself.
     """
     with db.write(durable=False) as session:
         return renew_in(session, db, run_id, client_id, questions, min(seconds, attention - idle))

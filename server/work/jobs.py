@@ -89,7 +89,8 @@ class Jobs:
         jobs.let_go(self.db, self._going_on())
 
     def _going_on(self) -> list[JobClaim]:
-        return [mine for mine, begun in self._working.items() if not begun.done()]
+        working = list(self._working.items())  # the loop may add one meanwhile
+        return [mine for mine, begun in working if not begun.done()]
 
     def _do(self, mine: JobClaim) -> None:
         """Do a job and store its result, or the reason why there is none. A refusing store leaves it open."""

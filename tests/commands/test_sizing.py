@@ -17,7 +17,7 @@ from parenting.commands.crew import Crew
 from parenting.commands.sizing import Sizing
 from parenting.commands.up import _number
 from parenting.server.db import Database
-from parenting.server.workers import Figures, sign, worker_name
+from parenting.server.workers import Figures, new_name, sign
 
 WAITING, BUSY, IDLE = (
     Figures(waited=0.3, busy=1.0),
@@ -142,8 +142,9 @@ def test_the_crew_follows_what_its_own_workers_say(db: Database, monkeypatch: py
 
     try:
         pid = crew.children[0].process.pid
-        sign(db, worker_name(pid), WAITING)
-        sign(db, worker_name(1), BUSY)
+        sign(db, new_name(pid), WAITING)
+        sign(db, new_name(1), BUSY)
+        sign(db, new_name(10 * pid), BUSY)
         sign(db, f"elsewhere:{pid}", BUSY)
         following.follow_load(crew, db, Rule(2), ended)
         assert heard == [[WAITING]]

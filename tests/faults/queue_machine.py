@@ -5,9 +5,10 @@ or lose its claim to another worker, whose answers then are the same (`queue_wor
 back and change them; the operator ends the run and lets it go on.
 
 The promises of docs/reliability.md, and what holds each: A1 and A5 the auditor, which knows every receipt,
-and the invariant, which counts; A2 `repeat`, `answer_it` and `change`; B1 `lease_one` and
-`lease_ahead_of_it`, which know who holds what until when; C1 and C2 `hear` and `hear_a_correction`, which
-live ticks again; C3 `ask`; C4 `lose_the_claim`; D5 `set_the_wall_clock`. A3, D1 and E12 need processes.
+and the invariant, which counts; A2 `repeat`, `answer_it` and `change`; B1 `lease_one`, `lease_ahead_of_it`,
+`renew_it` and `leave_the_page`, which know who holds what until when; C1 and C2 `hear` and
+`hear_a_correction`, which live ticks again; C3 `ask`; C4 `lose_the_claim`; D5 `set_the_wall_clock`. A3, D1
+and E12 need processes.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ from hypothesis.stateful import invariant, precondition, rule
 
 from parenting.server.errors import Conflict
 from parenting.server.operator_events import add_operator_event
-from parenting.server.queue.answers import Stored, answer
+from parenting.server.queue.answers import Stored, answer, get_query
 from parenting.server.queue.leases import lease, lease_ahead, release
+from parenting.server.queue.presence import ATTENTION_SECONDS, GRACE_SECONDS, Renewed, leave, renew
 from parenting.server.queue.revisions import supersede, withdraw
 from parenting.server.queue.worker_side import high_water, take_operator_events, watch
 from parenting.server.runs import set_goal, set_status
@@ -121,6 +123,32 @@ class Queue(Worked):
         told = self.asked[number].told
         assert told is not None
         assert answer(self.db, number, told.choice, self.asked[number].by, "human") == told
+
+    @precondition(lambda self: self.asked)
+    @rule(client=clients, idle=st.sampled_from((0.0, 90.0, 200.0)), data=st.data())
+    def renew_it(self, client: str, idle: float, data: st.DataObject) -> None:
+        """A page says what it shows: that is held for as long as its person is taken to look."""
+        self._count("renew")
+        number = data.draw(st.sampled_from(sorted(self.asked)))
+        one, name = self.asked[number], get_query(self.db, number).public_id
+        found = renew(self.db, self.run, client, [name], LEASE, idle)
+        if one.status != "open":
+            assert found == Renewed(closed=[name])
+        elif not one.free(client, self.now):
+            assert found == Renewed(elsewhere=[name])
+        else:
+            assert found == Renewed(yours=[name])
+            if (lasts := min(LEASE, ATTENTION_SECONDS - idle)) > 0:
+                one.holder, one.until = client, self.now + lasts
+
+    @rule(client=clients)
+    def leave_the_page(self, client: str) -> None:
+        """Its leases end within seconds, and no other's do."""
+        self._count("leave")
+        leave(self.db, self.run, client, GRACE_SECONDS)
+        for one in self.asked.values():
+            if one.status == "open" and one.holder == client and one.until > self.now:
+                one.until = min(one.until, self.now + GRACE_SECONDS)
 
     @precondition(lambda self: self.asked)
     @rule(client=clients, data=st.data())

@@ -49,6 +49,30 @@ def test_one_more_is_refused_until_one_is_over(
     refused(web.post("/api/v1/runs", json=RUN), setting)
 
 
+def test_one_that_goes_on_or_begins_from_another_counts_as_well(db: Database, settings: Settings) -> None:
+    web = client(db, settings, runs=2)
+    for _ in range(2):
+        assert web.post("/api/v1/runs", json=RUN).status_code == 201
+    refused(web.post("/api/v1/runs/1/roll-back", json={"tick": 0}), "PARENTING_RUNS")
+    assert web.post("/runs/1/roll-back", data={"roll_back": "0"}, follow_redirects=False).status_code == 409
+    set_status(db, 1, RunStatus.STOPPED)
+    assert web.post("/api/v1/runs", json=RUN).status_code == 201
+    refused(web.post("/api/v1/runs/1/resume"), "PARENTING_RUNS")
+    assert web.post("/runs/1/status", data={"status": "active"}, follow_redirects=False).status_code == 409
+    assert [(run.id, run.status) for run in list_runs(db)] == [(3, "active"), (2, "active"), (1, "stopped")]
+    assert web.post("/api/v1/runs/2/pause").status_code == 200
+    assert web.post("/api/v1/runs/2/resume").status_code == 200, "a paused one lives already"
+    set_status(db, 2, RunStatus.STOPPED)
+    assert web.post("/api/v1/runs/1/resume").status_code == 200
+
+
+def test_runs_that_a_client_begins_from_others_are_its_own(db: Database, settings: Settings) -> None:
+    web = client(db, settings, runs_per_client=2)
+    assert web.post("/api/v1/runs", json=RUN).status_code == 201
+    assert web.post("/api/v1/runs/1/roll-back", json={"tick": 0}).status_code == 201
+    refused(web.post("/api/v1/runs/1/roll-back", json={"tick": 0}), "PARENTING_RUNS_PER_CLIENT")
+
+
 def test_the_runs_of_others_count_for_nobody_else(db: Database, settings: Settings) -> None:
     web = client(db, settings, runs_per_client=2)
     other = TestClient(web.app, base_url="http://localhost", client=("192.0.2.7", 5000))

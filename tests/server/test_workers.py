@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+
 import pytest
 
 from parenting.server.checkpoints import load_checkpoints
@@ -19,7 +21,7 @@ from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
 from parenting.server.worker import Worker
-from parenting.server.workers import SILENT_SECONDS, alive, sign, sign_off
+from parenting.server.workers import SILENT_SECONDS, alive, is_here, new_name, sign, sign_off
 from tests.server.conftest import CLIPS, Clock
 from tests.server.heard import heard_answers
 
@@ -33,6 +35,17 @@ def test_signs_of_life(db: Database, clock: Clock) -> None:
     assert alive(db) == ["a"]
     sign_off(db, "a")
     assert alive(db) == []
+
+
+def test_two_workers_of_one_host_name_and_process_id_have_two_names() -> None:
+    """As those in two containers."""
+    one, other = new_name(7), new_name(7)
+    assert one != other
+    for name in (one, other, f"{socket.gethostname()}:7"):  # the last as older versions named it
+        assert is_here(name)
+        assert is_here(name, 7)
+        assert not is_here(name, 77)
+    assert not is_here("elsewhere:7:abcd")
 
 
 def test_a_worker_signs_and_signs_off(db: Database, settings: Settings) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
 from sqlalchemy import select
 
+from parenting.server import runs
 from parenting.server.db import Database
+from parenting.server.errors import BusyError
 from parenting.server.new_run import NewRun, start
 from parenting.server.operator_events import add_operator_event
 from parenting.server.queue.answers import answer
@@ -16,7 +18,7 @@ from parenting.server.queue.leases import lease
 from parenting.server.queue.revisions import supersede, withdraw
 from parenting.server.queue.skips import skip
 from parenting.server.queue.worker_side import look, post_query
-from parenting.server.runs import Claim, claim, let_go, set_goal, set_pace, set_status
+from parenting.server.runs import Claim, claim, get_run, let_go, set_goal, set_pace, set_status
 from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
@@ -230,3 +232,27 @@ def test_what_is_lost_and_what_nobody_told_of_is_seen(db: Database) -> None:
     assert set(news.lost) == {lost}
     assert list(news.unknown) == [mine[untold]]
     assert set(news.found) == {kept}
+
+
+def test_news_come_through_a_store_that_refuses_once(
+    db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Runs that nobody told it of are given back at the next look, and what was seen beside them counts."""
+    worker = Worker(db, settings)
+    kept, untold = begin(db, 2)
+    mine = {one.run_id: one for one in claim(db, worker.name)}
+    worker.claims[kept] = mine[kept]
+    refusals = iter([BusyError()])
+
+    def refused(at: Database, claims: Sequence[Claim]) -> None:
+        if (error := next(refusals, None)) is not None:
+            raise error
+        let_go(at, claims)
+
+    monkeypatch.setattr(runs, "let_go", refused)
+    with pytest.raises(BusyError):
+        worker._look()
+    assert kept in worker.schedule.seen
+    worker._look()
+    assert get_run(db, untold).worker is None
+    worker._close()

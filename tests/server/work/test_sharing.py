@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from parenting.server.checkpoints import load_checkpoints
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.runs import get_run, set_status
@@ -79,7 +80,8 @@ def test_a_second_worker_gets_its_share_and_the_runs_go_on_as_they_were(
     assert (len(one.claims), len(other.claims)) == (3, 2)
     assert not set(one.claims) & set(other.claims)
     for run_id, session in other.sessions.items():
-        assert session.last_tick == ticks[run_id]  # it was saved before it was given up
+        assert session.last_tick == ticks[run_id]
+        assert load_checkpoints(db, run_id)[0].tick == ticks[run_id], "it was saved before it was given up"
         assert get_run(db, run_id).worker == other.name
 
 

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from parenting.server import worker as module
 from parenting.server.checkpoints import load_checkpoints
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.runs import get_run
 from parenting.server.settings import Settings
-from parenting.server.worker import Worker
+from parenting.server.worker import CLAIM_EVERY, Worker
 from tests.server.conftest import Clock
 
 WITHIN_SECONDS = 5.0
@@ -54,9 +53,20 @@ def test_a_silent_workers_runs_are_raised_elsewhere_once_its_claims_lapse(
     go_on(other)
     assert set(other.claims) == set(one.claims)
     assert {get_run(db, run_id).worker for run_id in other.claims} == {other.name}
-    assert max(module.CLAIM_EVERY, settings.claim_seconds / 2) < WITHIN_SECONDS, (
-        "so often another worker looks"
-    )
+
+
+@pytest.mark.parametrize("seconds", [1.0, 5.0, 600.0])
+def test_a_quiet_worker_looks_often_enough_whatever_a_claim_lasts(
+    db: Database, settings: Settings, seconds: float
+) -> None:
+    worker = Worker(db, settings.model_copy(update={"claim_seconds": seconds}))
+    worker._claim()
+    start(db, NewRun(world="unsafe-exploration", parent="human"))
+    worker._committed = False
+    worker._claimed_at -= min(seconds / 2, WITHIN_SECONDS - CLAIM_EVERY)
+    worker._claim()
+    assert len(worker.claims) == 1
+    worker._close()
 
 
 def test_a_worker_that_ends_saves_each_run_before_it_gives_it_up(
