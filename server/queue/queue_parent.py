@@ -27,6 +27,7 @@ from parenting.server.damage import readable, reading, sound
 from parenting.server.db import Database
 from parenting.server.errors import Conflict
 from parenting.server.queue import answers, corrections, skips, worker_side
+from parenting.server.queue.known import Known
 from parenting.server.queue.repairs import repair
 from parenting.server.runs import Claim
 
@@ -48,6 +49,7 @@ class QueueParent:
         self.answers = self.events_wait = True
         self.corrected: amendment.Applied | None = None  # heard in this tick
         self.inherited: Sequence[Answer] = ()  # of an earlier run: corrections keep them in X
+        self.known = Known()
         self.record_ends = -1  # the last tick of the record: up to it, recorded questions stand
         self.follow_until = -1  # the last tick whose record another machine has written
 
@@ -83,7 +85,8 @@ class QueueParent:
     def in_tensors(self, row: tables.Answer, query: tables.Query) -> Answer:
         """Return a stored answer as the agent hears it."""
         choice = int(CHOICES[readable(row).choice])
-        return Answer(query=self.read(query), choice=torch.tensor([choice]))
+        known = self.known.forget(query.id)
+        return Answer(query=self.read(query) if known is None else known, choice=torch.tensor([choice]))
 
     def take(self, state: AgentState) -> Answer:
         """The answer to be heard in the tick that comes, or none."""
@@ -91,7 +94,8 @@ class QueueParent:
         if self.corrected is not None and self.corrected.heard is not None:
             return self.corrected.heard
         asking = self.answers and self.corrected is None
-        taken = worker_side.take_answer(self.db, self.mine, self.tick) if asking else None
+        known = self.known
+        taken = worker_side.take_answer(self.db, self.mine, self.tick, known.numbers()) if asking else None
         if taken is None:
             return queries.silence(queries.empty(1, self.stages, self.world.height, self.world.width))
         return self.in_tensors(taken.answer, taken.query)
@@ -116,6 +120,7 @@ class QueueParent:
                 self.policy,
                 int(query.votes[0]),
             )
+            self.known.keep(number, query)
             self.posted(number, query)
             self.asked()
 

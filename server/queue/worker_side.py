@@ -14,7 +14,7 @@ open to an answer, whereas an answer or a query closes it to both.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +28,7 @@ from sqlalchemy import (
     select,
     update,
 )
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer
 from sqlalchemy.orm.attributes import set_committed_value
 
 from parenting.server.columns import Damaged
@@ -92,6 +92,7 @@ _NAMES = ("run", "query", "answer", "event")
 _RUNS, _QUERY, _ANSWER, _EVENT = (Table.metadata.tables[name] for name in _NAMES)
 _PENDING = (
     select(Answer, Query)
+    .options(defer(Query.clips))
     .join(Query, Answer.query_id == Query.id)
     .where(Query.run_id == _RUN, Query.status == QueryStatus.ANSWERED, Answer.standing)
     .order_by(guidance_first(), Query.tick)
@@ -231,11 +232,17 @@ def asked_before(db: Database, run_id: int, tick: int) -> int:
         return session.execute(asked).scalar_one()
 
 
-def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
+def take_answer(db: Database, mine: Claim, tick: int, known: Collection[int] = ()) -> Taken | None:
     """Return the answer to be heard at this tick, or None: guidance first, then the oldest query's.
 
     A new answer is marked with the tick in the same transaction. On replay the recorded answer comes back,
     even if it was superseded later. A correction is heard by `take_correction` alone. This never waits.
+
+    Args:
+        db: The database.
+        mine: The worker's claim on the run.
+        tick: The tick that comes.
+        known: The numbers of the queries whose clips the caller has: they are not read.
 
     Raises:
         LostClaimError: another worker trains this run now.
@@ -245,7 +252,7 @@ def take_answer(db: Database, mine: Claim, tick: int) -> Taken | None:
             found = recorded_at(session, mine.run_id, tick)
             return None if found is None or heard_before(session, found.answer) else found
         held_status(session, mine)
-        found = _pending(session, mine.run_id)
+        found = _pending(session, mine.run_id, known)
         if found is not None:
             _hear(session, found, tick)
             db.outlive_crash(session)
@@ -291,6 +298,11 @@ def _hear(session: Session, found: Taken, tick: int) -> None:
     set_committed_value(found.query, "status", QueryStatus.APPLIED)
 
 
-def _pending(session: Session, run_id: int) -> Taken | None:
+def _pending(session: Session, run_id: int, known: Collection[int]) -> Taken | None:
     row = session.execute(_PENDING, {"run_id": run_id}).first()
-    return None if row is None else Taken(*row)
+    if row is None:
+        return None
+    found = Taken(*row)
+    if found.query.id not in known:
+        session.refresh(found.query, ["clips"])
+    return found
