@@ -65,7 +65,7 @@ def test_the_database_is_reached_over_its_socket_alone(compose: dict[str, Any]) 
     service = compose["services"][DATABASE]
     assert service["network_mode"] == "none"
     assert "ports" not in service
-    assert service["command"] == ["postgres", "-c", "listen_addresses="]
+    assert service["command"] == ["postgres", "-c", "listen_addresses=", "-c", "max_connections=200"]
     assert service["volumes"] == ["postgres:/var/lib/postgresql/data", SOCKETS]
     assert not any("PASSWORD" in name for name in service["environment"])
     needed = {"postgres": {"condition": "service_healthy", "required": False}}

@@ -21,9 +21,10 @@ from playwright.sync_api import Page
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.replay import relive
-from parenting.server.runs import list_runs
+from parenting.server.runs import get_run, list_runs
 from parenting.server.settings import Settings
 from parenting.server.statuses import OVER, RunStatus
+from parenting.server.workers import is_here
 from tests.access import cookies
 from tests.faults.auditor import Store, audit
 from tests.faults.figures import Figures
