@@ -26,8 +26,8 @@ RUNS, PARENTS, CROWD = 2, 2, 8
 KILLS = {"sqlite": length(45, 3000), "postgresql": length(15, 600)}
 SAMPLED = 6
 """Points that a run of CI tries on PostgreSQL; on SQLite it tries all."""
-SIZES = length([(1, 1)], [(1, 1), (2, 3)])
-"""Web processes and workers of a house that is killed at random moments; the seed draws one of these."""
+WEBS, WORKERS = length((1, 1), (2, 3))
+"""Processes of a house that is killed at random moments."""
 SPREAD = 0.15
 """A kill comes up to so many seconds after work has gone on."""
 
@@ -121,9 +121,9 @@ def test_killed_within_a_group(
 def test_killed_at_random_moments(
     settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures
 ) -> None:
-    runs, (webs, workers) = begin(db), rng.choice(SIZES)
-    figures.count("houses", f"{webs} web, {workers} workers")
-    with House(settings, [*WEB, *WORKER], workers, webs) as house:
+    runs = begin(db)
+    figures.count("houses", f"{WEBS} web, {WORKERS} workers")
+    with House(settings, [*WEB, *WORKER], WORKERS, WEBS) as house:
         house.keep()
         house.move_in(runs, PARENTS, rng)
         house.until_told(2)

@@ -38,7 +38,7 @@ def test_worker_stopped_inside_a_write_ends_nobody(
 ) -> None:
     """The store is busy for everybody meanwhile; the other worker waits, and all go on (D2, C4)."""
     runs = [start(db, ISLAND.new("human")).id for _ in range(2)]
-    with House(settings, workers=2, webs=rng.choice(length([1], [1, 2]))) as house:
+    with House(settings, workers=2, webs=length(1, 2)) as house:
         house.keep()
         house.move_in(runs, 2, rng)
         house.until_told(2)
