@@ -10,6 +10,7 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, friendly_errors, settings
+from parenting.commands.options import of_a_run
 from parenting.commands.printing import say
 from parenting.envs.people_text import read_name
 from parenting.server.access.roles import Role
@@ -33,7 +34,10 @@ def command(
         typer.Option(help="What it may do.", show_default="parent for a link, researcher for a token"),
     ] = None,
     run: Annotated[
-        int | None, typer.Option(min=1, help="The only run that it reaches.", show_default="all of them")
+        int | None,
+        typer.Option(
+            min=1, callback=of_a_run, help="The only run that it reaches.", show_default="all of them"
+        ),
     ] = None,
     name: Annotated[str | None, typer.Option(help="What to call it in the list.")] = None,
     days: Annotated[

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import httpx2
@@ -11,6 +12,8 @@ from parenting.server.access.credentials import Credentials
 
 SECONDS = 10.0
 """Seconds that a single request may take."""
+SENDABLE = re.compile("[!-~]+")
+"""Tokens whose characters a header may hold."""
 
 
 class UnavailableError(Exception):
@@ -114,9 +117,15 @@ def credentials() -> Credentials:
 
     Raises:
         ServerError: a setting is wrong.
+        UsageError: the token holds what no header can.
     """
     chosen = settings()
     token = None if chosen.token is None else chosen.token.get_secret_value()
+    if token and not SENDABLE.fullmatch(token):
+        raise UsageError(
+            "PARENTING_TOKEN: it holds a blank, a line end or another character that no token has. "
+            "Set it to a token alone, as `parenting access create token` prints it."
+        )
     return Credentials(token, chosen.data)
 
 

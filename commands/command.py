@@ -30,7 +30,10 @@ class Command(TyperCommand):
             BadParameter: one is wrong.
         """
         try:
-            return super().parse_args(ctx, args)
+            rest = super().parse_args(ctx, args)
+            for option in self.params:
+                _require_text(ctx, option)
+            return rest
         except typer.BadParameter as error:
             if isinstance(error.__cause__, ValidationError):
                 error.message = _sentence(error.param, error.__cause__)
@@ -47,6 +50,19 @@ class Command(TyperCommand):
                 for said in warnings(os.environ, FILE, names()):
                     say(said, err=True)
         return super().invoke(ctx)
+
+
+def _require_text(ctx: Any, option: Any) -> None:
+    """Refuse bytes that are not text, which stand in it as halves of surrogate pairs. A path may have them.
+
+    Raises:
+        BadParameter: the value of an option or argument has some.
+    """
+    value = ctx.params.get(option.name)
+    for text in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(text, str) and any("\ud800" <= one <= "\udfff" for one in text):
+            said = f"'{text}' holds bytes that are not text. Write it in UTF-8."
+            raise typer.BadParameter(said, ctx=ctx, param=option)
 
 
 def replace_unprintable() -> None:

@@ -27,6 +27,10 @@ PAUSE = 0.2
 """Seconds before a request that was not served is sent again."""
 SHOW_SECONDS = 2.0
 """Seconds between two live lines."""
+MOST_RUNS = 100_000
+"""Runs that `--runs` can name."""
+DIGITS = 4000
+"""Digits of a number at most: Python reads few more."""
 
 
 @dataclass(frozen=True)
@@ -205,12 +209,20 @@ def chosen_runs(text: str) -> list[int]:
     """Return the runs that `--runs` names, such as 1,3,7-12.
 
     Raises:
-        UsageError: it cannot be read.
+        UsageError: it cannot be read, or names more than `MOST_RUNS`.
     """
     found: list[int] = []
     for part in text.split(","):
         first, _, last = part.strip().partition("-")
-        if not first.isdecimal() or (last and not last.isdecimal()) or int(last or first) < int(first):
+        if not _is_number(first) or (last and not _is_number(last)) or int(last or first) < int(first):
             raise UsageError(f"--runs: {text!r} cannot be read at {part!r}. Write it as 1,3,7-12.")
-        found += range(int(first), int(last or first) + 1)
+        begin, end = int(first), int(last or first)
+        if len(found) + end - begin >= MOST_RUNS:
+            raise UsageError(f"--runs: {part!r} names too many runs. Name at most {MOST_RUNS} in all.")
+        found += range(begin, end + 1)
     return list(dict.fromkeys(found))
+
+
+def _is_number(text: str) -> bool:
+    """Return whether a text is a whole number that Python reads."""
+    return text.isdecimal() and len(text) <= DIGITS

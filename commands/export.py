@@ -13,6 +13,7 @@ from parenting.commands.audited import note_export
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors
 from parenting.commands.export_table import export_table
+from parenting.commands.options import of_a_run
 from parenting.commands.printing import say
 from parenting.commands.progress import bar
 from parenting.server.exports import Format, Part
@@ -34,7 +35,12 @@ TABLE = {Form.FIRST: Format.JSONL, Form.JSONL: Format.JSONL, Form.CSV: Format.CS
 def export(
     run: Annotated[
         list[int] | None,
-        typer.Argument(min=1, help="Numbers of runs; `parenting runs` lists them.", show_default=False),
+        typer.Argument(
+            min=1,
+            callback=of_a_run,
+            help="Numbers of runs; `parenting runs` lists them.",
+            show_default=False,
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -96,7 +102,7 @@ def export(
     with exit_on_interrupt(), friendly_errors():
         if check is not None:
             _check(check, run or out)
-        runs = run or []
+        runs = list(dict.fromkeys(run or []))  # a run that is named twice is one
         if not runs:
             raise UsageError("Name a run; `parenting runs` lists them.")
         if minari is not None:

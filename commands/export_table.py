@@ -15,6 +15,7 @@ from parenting.commands.database import database
 from parenting.commands.errors import UsageError
 from parenting.commands.printing import say
 from parenting.commands.progress import bar
+from parenting.server.backups.whole import file_at
 from parenting.server.damage import sound
 from parenting.server.exports import Format, Part, exported
 from parenting.server.runs import stored_run
@@ -63,7 +64,9 @@ def _whole(target: Path, force: bool) -> Iterator[TextIO]:
 
     Raises:
         UsageError: the file exists, or its folder cannot be written to.
+        SetupError: it is not a file but something else.
     """
+    target = file_at(target)
     if target.exists() and not force:
         raise UsageError(f"-o: {target} exists already. Name another file, or give --force to replace it.")
     part = target.with_name(f".{target.name}.{os.getpid()}.part")

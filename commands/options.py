@@ -4,12 +4,43 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
+from parenting.commands.errors import friendly_errors
+from parenting.drawing.sentences import mark
+from parenting.server.errors import NotFound
+
+RunOrRuns = TypeVar("RunOrRuns")
+
 AfterFd = Annotated[
     int | None, typer.Option(hidden=True, help="A pipe that `parenting up` closes once the tables are there.")
+]
+
+LARGEST = 2**63 - 1
+"""The largest number that a column of the database holds."""
+
+
+def of_a_run(number: RunOrRuns) -> RunOrRuns:
+    """Take a run's number, or several, as they are given.
+
+    Raises:
+        Exit: one is larger than any that a run can have.
+    """
+    with friendly_errors():
+        for one in number if isinstance(number, list) else [number]:
+            if isinstance(one, int) and one > LARGEST:
+                raise NotFound(mark("There is no run {run}."), run=one)
+    return number
+
+
+RunNumber = Annotated[
+    int, typer.Argument(min=1, callback=of_a_run, help="A run's number; `parenting runs` lists them.")
+]
+
+AnyRunNumber = Annotated[
+    int, typer.Argument(min=1, callback=of_a_run, help="A run's number; `parenting runs --all` lists them.")
 ]
 
 Public = Annotated[

@@ -13,12 +13,14 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, friendly_errors
+from parenting.commands.options import RunNumber
 from parenting.commands.printing import say
+from parenting.server.backups.whole import file_at
 from parenting.server.policies import PolicyFile, present_policy
 
 
 def policy(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    run: RunNumber,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -64,7 +66,9 @@ def _write(target: Path, blob: bytes, force: bool) -> None:
 
     Raises:
         UsageError: the file exists, or its folder cannot be written to.
+        SetupError: it is not a file but something else.
     """
+    target = file_at(target)
     if target.exists() and not force:
         raise UsageError(f"--out: {target} exists already. Name another file, or give --force to replace it.")
     part = target.with_name(f".{target.name}.{os.getpid()}.part")

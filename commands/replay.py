@@ -10,6 +10,7 @@ import typer
 from parenting._plural import counted
 from parenting.commands.database import database
 from parenting.commands.errors import exit_on_interrupt, friendly_errors
+from parenting.commands.options import RunNumber
 from parenting.commands.printing import say
 from parenting.commands.progress import bar
 from parenting.server.runs import get_run
@@ -33,7 +34,7 @@ PIECES = {
 
 
 def replay(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    run: RunNumber,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
     ] = False,

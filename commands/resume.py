@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from parenting.commands.database import database
 from parenting.commands.errors import friendly_errors
+from parenting.commands.options import RunNumber
 from parenting.commands.printing import say
 from parenting.server.runs import set_status
 from parenting.server.statuses import RunStatus
 
 
 def resume(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    run: RunNumber,
 ) -> None:
     """Let a paused, ended or failed run go on.
 

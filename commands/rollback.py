@@ -9,6 +9,7 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, friendly_errors, settings
+from parenting.commands.options import RunNumber
 from parenting.commands.printing import say
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.notify import Notifier
@@ -17,7 +18,7 @@ from parenting.server.rollback import roll_back
 
 
 def rollback(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    run: RunNumber,
     to: Annotated[int, typer.Option(min=0, metavar="TICK", help="The last tick that both have in common.")],
     name: Annotated[
         str | None, typer.Option(help="A name for the new run.", show_default="the run's, and the tick")

@@ -8,12 +8,13 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import friendly_errors
+from parenting.commands.options import AnyRunNumber
 from parenting.commands.printing import say
 from parenting.server.keeping import archive
 
 
 def command(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs --all` lists them.")],
+    run: AnyRunNumber,
     undo: Annotated[bool, typer.Option("--undo", help="Take it out of the archive.")] = False,
 ) -> None:
     """Leave a run out of the list, or take it in again. Nothing of it is lost, and its agent learns the same.

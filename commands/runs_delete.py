@@ -10,6 +10,7 @@ import typer
 from parenting._plural import counted
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors
+from parenting.commands.options import AnyRunNumber
 from parenting.commands.printing import say
 from parenting.server import deletion
 from parenting.server.db import Database
@@ -17,7 +18,7 @@ from parenting.server.sizes import size_text
 
 
 def command(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs --all` lists them.")],
+    run: AnyRunNumber,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nothing; for scripts.")] = False,
 ) -> None:
     """Say what a run holds, ask, and delete it for good: answers, questions, checkpoints, metrics, log.

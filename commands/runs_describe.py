@@ -8,12 +8,13 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, friendly_errors
+from parenting.commands.options import RunNumber
 from parenting.commands.printing import say
 from parenting.server.keeping import LONGEST_DESCRIPTION, describe, read_description
 
 
 def command(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    run: RunNumber,
     text: Annotated[str, typer.Argument(help='The description; "" takes it away.')],
 ) -> None:
     """Keep a description with a run, over or not.

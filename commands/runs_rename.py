@@ -8,13 +8,14 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, friendly_errors
+from parenting.commands.options import RunNumber
 from parenting.commands.printing import say
 from parenting.envs.people_text import read_name
 from parenting.server.keeping import describe
 
 
 def command(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    run: RunNumber,
     name: Annotated[str, typer.Argument(help='Its new name; "" takes the name away.')],
 ) -> None:
     """Give a run another name, over or not. Whoever answers its questions sees it, too.

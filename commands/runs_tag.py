@@ -8,12 +8,13 @@ import typer
 
 from parenting.commands.database import database
 from parenting.commands.errors import UsageError, friendly_errors
+from parenting.commands.options import RunNumber
 from parenting.commands.printing import say
 from parenting.server.keeping import read_tag, split_tags, tag
 
 
 def command(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    run: RunNumber,
     tags: Annotated[list[str] | None, typer.Argument(help="Tags to add.", show_default="none")] = None,
     remove: Annotated[
         list[str] | None, typer.Option(metavar="TAG", help="A tag to take away; may be repeated.")

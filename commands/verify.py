@@ -11,6 +11,7 @@ from parenting._plural import counted
 from parenting.commands import replay
 from parenting.commands.database import database
 from parenting.commands.errors import exit_on_interrupt, friendly_errors
+from parenting.commands.options import RunNumber
 from parenting.commands.printing import say
 from parenting.commands.progress import bar
 from parenting.server.runs import get_run
@@ -24,7 +25,7 @@ SHOWN = 20
 
 
 def verify(
-    run: Annotated[int, typer.Argument(min=1, help="A run's number; `parenting runs` lists them.")],
+    run: RunNumber,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
     ] = False,

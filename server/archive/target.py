@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 from zipfile import ZIP_DEFLATED, ZipFile
 
-from parenting.server.backups.whole import whole
+from parenting.server.backups.whole import behind_links, file_at, whole
 from parenting.server.errors import SetupError
 
 MANIFEST = "manifest.json"
@@ -108,6 +108,7 @@ def target(path: Path, force: bool = False) -> Iterator[Files]:
         SetupError: it exists and `force` is not given, is something else, or cannot be written.
     """
     if path.suffix.lower() == ".zip":
+        path = file_at(path)
         _sweep(path)
         with whole(path, force) as part, ZipFile(part, "w", ZIP_DEFLATED) as zipped:
             yield ZipFiles(zipped, part.parent)
@@ -125,11 +126,12 @@ def zip_in(file: IO[bytes], scratch: Path) -> Iterator[Files]:
 
 @contextmanager
 def folder_target(path: Path, force: bool = False) -> Iterator[Path]:
-    """Begin a folder under a hidden name; it gets its own once it is whole.
+    """Begin a folder under a hidden name; it gets its own once it is whole. Links to it stay.
 
     Raises:
         SetupError: as `target`.
     """
+    path = behind_links(path)
     _sweep(path)
     _refuse(path, force)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")

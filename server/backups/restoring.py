@@ -15,7 +15,7 @@ from parenting.server.backups import copies, dumps
 from parenting.server.backups.ended import statements
 from parenting.server.backups.in_use import alone, require_stopped, require_unconnected
 from parenting.server.backups.making import FOLDER, back_up, stamp
-from parenting.server.backups.whole import require_room, size, whole
+from parenting.server.backups.whole import file_at, require_room, size, whole
 from parenting.server.db import connect, utc_now
 from parenting.server.errors import SetupError
 from parenting.server.migrate import known_revisions, newest, revision, upgrade
@@ -66,7 +66,8 @@ def restore(settings: Settings, file: Path, replace: bool = False, new_identity:
 
 
 def _restore_copy(url: URL, file: Path, replace: bool) -> Restored:
-    target = Path(str(url.database))
+    named = Path(str(url.database))
+    target = file_at(named)  # beside which SQLite has its log, if the other is a link to it
     copies.require_database(file)
     if target.exists() and target.samefile(file):
         raise SetupError(f"{file} is the database itself. Name a backup.")
@@ -84,7 +85,7 @@ def _restore_copy(url: URL, file: Path, replace: bool) -> Restored:
             if high_water.foreign_log(target) is None:
                 until_replaced.enter_context(alone(target))  # its log is in the file now, if it is sound
             aside = _put_aside(target)
-    high_water.accept(target)
+    high_water.accept(named)
     return Restored(str(target), str(holds), aside, older)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,13 +19,13 @@ SPARE_BYTES = 8 * 1024 * 1024
 def whole(target: Path, force: bool = False) -> Iterator[Path]:
     """Yield the path of an empty file of the owner's, which takes the name `target` at the end.
 
-    If an error comes before, nothing is left of it.
+    If an error comes before, nothing is left of it. Where `target` is a link, the file that it names is
+    written.
 
     Raises:
-        SetupError: `target` exists and `force` is not given, or cannot be written.
+        SetupError: `target` exists and `force` is not given, is not a file, or cannot be written.
     """
-    if target.is_dir():
-        raise SetupError(f"{target} is a folder. Name a file in it.")
+    target = file_at(target)
     if target.exists() and not force:
         raise _exists(target)
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
@@ -41,6 +42,31 @@ def whole(target: Path, force: bool = False) -> Iterator[Path]:
         for left in (part, Path(f"{part}-journal"), Path(f"{part}-wal"), Path(f"{part}-shm")):
             with suppress(OSError):
                 left.unlink(missing_ok=True)
+
+
+def file_at(target: Path) -> Path:
+    """Return the file that a path names, which need not be there: where it is a link, what that names.
+
+    Raises:
+        SetupError: something else is there, such as a folder or a pipe, or it cannot be looked at.
+    """
+    found = behind_links(target)
+    try:
+        kind = found.stat().st_mode
+    except FileNotFoundError:
+        return found
+    except OSError as error:
+        raise SetupError(f"{target} cannot be written: {error.strerror}. Name another file.") from None
+    if stat.S_ISDIR(kind):
+        raise SetupError(f"{target} is a folder. Name a file in it.")
+    if not stat.S_ISREG(kind):
+        raise SetupError(f"{target} is a device, a pipe or a socket, so it is not replaced. Name a file.")
+    return found
+
+
+def behind_links(path: Path) -> Path:
+    """Return what a link names at its end, there or not; every other path as it is."""
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
 def require_room(folder: Path, needed: int, remedy: str) -> None:

@@ -19,7 +19,7 @@ from parenting.server.backups import copies
 from parenting.server.backups.in_use import STOP, alone, others_connected, require_stopped
 from parenting.server.backups.whole import require_room, size, whole
 from parenting.server.db import Database, connect
-from parenting.server.errors import SetupError
+from parenting.server.errors import GoneError, SetupError
 from parenting.server.migrate import VERSIONS, create_tables, newest, require_current, revision_in
 from parenting.server.settings import Settings
 from parenting.server.store.driver import can_write, sqlite_module
@@ -49,6 +49,25 @@ def place(named: str) -> URL:
     if url.get_backend_name() not in ("sqlite", "postgresql"):
         raise SetupError(f"{url.get_backend_name()} is neither sqlite nor postgresql. {_REMEDY}")
     return url
+
+
+@contextmanager
+def reaching(url: URL) -> Iterator[None]:
+    """Say which end of a transfer it is that cannot be reached, without its password.
+
+    Raises:
+        SetupError: it cannot be.
+    """
+    try:
+        yield
+    except GoneError:
+        named = f"database {url.database} at {url.host or 'its socket'}"
+        if url.get_backend_name() == "sqlite":
+            named = f"database {url.database}"
+        raise SetupError(
+            f"The {named} cannot be reached, or lets nobody in under this name; nothing was copied. "
+            "Look whether it is there, then give the command again."
+        ) from None
 
 
 _REMEDY = "Write the path of a file, or postgresql://user@host/database."
@@ -116,7 +135,8 @@ def source(url: URL, data: Path, snapshot: bool) -> Iterator[Source]:
                     pass
     db = connect(Settings(data=folder, database_url=url.render_as_string(False)), reading=True)
     try:
-        require_current(db)
+        with reaching(url):
+            require_current(db)
         with db.read() as session:
             connection = session.connection()
             if connection.dialect.name == "postgresql":
@@ -146,6 +166,8 @@ def target(url: URL, data: Path, needed: int) -> Iterator[Connection]:
         return
     db = connect(Settings(data=data, database_url=url.render_as_string(False)))
     try:
+        with reaching(url), db.read() as session:
+            session.connection()
         with db.write() as session:
             connection = session.connection()
             begin_migration(connection)

@@ -168,6 +168,16 @@ def test_wrong_runs(db: Database, web: httpx2.Client) -> None:
     assert said.stderr.startswith("--until: no policy counts as optimal in reward-hacking")
 
 
+@pytest.mark.parametrize("token", ["geheim\nb", "geheim ", "geheim\x07", "geheim\u20ac", "geheim\udcff"])
+def test_a_token_that_no_header_holds_is_not_printed(token: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PARENTING_TOKEN", token)
+    for more in ([], ["--people", "2"]):
+        said = CliRunner().invoke(app, ["answer", "--url", f"http://localhost:{free_port()}", *more])
+        assert (said.exit_code, said.stdout) == (2, "")
+        assert said.stderr.startswith("PARENTING_TOKEN: it holds a blank, a line end or another character")
+        assert "geheim" not in said.stderr
+
+
 def test_a_name_that_the_server_does_not_go_by(db: Database, web: httpx2.Client) -> None:
     begin(db)
     said = answer("--url", "http://elsewhere.example")

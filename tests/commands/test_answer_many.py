@@ -16,7 +16,7 @@ import uvicorn
 from structlog.testing import capture_logs
 from typer.testing import CliRunner, Result
 
-from parenting.commands.crowd import chosen_runs
+from parenting.commands.crowd import MOST_RUNS, chosen_runs
 from parenting.commands.crowd_figures import percentiles
 from parenting.commands.errors import UsageError
 from parenting.commands.main import app
@@ -137,6 +137,15 @@ def test_the_runs_of_a_crowd_can_be_named() -> None:
     for wrong in ("", "a", "3-1", "1,,2", "-1"):
         with pytest.raises(UsageError, match="--runs"):
             chosen_runs(wrong)
+
+
+def test_too_many_runs_are_refused_before_they_are_counted_out() -> None:
+    assert len(chosen_runs(f"1-{MOST_RUNS}")) == MOST_RUNS
+    for wrong in ("5-99999999999", f"0-{MOST_RUNS}", f"1-{MOST_RUNS},7", f"1-{'9' * 4000}"):
+        with pytest.raises(UsageError, match=f"--runs: .* names too many runs. Name at most {MOST_RUNS}"):
+            chosen_runs(wrong)
+    with pytest.raises(UsageError, match="cannot be read"):
+        chosen_runs("9" * 5000)
 
 
 def test_percentiles_lie_between_the_least_and_the_most() -> None:

@@ -68,6 +68,16 @@ def test_the_audit_log_tells_who_exported_what(db: Database, tmp_path: Path) -> 
     assert all(row.who.startswith("command line (") for row in found)
 
 
+def test_a_run_that_is_named_twice_is_one(db: Database, tmp_path: Path) -> None:
+    assert export("2", "2", "-o", str(tmp_path / "study")).exit_code == 0
+    assert export("2", "1", "2", "--of", "answers").exit_code == 2
+    assert export("2", "2", "--of", "answers").exit_code == 0
+    assert [row.what for row in entries(db, kind=Kind.EXPORT).rows] == [
+        "answers as jsonl",
+        "the whole run as folder",
+    ]
+
+
 def test_it_says_so_where_the_audit_log_takes_nothing(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("parenting.commands.audited.try_note_export", lambda *_: DiskFullError())
     said = export("1")

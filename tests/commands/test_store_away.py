@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from parenting.commands.main import COMMANDS, app
 from parenting.server.settings import Settings
 from tests.database import migrated
+from tests.server.serving import free_port
 
 pytestmark = pytest.mark.only("sqlite", "each test damages its own file, or names a server")
 
@@ -108,3 +109,16 @@ def test_a_file_that_is_missing_is_not_made(settings: Settings, command: str) ->
     said = said_by(command)
     assert str(settings.data / "parenting.db") in said
     assert list(settings.data.glob("*")) == []
+
+
+@pytest.mark.parametrize("way", ["from", "to"])
+def test_a_copy_names_the_host_that_is_away(settings: Settings, tmp_path: Path, way: str) -> None:
+    migrated(settings).close()
+    ends = [f"postgresql://u:geheim@127.0.0.1:{free_port()}/x", str(tmp_path / "t.db")]
+    if way == "to":
+        ends = [str(settings.data / "parenting.db"), ends[0]]
+    said = CliRunner().invoke(app, ["copy", *ends])
+    assert (said.exit_code, said.stdout) == (2, "")
+    assert said.stderr.startswith("The database x at 127.0.0.1 cannot be reached")
+    assert "geheim" not in said.stderr
+    assert not (tmp_path / "t.db").exists()

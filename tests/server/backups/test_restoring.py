@@ -75,6 +75,23 @@ def test_it_brings_the_copy_back_and_keeps_the_former_database(
     other.close()
 
 
+def test_a_database_behind_a_link_is_replaced_and_kept_where_it_is(
+    settings: Settings, copy: Path, opened: Callable[[], Database], tmp_path: Path
+) -> None:
+    link, far = settings.data / "parenting.db", tmp_path / "far"
+    far.mkdir()
+    link.rename(far / "real.db")
+    link.symlink_to(Path(os.path.relpath(far / "real.db", link.parent)))
+    done = restore(settings, copy, replace=True)
+    assert link.is_symlink()
+    assert worlds(opened()) == ["unsafe-exploration"]
+    assert done.aside is not None
+    assert done.aside.parent == far / "backups"
+    former = connect(Settings(database_url=f"sqlite:///{done.aside}", data=tmp_path / "other"))
+    assert worlds(former) == ["reward-hacking", "unsafe-exploration"]
+    former.close()
+
+
 def test_what_was_revoked_since_does_not_open_again(
     settings: Settings, db: Database, opened: Callable[[], Database], tmp_path: Path
 ) -> None:
