@@ -174,6 +174,9 @@ PRESETS: dict[str, dict[str, float | bool]] = {
 }
 """The settings of Table 1, by name, the conservative one first; and `frugal`, which is ours."""
 
+LARGEST_RATE = 1.0
+"""The largest `learning_rate` of a new run. Stored runs keep theirs: older versions took any."""
+
 FRUGAL_WORLDS = ("unsafe-exploration", "side-effects")
 """Worlds where `frugal` is shown to need fewer answers than `conservative` and to die no more often, on every
 level that was tried (docs/results/questions.md)."""
@@ -182,6 +185,16 @@ level that was tried (docs/results/questions.md)."""
 def offered_preset(world: str) -> str:
     """Return the preset that the form offers first: `frugal` where it is shown to be no worse."""
     return "frugal" if world in FRUGAL_WORLDS else "conservative"
+
+
+def too_steep(config: Config) -> str | None:
+    """Return why a new run may not have this `learning_rate`, in a sentence; None where it may."""
+    if config.learning_rate <= LARGEST_RATE:
+        return None
+    return (
+        f"{config.learning_rate:g} is more than {LARGEST_RATE:g}: after such steps the policy's weights are"
+        f" soon no finite numbers. Write a number up to {LARGEST_RATE:g}, such as 0.001."
+    )
 
 
 def compose(

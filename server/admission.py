@@ -23,6 +23,7 @@ from parenting.server.access.guard import GuardedRoute
 from parenting.server.errors import BusyError
 from parenting.server.store.patience import patience, remaining
 from parenting.server.store.sqlite import BUSY_SECONDS
+from parenting.server.strict import strictly
 
 Found = TypeVar("Found")
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -114,7 +115,7 @@ class AdmittedRoute(GuardedRoute):
         """Return the handler, behind the gate where the function blocks."""
         handle = self.get_handler()
         if iscoroutinefunction(self.endpoint) or isasyncgenfunction(self.endpoint):
-            return self.guarded(handle)
+            return self.guarded(strictly(self.dependant, handle))
 
         async def admitted(request: Request) -> Response:
             await request.body()  # first: a slow sender holds no place
@@ -122,7 +123,7 @@ class AdmittedRoute(GuardedRoute):
             async with admission.gate(request.method).entered(admission.seconds):
                 return await handle(request)
 
-        return self.guarded(admitted)
+        return self.guarded(strictly(self.dependant, admitted))
 
 
 def admitted_router(**options: Any) -> APIRouter:

@@ -54,6 +54,7 @@ from parenting.server.settings import Settings
 from parenting.server.static import OthersFiles, OurFiles
 from parenting.server.store.patience import patience
 from parenting.server.streams import Streams
+from parenting.server.strict import TwiceError
 from parenting.server.wrong_fields import messages
 
 LARGEST_BODY = 64 * 1024
@@ -234,9 +235,13 @@ def _add_errors(app: FastAPI) -> None:
 
 def _said(error: HTTPException) -> ServerError:
     """Return our error for one of the framework's."""
-    kinds: dict[int, type[ServerError]] = {404: NotFound, 405: MethodNotAllowed, 413: TooLargeError}
+    kinds: dict[int, type[ServerError]] = {404: NotFound, 405: MethodNotAllowed}
     if error.status_code == 400:  # a body that is not text, or not a form
         return InvalidFieldsError([("body", "It cannot be read. Send JSON in UTF-8, or a form.")])
+    if isinstance(error, TwiceError):
+        return error.said
+    if error.status_code == 413:  # `server.security` tells the limit
+        return TooLargeError(most=error.detail)
     if error.status_code in kinds:
         return kinds[error.status_code]()
     said = ServerError(str(error.detail))

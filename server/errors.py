@@ -149,7 +149,7 @@ class NotReadyError(ServerError):
 
 
 class TooLargeError(ServerError):
-    """The body of this request is too large."""
+    """The body of this request is too large: it may have {most} bytes. Send less, or in several requests."""
 
     status, code = 413, "too_large"
 

@@ -5,6 +5,7 @@ The log keeps the reasons.
 
 from __future__ import annotations
 
+from sqlalchemy.exc import StatementError
 from sqlalchemy.orm import Session
 
 from parenting.server.batches import refuse_if_of_batch
@@ -14,6 +15,15 @@ from parenting.server.notes import Failed, Resumed, add_note
 from parenting.server.queue.queries import reopen_in, withdraw_in
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Run
+
+
+def said_by(error: Exception) -> str:
+    """Return what an error says for people: of a statement its cause alone, without SQL and parameters."""
+    if not isinstance(error, StatementError):
+        return str(error)
+    cause = error.orig or error
+    first = str(cause).partition("\n")[0] if error.orig else ""
+    return f"{type(cause).__name__}: {first}" if first else type(cause).__name__
 
 
 def note_failure(session: Session, db: Database, run: Run, reason: str) -> None:

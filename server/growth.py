@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from parenting.agent.config import Config
 from parenting.agent.parent import Parent
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
@@ -23,6 +24,10 @@ SHARE = 0.05
 """The share of time at most that looks at the cells take."""
 
 
+class NotFiniteError(Exception):
+    """The policy has learnt numbers that are none: no probability can be read off it any more."""
+
+
 class Growth:
     """The growth of one agent in a worker."""
 
@@ -30,6 +35,7 @@ class Growth:
         self, world: Gridworld, run: Run, evaluation: Evaluation, state: AgentState, tally: Counters
     ) -> None:
         """Begin after the last tick of `state`. A world without a goal has no safe cells."""
+        self._config = run.config
         self.milestones = Milestones(world, run.milestones, int(state.keys.tick[0]), tally)
         self.lesson = Lesson(world)
         self._cells = SafeCells(evaluation) if isinstance(evaluation, TabularEvaluation) else None
@@ -40,6 +46,20 @@ class Growth:
     def overhear(self, parent: Parent) -> Parent:
         """Return a parent whose answers this hears, too."""
         return Overheard(parent, self.lesson)
+
+    def see(self, state: AgentState, tally: Counters) -> None:
+        """Look at the tick that has just passed.
+
+        Raises:
+            NotFiniteError: the policy is not finite after it; the sentence names the remedy.
+        """
+        if not is_finite(state):
+            rate = Config.model_validate(self._config).learning_rate
+            raise NotFiniteError(
+                f"The policy's weights are no longer finite at tick {int(state.keys.tick[0])}: "
+                f"a smaller learning_rate than {rate:g} is needed."
+            )
+        self.milestones.see(state, tally)
 
     def row(self, state: AgentState) -> Row:
         """Return the number of cells and of safe ones for a row of metrics, as last looked at."""
@@ -63,3 +83,11 @@ class Growth:
         if (lesson := self.lesson.news(state)) is not None:
             found["lesson"] = lesson
         return found
+
+
+def is_finite(state: AgentState) -> bool:
+    """Return whether the policy is finite in all that a tick shows of it: weights, loss, probabilities."""
+    shown = [state.info.logits]
+    if bool(state.info.trained.any()):
+        shown += [state.learner.params, state.info.loss]
+    return all(bool(numbers.isfinite().all()) for numbers in shown)

@@ -19,7 +19,7 @@ from pydantic import (
 )
 from sqlalchemy.orm import Session
 
-from parenting.agent.config import PRESETS, Config, merge
+from parenting.agent.config import PRESETS, Config, merge, too_steep
 from parenting.envs import registry
 from parenting.envs.art import LEVEL_CHARACTERS
 from parenting.envs.levels.spec import Level, LevelError
@@ -244,11 +244,14 @@ def _config(new: NewRun, level: Level | None, wrong: Wrong) -> Config | None:
     changes = waits | {name: whole(value) for name, value in new.config.items()}
     try:
         # Strict: pydantic would otherwise take true for 1, and "1" too.
-        return Config.model_validate(merge(PRESETS[new.preset], world, changes), strict=True)
+        config = Config.model_validate(merge(PRESETS[new.preset], world, changes), strict=True)
     except ValidationError as error:
         for field, message in messages(error.errors()):
             wrong.append(("config" if field == "body" else f"config.{field}", message))
-    return None
+        return None
+    if (said := too_steep(config)) is not None:
+        wrong.append(("config.learning_rate", said))
+    return config
 
 
 def _weights(

@@ -79,7 +79,7 @@ class SecurityMiddleware:
             message = await receive()
             size += len(message.get("body", b""))
             if size > most:  # a body without a declared length, in chunks
-                raise HTTPException(413)
+                raise HTTPException(413, str(most))
             return message
 
         async def safely(message: Message) -> None:
@@ -114,7 +114,7 @@ class SecurityMiddleware:
         headers, method = Headers(scope=scope), scope["method"]
         length = headers.get("content-length", "0")
         if not length.isdecimal() or len(length) > 15 or int(length) > most:
-            return TooLargeError()
+            return TooLargeError(most=most)
         if method in SAFE_METHODS:
             return None
         site, origin = headers.get("sec-fetch-site"), headers.get("origin")

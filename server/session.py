@@ -164,7 +164,7 @@ class RunSession:
         self._pace.work += self.lived_at - began
         tally = count(self.world, self.saved.tally, answer, state, events)
         self.saved = Snapshot(state, tally, config)
-        self.growth.milestones.see(state, tally)
+        self.growth.see(state, tally)
         self.lived.see(state, tally, events)
         self.board.see(state, tally, answer)
         self.why.see(self.saved, query)

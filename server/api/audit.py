@@ -10,13 +10,12 @@ from fastapi.responses import StreamingResponse
 from pydantic import Field
 
 from parenting.server.admission import admitted_router
-from parenting.server.api.lists import Part
+from parenting.server.api.lists import Cursor, Limit, Part
 from parenting.server.api.responses import read_responses, streams
 from parenting.server.audit.entries import as_table, entries
 from parenting.server.audit.table import AuditEntry, Kind
 from parenting.server.damage import damage
 from parenting.server.deps import Db
-from parenting.server.new_run import LARGEST_INT
 from parenting.server.schemas import DamagedSchema, Schema
 
 router = admitted_router(tags=["operator"])
@@ -51,10 +50,16 @@ class AuditRows(Schema):
 class AuditPart(Part):
     """The requested part of the audit log."""
 
-    before: Annotated[int, Field(ge=1, le=LARGEST_INT)] | None = Field(
+    before: Cursor | None = Field(
         None, description="Only entries with smaller ids; the `next` of the page before."
     )
-    limit: int = Field(50, ge=1, le=200, description="At most this many rows.")
+    limit: Limit = Field(50, ge=1, le=200, description="At most this many rows.")
+    kind: Kind | None = Field(None, description="Only entries of this kind.")
+
+
+class AuditKind(Part):
+    """The entries of the audit log that are exported."""
+
     kind: Kind | None = Field(None, description="Only entries of this kind.")
 
 
@@ -81,10 +86,10 @@ def read_audit_log(db: Db, part: Annotated[AuditPart, Query()]) -> AuditRows:
     response_class=TableResponse,
     responses=streams("text/csv", "The whole log, the oldest entry first."),
 )
-def export_audit_log(db: Db) -> TableResponse:
-    """Export the whole audit log as CSV, the oldest entry first."""
+def export_audit_log(db: Db, part: Annotated[AuditKind, Query()]) -> TableResponse:
+    """Export the whole audit log as CSV, or its entries of one kind, the oldest first."""
     named = {"Content-Disposition": 'attachment; filename="audit.csv"'}
-    return TableResponse(as_table(db), media_type="text/csv; charset=utf-8", headers=named)
+    return TableResponse(as_table(db, part.kind), media_type="text/csv; charset=utf-8", headers=named)
 
 
 def _schema(row: AuditEntry) -> AuditSchema | DamagedSchema:

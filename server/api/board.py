@@ -10,7 +10,7 @@ from pydantic import Field
 from parenting.drawing.rests import complete
 from parenting.server import runs
 from parenting.server.admission import admitted_router
-from parenting.server.api.lists import Part, Place
+from parenting.server.api.lists import Cursor, Number, Part, Place
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import read_responses
 from parenting.server.board import store
@@ -61,8 +61,14 @@ class BoardPart(Part):
     """The part that the reader has already."""
 
     after: Place = Field(-1, description="Only snapshots after this tick.")
-    states: int = Field(0, ge=0, le=LARGEST_INT, description="The number of states that you have.")
-    rests: int = Field(0, ge=0, le=LARGEST_INT, description="The number of rests that you have.")
+    states: Number = Field(0, description="The number of states that you have.")
+    rests: Number = Field(0, description="The number of rests that you have.")
+
+
+class SnapshotPart(Part):
+    """The policy of a snapshot that is wanted."""
+
+    stage: Cursor | None = Field(None, description="An earlier stage's policy.")
 
 
 class NumbersSchema(SnapshotSchema):
@@ -118,9 +124,7 @@ def get_snapshot(
     run_id: RunId,
     tick: Annotated[int, Path(ge=0, le=LARGEST_INT, description="Its tick, or a later one.", examples=[41])],
     db: Db,
-    stage: Annotated[
-        int | None, Query(ge=1, le=LARGEST_INT, description="An earlier stage's policy.")
-    ] = None,
+    part: Annotated[SnapshotPart, Query()],
 ) -> NumbersSchema:
     """Read the last snapshot up to a tick, with the policy that acted or that of an earlier stage."""
     run = runs.get_run(db, run_id)
@@ -130,7 +134,7 @@ def get_snapshot(
             f"No snapshot of run {run.id} is stored up to tick {tick}. "
             "A worker stores the first one when it takes the run up."
         )
-    wanted = row.stage if stage is None else stage
+    wanted = row.stage if part.stage is None else part.stage
     other = row if wanted == row.stage else store.read_frozen(db, run.id, wanted)
     if other is None or wanted > row.stage:
         raise NotFound(f"At tick {row.tick} there was no policy of stage {wanted}; the last was {row.stage}.")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from fastapi import Query
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
 from parenting.envs.people_text import plain
@@ -25,10 +24,6 @@ from parenting.server.patterns import CLIENT, SHA256
 from parenting.server.schemas import By
 from parenting.server.whole import WHOLE
 
-After = Annotated[
-    int | None,
-    Query(ge=-1, le=LARGEST_INT, description="Send metrics too: those of the ticks after this one."),
-]
 ClientId = Annotated[
     str,
     StringConstraints(min_length=1, max_length=64, pattern=CLIENT),

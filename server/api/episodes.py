@@ -9,11 +9,10 @@ from pydantic import Field
 
 from parenting.server import moves, runs
 from parenting.server.admission import admitted_router
-from parenting.server.api.lists import Part, Rows
+from parenting.server.api.lists import Cursor, Limit, Part, Rows
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import read_responses
 from parenting.server.deps import Db
-from parenting.server.new_run import LARGEST_INT
 from parenting.server.schemas import Schema
 
 router = admitted_router(tags=["runs"])
@@ -46,10 +45,10 @@ class EpisodeRows(Rows[EpisodeSchema]):
 class EpisodePart(Part):
     """The requested part of a life's episodes."""
 
-    before: Annotated[int, Field(ge=1, le=LARGEST_INT)] | None = Field(
+    before: Cursor | None = Field(
         None, description="Only episodes with smaller numbers; the `next` of the page before."
     )
-    limit: int = Field(50, ge=1, le=200, description="At most this many rows.")
+    limit: Limit = Field(50, ge=1, le=200, description="At most this many rows.")
 
 
 @router.get("/runs/{run_id}/episodes", summary="List the episodes", responses=read_responses(404))

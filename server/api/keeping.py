@@ -11,14 +11,14 @@ from pydantic import Field
 from parenting.server import deletion, keeping
 from parenting.server.admission import admitted_router
 from parenting.server.api.bodies import Strict
-from parenting.server.api.lists import Part
+from parenting.server.api.lists import Cursor, Limit, Part
 from parenting.server.api.names import PublicId, RunId
 from parenting.server.api.responses import read_responses, write_responses
 from parenting.server.damage import damage
 from parenting.server.deps import Db, notify_worker
 from parenting.server.errors import Conflict
 from parenting.server.keeping import Description, Tag
-from parenting.server.new_run import LARGEST_INT, PersonsName
+from parenting.server.new_run import PersonsName
 from parenting.server.reads.schemas import run_schema
 from parenting.server.schemas import DamagedSchema, RunSchema, Schema
 from parenting.server.tables import Tombstone
@@ -93,10 +93,10 @@ class TombstoneRows(Schema):
 class DeletedPart(Part):
     """The requested part of the deleted runs."""
 
-    before: Annotated[int, Field(ge=1, le=LARGEST_INT)] | None = Field(
+    before: Cursor | None = Field(
         None, description="Only runs with smaller numbers; the `next` of the page before."
     )
-    limit: int = Field(50, ge=1, le=200, description="At most this many rows.")
+    limit: Limit = Field(50, ge=1, le=200, description="At most this many rows.")
 
 
 @router.post(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
 from parenting.server import exports, tables
 from parenting.server.damage import damage
@@ -24,10 +24,14 @@ from parenting.server.schemas import (
     Schema,
 )
 from parenting.server.statuses import QueryStatus
+from parenting.server.strict import DIGITS
 
 Row = TypeVar("Row")
-Place = Annotated[int, Field(ge=-1, le=LARGEST_INT)]
+Place = Annotated[int, Field(ge=-1, le=LARGEST_INT), DIGITS]
 """A tick, or an id; -1 lies before the first."""
+Number = Annotated[int, Field(ge=0, le=LARGEST_INT), DIGITS]
+Cursor = Annotated[int, Field(ge=1, le=LARGEST_INT), DIGITS]
+Limit = Annotated[int, DIGITS]
 
 
 class Rows(Schema, Generic[Row]):
@@ -77,10 +81,10 @@ class Part(BaseModel):
 class RunPart(Part):
     """The requested part of the runs."""
 
-    before: Annotated[int, Field(ge=1, le=LARGEST_INT)] | None = Field(
+    before: Cursor | None = Field(
         None, description="Only runs behind this one: with smaller ids. The `next` of the page before."
     )
-    limit: int = Field(50, ge=1, le=200, description="At most this many rows.")
+    limit: Limit = Field(50, ge=1, le=200, description="At most this many rows.")
     q: str = Field("", max_length=200, description="Only runs with each of these words, or of this number.")
     tag: Tag | None = Field(None, description="Only runs with this tag.")
     world: Name | None = Field(None, description="Only runs in this world.")
@@ -94,7 +98,7 @@ class AskedPart(Part):
     after: Place = Field(
         -1, description="Only questions asked after this tick; the `next` of the page before."
     )
-    limit: int = Field(50, ge=1, le=200, description="At most this many rows.")
+    limit: Limit = Field(50, ge=1, le=200, description="At most this many rows.")
     status: QueryStatus | None = Field(None, description="Only questions of this status.")
 
 
@@ -102,7 +106,7 @@ class MetricPart(Part):
     """The requested part of a run's metrics."""
 
     after: Place = Field(-1, description="Only ticks after this one; the `next` of the page before.")
-    limit: int = Field(10_000, ge=1, le=10_000, description="At most this many rows.")
+    limit: Limit = Field(10_000, ge=1, le=10_000, description="At most this many rows.")
 
 
 OnAxis = Annotated[float, Field(ge=0, le=LARGEST_INT)]
@@ -118,23 +122,38 @@ class CurvePart(Part):
     by: Axis = Field("tick", description="The axis: ticks, questions answered so far, or minutes.")
     begin: OnAxis | None = Field(None, description="The first place on the axis.")
     end: OnAxis | None = Field(None, description="The last place on the axis.")
-    points: int = Field(POINTS, ge=FEWEST, le=POINTS, description="At most this many points a curve.")
+    points: Limit = Field(POINTS, ge=FEWEST, le=POINTS, description="At most this many points a curve.")
 
 
 class ExportPart(Part):
     """The part of a run that is exported, and the format."""
 
-    of: exports.Part = Field(exports.Part.ANSWERS, description="answers, metrics or events (the log).")
     format: Literal["jsonl", "csv", "zip"] = Field(
-        "jsonl", description="jsonl or csv: one table; zip: the whole run, whatever `of` is."
+        "jsonl", description="jsonl or csv: the table that `of` names; zip: the whole run."
     )
+    of: exports.Part = Field(
+        exports.Part.ANSWERS, description="answers, metrics or events (the log); not with zip."
+    )
+
+    @field_validator("of")
+    @classmethod
+    def _of_a_table(cls, of: exports.Part, given: ValidationInfo) -> exports.Part:
+        if given.data.get("format") == "zip":
+            raise ValueError("A zip holds the whole run. Leave this out, or ask for the format jsonl or csv.")
+        return of
+
+
+class FollowPart(Part):
+    """The rows of metrics that a live stream sends, too."""
+
+    after: Place | None = Field(None, description="Send metrics too: those of the ticks after this one.")
 
 
 class EventPart(Part):
     """The requested part of a run's operator events."""
 
     after: Place = Field(-1, description="Only events with greater ids; the `next` of the page before.")
-    limit: int = Field(200, ge=1, le=1000, description="At most this many rows.")
+    limit: Limit = Field(200, ge=1, le=1000, description="At most this many rows.")
 
 
 def operator_event(row: tables.OperatorEvent) -> OperatorEventSchema | DamagedSchema:

@@ -31,7 +31,7 @@ ERRORS: dict[int, ServerError] = {
     404: NotFound("There is no run 9."),
     409: Conflict("This run is stopped; its agent cannot be changed any more."),
     410: ElsewhereError(),
-    413: TooLargeError(),
+    413: TooLargeError(most=64 * 1024),
     422: InvalidFieldsError([("choice", "Input should be 'left', 'right', 'either' or 'neither'")]),
     429: TooManyOfOneError(),
     500: ServerError(),

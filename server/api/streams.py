@@ -11,8 +11,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from parenting.server.access.staying import Stay
 from parenting.server.admission import admitted_router
-from parenting.server.api.bodies import After
-from parenting.server.api.lists import ExportPart
+from parenting.server.api.lists import ExportPart, FollowPart
 from parenting.server.api.names import RunId
 from parenting.server.api.responses import streams
 from parenting.server.archive.zipped import zipped
@@ -58,7 +57,7 @@ def known(request: Request, run_id: RunId, db: Db) -> int:
 async def follow_run(
     request: Request,
     run_id: Annotated[int, Depends(known)],
-    after: After = None,
+    part: Annotated[FollowPart, Query()],
     last_event_id: Annotated[str | None, Header(description="As a browser sends it.")] = None,
 ) -> AsyncIterable[ServerSentEvent]:
     """Follow a run by server-sent events: the state at the beginning, then every change.
@@ -68,13 +67,9 @@ async def follow_run(
     that tells nothing else, and comes again when a lease ends. `metrics` are rows of the ticks after `after`,
     if it is given.
     """
-    if (
-        after is not None
-        and last_event_id is not None
-        and last_event_id.isdigit()
-        and len(last_event_id) < 16
-    ):
-        after = max(after, int(last_event_id))
+    after, seen = part.after, last_event_id or ""
+    if after is not None and seen.isdigit() and len(seen) < 16:
+        after = max(after, int(seen))
     with request.app.state.seats.taken(request):
         async for event in request.app.state.streams.subscribe(run_id, after, Stay(request)):
             yield event

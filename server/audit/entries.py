@@ -31,9 +31,9 @@ def entries(
         return cut(session.scalars(rows).all(), limit, lambda row: row.id)
 
 
-def as_table(db: Database) -> Iterator[str]:
-    """Yield the whole log as CSV, the oldest entry first, read in batches."""
-    return as_csv(lambda: _rows(db), COLUMNS)
+def as_table(db: Database, kind: Kind | None = None) -> Iterator[str]:
+    """Yield the whole log as CSV, or its entries of one kind, the oldest first, read in batches."""
+    return as_csv(lambda: _rows(db, kind), COLUMNS)
 
 
 def told(row: AuditEntry) -> dict[str, Any]:
@@ -43,14 +43,16 @@ def told(row: AuditEntry) -> dict[str, Any]:
     return values | ({"damaged": found} if found else {})
 
 
-def _rows(db: Database) -> Iterator[dict[str, Any]]:
+def _rows(db: Database, kind: Kind | None) -> Iterator[dict[str, Any]]:
     last = 0
-    while batch := _after(db, last):
+    while batch := _after(db, last, kind):
         yield from (told(row) for row in batch)
         last = batch[-1].id
 
 
-def _after(db: Database, last: int) -> Sequence[AuditEntry]:
+def _after(db: Database, last: int, kind: Kind | None) -> Sequence[AuditEntry]:
     rows = select(AuditEntry).where(AuditEntry.id > last).order_by(AuditEntry.id).limit(BATCH)
+    if kind is not None:
+        rows = rows.where(AuditEntry.kind == str(kind))
     with db.read() as session:
         return session.scalars(rows).all()

@@ -13,6 +13,8 @@ import structlog
 from parenting.server import runs
 from parenting.server.db import Database
 from parenting.server.errors import LostClaimError, StoreError
+from parenting.server.failures import said_by
+from parenting.server.growth import NotFiniteError
 from parenting.server.pressure import Pressure
 from parenting.server.queue.worker_side import Watch
 from parenting.server.runs import Claim
@@ -99,7 +101,8 @@ class HeldRuns:
             raise
         except Exception as error:
             log.error("run failed", run=run_id, error=repr(error))
-            reason = f"The agent could not go on: {error}"
+            ours = isinstance(error, NotFiniteError)
+            reason = str(error) if ours else f"The agent could not go on: {said_by(error)}"
             runs.finish(self.db, self.claims[run_id], RunStatus.FAILED, reason, traceback.format_exc())
             self.drop(run_id)
         return AT_NEWS

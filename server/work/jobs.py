@@ -13,10 +13,12 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 
 import structlog
 import torch
+from sqlalchemy.exc import StatementError
 
 from parenting.server import jobs
 from parenting.server.db import Database
 from parenting.server.errors import LostClaimError, ServerError, StoreError
+from parenting.server.failures import said_by
 from parenting.server.jobs import JobClaim
 from parenting.server.work.courtesy import Courtesy
 from parenting.server.work.doers import do
@@ -120,5 +122,8 @@ class Jobs:
 
 def _reason(mine: JobClaim, error: Exception) -> str:
     """Return why a job failed, in a sentence for people."""
-    said = error.message if isinstance(error, ServerError) else f"{type(error).__name__}: {error}"
+    if isinstance(error, (ServerError, StatementError)):
+        said = said_by(error)
+    else:
+        said = f"{type(error).__name__}: {error}"
     return f"The worker could not do this ({mine.kind}): {said}"

@@ -59,6 +59,25 @@ def test_error_echoes_nothing(client: httpx2.Client) -> None:
     ).text.replace("hunter2x", "")
 
 
+@pytest.mark.parametrize(
+    ("path", "body", "field"),
+    [
+        ("queries/1/answer", b'{"choice": "left", "choice": "right", "client_id": "me"}', "choice"),
+        ("runs/1/queries/lease", b'{"client_id": "me", "client_id": "me"}', "client_id"),
+        ("runs", b'{"world": "W", "config": {"p_rec": 0.1, "p_rec": 0.2}}', "p_rec"),
+        ("runs", b'{"\\u0000": 1, "\\u0000": 2}', "body"),
+        ("runs", b'{"\\ud800": 1, "\\ud800": 2}', "body"),
+    ],
+)
+def test_a_field_that_stands_twice_is_refused(
+    client: httpx2.Client, guidance: int, path: str, body: bytes, field: str
+) -> None:
+    headers = {"Content-Type": "application/json"}
+    refused = wrong(client.post(f"/api/v1/{path}", content=body, headers=headers))
+    assert refused == {field: "It stands twice in this body. Send it once."}
+    assert client.get(f"/api/v1/queries/{guidance}").json()["answer"] is None
+
+
 def sized(size: int) -> bytes:
     return json.dumps({"world": WORLD, "name": "x" * size}).encode()
 
@@ -75,6 +94,7 @@ def test_large_body_is_refused_with_and_without_length(client: httpx2.Client) ->
     for content in (sized(LARGEST_BODY), pieces(sized(LARGEST_BODY))()):
         refused = client.post("/api/v1/runs", content=content, headers=headers)
         assert (refused.status_code, refused.json()["error"]["code"]) == (413, "too_large")
+        assert f"may have {LARGEST_BODY} bytes" in refused.json()["error"]["message"]
     assert wrong(client.post("/api/v1/runs", content=pieces(sized(200))(), headers=headers)).keys() == {
         "name"
     }

@@ -141,3 +141,10 @@ def test_the_whole_run_as_a_zip(client: httpx2.Client, heard: Claim) -> None:
         assert len(zipped.read("answers.jsonl").splitlines()) == len(CHOICES)
     assert [run["counts"]["answers"] for run in told["runs"]] == [len(CHOICES)]
     assert client.get("/api/v1/runs/99/export?format=zip").status_code == 404
+
+
+@pytest.mark.parametrize("of", ["metrics", "answers"])
+def test_a_zip_has_no_part(client: httpx2.Client, run: Run, of: str) -> None:
+    refused = client.get(f"/api/v1/runs/{run.id}/export?of={of}&format=zip")
+    assert (refused.status_code, refused.json()["error"]["field"]) == (422, "of")
+    assert "A zip holds the whole run." in refused.json()["error"]["message"]

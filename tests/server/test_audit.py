@@ -193,6 +193,15 @@ def test_it_leaves_whole_as_csv_without_formulas(client: httpx2.Client, db: Data
     assert [row[3] for row in rows] == ["'=pace 0", "'=pace 1", "'=pace 2"]
 
 
+def test_one_kind_leaves_as_csv(client: httpx2.Client, db: Database) -> None:
+    fill(db, 3)
+    told = {kind: client.get("/api/v1/audit/export", params={"kind": kind}) for kind in Kind}
+    rows = [row for reply in told.values() for row in list(csv.reader(io.StringIO(reply.text)))[1:]]
+    assert sorted(int(row[0]) for row in rows) == [entry.id for entry in log(db)]
+    assert all(row[2] == kind for kind in Kind for row in list(csv.reader(io.StringIO(told[kind].text)))[1:])
+    assert client.get("/api/v1/audit/export", params={"kind": "gossip"}).status_code == 422
+
+
 def test_a_locked_store_holds_up_the_end_for_a_second_at_most(
     settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from parenting.agent.config import Config
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.new_run import NewRun, plan, start
@@ -68,6 +69,20 @@ def test_wrong_hyperparameter_is_named(text: str, part: str) -> None:
     with pytest.raises(InvalidFieldsError, match=part) as caught:
         plan(read_form({"world": WORLD, "config.p_guid": text}))
     assert caught.value.field == "config.p_guid"
+
+
+@pytest.mark.parametrize("rate", [1e308, 1.5])
+def test_a_learning_rate_above_one_is_named_with_its_bound(rate: float) -> None:
+    with pytest.raises(InvalidFieldsError) as caught:
+        plan(NewRun(world=WORLD, config={"learning_rate": rate}))
+    assert caught.value.field == "config.learning_rate"
+    assert f"{rate:g} is more than 1: " in caught.value.message
+    assert caught.value.message.endswith("Write a number up to 1, such as 0.001.")
+
+
+def test_a_learning_rate_of_one_is_taken_and_stored_ones_are_read() -> None:
+    assert plan(NewRun(world=WORLD, config={"learning_rate": 1}))["config"]["learning_rate"] == 1
+    assert Config(learning_rate=1e308).learning_rate == 1e308
 
 
 def test_each_of_several_has_its_message() -> None:
