@@ -34,7 +34,7 @@ BACK_PATHS = {"parent": "/parent", "dashboard": "", "operator": "#operator"}
 
 FIELD_ERRORS = {
     **dict.fromkeys(PROBABILITIES, "A probability is a number from 0 to 1, such as 0.5."),
-    "goal": "A goal is a whole number of questions from 1 to 1000000; leave it empty to have none.",
+    "goal": "A goal is a whole number of answers from 1 to 1000000; leave it empty to have none.",
     "pace": "A pace is a number of ticks a second, above 0 and up to 1000; leave it empty to have none.",
 }
 """The error next to a wrong field."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Literal
 
 import httpx2
 import pytest
@@ -16,6 +17,7 @@ from parenting.server.runs import Claim, get_run
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
 from tests.pages.parent_page import look
+from tests.pages.test_access import violations
 
 ME = "client-of-mine"
 
@@ -132,6 +134,19 @@ def test_a_corrected_answer_says_so(client: httpx2.Client, db: Database, mine: C
     page = client.get("/runs/1/history").text
     assert "corrected later" in entry(page, 1)
     assert "corrected later" not in entry(page, 2)
+
+
+def test_a_corrected_answer_is_as_easy_to_read(tabs: BrowserTabs, db: Database, mine: Claim) -> None:
+    for tick, kind in ((1, "guidance"), (2, "preference")):
+        revisions.supersede(db, answered(db, mine, tick, "left", kind), "right", ME, "human")
+    page = tabs.open("/runs/1/history")
+    expect(page.locator(".superseded")).to_have_count(2)
+    dim = "all => all.filter(part => getComputedStyle(part).opacity < 1).length"
+    assert page.locator(".superseded, .superseded :not(svg *)").evaluate_all(dim) == 0
+    schemes: list[Literal["light", "dark"]] = ["light", "dark"]
+    for scheme in schemes:
+        page.emulate_media(color_scheme=scheme)
+        assert violations(page, runOnly=["color-contrast"]) == [], scheme
 
 
 def test_dashboard_and_parents_page_lead_there(client: httpx2.Client, mine: Claim) -> None:

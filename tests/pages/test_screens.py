@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -9,6 +11,7 @@ from parenting.envs import registry
 from parenting.server.db import Database
 from tests.drawing.world_clips import guidance, preference
 from tests.pages.browser_tabs import BrowserTabs
+from tests.pages.parent_page import address, shown
 from tests.pages.test_every_world_page import LEVELS, posted
 
 SCREENS = ((1280, 720), (1366, 768), (390, 844), (844, 390), (320, 568))
@@ -42,6 +45,27 @@ def test_a_question_fits_every_screen(tabs: BrowserTabs, db: Database, world: st
             if found := outside(page):
                 wrong[kind, width, height] = found
     assert wrong == {}
+
+
+SIZES = ((768, 1024), (820, 1180), (844, 390), (932, 430), (960, 540), (1024, 768), (390, 844), (320, 568))
+SAID = ("", "Saving", "Saved", "Taken back", "Kept here, not sent yet", "Kept here, not stored")
+
+
+def test_the_question_stays_where_it_is_whatever_is_said_of_the_answer(
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
+) -> None:
+    page = tabs.open(address(db))
+    shown(page, ask())
+    tops = """all => all.map(words => {
+        document.getElementById("saved").textContent = words;
+        return document.getElementById("stage").getBoundingClientRect().top;
+    })"""
+    for left in ("", "about 12 minutes left"):
+        page.evaluate("words => { document.getElementById('left').textContent = words; }", left)
+        for width, height in SIZES:
+            page.set_viewport_size({"width": width, "height": height})
+            assert len(set(page.evaluate(tops, SAID))) == 1, (width, height, left)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 FIELD = "\n".join(

@@ -180,6 +180,7 @@ const tell = {
     put("answered", now.standing);
     put("skipped", now.skipped);
     put("goal", now.goal);
+    document.getElementById("goal-many").hidden = now.goal === 1;
     put("maturity", now.maturity);
     if (now.reason) put("reason", now.reason);
     put("speed", now.speed);
