@@ -79,15 +79,15 @@ def test_no_row_is_dropped_in_silence(text: str, line: int, said: str) -> None:
     [
         ("    ", "", "4 blank columns left of the art were cut"),
         ("", "  ", "2 blank columns right of the art were cut"),
-        ("\u200b", "", "7 zero width spaces were left out"),
+        ("\u200b", "", "6 zero width spaces were left out"),
     ],
 )
 def test_a_map_is_tidied_as_a_level_is(before: str, after: str, said: str) -> None:
-    for text, lines in ((CRATE, 7), ("SFFF\nFHFG\n" * 3 + "HFFF\n", 7)):
+    for text in (CRATE, "SFFF\nFHFG\n" * 3):
         disguised = "".join(f"{before}{row}{after}\n" for row in text.splitlines())
         (level,), (plain,) = imported(disguised), imported(text)
         assert level.level == plain.level
-        assert level.lost[0].removeprefix(str(lines)) == said.removeprefix(str(lines))
+        assert level.lost[0] == said
 
 
 def test_a_code_fence_names_no_map() -> None:

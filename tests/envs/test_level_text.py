@@ -162,6 +162,13 @@ def test_bytes_of_every_writer_are_read(blob: bytes, said: tuple[str, ...]) -> N
     assert decode(blob) == (POND, said)
 
 
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-32-le", "utf-32-be"])
+def test_text_without_a_mark_is_read_in_any_script(encoding: str) -> None:
+    text = f"; \u041e\u0441\u0442\u0440\u043e\u0432\u3000\u6c60\U0001f41f\n{POND}"
+    assert decode(text.encode(encoding)) == (text, (f"the text was read as {encoding[:6].upper()}",))
+    assert decode(POND.replace("A", "\0").encode())[1] == ()  # a stray zero is told with its place
+
+
 def test_other_bytes_are_refused_with_a_remedy() -> None:
     with pytest.raises(ValueError, match="byte 13, on line 2, is not UTF-8; save it as UTF-8"):
         decode("name: x\nnäh".encode("latin-1").replace(b"n\xe4", b"nah \xe4"))
