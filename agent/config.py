@@ -90,7 +90,10 @@ class Config(BaseModel):
         1, ge=1, le=16, description="The last clip length T; the agent matures through the stages 1 .. T."
     )
     queries_per_stage: int | None = Field(
-        None, ge=1, description="Answered queries after which a stage ends; none leaves it to the operator."
+        None,
+        ge=1,
+        le=2**53 - 1,
+        description="Answered queries after which a stage ends; none leaves it to the operator.",
     )
     own_stage_only: bool = Field(
         False, description="Train pi_T on entries of maturity T alone, as Sec. 4.1 supposes."

@@ -65,6 +65,17 @@ def _require_text(ctx: Any, option: Any) -> None:
             raise typer.BadParameter(said, ctx=ctx, param=option)
 
 
+def open_closed() -> None:
+    """Put something in the place of a closed stream, whose number a file of data would get otherwise.
+
+    Reading the input and writing to the output are errors of the system then; messages have no place.
+    """
+    modes = (("stdin", os.O_WRONLY, "r"), ("stdout", os.O_RDONLY, "w"), ("stderr", os.O_WRONLY, "w"))
+    for name, flags, mode in modes:
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, flags), mode, encoding="utf-8"))
+
+
 def replace_unprintable() -> None:
     """Let output go on where the terminal's encoding lacks a character: a question mark stands for it."""
     for stream in (sys.stdout, sys.stderr):

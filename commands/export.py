@@ -31,6 +31,20 @@ class Form(StrEnum):
 TABLE = {Form.FIRST: Format.JSONL, Form.JSONL: Format.JSONL, Form.CSV: Format.CSV}
 """The formats of one table."""
 
+ENDINGS = {
+    ".jsonl": Form.JSONL,
+    ".ndjson": Form.JSONL,
+    ".json": Form.JSONL,
+    ".csv": Form.CSV,
+    ".zip": Form.WHOLE,
+}
+"""The ends of names and the formats that they stand for."""
+OTHERS = (
+    *(".parquet", ".feather", ".arrow", ".xlsx", ".xls", ".ods", ".tsv", ".db", ".sqlite", ".pkl"),
+    *(".tar", ".gz", ".tgz", ".bz2", ".xz", ".zst", ".7z", ".rar"),
+)
+"""The ends of names of formats that nothing is written in."""
+
 
 def export(
     run: Annotated[
@@ -109,6 +123,8 @@ def export(
             _episodes(runs, minari, out or of or format_)
             return
         form = format_ or _form(out, of)
+        if out is not None:
+            _check_name(out, form)
         if form is not Form.WHOLE:
             if len(runs) > 1:
                 raise UsageError(
@@ -167,9 +183,28 @@ def _episodes(runs: list[int], name: str, others: object) -> None:
 
 def _form(out: Path | None, of: Part | None) -> Form:
     """Return the format that the other options mean."""
-    if out is None or of is not None or out.suffix.lower() in (".jsonl", ".ndjson", ".json"):
-        return Form.JSONL
-    return Form.CSV if out.suffix.lower() == ".csv" else Form.WHOLE
+    ending = "" if out is None else out.suffix.lower()
+    if out is None or of is not None:
+        return Form.CSV if ending == ".csv" else Form.JSONL
+    return ENDINGS.get(ending, Form.WHOLE)
+
+
+def _check_name(out: Path, form: Form) -> None:
+    """Refuse a name that promises another format than the one that is written.
+
+    Raises:
+        UsageError: it does.
+    """
+    formats = "A folder or FILE.zip is of whole runs, FILE.jsonl and FILE.csv are one table"
+    if str(out) == "-":
+        raise UsageError(f"--out: - is no name of a file. Leave --out out for standard output. {formats}.")
+    ending = out.suffix.lower()
+    meant = ENDINGS.get(ending, form)
+    if ending in OTHERS:
+        raise UsageError(f"--out: {out} ends with {ending}, and no such file is written. {formats}.")
+    if (meant is Form.WHOLE) != (form is Form.WHOLE) or (meant is Form.CSV) != (form is Form.CSV):
+        whole = "whole runs are" if form is Form.WHOLE else f"one table as {TABLE[form]} is"
+        raise UsageError(f"--out: {out} ends with {ending}, and {whole} asked for. {formats}.")
 
 
 def _whole(runs: list[int], out: Path, force: bool) -> None:

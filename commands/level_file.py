@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from errno import EBADF
 from os.path import exists
 from pathlib import Path
 
@@ -76,7 +77,10 @@ def _bytes(file: str) -> bytes:
     if file == STANDARD_INPUT:
         if sys.stdin.isatty():
             say("Type or paste a level; Ctrl-D ends it.", err=True)
-        return sys.stdin.buffer.read(FILE_BYTES + 1)
+        try:
+            return sys.stdin.buffer.read(FILE_BYTES + 1)
+        except OSError as error:
+            raise OSError("it is closed" if error.errno == EBADF else str(error)) from None
     with Path(file).open("rb") as opened:
         return opened.read(FILE_BYTES + 1)
 

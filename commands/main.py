@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from parenting.commands.command import Command, paragraphs, replace_unprintable
+from parenting.commands.command import Command, open_closed, paragraphs, replace_unprintable
 from parenting.commands.printing import say
 from parenting.commands.renamed import modern
 from parenting.envs.names import did_you_mean
@@ -93,8 +93,8 @@ parenting run unsafe-exploration --preset conservative --trials 100
 `parenting COMMAND --help` shows an example of each command.
 """
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""The errors of a disk that takes no more of an output."""
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
+"""The errors of a disk that takes no more of an output, and of an output that is closed."""
 
 
 class LazyGroup(TyperGroup):
@@ -102,6 +102,7 @@ class LazyGroup(TyperGroup):
 
     def main(self, *args: Any, **named: Any) -> Any:
         """Run the program; no character of its output can end it, and a full disk ends it with a sentence."""
+        open_closed()
         replace_unprintable()
         try:
             return super().main(*args, **named)

@@ -48,12 +48,12 @@ def run(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Set a hyperparameter; may be repeated."),
     ] = None,
-    trials: Annotated[int, typer.Option(min=1, help="Number of agents.")] = 1,
+    trials: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of agents.")] = 1,
     seed: Annotated[
         int, typer.Option(min=0, max=2**53 - 1, help="Seed; trial i of a seed is always the same agent.")
     ] = 0,
     max_ticks: Annotated[
-        int, typer.Option(min=1, help="Give a trial up as unfinished after this many ticks.")
+        int, typer.Option(min=1, max=10**9, help="Give a trial up as unfinished after this many ticks.")
     ] = 20_000,
     until: Annotated[
         str | None,
@@ -211,7 +211,8 @@ def _until(world: str, text: str | None) -> StopRule:
 
     spec = registry.spec(world)
     try:
-        return read_stop_rule(text or ("optimal" if spec.ends_at_goal else "queries:1000"), spec)
+        usual = "optimal" if spec.ends_at_goal else "queries:1000"
+        return read_stop_rule(usual if text is None else text, spec)
     except ValueError as error:
         raise UsageError(f"--until: {error}") from None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Annotated
 
 import typer
@@ -74,6 +75,7 @@ def start(
     Example: parenting start unsafe-exploration --goal 50 --set guidance_layout=two --set practice=required
     """
     with friendly_errors():
+        _refuse_empty({"preset": preset, "parent": parent, "seed": seed, "goal": goal, "finish": finish})
         given = {"world": world, "preset": preset, "seed": seed, **parent_of(parent)}
         given |= {
             key: text
@@ -98,6 +100,17 @@ def start(
     page = "parent" if run.parent == "human" else ""
     _tell_cost(run)
     say(f"Run {run.id} is started. Its page: /runs/{run.public_id}/{page}".rstrip("/"))
+
+
+def _refuse_empty(options: Mapping[str, str | None]) -> None:
+    """Refuse an option that is given without a value, which the form takes for an absent one.
+
+    Raises:
+        UsageError: one is.
+    """
+    for name, value in options.items():
+        if value is not None and not value.strip():
+            raise UsageError(f"--{name}: '{value}' is no value. Give one, or leave --{name} out.")
 
 
 def _tell_cost(run: Run) -> None:

@@ -130,7 +130,7 @@ def _random(
     """
     if registry.spec(world).name not in SIZES:
         raise ValueError(f"--random: {world} has no random levels; {RANDOM} has.")
-    wanted = (count, *_size(size or SIZES[world]), seed)
+    wanted = (count, *_size(SIZES[world] if size is None else size), seed)
     if world == ISLANDS:
         from parenting.envs.random_islands import island_levels
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from parenting.envs.levels.spec import AGENT, Cell, Level, LevelError, WorldSpec
-from parenting.envs.people_text import plain, printable
+from parenting.envs.people_text import plain, printable, sign
 
 __all__ = ["LARGEST", "LEVEL_CHARACTERS", "SMALLEST", "Level", "LevelError", "check_text", "draw", "parse"]
 
@@ -141,7 +141,7 @@ def _check_glyphs(level: Level, world: WorldSpec) -> None:
             if glyph == "\t":
                 raise level.wrong((row, column), "a tab has no width of its own here; write spaces")
             if glyph not in world.legend:
-                rule = f"{glyph!r} is not a glyph of {world.name}, whose glyphs are {known}"
+                rule = f"{sign(glyph)} is not a glyph of {world.name}, whose glyphs are {known}"
                 raise level.wrong((row, column), rule)
 
 

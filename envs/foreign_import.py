@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from parenting.envs import registry
 from parenting.envs.foreign_levels import carry
-from parenting.envs.foreign_text import ForeignMap, maps
+from parenting.envs.foreign_text import ForeignMap, MapRowError, maps
 from parenting.envs.levels.spec import Level, LevelError
 
 
@@ -54,10 +54,12 @@ def imported(
         world: The world of art of gridworlds; none is found by its signs.
 
     Raises:
-        ForeignMapError: there is no map, or one holds what no world of ours has.
+        ForeignMapError: there is no map, a row of one is wrong, or one holds what no world of ours has.
     """
     try:
         found = maps(text, form)
+    except MapRowError as error:
+        raise ForeignMapError(str(error), error.line) from None
     except ValueError as error:
         raise ForeignMapError(str(error)) from None
     return [_one(one, name, world) for one, name in zip(found, _names(found, stem), strict=True)]
@@ -82,14 +84,15 @@ def _one(one: ForeignMap, name: str, world: str | None) -> Imported:
         carried = carry(one, world)
     except ValueError as error:
         raise ForeignMapError(f"{error}.", one.line) from None
+    lost = (*one.said, *carried.lost)
     level = Level(name, carried.world, carried.rows, dict(carried.header), name)
     try:
-        return Imported(registry.read_level(carried.world, level.text, name), one.format, carried.lost, None)
+        return Imported(registry.read_level(carried.world, level.text, name), one.format, lost, None)
     except LevelError as error:
         row = error.line - len(level.header) - 3
         where = f"row {row}, column {error.column}" if row > 0 else "its header"
         refused = f"{carried.world} refuses this level at {where}: {error.rule}; mend it by hand"
-        return Imported(level, one.format, carried.lost, refused)
+        return Imported(level, one.format, lost, refused)
 
 
 def _names(found: Sequence[ForeignMap], stem: str) -> list[str]:

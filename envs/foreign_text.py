@@ -8,8 +8,12 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import NamedTuple
+
+from parenting.envs.level_text import COMMENT, FENCE, Line, Written, lines_of, tidied, visible
+from parenting.envs.people_text import sign
 
 FORMATS = {
     "xsb": "Sokoban's XSB",
@@ -24,12 +28,45 @@ ROWS = {
     "frozenlake": re.compile(r"[SFHG]{2,}"),
     "cliffwalking": re.compile(r"\s*[oxCT](\s+[oxCT])+\s*"),
     "taxi": re.compile(r"\+-+\+|\|[RGYB :|]+\|"),
-    "gridworlds": re.compile(r"[ #A-Ztv0-9><^~*]*[#W][ #A-Ztv0-9><^~*]*"),
+    "gridworlds": re.compile(r"(?=[^#W]*[#W])[ #A-Ztv0-9><^~*]+"),
 }
 """The pattern of a row of each format."""
 MARKS = {"xsb": "@+", "frozenlake": "S", "cliffwalking": "x", "taxi": "|", "gridworlds": "A"}
 """The signs of which a map of each format has one: where its agent starts, or, of Taxi, its walls."""
-QUOTED = re.compile(r"""[bru]?("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')""")
+SIGNS = {
+    "xsb": "#@+$*.",
+    "frozenlake": "SFHG",
+    "cliffwalking": "oxCT",
+    "taxi": "+-|:RGYB",
+    "gridworlds": "#WAG",
+}
+"""The signs of each format that make most of a row, so that a row with a strange sign is known by them."""
+EVERY = {"xsb": "#", "frozenlake": "FH", "cliffwalking": "oC", "taxi": "+|", "gridworlds": "#W"}
+"""The signs of which nearly every row of each format has one."""
+OF_ONE_LENGTH = ("frozenlake", "cliffwalking", "taxi")
+"""The formats whose rows are of one length; XSB's need not be, and art of gridworlds is refused later."""
+QUOTED = re.compile(r"""(?i:(r[bu]?|[bu]r)|[bu])?("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')""")
+"""A string in Python: whether it is a raw one, and its text in quotation marks."""
+ESCAPE = re.compile(
+    r"""\\(?:[\\'"abfnrtv]|[0-3]?[0-7]{1,2}|x[0-9a-fA-F]{2}|u(?![dD][89a-fA-F])[0-9a-fA-F]{4}|U00(?:0[0-9a-fA-F]|10)[0-9a-fA-F]{4})"""
+)
+"""An escape that Python reads; any other one stays as it stands."""
+
+
+class MapRowError(ValueError):
+    """A line that parts a map, or that looks like a row of one and is none."""
+
+    def __init__(self, line: int, said: str) -> None:
+        super().__init__(said)
+        self.line = line
+
+
+class _Run(NamedTuple):
+    """Lines that follow one another and are all rows of one format, or all none, and what is seen of each."""
+
+    is_rows: bool
+    lines: list[Line]
+    seen: list[str]
 
 
 @dataclass(frozen=True)
@@ -40,6 +77,7 @@ class ForeignMap:
     rows: tuple[str, ...]
     line: int  # of its first row, counted from 1
     name: str = ""
+    said: tuple[str, ...] = ()  # what was cut around it
 
 
 def recognise(rows: Sequence[str]) -> str | None:
@@ -63,58 +101,164 @@ def hint(rows: Sequence[str]) -> str:
 def maps(text: str, wanted: str | None = None) -> list[ForeignMap]:
     """Return the maps in a text, also as lists of strings in Python.
 
+    What stands around a map is cut as it is around a level of ours.
+
     Args:
         text: The text.
         wanted: The only format to look for; none is the first one that fits a map.
 
     Raises:
+        MapRowError: A line is nearly a row of a map, and the map cannot be whole without it.
         ValueError: There is none.
     """
-    lines = _unquoted(text.removeprefix("\ufeff").replace("\u00a0", " ").splitlines())
-    found: list[ForeignMap] = []
+    lines = lines_of(text)
+    quoted = any(QUOTED.search(line.text) for line in lines)
+    for view in ([_unquoted(lines)] if quoted else []) + [lines]:
+        seen = [visible(line) for line in view]
+        for format in (wanted,) if wanted else FORMATS:
+            if found := _of(format, view, seen):
+                return found
     for format in (wanted,) if wanted else FORMATS:
-        found += _of(format, lines)
-        if found:
-            return found
+        _check_all(format, lines)
     what = FORMATS[wanted] if wanted else ", ".join(FORMATS.values())
     raise ValueError(f"no map is here. A map is {what}.")
 
 
-def _of(format: str, lines: Sequence[str]) -> list[ForeignMap]:
+def _of(format: str, lines: Sequence[Line], seen: Sequence[str]) -> list[ForeignMap]:
     """Return the runs of lines that are rows of one format; the line above, or a title below, names one."""
+    pattern = ROWS[format]
+    pairs = groupby(zip(lines, seen, strict=True), lambda one: pattern.fullmatch(one[1]) is not None)
+    runs = [
+        _Run(is_rows, [line for line, _ in block], [text for _, text in block])
+        for is_rows, block in ((is_rows, list(several)) for is_rows, several in pairs)
+    ]
+    whole = [one.is_rows and len(one.seen) > 1 and recognise(one.seen) == format for one in runs]
+    if any(whole):
+        _check(format, runs, whole)
     found: list[ForeignMap] = []
     above = ""
-    for is_row, run in groupby(enumerate(lines, 1), lambda one: ROWS[format].fullmatch(one[1]) is not None):
-        block = list(run)
-        rows = tuple(line for _, line in block)
-        if not is_row:
-            title = next((line for _, line in block if line.lower().startswith("title:")), None)
-            if title and found and not found[-1].name:
-                found[-1] = ForeignMap(*_but_name(found[-1]), title.partition(":")[2].strip())
-            named = [line for _, line in block if line.strip() and line.strip() != "(Down)"]
-            above = named[-1].strip("; \t'\"") if named and named[-1] is not title else ""
-        elif len(rows) > 1 and recognise(rows) == format:
-            found.append(ForeignMap(format, rows, block[0][0], above))
+    for run, is_map in zip(runs, whole, strict=True):
+        if is_map:
+            found.append(replace(_map(format, run), name=above))
             above = ""
+        elif not run.is_rows:
+            title = next((text for text in run.seen if _is_title(text)), None)
+            if title and found and not found[-1].name:
+                found[-1] = replace(found[-1], name=title.partition(":")[2].strip())
+            above = _name_above(run.seen)
     return found
 
 
-def _but_name(one: ForeignMap) -> tuple[str, tuple[str, ...], int]:
-    return one.format, one.rows, one.line
+def _is_title(text: str) -> bool:
+    return text.lower().startswith("title:")
 
 
-def _unquoted(lines: Sequence[str]) -> list[str]:
+def _name_above(seen: Sequence[str]) -> str:
+    """Return the name that the lines above a map give it; above a code fence only a comment does."""
+    fences = [place for place, text in enumerate(seen) if FENCE.fullmatch(text)]
+    named = [
+        text
+        for place, text in enumerate(seen)
+        if text and text != "(Down)" and place not in fences
+        if not fences or place > fences[-1] or text.startswith(COMMENT)
+    ]
+    return named[-1].strip("; \t'\"") if named and not _is_title(named[-1]) else ""
+
+
+def _map(format: str, run: _Run) -> ForeignMap:
+    """Return a run of rows as a map, cut to what stands within its walls.
+
+    Raises:
+        MapRowError: A row is indented as no other one is, or has another length.
+    """
+    art = tidied(Written(art=run.lines), "")
+    rows = [line.text for line in art.art]
+    lengths = [len(row.split()) if format == "cliffwalking" else len(row) for row in rows]
+    for line, row, length in zip(run.lines, rows, lengths, strict=True):
+        if ROWS[format].fullmatch(row) is None:
+            raise _strange(format, line, row)
+        if format in OF_ONE_LENGTH and length != lengths[0]:
+            said = f"this row has {length} signs, and the map's first row has {lengths[0]}. Mend it"
+            raise MapRowError(line.number, f"{said}.")
+    return ForeignMap(format, tuple(rows), run.lines[0].number, said=art.said)
+
+
+def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:
+    """Refuse lines that would part a map or leave rows of it out.
+
+    Raises:
+        MapRowError: There is one.
+    """
+    for place, run in enumerate(runs):
+        before, after = place > 0 and whole[place - 1], place + 1 < len(runs) and whole[place + 1]
+        if run.is_rows:
+            if not whole[place] and len(run.lines) > 1:
+                signs = " or ".join(f"'{one}'" for one in MARKS[format])
+                said = f"these rows of {FORMATS[format]} are no map by themselves: none has {signs}"
+                raise MapRowError(run.lines[0].number, f"{said}. Join them to their map, or leave them out.")
+            continue
+        parts = before != after and 0 < place < len(runs) - 1 and all(run.seen)
+        width = len(runs[place - 1].seen[-1]) if before else 0
+        for at in {*([0] if before else []), *([len(run.seen) - 1] if after else [])}:
+            text = run.seen[at]
+            if _is_apart(text):
+                continue
+            if parts or _is_nearly_a_row(format, text) or (at == 0 and width == len(text) and not after):
+                raise _strange(format, run.lines[at], text)
+
+
+def _check_all(format: str, lines: Sequence[Line]) -> None:
+    """Refuse lines that are all nearly rows of one format, and are no map for some of them.
+
+    Raises:
+        MapRowError: They are.
+    """
+    shown = [(line, text) for line in lines if (text := visible(line))]
+    wrong = [one for one in shown if ROWS[format].fullmatch(one[1]) is None]
+    if wrong and len(shown) > 1 and all(_is_nearly_a_row(format, text) for _, text in shown):
+        raise _strange(format, *wrong[0])
+
+
+def _is_apart(text: str) -> bool:
+    """Return whether a line is no row of any map: it is empty, a comment, a title or a code fence."""
+    return not text or text.startswith(COMMENT) or _is_title(text) or FENCE.fullmatch(text) is not None
+
+
+def _is_nearly_a_row(format: str, text: str) -> bool:
+    """Return whether more than half of the signs of a line are those of a row."""
+    signs = "".join(text.split())
+    known = sum(one in SIGNS[format] for one in signs)
+    return 2 * known > len(signs) and any(one in EVERY[format] for one in signs)
+
+
+def _strange(format: str, line: Line, text: str) -> MapRowError:
+    """Return the error of a line that stands amid rows and is none, with its first strange sign."""
+    signs = SIGNS[format] + " -_" * (format == "xsb") + " " * (format in ("cliffwalking", "taxi"))
+    strange = next((one for one in text if one not in signs), text[0])
+    shown = "a tab" if strange == "\t" else sign(strange)
+    said = f"{shown} makes this line no row of {FORMATS[format]}, and it would part the map"
+    return MapRowError(line.number, f"{said}. Mend the row, or put an empty line beside it if it is a text.")
+
+
+def _unquoted(lines: Sequence[Line]) -> list[Line]:
     """Return lines of a list in Python as the strings in them; the end of an inner list parts two maps.
 
-    A line keeps its number, unless several strings stand on it and are longer than a character.
+    Each has the number of the line where it stood.
     """
-    if not any(QUOTED.search(line) for line in lines):
-        return list(lines)
-    found: list[str] = []
+    found: list[Line] = []
     for line in lines:
-        parts = [str(ast.literal_eval(one[1])) for one in QUOTED.finditer(line)]
+        parts = [_string(one) for one in QUOTED.finditer(line.text)]
         by_cell = all(len(part) == 1 for part in parts)
-        found += ["".join(parts)] if by_cell else parts
-        if not by_cell and "]" in QUOTED.sub("", line):
-            found.append("")
+        texts = ["".join(parts)] if by_cell else parts
+        if not by_cell and "]" in QUOTED.sub("", line.text):
+            texts.append("")
+        found += [Line(line.number, text, tuple(range(1, len(text) + 1))) for text in texts]
     return found
+
+
+def _string(quoted: re.Match[str]) -> str:
+    """Return the text of a string in Python; a wrong escape stays as it stands."""
+    raw, inner = quoted[1], quoted[2][1:-1]
+    if raw:
+        return inner
+    return ESCAPE.sub(lambda one: str(ast.literal_eval(f"'{one[0]}'")), inner)

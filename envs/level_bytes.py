@@ -5,6 +5,8 @@ Files are opened elsewhere; nothing here does.
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from parenting.envs.people_text import read_name
 
 FILE_BYTES = 2_000_000
@@ -27,14 +29,28 @@ def decode(blob: bytes) -> tuple[str, tuple[str, ...]]:
     """
     if len(blob) > FILE_BYTES:
         raise ValueError(f"a file of levels has at most {FILE_BYTES} bytes, and this one has more")
+    encoding = encoding_of(blob)
+    mark = next((bom for bom, known in BOMS if known == encoding and blob.startswith(bom)), b"")
+    return _read(blob[len(mark) :], encoding)
+
+
+def encoding_of(blob: bytes) -> str:
+    """Return the encoding that bytes are most likely in: by their mark, or by where their zeros stand."""
     for bom, encoding in BOMS:
         if blob.startswith(bom):
-            return _read(blob[len(bom) :], encoding)
-    for zeros, signs, encoding in ((1, 0, "utf-16-le"), (0, 1, "utf-16-be")):
-        # Text in Latin letters and signs has a zero in every second byte, and no other text has.
-        if len(blob) > 1 and not any(blob[zeros::2]) and all(blob[signs::2]):
-            return _read(blob, encoding)
-    return _read(blob, "utf-8")
+            return encoding
+    if b"\0" not in blob:
+        return "utf-8"
+    for encoding in ("utf-32-le", "utf-32-be"):
+        with suppress(UnicodeDecodeError):
+            blob.decode(encoding)  # hardly any other bytes are
+            return encoding
+    even, odd = blob[::2].count(0), blob[1::2].count(0)
+    # Signs and Latin letters have a zero in every second byte, and the art of a level is of these.
+    for zeros, others, encoding in ((odd, even, "utf-16-le"), (even, odd, "utf-16-be")):
+        if 8 * zeros >= len(blob) - 1 and zeros > 4 * others:
+            return encoding
+    return "utf-8"
 
 
 def _read(blob: bytes, encoding: str) -> tuple[str, tuple[str, ...]]:

@@ -17,8 +17,8 @@ from parenting.envs.levels.spec import AGENT, Cell, LevelError
 
 FILE_CHARACTERS = 1_000_000
 """Characters of a text that holds several levels."""
-FENCE = re.compile(r"\s*(`{3,}|~{3,})\s*\w*\s*")
-"""The line before and after a block of code in Markdown."""
+FENCE = re.compile(r"\s*(`{3,}[^`]*|~{3,}.*)")
+"""The line before and after a block of code in Markdown; the first one may say anything of the block."""
 ENTRY = re.compile(r"\s*[a-z_]+\s*:\s*\S.*")
 """An entry of a header, which may stand above a block of code."""
 COMMENT = ";"
@@ -67,6 +67,7 @@ class Written:
     art: Sequence[Line] = ()
     comment: str = ""  # the name that a comment above the art gives
     said: tuple[str, ...] = field(default=(), compare=False)  # what was cut or replaced
+    comment_at: Cell = field(default=(1, 1), compare=False)  # line and column of that name
 
     @property
     def name(self) -> str:
@@ -89,12 +90,17 @@ class Written:
         return line, column
 
 
-def written(text: str, glyphs: str) -> list[Written]:
-    """Take a text apart into its levels, at least one; `glyphs` are the world's."""
-    lines = [
+def lines_of(text: str) -> list[Line]:
+    """Return the lines of a text, without a byte order mark."""
+    return [
         Line(number, line, tuple(range(1, len(line) + 1)))
         for number, line in enumerate(ENDS.split(text.removeprefix("\ufeff")), 1)
     ]
+
+
+def written(text: str, glyphs: str) -> list[Written]:
+    """Take a text apart into its levels, at least one; `glyphs` are the world's."""
+    lines = lines_of(text)
     prose = _prose(lines, glyphs)
     lines = [replace(line, text="", columns=()) if line.number in prose else line for line in lines]
     found: list[Written] = []
@@ -105,7 +111,9 @@ def written(text: str, glyphs: str) -> list[Written]:
         if ends or (kind == "header" and now.header):
             found, now = [*found, *_apart(now, lines)], Written()
         if kind == "comment":
-            now = replace(now, comment=block[-1].text.strip(COMMENT + BLANKS))
+            text = block[-1].text
+            at = block[-1].number, len(text) - len(text.lstrip(COMMENT + BLANKS)) + 1
+            now = replace(now, comment=text.strip(COMMENT + BLANKS), comment_at=at)
         elif kind == "header":
             now = replace(now, header=block)
         elif kind == "rows":
@@ -113,24 +121,33 @@ def written(text: str, glyphs: str) -> list[Written]:
     if now.art or now.header or not found:
         found += _apart(now, lines)
     said = (*([PROSE] if prose else []), *_around(lines, found, glyphs))
-    return [_tidied(one, glyphs, said) for one in found]
+    return [tidied(one, glyphs, said) for one in found]
 
 
 def choose(found: Sequence[Written], which: str | None, source: str) -> Written:
     """Return the level that is meant: the only one, or the one of a name or, counted from 1, of a number.
 
     Raises:
-        SeveralLevelsError: There are several and none is named, or none is of that name or number.
+        SeveralLevelsError: There are several and none is named, none is of that name or number, or one is of
+            that name and another one of that number.
     """
     if which is None:
         if len(found) == 1:
             return found[0]
         raise SeveralLevelsError(source, found, f"{len(found)} levels are here, and one is wanted")
     named = [one for one in found if one.name == which]
+    numbered = found[int(which) - 1] if NUMBER.fullmatch(which) and 1 <= int(which) <= len(found) else None
+    if len(named) == 1 and numbered not in (None, named[0]):
+        number = next(number for number, one in enumerate(found, 1) if one is named[0])
+        meant = (
+            f"level {which}, named '{numbered.name}'" if numbered.name else f"level {which}, without a name"
+        )
+        said = f"'{which}' may mean {meant}, or level {number}, named '{which}'. Rename one"
+        raise SeveralLevelsError(source, found, f"{said}; the levels are")
     if len(named) == 1:
         return named[0]
-    if NUMBER.fullmatch(which) and 1 <= int(which) <= len(found):
-        return found[int(which) - 1]
+    if numbered is not None:
+        return numbered
     count = f"{len(named)} levels are" if named else "no level is"
     raise SeveralLevelsError(source, found, f"{count} called '{which}' here. The levels are")
 
@@ -196,7 +213,7 @@ def _apart(one: Written, lines: Sequence[Line]) -> list[Written]:
     return [replace(one, art=blocks[0]), *(Written(art=block) for block in blocks[1:])]
 
 
-def _tidied(one: Written, glyphs: str, said: tuple[str, ...]) -> Written:
+def tidied(one: Written, glyphs: str, said: tuple[str, ...] = ()) -> Written:
     """Return a level whose art is cut to what stands within its walls."""
     replaced: Counter[tuple[str, str]] = Counter()
     art = [_plain(line, glyphs, replaced) for line in one.art]
@@ -211,8 +228,15 @@ def _tidied(one: Written, glyphs: str, said: tuple[str, ...]) -> Written:
     return replace(one, art=[line.cut(len(indent), width) for line in art], said=(*said, *notes))
 
 
+def visible(line: Line) -> str:
+    """Return what can be seen of a line: without blanks around it and signs of no width."""
+    return _plain(line, "", Counter()).text.strip(BLANKS)
+
+
 def _plain(line: Line, glyphs: str, replaced: Counter[tuple[str, str]]) -> Line:
     """Replace what looks like a space, leave out what has no width, and count both by name."""
+    if line.text.isascii() and line.text.isprintable():
+        return line
     text, columns = "", []
     for character, column in zip(line.text, line.columns, strict=True):
         plain = character

@@ -56,6 +56,13 @@ def plain(text: str) -> str:
     return text
 
 
+def sign(character: str) -> str:
+    """Return a character in quotation marks, with its name where it may be taken for another one."""
+    if character.isascii():
+        return repr(character)
+    return f"{character!r} ({unicodedata.name(character, f'U+{ord(character):04X}').lower()})"
+
+
 def is_visible(text: str) -> bool:
     """Return whether something of a text can be seen: not blanks, zero-width or directional signs alone."""
     return any(unicodedata.category(one)[0] in "LNPS" and one not in BLANK for one in text)

@@ -188,7 +188,7 @@ def read_written(world: str, chosen: Written, source: str = "level") -> Level:
         # A text without line end would be taken for a name.
         found = level(world, chosen.text + "\n", source)
         if chosen.comment and found.name == source:
-            found = replace(found, name=chosen.comment)
+            found = replace(found, name=chosen.comment, places={**found.places, "name": chosen.comment_at})
         return replace(named_by_a_person(found), said=chosen.said)
     except LevelError as error:
         place = chosen.place(error.line, error.column)

@@ -7,14 +7,17 @@ other programs share the environment, but it is told with the nearest setting: i
 from __future__ import annotations
 
 import logging
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE, BOM_UTF32_BE
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from io import StringIO
+from os.path import expanduser
 from pathlib import Path
 
-from dotenv.parser import parse_stream
+from dotenv.parser import Binding, parse_stream
 from pydantic_settings import DotEnvSettingsSource
 
+from parenting.envs.level_bytes import encoding_of
 from parenting.server.errors import SetupError
 
 PREFIX = "PARENTING_"
@@ -34,6 +37,8 @@ NEAR = 0.85
 """The least likeness of a name without the prefix to that of a setting, so that it counts as misspelt."""
 UNREAD = "Warning: line {} of {} is ignored: it is not NAME=value, or a quotation mark in it is not closed."
 """The warning of a line that cannot be read; the line itself may hold a secret."""
+NO_VALUE = "Warning: line {} of {} is ignored: {} has no value. Write {}=VALUE."
+"""The warning of a name alone."""
 SAVE_AGAIN = "Save it as UTF-8, in an editor or by: iconv -f"
 
 
@@ -45,7 +50,13 @@ class EnvironmentFile(DotEnvSettingsSource):
         logging.getLogger("dotenv.main").setLevel(
             logging.ERROR
         )  # `warnings` tells it, once and with the file
-        return super()._read_env_file(file_path)
+        return {name: self._home(name, value) for name, value in super()._read_env_file(file_path).items()}
+
+    def _home(self, name: str, value: str | None) -> str | None:
+        """Return a folder with its ~ replaced as a shell replaces it, and any other value as it is."""
+        field = self.settings_cls.model_fields.get(name.lower().removeprefix(PREFIX.lower()))
+        is_folder = field is not None and field.annotation in (Path, Path | None)
+        return expanduser(value) if value is not None and is_folder else value
 
 
 def read(file: Path) -> str:
@@ -60,11 +71,16 @@ def read(file: Path) -> str:
         stored = file.read_bytes()
     except OSError as error:
         raise SetupError(f"{file.absolute()} cannot be read: {error.strerror}.") from None
-    if stored.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in stored:
+    encoding = encoding_of(stored)
+    if encoding != "utf-8":
+        name, marked = encoding[:6].upper(), stored.startswith((BOM_UTF16_LE, BOM_UTF16_BE, BOM_UTF32_BE))
         raise SetupError(
-            f"{file.absolute()} cannot be read: it is not UTF-8 text, but looks like UTF-16. "
-            f"{SAVE_AGAIN} UTF-16 -t UTF-8"
+            f"{file.absolute()} cannot be read: it is not UTF-8 text, but looks like {name}. "
+            f"{SAVE_AGAIN} {name if marked else name + encoding[-2:].upper()} -t UTF-8"
         )
+    if b"\0" in stored:
+        line = stored.count(b"\n", 0, stored.index(b"\0")) + 1
+        raise SetupError(f"{file.absolute()} cannot be read: line {line} holds a NUL byte (0x00). Remove it.")
     try:
         return stored.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -76,7 +92,7 @@ def read(file: Path) -> str:
 
 
 def warnings(environment: Iterable[str], file: Path, settings: Iterable[str]) -> list[str]:
-    """Return a sentence for each line that cannot be read, and for each name that is nearly a setting.
+    """Return a sentence for each line that is not NAME=value, and for each name that is nearly a setting.
 
     Args:
         environment: The names of the environment's variables.
@@ -90,7 +106,19 @@ def warnings(environment: Iterable[str], file: Path, settings: Iterable[str]) ->
     found = [(name, "in the environment") for name in environment]
     found += [(line.key, f"in {file.absolute()}") for line in lines if line.key is not None]
     said = [told for name, where in found if (told := _warning(name, where, known)) is not None]
-    return [UNREAD.format(line.original.line, file.absolute()) for line in lines if line.error] + said
+    unread = [UNREAD.format(_number(line), file.absolute()) for line in lines if line.error]
+    unread += [
+        NO_VALUE.format(_number(line), file.absolute(), line.key, line.key)
+        for line in lines
+        if line.key is not None and line.value is None and line.key.upper() in known
+    ]
+    return unread + said
+
+
+def _number(line: Binding) -> int:
+    """Return the number of a line; the parser counts from the empty lines above it."""
+    text = line.original.string
+    return line.original.line + text[: len(text) - len(text.lstrip())].count("\n")
 
 
 def _warning(name: str, where: str, known: Sequence[str]) -> str | None:

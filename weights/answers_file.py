@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from parenting.envs.level_bytes import encoding_of
+
 Whole = Annotated[int, Field(ge=-1, le=1000)]
 MOST_BYTES = 200_000_000
 """A larger export is refused."""
@@ -63,6 +65,10 @@ def read_answers(blob: bytes) -> Answers:
     """
     if len(blob) > MOST_BYTES:
         raise AnswersFileError(f"it has {len(blob)} bytes, and {MOST_BYTES} are read at most")
+    if (encoding := encoding_of(blob)) != "utf-8":
+        raise AnswersFileError(
+            f"it is {encoding[:6].upper()}, and a table is read in UTF-8; save it as UTF-8"
+        )
     found, source = list[Heard](), dict[str, Any]()
     for number, line in enumerate(blob.splitlines(), start=1):
         if line.strip():

@@ -6,6 +6,9 @@ from typing import Literal, NamedTuple
 
 from parenting.envs.levels.spec import WorldSpec
 
+MOST = 10**9
+"""The largest number of a rule; more queries or ticks than that are never reached."""
+
 
 class StopRule(NamedTuple):
     """The condition under which a trial is finished.
@@ -40,6 +43,8 @@ def read_stop_rule(text: str, world: WorldSpec) -> StopRule:
             " Use queries:N or ticks:N, such as queries:1000."
         )
     kind, _, number = text.partition(":")
-    if kind in ("queries", "ticks") and number.isascii() and number.isdigit() and int(number) > 0:
-        return StopRule(kind, int(number))  # type: ignore[arg-type]
-    raise ValueError(f"'{text}' is none of optimal, queries:N and ticks:N with N at least 1.")
+    if kind in ("queries", "ticks") and number.isascii() and number.isdigit():
+        wanted = int(number.lstrip("0")[: len(str(MOST)) + 1] or 0)  # Python reads no number of any length
+        if 1 <= wanted <= MOST:
+            return StopRule(kind, wanted)  # type: ignore[arg-type]
+    raise ValueError(f"'{text}' is none of optimal, queries:N and ticks:N with N from 1 to {MOST}.")

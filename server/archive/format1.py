@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from parenting.agent.events import Event
+from parenting.envs.level_bytes import encoding_of
 from parenting.server.errors import SetupError
 from parenting.server.notes import AGENT_KINDS
 from parenting.weights.answers_file import MOST_BYTES
@@ -125,6 +126,8 @@ def _bytes(path: Path) -> bytes:
         raise SetupError(f"{path} cannot be read: {error.strerror}.") from None
     if len(blob) > MOST_BYTES:
         raise SetupError(f"{path} has more than {MOST_BYTES} bytes, which are read at most.")
+    if (encoding := encoding_of(blob)) != "utf-8":
+        raise SetupError(f"{path} is {encoding[:6].upper()}, and a table is read in UTF-8. Save it as UTF-8.")
     return blob
 
 

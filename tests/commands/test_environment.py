@@ -55,6 +55,41 @@ def test_a_file_that_is_no_utf8_is_refused_with_its_remedy(folder: Path, stored:
         Settings()
 
 
+@pytest.mark.parametrize(
+    ("stored", "said"),
+    [
+        (
+            LINE.encode("utf-32"),
+            "looks like UTF-32. Save it as UTF-8, in an editor or by: iconv -f UTF-32 -t UTF-8",
+        ),
+        (LINE.encode("utf-32-be"), "iconv -f UTF-32BE -t UTF-8"),
+        (
+            LINE.encode("utf-16"),
+            "looks like UTF-16. Save it as UTF-8, in an editor or by: iconv -f UTF-16 -t",
+        ),
+        (f"# Zürich\n\0{LINE}".encode(), "cannot be read: line 2 holds a NUL byte (0x00). Remove it."),
+    ],
+)
+def test_the_encoding_of_such_a_file_is_named(folder: Path, stored: bytes, said: str) -> None:
+    (folder / ".env").write_bytes(stored)
+    with pytest.raises(SetupError) as refused:
+        Settings()
+    assert said in str(refused.value)
+
+
+def test_a_name_without_a_value_is_told_and_a_folder_at_home_is_found(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("PARENTING_DATA")
+    monkeypatch.setenv("HOME", str(folder / "me"))
+    (folder / ".env").write_text("\nPARENTING_DATA\n", encoding="utf-8")
+    said = CliRunner().invoke(app, ["worlds"]).stderr
+    end = "is ignored: PARENTING_DATA has no value. Write PARENTING_DATA=VALUE.\n"
+    assert said == f"Warning: line 2 of {folder}/.env {end}"
+    (folder / ".env").write_text("PARENTING_DATA=~/x\nPARENTING_HOSTS=~a\n", encoding="utf-8")
+    assert (Settings().data, Settings().hosts) == (folder / "me" / "x", "~a")
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_refuses_it(folder: Path, command: str) -> None:
     (folder / ".env").write_bytes(NO_UTF8["latin-1"])

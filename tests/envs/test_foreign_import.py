@@ -38,3 +38,59 @@ def test_levels_are_named_by_their_file_or_their_title() -> None:
     with pytest.raises(ForeignMapError, match="no map is here") as refused:
         imported("nothing")
     assert refused.value.line is None
+
+
+@pytest.mark.parametrize(
+    ("above", "name"),
+    [
+        ('x = r"C:\\users\\me"\n', "C:\\users\\me"),
+        ('x = "C:\\users \\x1 \\x41"\n', "C:\\users \\x1 A"),
+        ("", "map"),
+    ],
+)
+def test_a_string_is_read_raw_and_its_wrong_escapes_stay(above: str, name: str) -> None:
+    (level,) = imported(f'{above}m = ["SFFF", "FHFG"]\n')
+    assert (level.level.name, level.level.rows) == (name, ("######", "#A   #", "# W G#", "######"))
+
+
+LOST = {
+    "a strange sign": ("SFFF\nFFFG\nFFxF\nFFFF\n", 3, "'x' makes this line no row of a map of Gymnasium"),
+    "alone": ("SFFF\nFFxF\nFFFG\n", 2, "'x' makes"),
+    "in the last row": ("SFFF\nFFFG\nxxxx\n", 3, "'x' makes"),
+    "a row apart": ("SFFF\nFFFG\n\nFFFF\nFFFF\n", 4, "none has 'S'"),
+    "like another letter": ("SFFF\nFF\u0421F\nFFFG\n", 2, "'\u0421' (cyrillic capital letter es) makes"),
+    "in XSB": (CRATE.replace("#  .", "# x ."), 4, "'x' makes this line no row of Sokoban's XSB"),
+    "a tab": (f"\t{CRATE}", 1, "a tab makes"),
+    "a short row": ("+---+\n|R:G|\n|Y:|\n+---+\n", 3, "this row has 4 signs, and the map's first row has 5"),
+    "a row without its end": ("+---+\n|R:G|\n|Y:B\n+---+\n", 3, "'|' makes"),
+}
+
+
+@pytest.mark.parametrize(("text", "line", "said"), LOST.values(), ids=LOST)
+def test_no_row_is_dropped_in_silence(text: str, line: int, said: str) -> None:
+    with pytest.raises(ForeignMapError) as refused:
+        imported(text)
+    assert refused.value.line == line
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("    ", "", "4 blank columns left of the art were cut"),
+        ("", "  ", "2 blank columns right of the art were cut"),
+        ("\u200b", "", "6 zero width spaces were left out"),
+    ],
+)
+def test_a_map_is_tidied_as_a_level_is(before: str, after: str, said: str) -> None:
+    for text in (CRATE, "SFFF\nFHFG\n" * 3):
+        disguised = "".join(f"{before}{row}{after}\n" for row in text.splitlines())
+        (level,), (plain,) = imported(disguised), imported(text)
+        assert level.level == plain.level
+        assert level.lost[0] == said
+
+
+def test_a_code_fence_names_no_map() -> None:
+    lake = "SFFF\nFHFG\n"
+    for above, name in (("Look:\n```text\n", "map"), ("; small\n``` {.text}\n", "small"), ("Lake\n", "Lake")):
+        assert imported(f"{above}{lake}```\n")[0].level.name == name

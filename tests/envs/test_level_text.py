@@ -47,6 +47,11 @@ DISGUISED = {
         "the text outside of the code fences was left out",
     ),
     "fenced with a language": (f"~~~~ text\n{POND}~~~~", "the code fences around the art were left out"),
+    "fenced with a sign": (f"```c++\n{POND}```\n", "the code fences around the art were left out"),
+    "fenced with words": (
+        f'``` {{.text}} title="x: y"\n{POND}```\n',
+        "the code fences around the art were left out",
+    ),
     "blank lines": (f"   \n{POND}\n  \t\n", "2 blank rows around the art were cut"),
     "old Mac": (POND.replace("\n", "\r"), None),
     "Windows": (f"\ufeff{POND}".replace("\n", "\r\n"), None),
@@ -82,6 +87,8 @@ def test_every_built_in_level_is_read_unchanged_and_disguised(world: str) -> Non
         ("```\n```", (1, 1), "the level is empty"),
         ("name: a", (2, 1), "the level is empty"),
         (POND.replace("A", "\x07"), (2, 7), "the control character U+0007 is not allowed here"),
+        (POND.replace("A", "\u0410"), (2, 7), "'\u0410' (cyrillic capital letter a) is not a glyph of"),
+        ("; " + "x" * 101 + f"\n{POND}", (1, 3), "the name of the level: at most 100 characters"),
         ("name: " + "x" * 101 + f"\n\n{POND}", (1, 7), "the name of the level: at most 100 characters"),
     ],
 )
@@ -130,7 +137,9 @@ def test_levels_without_names_are_chosen_by_number_and_a_blank_row_of_one_is_kep
     assert read(walled).rows == tuple(walled.splitlines())
     with pytest.raises(SeveralLevelsError, match="2 levels are called 'first' here"):
         read(f"; first\n{POND}; first\n{SECOND}", "first")
-    assert read(f"; 2\n{POND}; 1\n{SECOND}", "2").rows == ROWS  # a name goes before a number
+    with pytest.raises(SeveralLevelsError, match=r"'2' may mean level 2, named '1', or level 1, named '2'\."):
+        read(f"; 2\n{POND}; 1\n{SECOND}", "2")
+    assert read(f"; 1\n{POND}; 2\n{SECOND}", "2").rows == tuple(SECOND.splitlines())
 
 
 def test_an_error_in_a_later_level_names_its_line_in_the_text() -> None:
@@ -151,6 +160,13 @@ BYTES = {
 @pytest.mark.parametrize(("blob", "said"), BYTES.values(), ids=BYTES)
 def test_bytes_of_every_writer_are_read(blob: bytes, said: tuple[str, ...]) -> None:
     assert decode(blob) == (POND, said)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-32-le", "utf-32-be"])
+def test_text_without_a_mark_is_read_in_any_script(encoding: str) -> None:
+    text = f"; \u041e\u0441\u0442\u0440\u043e\u0432\u3000\u6c60\U0001f41f\n{POND}"
+    assert decode(text.encode(encoding)) == (text, (f"the text was read as {encoding[:6].upper()}",))
+    assert decode(POND.replace("A", "\0").encode())[1] == ()  # a stray zero is told with its place
 
 
 def test_other_bytes_are_refused_with_a_remedy() -> None:
