@@ -206,7 +206,7 @@ def test_whole_runs(db: Database, tmp_path: Path) -> None:
         (["1", "--format", "2", "-o", "a.csv"], "--out: a.csv ends with .csv, and whole runs are asked for"),
         (["1", "-o", "a.parquet"], "--out: a.parquet ends with .parquet, and no such file is written. A"),
         (["1", "-o", "a.tar.gz"], "--out: a.tar.gz ends with .gz, and no such file is written."),
-        (["1", "-o", "-"], "--out: - is no name of a file. Leave --out out for standard output."),
+        (["1", "-o", "-"], "--out: - is not a name of a file. Leave --out out for standard output."),
     ],
 )
 def test_whole_runs_that_cannot_be_written(given: list[str], told: str) -> None:
