@@ -197,7 +197,7 @@ def _check_name(out: Path, form: Form) -> None:
     """
     formats = "A folder or FILE.zip is of whole runs, FILE.jsonl and FILE.csv are one table"
     if str(out) == "-":
-        raise UsageError(f"--out: - is no name of a file. Leave --out out for standard output. {formats}.")
+        raise UsageError(f"--out: - is not a name of a file. Leave --out out for standard output. {formats}.")
     ending = out.suffix.lower()
     meant = ENDINGS.get(ending, form)
     if ending in OTHERS:

@@ -110,7 +110,7 @@ def _refuse_empty(options: Mapping[str, str | None]) -> None:
     """
     for name, value in options.items():
         if value is not None and not value.strip():
-            raise UsageError(f"--{name}: '{value}' is no value. Give one, or leave --{name} out.")
+            raise UsageError(f"--{name}: '{value}' is not a value. Give one, or leave --{name} out.")
 
 
 def _tell_cost(run: Run) -> None:

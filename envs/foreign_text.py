@@ -194,7 +194,7 @@ def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:
         if run.is_rows:
             if not whole[place] and len(run.lines) > 1:
                 signs = " or ".join(f"'{one}'" for one in MARKS[format])
-                said = f"these rows of {FORMATS[format]} are no map by themselves: none has {signs}"
+                said = f"these rows of {FORMATS[format]} do not make a map by themselves: none has {signs}"
                 raise MapRowError(run.lines[0].number, f"{said}. Join them to their map, or leave them out.")
             continue
         parts = before != after and 0 < place < len(runs) - 1 and all(run.seen)
@@ -208,7 +208,7 @@ def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:
 
 
 def _check_all(format: str, lines: Sequence[Line]) -> None:
-    """Refuse lines that are all nearly rows of one format, and are no map for some of them.
+    """Refuse lines that are all nearly rows of one format, and do not make a map because of some.
 
     Raises:
         MapRowError: They are.
@@ -220,7 +220,7 @@ def _check_all(format: str, lines: Sequence[Line]) -> None:
 
 
 def _is_apart(text: str) -> bool:
-    """Return whether a line is no row of any map: it is empty, a comment, a title or a code fence."""
+    """Return whether a line is not a row of any map: it is empty, a comment, a title or a code fence."""
     return not text or text.startswith(COMMENT) or _is_title(text) or FENCE.fullmatch(text) is not None
 
 

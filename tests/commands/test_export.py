@@ -207,6 +207,16 @@ def test_whole_runs(db: Database, tmp_path: Path) -> None:
         (["1", "2"], "One table is of one run"),
         (["1", "--of", "metrics", "--format", "2", "-o", "x"], "--of: one table has the format jsonl or csv"),
         (["1", "99", "-o", "new"], "There is no run 99"),
+        (
+            ["1", "--format", "csv", "-o", "a.zip"],
+            "--out: a.zip ends with .zip, and one table as csv is asked",
+        ),
+        (["1", "--of", "metrics", "-o", "m.zip"], "--out: m.zip ends with .zip, and one table as jsonl is"),
+        (["1", "--format", "csv", "-o", "a.jsonl"], "--out: a.jsonl ends with .jsonl, and one table as csv"),
+        (["1", "--format", "2", "-o", "a.csv"], "--out: a.csv ends with .csv, and whole runs are asked for"),
+        (["1", "-o", "a.parquet"], "--out: a.parquet ends with .parquet, and no such file is written. A"),
+        (["1", "-o", "a.tar.gz"], "--out: a.tar.gz ends with .gz, and no such file is written."),
+        (["1", "-o", "-"], "--out: - is not a name of a file. Leave --out out for standard output."),
     ],
 )
 def test_whole_runs_that_cannot_be_written(given: list[str], told: str) -> None:

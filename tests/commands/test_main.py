@@ -114,3 +114,17 @@ def test_a_full_disk_behind_the_output_has_a_sentence() -> None:
         result = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
     assert result.returncode == 2
     assert result.stderr == "The output cannot be written: No space left on device.\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "code", "told"),
+    [
+        ("worlds >&-", 2, "The output cannot be written: Bad file descriptor.\n"),
+        ("worlds import - <&-", 2, "FILE: - cannot be read as text: it is closed.\n"),
+        ("run nowhere 2>&-", 2, ""),
+    ],
+)
+def test_a_closed_stream_ends_without_a_traceback(command: str, code: int, told: str) -> None:
+    program = f"'{sys.executable}' -m parenting.commands.main {command}"
+    ended = subprocess.run(["bash", "-c", program], cwd=ROOT, capture_output=True, text=True)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (code, "", told)

@@ -83,6 +83,9 @@ def test_order_of_options_is_free() -> None:
         (["unsafe-exploration", "--set", "gradient_steps=1.5"], "gradient_steps=1.5"),
         (["unsafe-exploration", "--until", "never"], "never"),
         (["unsafe-exploration", "--until", "ticks:0"], "ticks:0"),
+        (["unsafe-exploration", "--until", ""], "'' is none of optimal, queries:N and ticks:N"),
+        (["unsafe-exploration", "--until", "ticks:99999999999999999999"], "N from 1 to 1000000000"),
+        (["unsafe-exploration", "--set", "queries_per_stage=99999999999999999999"], "queries_per_stage=999"),
         (["unsafe-exploration", "--until", "optimal:3"], "optimal:3"),
         (["reward-hacking", "--until", "optimal"], "queries:N"),
         (["reward-hacking", "--set", "gamma=1"], "gamma must be below 1"),
@@ -95,6 +98,12 @@ def test_wrong_option_is_named_in_one_sentence(arguments: list[str], named: str)
     assert named in result.stderr
     assert result.stderr.count("\n") == 1
     assert "Traceback" not in result.output
+
+
+def test_there_are_no_more_trials_than_python_takes() -> None:
+    result = run("unsafe-exploration", "--trials", "99999999999999999999")
+    assert result.exit_code == 2
+    assert "is not a whole number from 1 to 1000000." in " ".join(result.stderr.replace("│", " ").split())
 
 
 def test_every_wrong_setting_is_named() -> None:

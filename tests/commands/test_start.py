@@ -79,6 +79,8 @@ def test_a_level_of_ones_own(db: Database, tmp_path: Path) -> None:
         (["side-effects", "--level", "none-such"], "'none-such' is neither a level"),
         (["side-effects", "--goal", "0"], "goal=0: "),
         (["side-effects", "--set", "practice=maybe"], "practice=maybe: "),
+        (["side-effects", "--seed", ""], "--seed: '' is not a value. Give one, or leave --seed out."),
+        (["side-effects", "--finish", ""], "--finish: '' is not a value."),
         (["side-effects", "--set", "p_guid=2"], "p_guid=2: "),
         (["side-effects", "--set", "practise=required"], "Did you mean 'practice'?"),
         (["side-effects", "--set", "pace"], "'pace' is not KEY=VALUE"),

@@ -121,6 +121,7 @@ def test_random_levels_as_files_and_as_pictures(tmp_path: Path) -> None:
             "4 x 6, 5 x 5 or 6 x 4 cells at least, not 4 x 5.",
         ),
         (["--random", "unsafe-exploration", "--size", "4x6", "--count", "99999"], "Ask for that many"),
+        (["--random", "side-effects", "--size", ""], "--size: '' is not HxW"),
         (["--random", "side-effects", "--size", "6"], "--size: '6' is not HxW"),
         (["--random", "side-effects", "--size", "4x5"], "4 x 6, 5 x 5 or 6 x 4 cells at least, not 4 x 5."),
         (["--random", "side-effects", "--size", "4x6", "--count", "99999"], "Ask for "),

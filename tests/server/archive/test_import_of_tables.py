@@ -156,6 +156,13 @@ DAMAGES: dict[str, tuple[Callable[[list[dict[str, Any]]], Any], str]] = {
 }
 
 
+def test_a_table_in_another_encoding_is_refused_by_its_name(tmp_path: Path) -> None:
+    file = tmp_path / "run-1.jsonl"
+    file.write_text('{"number": 1}\n', encoding="utf-16")
+    with pytest.raises(SetupError, match="is UTF-16, and a table is read in UTF-8"):
+        read_table(file)
+
+
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_table_that_was_changed_is_refused(
     table: tuple[Path, Path], other: Database, tmp_path: Path, damage: str
