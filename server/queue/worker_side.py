@@ -236,13 +236,8 @@ def take_answer(db: Database, mine: Claim, tick: int, known: Collection[int] = (
     """Return the answer to be heard at this tick, or None: guidance first, then the oldest query's.
 
     A new answer is marked with the tick in the same transaction. On replay the recorded answer comes back,
-    even if it was superseded later. A correction is heard by `take_correction` alone. This never waits.
-
-    Args:
-        db: The database.
-        mine: The worker's claim on the run.
-        tick: The tick that comes.
-        known: The numbers of the queries whose clips the caller has: they are not read.
+    even if it was superseded later. A correction is heard by `take_correction` alone. This never waits, and
+    it reads no clips of queries of `known` numbers.
 
     Raises:
         LostClaimError: another worker trains this run now.
@@ -299,10 +294,7 @@ def _hear(session: Session, found: Taken, tick: int) -> None:
 
 
 def _pending(session: Session, run_id: int, known: Collection[int]) -> Taken | None:
-    row = session.execute(_PENDING, {"run_id": run_id}).first()
-    if row is None:
-        return None
-    found = Taken(*row)
-    if found.query.id not in known:
+    found = None if (row := session.execute(_PENDING, {"run_id": run_id}).first()) is None else Taken(*row)
+    if found is not None and found.query.id not in known:
         session.refresh(found.query, ["clips"])
     return found

@@ -12,16 +12,12 @@ from sqlalchemy import Connection, event, select, text
 from parenting.server.db import Database, connect
 from parenting.server.errors import BusyError, GoneError, RefusedError, SetupError
 from parenting.server.migrate import downgrade, require_current, upgrade
-from parenting.server.new_run import NewRun, start
 from parenting.server.operator_events import add_operator_event
 from parenting.server.progress import report_progress
 from parenting.server.queue.answers import answer
-from parenting.server.queue.corrections import take_correction
 from parenting.server.queue.leases import lease
-from parenting.server.queue.revisions import supersede
-from parenting.server.queue.worker_side import post_query, take_answer, watch
-from parenting.server.runs import Claim, claim
-from parenting.server.session import RunSession
+from parenting.server.queue.worker_side import post_query, take_answer
+from parenting.server.runs import Claim
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql
 from parenting.server.tables import Run
@@ -92,48 +88,6 @@ def test_what_somebody_was_told_is_on_the_disk_at_once(
     event.listen(db.engine, "commit", look)
     verb(db, mine, guidance)
     assert found == [committing]
-
-
-def test_an_answer_that_was_heard_is_heard_after_a_crash_of_the_server(
-    db: Database, mine: Claim, guidance: int
-) -> None:
-    """The worker lives through it: it would hear the answer a second time."""
-    answer(db, guidance, "left", "a", "human")
-    found = committing(db)
-    assert take_answer(db, mine, 9) is not None
-    assert found == ["on"]
-
-
-def committing(db: Database) -> list[object]:
-    """A list to which each commit adds whether it waits for the log."""
-    found: list[object] = []
-    event.listen(
-        db.engine,
-        "commit",
-        lambda connection: found.append(connection.exec_driver_sql("SHOW synchronous_commit").scalar()),
-    )
-    return found
-
-
-def test_a_correction_that_was_heard_is_heard_after_a_crash_of_the_server(
-    db: Database, mine: Claim, guidance: int
-) -> None:
-    answer(db, guidance, "left", "a", "human")
-    take_answer(db, mine, 9)
-    supersede(db, guidance, "right", "a", "human")
-    found = committing(db)
-    assert take_correction(db, mine, 10) is not None
-    assert found == ["on"]
-
-
-def test_what_a_worker_forgets_once_it_is_stored_is_there_after_a_crash_of_the_server(db: Database) -> None:
-    run = start(db, NewRun(world="unsafe-exploration"))
-    life = RunSession(db, next(one for one in claim(db, "me") if one.run_id == run.id), run, lambda: None)
-    life.tick(watch(db, [run.id])[run.id])
-    found = committing(db)
-    life.lived.write()
-    life.why.write()
-    assert found == ["on", "on"]
 
 
 def test_a_row_that_stays_locked_is_busy(
