@@ -51,8 +51,16 @@ PRESET_WORDS = {
 NUMBER_ERRORS = {
     "seed": f"A seed is a whole number from 0 to {LARGEST_INT}.",
     "goal": "A goal is a whole number of answers from 1 to 1000000; leave it empty to have none.",
+    "pace": "A pace is a number of ticks a second, above 0 and up to 1000; leave it empty to have none.",
+    "script": "A number of this script is none, too small or too large. An example that is right: noisy:0.1.",
+    "config.stages": "The number of stages is a whole number from 1 to 16; leave it empty to have one.",
+    "config.mature_every": "A stage ends after a whole number of answers, from 1; or leave it empty.",
+    "config.gradient_steps": "Gradient steps are a whole number from 1 to 1000; or leave it empty.",
 }
 """The sentence next to a field that takes a number and holds something else."""
+
+BARE = "Input should be "
+"""Messages of Pydantic begin with this or hold it. People get a sentence of ours in their place."""
 
 FILE = "policy_file"
 """The field of the form that takes a policy's file."""
@@ -205,7 +213,8 @@ def _checked(given: Mapping[str, str], settings: Settings, db: Database) -> tupl
             plan(read_form(known), settings.weights, origin, db, settings.bound)
         except InvalidFieldsError as error:
             errors = {**dict(error.fields), **errors}
-    return {name: NUMBER_ERRORS.get(name, said) for name, said in errors.items()}, origin
+    said = {name: NUMBER_ERRORS.get(name, said) if BARE in said else said for name, said in errors.items()}
+    return said, origin
 
 
 def _page(

@@ -220,12 +220,22 @@ def test_goal_pace_and_stages(client: httpx2.Client, db: Database) -> None:
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("goal", "0"), ("goal", "some"), ("pace", "-1"), ("config.stages", "17"), ("config.mature_every", "x")],
+    [
+        ("goal", "0"),
+        ("goal", "some"),
+        ("pace", "-1"),
+        ("script", "noisy:2"),
+        ("config.stages", "17"),
+        ("config.mature_every", "x"),
+        ("config.gradient_steps", "0"),
+    ],
 )
 def test_a_wrong_number_among_the_settings(client: httpx2.Client, field: str, value: str) -> None:
-    page = client.post("/runs", data={**FORM, field: value})
+    page = client.post("/runs", data={**FORM, "parent": "scripted", field: value})
     assert page.status_code == 422
-    assert page.text.partition(f'id="{field}-error">')[2].partition("</p>")[0]
+    said = page.text.partition(f'id="{field}-error">')[2].partition("</p>")[0]
+    assert said.endswith(".")
+    assert "Input should" not in said
     assert f'value="{value}"' in page.text
     assert ('<details class="more" open>' in page.text) == (field != "goal")
 
