@@ -10,9 +10,12 @@ from playwright.sync_api import expect
 from sqlalchemy import select
 
 from parenting.server.db import Database
+from parenting.server.notify import Notifier
 from parenting.server.queue.answers import answer, get_query
 from parenting.server.queue.worker_side import take_answer
-from parenting.server.runs import Claim, get_run
+from parenting.server.runs import Claim, get_run, set_status
+from parenting.server.settings import Settings
+from parenting.server.statuses import RunStatus
 from parenting.server.tables import Answer
 from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs, until
@@ -111,3 +114,93 @@ def test_z_asks_again_and_the_history_changes(
     page.locator(".answers [value=neither]").click()
     until(lambda: stored(db)[-1] == ("neither", True))
     assert [standing for _, standing in stored(db)] == [False, False, False, True]
+
+
+def test_a_change_without_a_connection_is_kept_and_sent(
+    tabs: BrowserTabs, db: Database, mine: Claim, ask: Callable[..., int]
+) -> None:
+    tabs.expected = ("net::ERR_INTERNET_DISCONNECTED",)
+    first = ask()
+    page = tabs.open(address(db))
+    shown(page, first)
+    page.keyboard.press("a")
+    until(lambda: stored(db) == [("left", True)])
+    assert take_answer(db, mine, 2) is not None
+    page.keyboard.press("z")
+    expect(page.locator(".again")).to_contain_text("Your answer: A, left.")
+    shown(page, first)
+    expect(page.locator("#undo")).to_be_hidden()
+    page.context.set_offline(True)
+    page.keyboard.press("b")
+    expect(page.locator("#saved")).to_have_text("Kept here, not sent yet")
+    expect(page.locator("#undo button")).to_contain_text("Undo: B, down")
+    assert stored(db) == [("left", True)]
+    page.context.set_offline(False)
+    expect(page.locator("#saved")).to_have_text("Saved")
+    assert stored(db) == [("left", False), ("right", True)]
+    expect(page.locator("#count")).to_have_text("1")
+
+
+def test_an_undo_that_is_not_sent_says_so_until_the_server_is_here_again(
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
+) -> None:
+    tabs.expected = ("net::ERR_INTERNET_DISCONNECTED", "net::ERR_FAILED")
+    first, second = ask(), ask()
+    page = tabs.open(address(db))
+    shown(page, first)
+    page.keyboard.press("b")
+    expect(page.locator("#saved")).to_have_text("Saved")
+    shown(page, second)
+    page.context.set_offline(True)
+    page.keyboard.press("z")
+    expect(page.locator("#alert")).to_contain_text("The server cannot be reached")
+    page.context.set_offline(False)
+    expect(page.locator("#alert")).to_be_empty()
+    assert stored(db) == [("right", True)]
+    page.route("**/answer", lambda route: route.abort())
+    page.keyboard.press("a")
+    expect(page.locator("#saved")).to_have_text("Kept here, not sent yet")
+    page.clock.install()
+    page.keyboard.press("z")
+    page.clock.run_for(3000)  # for which it waits for the answer to go
+    expect(page.locator("#alert")).to_contain_text("Your last answer is not sent yet.")
+    page.unroute("**/answer")
+    page.clock.run_for(5000)
+    expect(page.locator("#alert")).to_be_empty()
+    expect(page.locator("#saved")).to_have_text("Saved")
+
+
+def test_a_run_that_is_over_offers_no_undo(
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int], settings: Settings
+) -> None:
+    page = tabs.open(address(db))
+    shown(page, ask())
+    page.keyboard.press("b")
+    expect(page.locator("#saved")).to_have_text("Saved")
+    expect(page.locator("#undo")).to_be_visible()
+    set_status(db, 1, RunStatus.STOPPED)
+    Notifier(settings.data, "web").notify()
+    expect(page.get_by_role("heading", name="This run is over.")).to_be_visible()
+    expect(page.locator("#undo")).to_be_hidden()
+    page.reload()
+    expect(page.locator("#undo")).to_be_hidden()
+
+
+def test_the_last_answer_is_that_of_another_tab(
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
+) -> None:
+    first, second = ask(), ask()
+    page = tabs.open(address(db))
+    shown(page, first)
+    page.keyboard.press("b")
+    shown(page, second)
+    until(lambda: stored(db) == [("right", True)])
+    other = page.context.new_page()
+    other.goto(page.url)
+    shown(other, second)
+    other.keyboard.press("a")
+    expect(page.locator("#undo button")).to_contain_text("Undo: A, left")
+    page.bring_to_front()
+    page.keyboard.press("z")
+    until(lambda: stored(db) == [("right", True), ("left", False)])
+    shown(page, second)

@@ -171,3 +171,20 @@ def test_without_a_worker_the_dialog_says_so_and_walks_once_there_is_one(
     some.begin("late")
     some.close(60)
     expect(dialog(page).locator(".walk.played")).to_be_visible()
+
+
+def test_what_did_not_come_without_a_connection_comes_later(
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
+) -> None:
+    tabs.expected = ("net::ERR_INTERNET_DISCONNECTED",)
+    page = tabs.open(address(db))
+    shown(page, ask())
+    page.context.set_offline(True)
+    page.keyboard.press("w")
+    expect(page.locator("#alert")).to_have_text("The walk cannot be loaded now. Try again.")
+    expect(page.locator("link[href*=walk]")).to_have_count(0)
+    page.context.set_offline(False)
+    page.keyboard.press("w")
+    expect(dialog(page)).to_be_visible()
+    expect(page.locator("#alert")).to_be_empty()
+    assert page.locator("link[href*=walk]").evaluate("link => link.sheet.cssRules.length > 0")

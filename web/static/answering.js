@@ -12,14 +12,21 @@ import { play } from "./play.js";
 import { attentive, leases } from "./presence.js";
 import { arrive, next, prefetch, show, take } from "./questions.js";
 import { t } from "./sentences.js";
+import { heed, relieve } from "./undo.js";
 import { lostState, wait } from "./waiting.js";
+
+const UNWALKED = t("The walk cannot be loaded now. Try again.");
 
 // A part of the page that is loaded when it is first used, after the style sheet that such parts share.
 let styled = null;
 function later(load) {
-  styled ??= new Promise((done) => {
-    const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href: $("walk").dataset.sheet, onload: done, onerror: done });
+  styled ??= new Promise((done, fail) => {
+    const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href: $("walk").dataset.sheet, onload: done, onerror: fail });
     document.head.append(link);
+    link.addEventListener("error", () => { // the next use asks again
+      link.remove();
+      styled = null;
+    });
   });
   return styled.then(load);
 }
@@ -41,6 +48,8 @@ const tell = {
     $("optimal").hidden = !now.optimal || !now.standing || page.state === "over";
     if ($("resume")) $("resume").hidden = !["stopped", "failed"].includes(now.status);
     count(now.answers, now.answers - now.standing);
+    relieve();
+    heed();
     if (now.answers && (given.size || !page.current)) later(() => import("./growth.js")).then(({ grown }) => grown(now, !page.current), () => null); // the next answer asks again
     if (page.current && page.state === "over") page.current = null;
     if (page.current) {
@@ -92,7 +101,10 @@ export function begin(form) {
   // Watch it walk. The form works without this script; its style sheet comes with the walk, too.
   $("walk").addEventListener("submit", (event) => {
     event.preventDefault();
-    later(() => import("./walk.js")).then(({ watch }) => watch(play), () => { alarm(t("The walk cannot be loaded. Reload the page.")); });
+    later(() => import("./walk.js")).then(({ watch }) => {
+      if ($("alert").textContent === UNWALKED) alarm("");
+      watch(play);
+    }, () => { alarm(UNWALKED); });
   });
   if (form) show(form);
   flush(report).then(listen);

@@ -8,7 +8,7 @@ import { $, alarm, client, given, name, page, painted, run, waiting } from "./pa
 import { next, show } from "./questions.js";
 import { remark } from "./remarks.js";
 import { t } from "./sentences.js";
-import { change, remember } from "./undo.js";
+import { heed, relieve, remember } from "./undo.js";
 import { wait } from "./waiting.js";
 
 const HASTE = 40; // ms after an answer when the next question is asked for, if the answer's reply is not there before
@@ -39,20 +39,20 @@ export function count(answered, retracted = 0) {
 
 export function answer(choice) {
   if (!listens(page.current)) return;
-  const { database, query, former } = page.current.dataset;
-  if (former) return change(page.current, choice);
-  const measured = measure(page.current);
-  remember(page.current, choice);
-  remark(page.current, choice, performance.now() - page.shown);
-  given.add(query);
-  for (const button of page.current.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
+  const question = page.current, { database, query, former } = question.dataset, change = Boolean(former);
+  const measured = measure(question);
   page.current = null;
+  remember(question, choice);
+  if (!change) remark(question, choice, performance.now() - page.shown);
+  given.add(query);
+  for (const button of question.querySelectorAll("[aria-pressed][value]")) button.removeAttribute("aria-pressed");
+  for (const button of question.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
   page.unsaved++;
   $("saved").textContent = t("Saving");
   $("alert").textContent = "";
   performance.mark("answer", { detail: query });
-  if (choice !== "skip") recordAnswer();
-  keep({ database, run, question: query, choice, replays: page.player?.replays, measured, client_id: client, title: name, given: Date.now() });
+  if (choice !== "skip" && !change) recordAnswer();
+  keep({ database, run, question: query, choice, change, replays: page.player?.replays, measured, client_id: client, title: name, given: Date.now() });
   if (page.ahead) {
     painted(() => flush(report));
     return show(page.ahead);
@@ -77,8 +77,11 @@ export function report(outcome, reply, answer) {
     return;
   }
   page.unsaved = Math.max(0, page.unsaved - 1);
+  relieve(answer.question);
   if (outcome === "saved") {
-    if (reply.run_public_id === run && answer.choice !== "skip") count(reply.number);
+    const here = reply.run_public_id === run;
+    if (here && answer.choice !== "skip" && !answer.change) count(reply.number);
+    heed(here && given.has(answer.question) ? reply.number : null);
     if (!page.unsaved) $("saved").textContent = t("Saved");
   } else {
     if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? t("Kept here, not stored") : "";

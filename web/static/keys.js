@@ -23,7 +23,7 @@ export const letters = {
 
 stage.addEventListener("submit", (event) => {
   const turns = event.submitter.matches(".card") && takesTurns(page.current);
-  if (!turns && event.target.matches("[data-former], [data-plain]")) return; // the form itself is sent
+  if (!turns && event.target.matches("[data-plain]")) return; // the form itself is sent
   event.preventDefault();
   if (turns) turn(page.current);
   else page.answer(event.submitter.value);

@@ -12,12 +12,12 @@ const wait = (ms) => new Promise((done) => { setTimeout(done, ms); addEventListe
 // One attempt: "saved", "refused" (the question has another answer, or was withdrawn), "elsewhere" (it is meant for another
 // database or is of another name, or the server cannot read it) or "kept" with the state of the page (no connection, a
 // server in trouble, or nobody has come in).
-async function send({ database, run, question, choice, replays, measured, given, client_id }) {
+async function send({ database, run, question, choice, change, replays, measured, given, client_id }) {
   if (!question) return ["elsewhere"];
   const late = new AbortController(), timer = setTimeout(() => late.abort(), LATE);
   try {
-    const skips = choice === "skip", asked = { client_id, database, run, question, measured: sent(measured, given) };
-    const reply = await fetch(`/api/v1/queries/${question}/${skips ? "skip" : "answer"}`, {
+    const skips = choice === "skip", verb = change ? "change" : skips ? "skip" : "answer", asked = { client_id, database, run, question, measured: sent(measured, given) };
+    const reply = await fetch(`/api/v1/queries/${question}/${verb}`, {
       method: "POST", keepalive: true, signal: late.signal, headers: { "content-type": "application/json" },
       body: JSON.stringify(skips ? asked : { choice, replays, ...asked }),
     });
@@ -43,7 +43,7 @@ async function drain(report) {
       continue;
     }
     delay = 500;
-    if (outcome !== "elsewhere") write(read().filter((other) => key(other) !== key(answer)));
+    if (outcome !== "elsewhere") write(read().filter((other) => key(other) !== key(answer) || other.given !== answer.given)); // it may have been changed meanwhile
   }
 }
 

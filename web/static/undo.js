@@ -1,52 +1,95 @@
 // Undo: takes the last answer back while the agent has not heard it, and shows its question again. One that it has heard is
-// shown with its mark, by the server's own markup, and the form there changes it.
+// shown with its mark, by the server's own markup, and what is chosen there takes its place.
 import { report } from "./answers.js";
 import { keyName } from "./key_names.js";
 import { letters } from "./keys.js";
 import { kept } from "./kept.js";
-import { measure } from "./measuring.js";
 import { flush } from "./outbox.js";
-import { $, alarm, client, given, inDialog, page, run } from "./page.js";
+import { $, alarm, client, given, inDialog, page, run, speak } from "./page.js";
 import { show } from "./questions.js";
 import { t } from "./sentences.js";
 
 const PATIENCE = 3000; // ms for which the last answer may still be on its way
 const MOST = 20; // answers that can be taken back one after another
 const UNSENT = t("Your last answer is not sent yet. Take it back once the server is here again.");
+const AWAY = t("The server cannot be reached, so your last answer was not taken back. Try again once it is here.");
+const OFTEN = 5000; // ms between two looks at what was answered last
 const form = $("undo"), answered = [];
-let busy = false;
+const own = new Set(); // the numbers of this page's answers, of those after `known`
+let busy = false, known = page.answers, looked = -OFTEN;
+let told = null; // what is said of an undo that did not work for the time being: the words, and the answer that they wait for
 
+// Undo is offered where there is an answer to take back. A run that is over asks nothing again.
 function offer() {
+  form.hidden = !form.elements.question.value || page.state === "over" || Boolean(page.current?.dataset.former);
+}
+
+function name(query, said) {
+  form.elements.question.value = query;
+  $("undone").textContent = said;
+  offer();
+}
+
+function nameLast() {
   const last = answered.at(-1);
-  form.hidden = !last;
-  if (!last) return;
-  form.elements.question.value = last.question.dataset.query;
-  $("undone").textContent = last.question.querySelector(`[data-said][value=${last.choice}]`).dataset.said;
+  if (last) name(last.question.dataset.query, last.question.querySelector(`[data-said][value=${last.choice}]`).dataset.said);
+  else name("", "");
 }
 
 export function remember(question, choice) {
   answered.push({ question: question.cloneNode(true), choice });
   if (answered.length > MOST) answered.shift();
-  offer();
+  nameLast();
 }
 
-// Send the form of an answer that is changed, with what was measured of it.
-export function change(question, choice) {
-  question.elements.replays.value = page.player?.replays ?? "";
-  question.elements.measured.value = JSON.stringify({ ...measure(question), queued: 0 });
-  question.requestSubmit(question.querySelector(`.answers [value=${choice}]`));
+// Others have answered since this page knew the last answer; the same parent may be among them, in another tab.
+const behind = () => !page.unsaved && page.answers - known > own.size;
+
+// What the page would offer if it were loaded now.
+async function look() {
+  const last = answered.at(-1), until = page.answers;
+  looked = performance.now();
+  const reply = await fetch(`/runs/${run}/parent`).catch(() => null);
+  if (!reply?.ok) return;
+  const holder = document.createElement("template");
+  holder.innerHTML = await reply.text();
+  const found = holder.content.getElementById("undo");
+  if (!found || last !== answered.at(-1)) return; // an answer was given meanwhile: that is the last
+  known = until;
+  for (const number of own) if (number <= until) own.delete(number);
+  const query = found.elements.question.value;
+  if (query !== last?.question.dataset.query) answered.length = 0;
+  name(query, found.querySelector("#undone").textContent);
+}
+
+// The run has changed, or an answer of this page was stored under a number.
+export function heed(number = null) {
+  if (number > known) own.add(number);
+  offer();
+  if (behind() && !document.hidden && performance.now() - looked > OFTEN) look();
+}
+
+// What hindered an undo is over: the server is here again, or has that answer now.
+export function relieve(stored = null) {
+  if (!told || (told.query && told.query !== stored)) return;
+  if ($("alert").textContent === told.words) $("alert").textContent = "";
+  told = null;
+}
+
+function hinder(words, query = null) {
+  told = { words, query };
+  return new Error(words);
 }
 
 const again = (query, more = "") => location.assign(`/runs/${run}/parent?query=${query}${more}`);
 
 async function withdraw(query) {
   await Promise.race([flush(report), new Promise((done) => { setTimeout(done, PATIENCE); })]);
-  if (kept().includes(query)) throw new Error(UNSENT);
-  const reply = await fetch(`/api/v1/queries/${query}/withdraw`, {
+  if (kept().includes(query)) throw hinder(UNSENT, query);
+  const [reply, found] = await fetch(`/api/v1/queries/${query}/withdraw`, {
     method: "POST", headers: { "content-type": "application/json" },
     body: JSON.stringify({ client_id: client, database: form.elements.database.value, run, question: query }),
-  }).catch(() => { throw new Error(UNSENT); });
-  const found = await reply.json();
+  }).then(async (reply) => [reply, await reply.json()]).catch(() => { throw hinder(AWAY); });
   if (!reply.ok) throw new Error(found.error.message);
   return found.outcome;
 }
@@ -55,12 +98,15 @@ async function undo() {
   if (busy || form.hidden) return;
   busy = true;
   $("alert").textContent = "";
+  told = null;
   const query = form.elements.question.value;
   try {
+    if (behind()) await look();
+    if (form.elements.question.value !== query) return speak(form.textContent); // another answer came later: who wants that one back says so
     if (await withdraw(query) === "heard") return again(query, "&change=true");
     const last = answered.pop();
-    if (!last) return again(query);
-    offer();
+    if (!last || last.question.dataset.former) return again(query);
+    nameLast();
     given.delete(query);
     $("saved").textContent = t("Taken back");
     show(last.question);
@@ -69,6 +115,7 @@ async function undo() {
   } finally { busy = false; }
 }
 
+addEventListener("online", () => relieve());
 form.addEventListener("submit", (event) => {
   event.preventDefault();
   undo();
