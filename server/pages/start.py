@@ -60,7 +60,7 @@ NUMBER_ERRORS = {
 """The sentence next to a field that takes a number and holds something else."""
 
 BARE = "Input should be "
-"""What Pydantic's own messages hold, which are no sentences for people. Other errors of a field say more."""
+"""Messages of Pydantic begin with this or hold it. People get a sentence of ours in their place."""
 
 FILE = "policy_file"
 """The field of the form that takes a policy's file."""

@@ -56,7 +56,7 @@ def test_from_start_to_stop(tabs: BrowserTabs, db: Database, worker: Worker) -> 
     page.get_by_label("Stages").fill("two")
     page.get_by_label("Goal").fill("5")
     press(page, "Start")
-    expect(page.locator("[id='config.stages-error']")).to_contain_text("valid integer")
+    expect(page.locator("[id='config.stages-error']")).to_contain_text("a whole number from 1 to 16")
     page.get_by_label("Stages").fill("2")
     press(page, "Start")
     expect(page).to_have_url(tabs.address + address(db))

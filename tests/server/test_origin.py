@@ -152,9 +152,7 @@ def test_of_an_origin_names_and_numbers_are_kept(files: tuple[Path, Path], tmp_p
         assert (about["answers"]["database"], about["answers"]["run"]) == (kept, kept)
     named = tmp_path / "\udcff\x1b.jsonl"
     named.write_bytes(files[1].read_bytes())
-    about = read_origin(None, named).about
-    assert about is not None
-    assert about["answers"]["file"] == "\\udcff\\x1b.jsonl"
+    assert (read_origin(None, named).about or {})["answers"]["file"] == "\\udcff\\x1b.jsonl"
 
 
 @pytest.mark.parametrize(
