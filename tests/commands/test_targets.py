@@ -1,4 +1,4 @@
-"""What a command writes takes the place of a file alone, and of the one that a link names."""
+"""Output of a command takes the place of a file alone, and of the one that a link names."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from parenting.server.db import Database
 LARGE = 2**63
 """The first number that no column of the database holds."""
 NO_TEXT = "a\udcff"
-"""What Python makes of a byte that is not UTF-8."""
+"""A byte that is not UTF-8, as Python reads it."""
 
 
 @pytest.mark.parametrize("number", [LARGE - 1, LARGE, 10**100])

@@ -1,4 +1,4 @@
-"""What a worker may forget is on PostgreSQL's disk: the server may crash alone, and the worker lives on."""
+"""A worker forgets only what PostgreSQL has on its disk: the server may crash alone, and the worker lives on."""
 
 import pytest
 from sqlalchemy import event
