@@ -1,4 +1,4 @@
-"""A worker forgets only what PostgreSQL has on its disk: the server may crash alone, and the worker lives on."""
+"""A worker forgets only what PostgreSQL has on its disk: the server may crash alone, without the worker."""
 
 import pytest
 from sqlalchemy import event
