@@ -32,13 +32,13 @@ def rollback(
     The record up to the tick is copied: questions, answers and the operator's events. A worker lives these
     ticks again, bit for bit, and goes on from there. What the agent had not heard by then is asked again.
 
-    Exit codes: 0 started; 2 there is no such run, or it has not come to this tick.
+    Exit codes: 0 started; 2 there is no such run, it has not come to this tick, or no more may live.
 
     Example: parenting rollback 3 --to 120
     """
     with friendly_errors(), database() as db:
         try:
-            new = roll_back(db, run, to, name)
+            new = roll_back(db, run, to, name, settings().runs)
         except InvalidFieldsError as error:
             raise UsageError(f"--to: {error.fields[0][1]}") from None
         shown = run_schema(db, new.id)

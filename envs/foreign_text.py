@@ -149,6 +149,12 @@ def _of(format: str, lines: Sequence[Line], seen: Sequence[str]) -> list[Foreign
     return found
 
 
+ABOUT = re.compile(
+    r"(title|author|comment|collection|copyright|date|email|homepage|level|set|url|website):", re.I
+)
+"""The beginning of a line that tells of a map, or of the collection that it is from."""
+
+
 def _is_title(text: str) -> bool:
     return text.lower().startswith("title:")
 
@@ -221,7 +227,12 @@ def _check_all(format: str, lines: Sequence[Line]) -> None:
 
 def _is_apart(text: str) -> bool:
     """Return whether a line is not a row of any map: it is empty, a comment, a title or a code fence."""
-    return not text or text.startswith(COMMENT) or _is_title(text) or FENCE.fullmatch(text) is not None
+    return (
+        not text
+        or text.startswith(COMMENT)
+        or ABOUT.match(text) is not None
+        or FENCE.fullmatch(text) is not None
+    )
 
 
 def _is_nearly_a_row(format: str, text: str) -> bool:

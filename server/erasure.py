@@ -152,11 +152,11 @@ def finish(db: Database, person_id: int) -> bool:
     """
     with db.write() as session:
         clients = clients_of(session, person_id)
+        theirs = select(Query.run_id).where(Query.leased_by.in_(clients))
+        session.execute(select(Run.id).where(Run.id.in_(theirs)).order_by(Run.id).with_for_update()).all()
         for table in reversed(Table.metadata.sorted_tables):
             if "client_id" in table.c and table.name not in ("answer", "person_client"):
                 session.execute(delete(table).where(table.c.client_id.in_(clients)))
-        theirs = select(Query.run_id).where(Query.leased_by.in_(clients))
-        session.execute(select(Run.id).where(Run.id.in_(theirs)).order_by(Run.id).with_for_update()).all()
         session.execute(update(Query).where(Query.leased_by.in_(clients)).values(dict.fromkeys(_LEASE)))
         session.execute(delete(PersonName).where(PersonName.person_id == person_id))
         session.execute(delete(PersonClient).where(PersonClient.person_id == person_id))

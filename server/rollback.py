@@ -76,14 +76,14 @@ def roll_back(db: Database, run_id: int, tick: int, name: str | None = None, mos
         DamagedRowError: a row of the run cannot be read.
     """
     with db.write() as session:
-        if most is not None:
-            require_room(session, most)
         old = readable(hold(session, run_id))
         refuse_if_of_batch(old)
         if not 0 <= tick <= old.tick:
             raise InvalidFieldsError(
                 [("tick", f"Run {run_id} has come to tick {old.tick}: write 0 to that.")]
             )
+        if most is not None:
+            require_room(session, most)
         new = Run(id=unused_number(session, Run), created=db.clock())
         for column in SETTINGS:
             setattr(new, column, getattr(old, column))

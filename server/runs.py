@@ -90,10 +90,10 @@ def set_status(
         DamagedRowError: it was stopped or has failed, and its row cannot be read.
     """
     with db.write() as session:
-        if most is not None and status is RunStatus.ACTIVE and find(session, run_id).status in RESUMABLE:
-            require_room(session, most)  # before the run is locked, in the order of whoever starts one
         before = (run := hold(session, run_id)).status
         if before in RESUMABLE and status is RunStatus.ACTIVE:
+            if most is not None:
+                require_room(session, most)
             resume_in(session, db, run)
         if run.status in OVER and run.status != status:
             raise Conflict(

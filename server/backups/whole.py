@@ -50,8 +50,9 @@ def file_at(target: Path) -> Path:
     Raises:
         SetupError: something else is there, such as a folder or a pipe, or it cannot be looked at.
     """
-    found = behind_links(target)
+    found = target
     try:
+        found = behind_links(target)
         kind = found.stat().st_mode
     except FileNotFoundError:
         return found

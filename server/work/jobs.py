@@ -27,7 +27,7 @@ log = structlog.get_logger()
 
 AT_ONCE = 2
 """Jobs of a worker at a time. More would only take the processor from its runs."""
-LOOK_SECONDS = 0.5
+LOOK_SECONDS = 0.1
 """Seconds between two looks for jobs, at the least: a worker that raises runs commits all the time."""
 
 

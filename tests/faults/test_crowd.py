@@ -10,7 +10,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from parenting.server.replay import relive
 from parenting.server.runs import get_run, list_runs
 from parenting.server.settings import Settings
 from parenting.server.statuses import OVER, RunStatus
+from parenting.server.tables import Run
 from parenting.server.workers import is_here
 from tests.access import cookies
 from tests.faults.auditor import Store, audit
@@ -109,8 +110,7 @@ def test_a_worker_of_several_is_killed_under_a_crowd(
         half = RUNS * ANSWERS // 2
         until(lambda: sum(run.answers for run in list_runs(db)) >= half, "half of the answers")
         picture(pages, "before")
-        least = min(list_runs(db), key=lambda run: run.answers)
-        (victim,) = (one for one in workers if is_here(least.worker or "", one.process.pid))
+        least, victim = raised_least(db, workers)
         victim.kill()
         figures.count("crowd", "workers killed")
         until(lambda: over(db), f"the end of all runs: {[(run.id, run.status) for run in list_runs(db)]}")
@@ -127,6 +127,19 @@ def test_a_worker_of_several_is_killed_under_a_crowd(
     different = [run.id for run in runs if not relive(db, run.id).equal]
     assert different == []
     figures.count("crowd", "runs replayed equal", len(runs))
+
+
+def raised_least(db: Database, workers: Sequence[Command]) -> tuple[Run, Command]:
+    """The run with the fewest answers, and the worker that raises it."""
+    found: list[tuple[Run, Command]] = []
+
+    def look() -> bool:
+        run = min(list_runs(db), key=lambda one: one.answers)
+        found[:] = [(run, one) for one in workers if is_here(run.worker or "", one.process.pid)]
+        return bool(found)
+
+    until(look, "a worker raises it")
+    return found[0]
 
 
 def over(db: Database) -> bool:

@@ -79,9 +79,8 @@ export function report(outcome, reply, answer) {
   page.unsaved = Math.max(0, page.unsaved - 1);
   relieve(answer.question);
   if (outcome === "saved") {
-    const here = reply.run_public_id === run;
-    if (here && answer.choice !== "skip" && !answer.change) count(reply.number);
-    heed(here && given.has(answer.question) ? reply.number : null);
+    if (reply.run_public_id === run && answer.choice !== "skip" && !answer.change) count(reply.number);
+    heed();
     if (!page.unsaved) $("saved").textContent = t("Saved");
   } else {
     if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? t("Kept here, not stored") : "";

@@ -31,19 +31,22 @@ async function send({ database, run, question, choice, change, replays, measured
   } finally { clearTimeout(timer); }
 }
 
+// An answer may have been changed while it was on its way.
+const same = (answer) => (other) => key(other) === key(answer) && other.given === answer.given;
+
 async function drain(report) {
   for (let answers = read().filter(meant); answers.length; answers = read().filter(meant)) {
     const [answer] = answers, [outcome, reply] = await send(answer);
     if (outcome === "elsewhere") elsewhere.add(key(answer));
     report(outcome, reply, answer);
     if (outcome === "kept") {
-      if (reply.alone) keep(answer); // the fault may be this question's alone: the others go first
+      if (reply.alone && read().some(same(answer))) keep(answer); // the fault may be this question's alone: the others go first
       await wait(delay);
       delay = Math.min(5000, delay * 2);
       continue;
     }
     delay = 500;
-    if (outcome !== "elsewhere") write(read().filter((other) => key(other) !== key(answer) || other.given !== answer.given)); // it may have been changed meanwhile
+    if (outcome !== "elsewhere") write(read().filter((other) => !same(answer)(other)));
   }
 }
 

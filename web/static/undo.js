@@ -12,11 +12,12 @@ import { t } from "./sentences.js";
 const PATIENCE = 3000; // ms for which the last answer may still be on its way
 const MOST = 20; // answers that can be taken back one after another
 const UNSENT = t("Your last answer is not sent yet. Take it back once the server is here again.");
-const AWAY = t("The server cannot be reached, so your last answer was not taken back. Try again once it is here.");
+const AWAY = t("The server cannot be reached, so it is not known whether your last answer was taken back. Try again once it is here.");
+const ANSWERED = "parenting.answered"; // tells the other tabs of this browser that one has answered
 const OFTEN = 5000; // ms between two looks at what was answered last
 const form = $("undo"), answered = [];
-const own = new Set(); // the numbers of this page's answers, of those after `known`
-let busy = false, known = page.answers, looked = -OFTEN;
+let busy = false, looked = -OFTEN;
+let before = null; // the number of answers when another tab of this browser gave one; null: none has since the last look
 let told = null; // what is said of an undo that did not work for the time being: the words, and the answer that they wait for
 
 // Undo is offered where there is an answer to take back. A run that is over asks nothing again.
@@ -40,31 +41,30 @@ export function remember(question, choice) {
   answered.push({ question: question.cloneNode(true), choice });
   if (answered.length > MOST) answered.shift();
   nameLast();
+  try { localStorage.setItem(ANSWERED, `${run} ${Date.now()}`); } catch { /* no storage: then they know of their own answers alone */ }
 }
 
-// Others have answered since this page knew the last answer; the same parent may be among them, in another tab.
-const behind = () => !page.unsaved && page.answers - known > own.size;
+// The answer of another tab is stored, so it may be the last one.
+const behind = () => before !== null && page.answers > before && !page.unsaved;
 
 // What the page would offer if it were loaded now.
 async function look() {
-  const last = answered.at(-1), until = page.answers;
+  const last = answered.at(-1);
   looked = performance.now();
   const reply = await fetch(`/runs/${run}/parent`).catch(() => null);
   if (!reply?.ok) return;
   const holder = document.createElement("template");
   holder.innerHTML = await reply.text();
+  before = null;
   const found = holder.content.getElementById("undo");
   if (!found || last !== answered.at(-1)) return; // an answer was given meanwhile: that is the last
-  known = until;
-  for (const number of own) if (number <= until) own.delete(number);
   const query = found.elements.question.value;
   if (query !== last?.question.dataset.query) answered.length = 0;
   name(query, found.querySelector("#undone").textContent);
 }
 
-// The run has changed, or an answer of this page was stored under a number.
-export function heed(number = null) {
-  if (number > known) own.add(number);
+// The run has changed.
+export function heed() {
   offer();
   if (behind() && !document.hidden && performance.now() - looked > OFTEN) look();
 }
@@ -104,7 +104,8 @@ async function undo() {
     if (behind()) await look();
     if (form.elements.question.value !== query) return speak(form.textContent); // another answer came later: who wants that one back says so
     if (await withdraw(query) === "heard") return again(query, "&change=true");
-    const last = answered.pop();
+    const place = answered.map(({ question }) => question.dataset.query).lastIndexOf(query); // one may have been given meanwhile
+    const [last] = place < 0 ? [] : answered.splice(place, 1);
     if (!last || last.question.dataset.former) return again(query);
     nameLast();
     given.delete(query);
@@ -116,6 +117,9 @@ async function undo() {
 }
 
 addEventListener("online", () => relieve());
+addEventListener("storage", ({ key, newValue }) => {
+  if (key === ANSWERED && newValue?.startsWith(run)) before = page.answers;
+});
 form.addEventListener("submit", (event) => {
   event.preventDefault();
   undo();
