@@ -94,3 +94,9 @@ def test_a_code_fence_names_no_map() -> None:
     lake = "SFFF\nFHFG\n"
     for above, name in (("Look:\n```text\n", "map"), ("; small\n``` {.text}\n", "small"), ("Lake\n", "Lake")):
         assert imported(f"{above}{lake}```\n")[0].level.name == name
+
+
+def test_lines_about_a_map_below_it_are_no_rows_of_it() -> None:
+    """Even one that is as wide as the map."""
+    text = "###########\n#@$.      #\n###########\nAuthor: bar\n"
+    assert len(imported(text)) == 1

@@ -117,6 +117,23 @@ def test_clips_that_were_put_back_come_once_more(tabs: BrowserTabs, db: Database
     expect(page.locator("#waiting")).to_be_visible()
 
 
+def test_clips_that_were_put_back_can_be_asked_for_at_once(
+    tabs: BrowserTabs, db: Database, mine: Claim
+) -> None:
+    """They are what the parent answered last, though no answer stands."""
+    clips = fixtures.guidance("left", "down", start=(1, 2))
+    first, second = (post_query(db, mine, tick, "preference", 1, clips) for tick in (1, 2))
+    page = tabs.open(address(db))
+    shown(page, first)
+    page.keyboard.press("s")
+    until(lambda: stored(db) == [("skip", False)])
+    shown(page, second)
+    page.wait_for_timeout(700)  # by then the stream has told of the skip
+    expect(page.locator("#undo")).to_be_visible()
+    page.keyboard.press("z")
+    shown(page, first)
+
+
 @pytest.mark.parametrize(("wanted", "relabels"), [(True, False), (False, False), (True, True)])
 def test_an_answer_that_contradicts_an_earlier_one_gets_a_sentence(
     tabs: BrowserTabs, db: Database, mine: Claim, wanted: bool, relabels: bool

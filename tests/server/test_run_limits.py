@@ -8,9 +8,12 @@ from contextlib import closing
 import httpx2
 import pytest
 from fastapi.testclient import TestClient
+from typer.testing import CliRunner
 
+from parenting.commands.main import app
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
+from parenting.server.new_run import NewRun, start
 from parenting.server.runs import list_runs, set_status
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
@@ -64,6 +67,21 @@ def test_one_that_goes_on_or_begins_from_another_counts_as_well(db: Database, se
     assert web.post("/api/v1/runs/2/resume").status_code == 200, "a paused one lives already"
     set_status(db, 2, RunStatus.STOPPED)
     assert web.post("/api/v1/runs/1/resume").status_code == 200
+
+
+def test_commands_keep_to_the_limit_of_all(
+    db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PARENTING_DATA", str(settings.data))
+    monkeypatch.setenv("PARENTING_DATABASE_URL", settings.url)
+    monkeypatch.setenv("PARENTING_RUNS", "1")
+    one = start(db, NewRun(world="unsafe-exploration")).id
+    said = CliRunner().invoke(app, ["rollback", str(one), "--to", "0"])
+    assert (said.exit_code, "1 runs live" in said.stderr) == (2, True)
+    set_status(db, one, RunStatus.STOPPED)
+    start(db, NewRun(world="unsafe-exploration"))
+    said = CliRunner().invoke(app, ["resume", str(one)])
+    assert (said.exit_code, "1 runs live" in said.stderr) == (2, True)
 
 
 def test_runs_that_a_client_begins_from_others_are_its_own(db: Database, settings: Settings) -> None:
