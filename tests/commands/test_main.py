@@ -65,11 +65,11 @@ def test_the_version_is_that_of_the_package() -> None:
     [
         (
             ["run", "side-effects", "--trials", "-1"],
-            "'--trials': '-1' is not a whole number of at least 1.",
+            "'--trials': '-1' is not a whole number from 1 to 1000000.",
         ),
         (
             ["run", "side-effects", "--trials", "x"],
-            "'--trials': 'x' is not a whole number of at least 1.",
+            "'--trials': 'x' is not a whole number from 1 to 1000000.",
         ),
         (["runs", "--limit", "0"], "'--limit': '0' is not a whole number from 1 to 10000."),
         (["replay", "abc"], "'run': 'abc' is not a whole number of at least 1."),

@@ -37,11 +37,24 @@ def raised(db: Database) -> None:
 
 
 @pytest.fixture(params=WRITERS, ids=" ".join)
-def write(request: pytest.FixtureRequest) -> Callable[..., Result]:
+def words(request: pytest.FixtureRequest) -> list[str]:
     """One of the commands that write a file."""
+    said: list[str] = request.param
+    return said
+
+
+@pytest.fixture
+def ending(words: list[str]) -> str:
+    """The ending of a name for what it writes."""
+    return ".jsonl" if "--of" in words else ".zip"
+
+
+@pytest.fixture
+def write(words: list[str]) -> Callable[..., Result]:
+    """Have it write a file."""
 
     def call(target: Path, *more: str) -> Result:
-        return CliRunner().invoke(app, [*request.param, str(target), *more])
+        return CliRunner().invoke(app, [*words, str(target), *more])
 
     return call
 
@@ -59,9 +72,13 @@ def listening(path: Path) -> None:
 @pytest.mark.parametrize("force", [[], ["--force"]])
 @pytest.mark.parametrize("make", [pipe, listening])
 def test_what_is_not_a_file_stays(
-    write: Callable[..., Result], make: Callable[[Path], None], force: list[str], tmp_path: Path
+    write: Callable[..., Result],
+    ending: str,
+    make: Callable[[Path], None],
+    force: list[str],
+    tmp_path: Path,
 ) -> None:
-    target, link = tmp_path / "it.zip", tmp_path / "link.zip"
+    target, link = tmp_path / f"it{ending}", tmp_path / f"link{ending}"
     make(target)
     link.symlink_to(target)
     kind = stat.S_IFMT(target.stat().st_mode)
@@ -74,10 +91,10 @@ def test_what_is_not_a_file_stays(
 
 
 def test_a_link_stays_and_the_file_that_it_names_is_written(
-    write: Callable[..., Result], tmp_path: Path
+    write: Callable[..., Result], ending: str, tmp_path: Path
 ) -> None:
     (tmp_path / "far").mkdir()
-    file, link = tmp_path / "far" / "it.zip", tmp_path / "link.zip"
+    file, link = tmp_path / "far" / f"it{ending}", tmp_path / f"link{ending}"
     link.symlink_to(file)
     assert write(link).exit_code == 0
     assert (link.is_symlink(), file.is_file()) == (True, True)
@@ -87,11 +104,13 @@ def test_a_link_stays_and_the_file_that_it_names_is_written(
     assert write(link, "--force").exit_code == 0
     assert link.is_symlink()
     assert file.read_bytes() != b"former"
-    assert [path.name for path in file.parent.iterdir()] == ["it.zip"]
+    assert [path.name for path in file.parent.iterdir()] == [f"it{ending}"]
 
 
-def test_a_link_to_itself_is_told_in_a_sentence(write: Callable[..., Result], tmp_path: Path) -> None:
-    link = tmp_path / "link.zip"
+def test_a_link_to_itself_is_told_in_a_sentence(
+    write: Callable[..., Result], ending: str, tmp_path: Path
+) -> None:
+    link = tmp_path / f"link{ending}"
     link.symlink_to(link)
     said = write(link, "--force")
     assert (said.exit_code, said.stderr.count("\n")) == (2, 1)

@@ -87,7 +87,7 @@ def raised(tabs: BrowserTabs, world: str, stage: int) -> dict[str, Any]:
     expect(dashboard.locator("#now-tick")).not_to_have_text(halfway)
     expect(page.get_by_role("heading", name="That was the last question of this goal.")).to_be_visible()
     expect(dashboard.locator("#now-answered")).to_have_text(str(QUESTIONS))
-    expect(dashboard.get_by_role("status")).to_contain_text(f"The goal of {QUESTIONS} questions is reached.")
+    expect(dashboard.get_by_role("status")).to_contain_text(f"The goal of {QUESTIONS} answers is reached.")
     expect(dashboard.locator("#now-maturity")).to_have_text(str(stage))
     expect(dashboard.locator(".js-plotly-plot").first).to_be_visible()
     told: dict[str, Any] = httpx2.get(f"{tabs.address}/api/v1/runs/{run}").json()

@@ -46,6 +46,7 @@ UNTOLD: dict[str, list[Any]] = {
         "ask_job",
         "ask_pretraining",
         "roll_back_run",
+        "export_run",
     )
 }
 """Rules that a schema cannot hold: which worlds, levels, presets and settings there are, which fields go
