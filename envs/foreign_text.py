@@ -149,9 +149,7 @@ def _of(format: str, lines: Sequence[Line], seen: Sequence[str]) -> list[Foreign
     return found
 
 
-ABOUT = re.compile(
-    r"(title|author|comment|collection|copyright|date|email|homepage|level|set|url|website):", re.I
-)
+ABOUT = re.compile(r"(title|author|comment|collection|copyright|date|email|homepage|url|website):", re.I)
 """The beginning of a line that tells of a map, or of the collection that it is from."""
 
 
@@ -165,7 +163,10 @@ def _name_above(seen: Sequence[str]) -> str:
     named = [
         text
         for place, text in enumerate(seen)
-        if text and text != "(Down)" and place not in fences
+        if text
+        and text != "(Down)"
+        and place not in fences
+        and (_is_title(text) or ABOUT.match(text) is None)
         if not fences or place > fences[-1] or text.startswith(COMMENT)
     ]
     return named[-1].strip("; \t'\"") if named and not _is_title(named[-1]) else ""
@@ -209,7 +210,8 @@ def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:
             text = run.seen[at]
             if _is_apart(text):
                 continue
-            if parts or _is_nearly_a_row(format, text) or (at == 0 and width == len(text) and not after):
+            alike = _is_nearly_a_row(format, text) or (at == 0 and width == len(text) and not after)
+            if parts or (alike and ABOUT.match(text) is None):
                 raise _strange(format, run.lines[at], text)
 
 
@@ -227,12 +229,7 @@ def _check_all(format: str, lines: Sequence[Line]) -> None:
 
 def _is_apart(text: str) -> bool:
     """Return whether a line is not a row of any map: it is empty, a comment, a title or a code fence."""
-    return (
-        not text
-        or text.startswith(COMMENT)
-        or ABOUT.match(text) is not None
-        or FENCE.fullmatch(text) is not None
-    )
+    return not text or text.startswith(COMMENT) or _is_title(text) or FENCE.fullmatch(text) is not None
 
 
 def _is_nearly_a_row(format: str, text: str) -> bool:

@@ -59,6 +59,7 @@ LOST = {
     "in the last row": ("SFFF\nFFFG\nxxxx\n", 3, "'x' makes"),
     "a row apart": ("SFFF\nFFFG\n\nFFFF\nFFFF\n", 4, "none has 'S'"),
     "like another letter": ("SFFF\nFF\u0421F\nFFFG\n", 2, "'\u0421' (cyrillic capital letter es) makes"),
+    "behind words": ("SFFF\nFHFF\nFFFG\nAuthor: x\nHFFG\n", 4, "makes"),
     "in XSB": (CRATE.replace("#  .", "# x ."), 4, "'x' makes this line no row of Sokoban's XSB"),
     "a tab": (f"\t{CRATE}", 1, "a tab makes"),
     "a short row": ("+---+\n|R:G|\n|Y:|\n+---+\n", 3, "this row has 4 signs, and the map's first row has 5"),
@@ -100,3 +101,5 @@ def test_lines_about_a_map_below_it_are_no_rows_of_it() -> None:
     """Even one that is as wide as the map."""
     text = "###########\n#@$.      #\n###########\nAuthor: bar\n"
     assert len(imported(text)) == 1
+    two = imported(f"{CRATE}Title: one\nAuthor: bar\n\n{CRATE}Title: two\nAuthor: bar\n")
+    assert [one.level.name for one in two] == ["one", "two"]

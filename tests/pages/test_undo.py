@@ -204,3 +204,23 @@ def test_the_last_answer_is_that_of_another_tab(
     page.keyboard.press("z")
     until(lambda: stored(db) == [("right", True), ("left", False)])
     shown(page, second)
+
+
+def test_an_answer_of_somebody_else_between_changes_nothing(
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
+) -> None:
+    """It is counted before that of the other tab is stored, and is nobody's to take back here."""
+    first, second, third = ask(), ask(), ask()
+    page = tabs.open(address(db))
+    shown(page, first)
+    page.keyboard.press("b")
+    shown(page, second)
+    until(lambda: stored(db) == [("right", True)])
+    other = page.context.new_page()
+    other.goto(page.url)
+    shown(other, second)
+    answer(db, third, "right", OTHER, "human")
+    page.wait_for_timeout(700)  # by then the stream has told of it
+    expect(page.locator("#undo button")).to_contain_text("Undo: B, down")
+    other.keyboard.press("a")
+    expect(page.locator("#undo button")).to_contain_text("Undo: A, left")

@@ -8,7 +8,7 @@ import { $, alarm, client, given, name, page, painted, run, waiting } from "./pa
 import { next, show } from "./questions.js";
 import { remark } from "./remarks.js";
 import { t } from "./sentences.js";
-import { heed, relieve, remember } from "./undo.js";
+import { heed, relieve, remember, stored } from "./undo.js";
 import { wait } from "./waiting.js";
 
 const HASTE = 40; // ms after an answer when the next question is asked for, if the answer's reply is not there before
@@ -80,6 +80,7 @@ export function report(outcome, reply, answer) {
   relieve(answer.question);
   if (outcome === "saved") {
     if (reply.run_public_id === run && answer.choice !== "skip" && !answer.change) count(reply.number);
+    stored(reply.run_public_id, answer.question);
     heed();
     if (!page.unsaved) $("saved").textContent = t("Saved");
   } else {

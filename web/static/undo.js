@@ -13,11 +13,11 @@ const PATIENCE = 3000; // ms for which the last answer may still be on its way
 const MOST = 20; // answers that can be taken back one after another
 const UNSENT = t("Your last answer is not sent yet. Take it back once the server is here again.");
 const AWAY = t("The server cannot be reached, so it is not known whether your last answer was taken back. Try again once it is here.");
-const ANSWERED = "parenting.answered"; // tells the other tabs of this browser that one has answered
+const ANSWERED = "parenting.answered"; // tells the other tabs of this browser that an answer is stored
 const OFTEN = 5000; // ms between two looks at what was answered last
 const form = $("undo"), answered = [];
 let busy = false, looked = -OFTEN;
-let before = null; // the number of answers when another tab of this browser gave one; null: none has since the last look
+let stale = false, others = false; // another tab has answered since the last look, and ever since `answered` began
 let told = null; // what is said of an undo that did not work for the time being: the words, and the answer that they wait for
 
 // Undo is offered where there is an answer to take back. A run that is over asks nothing again.
@@ -38,28 +38,44 @@ function nameLast() {
 }
 
 export function remember(question, choice) {
+  if (stale) forget();
+  stale = false; // this answer is the last one
   answered.push({ question: question.cloneNode(true), choice });
   if (answered.length > MOST) answered.shift();
   nameLast();
-  try { localStorage.setItem(ANSWERED, `${run} ${Date.now()}`); } catch { /* no storage: then they know of their own answers alone */ }
+}
+
+// What this page remembers does not follow one another: answers of another tab come between.
+function forget(kept = 0) {
+  answered.splice(0, answered.length - kept);
+  others = true;
+}
+
+// An answer is stored; any tab's outbox may have sent it.
+export function stored(at, query) {
+  try { localStorage.setItem(ANSWERED, `${at} ${Date.now()}`); } catch { /* no storage: then tabs know of their own answers alone */ }
+  stale ||= at === run && !answered.some(({ question }) => question.dataset.query === query);
 }
 
 // The answer of another tab is stored, so it may be the last one.
-const behind = () => before !== null && page.answers > before && !page.unsaved;
+const behind = () => stale && !page.unsaved;
 
 // What the page would offer if it were loaded now.
 async function look() {
   const last = answered.at(-1);
   looked = performance.now();
+  stale = false;
   const reply = await fetch(`/runs/${run}/parent`).catch(() => null);
-  if (!reply?.ok) return;
+  if (!reply?.ok) {
+    stale = last === answered.at(-1);
+    return;
+  }
   const holder = document.createElement("template");
   holder.innerHTML = await reply.text();
-  before = null;
   const found = holder.content.getElementById("undo");
   if (!found || last !== answered.at(-1)) return; // an answer was given meanwhile: that is the last
   const query = found.elements.question.value;
-  if (query !== last?.question.dataset.query) answered.length = 0;
+  forget(query === last?.question.dataset.query ? 1 : 0);
   name(query, found.querySelector("#undone").textContent);
 }
 
@@ -108,6 +124,7 @@ async function undo() {
     const [last] = place < 0 ? [] : answered.splice(place, 1);
     if (!last || last.question.dataset.former) return again(query);
     nameLast();
+    stale ||= others && !answered.length;
     given.delete(query);
     $("saved").textContent = t("Taken back");
     show(last.question);
@@ -118,7 +135,9 @@ async function undo() {
 
 addEventListener("online", () => relieve());
 addEventListener("storage", ({ key, newValue }) => {
-  if (key === ANSWERED && newValue?.startsWith(run)) before = page.answers;
+  if (key !== ANSWERED || !newValue?.startsWith(run)) return;
+  stale = true;
+  heed();
 });
 form.addEventListener("submit", (event) => {
   event.preventDefault();
