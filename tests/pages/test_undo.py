@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 import httpx2
-from playwright.sync_api import expect
+from playwright.sync_api import Page, expect
 from sqlalchemy import select
 
 from parenting.server.db import Database
@@ -186,10 +186,8 @@ def test_a_run_that_is_over_offers_no_undo(
     expect(page.locator("#undo")).to_be_hidden()
 
 
-def test_the_last_answer_is_that_of_another_tab(
-    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
-) -> None:
-    first, second = ask(), ask()
+def two_tabs(tabs: BrowserTabs, db: Database, first: int, second: int) -> tuple[Page, Page]:
+    """Two tabs of one browser: in one the first question was answered, and both show the second."""
     page = tabs.open(address(db))
     shown(page, first)
     page.keyboard.press("b")
@@ -198,6 +196,14 @@ def test_the_last_answer_is_that_of_another_tab(
     other = page.context.new_page()
     other.goto(page.url)
     shown(other, second)
+    return page, other
+
+
+def test_the_last_answer_is_that_of_another_tab(
+    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
+) -> None:
+    first, second = ask(), ask()
+    page, other = two_tabs(tabs, db, first, second)
     other.keyboard.press("a")
     expect(page.locator("#undo button")).to_contain_text("Undo: A, left")
     page.bring_to_front()
@@ -211,14 +217,7 @@ def test_an_answer_of_somebody_else_between_changes_nothing(
 ) -> None:
     """It is counted before that of the other tab is stored, and is nobody's to take back here."""
     first, second, third = ask(), ask(), ask()
-    page = tabs.open(address(db))
-    shown(page, first)
-    page.keyboard.press("b")
-    shown(page, second)
-    until(lambda: stored(db) == [("right", True)])
-    other = page.context.new_page()
-    other.goto(page.url)
-    shown(other, second)
+    page, other = two_tabs(tabs, db, first, second)
     answer(db, third, "right", OTHER, "human")
     page.wait_for_timeout(700)  # by then the stream has told of it
     expect(page.locator("#undo button")).to_contain_text("Undo: B, down")
