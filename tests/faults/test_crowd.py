@@ -6,7 +6,6 @@ pictures at 1280 and 390 pixels lie in PARENTING_PICTURES, if that names a folde
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import time
@@ -28,18 +27,18 @@ from parenting.server.tables import Run
 from parenting.server.workers import is_here
 from tests.access import cookies
 from tests.faults.auditor import Store, audit
+from tests.faults.crowds import crowded, figures_of
 from tests.faults.figures import Figures
 from tests.faults.ledger import Entries
 from tests.lengths import TORTURE, length
 from tests.pages.browser_tabs import BrowserTabs
-from tests.server.processes import Command, store_of
-from tests.server.serving import free_port, until_up
+from tests.server.processes import Command
 from tests.simulated_person import chromium
 
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 3600))]
 PEOPLE, RUNS, WORKERS, ANSWERS = length((3, 2, 2, 4), (50, 50, 3, 12))
 THINK = length("0.05", "1.0")
-CLAIM_SECONDS = 1.0
+CLAIM_SECONDS = "1.0"
 PATIENCE = length(60.0, 900.0)
 WIDTHS = (1280, 390)
 SPEED = {
@@ -91,22 +90,14 @@ def test_a_worker_of_several_is_killed_under_a_crowd(
                 finish=f"goal:{ANSWERS}",
             ),
         )
-    environment = store_of(settings) | {"PARENTING_CLAIM_SECONDS": str(CLAIM_SECONDS)}
-    url = f"http://127.0.0.1:{free_port()}"
-
     with ExitStack() as stack:
-
-        def begun(*arguments: str) -> Command:
-            one = Command(*arguments, data=settings.data, environment=environment, patches=SPEED)
-            stack.callback(lambda: one.kill() if one.alive else None)
-            return one
-
-        begun("web", "--port", url.rpartition(":")[2])
-        workers = [begun("worker") for _ in range(WORKERS)]
-        until_up(url)
+        house = stack.enter_context(
+            crowded(settings, WORKERS, {"PARENTING_CLAIM_SECONDS": CLAIM_SECONDS}, SPEED)
+        )
+        url, workers = house.url, house.workers
         until(lambda: len(raisers(db)) == WORKERS, "each worker raises a run")
         pages = stack.enter_context(watched(url, db, list_runs(db)[0].public_id))
-        bots = begun("answer", "--url", url, "--people", str(PEOPLE), "--think", THINK, "--json")
+        bots = house.answer("--people", str(PEOPLE), "--think", THINK)
         half = RUNS * ANSWERS // 2
         until(lambda: sum(run.answers for run in list_runs(db)) >= half, "half of the answers")
         picture(pages, "before")
@@ -118,7 +109,7 @@ def test_a_worker_of_several_is_killed_under_a_crowd(
         assert bots.wait(60) == 0, bots.said()
         for worker in workers:
             assert worker is victim or worker.stop() == 0, worker.said()
-    found = json.loads(bots.said().splitlines()[-1])
+    found = figures_of(bots)
     runs = list_runs(db)
     assert {run.status for run in runs} == {RunStatus.FINISHED}
     assert get_run(db, least.id).fencing_token > least.fencing_token, "another worker took it up"
