@@ -1,4 +1,7 @@
-"""A parent as a thread: it leases, thinks, answers, resends until it is told, and writes the ledger."""
+"""A parent as a thread: it leases, thinks, answers or skips, has second thoughts, and writes the ledger.
+
+What it sends, it sends again until it is told what became of it.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,8 @@ PAUSE = 0.05
 SECONDS = 10.0
 AGAIN = 0.1
 """The share of answers that are sent again, of those sent with another choice, and of leases let go."""
+SECOND_THOUGHTS, SKIPS = 0.1, 0.05
+"""The share of answers that are changed, of those taken back and given again, and of questions skipped."""
 
 
 class Parent(threading.Thread):
@@ -52,20 +57,37 @@ class Parent(threading.Thread):
             if self._send(f"queries/{query}/release", {}) is not None:
                 self.ledger.offered(Offer(str(query), self.client, since, since))
             return
-        choice = self.rng.choice(CHOICES)
-        receipt = self._until_told(query, choice)
+        skips, choice = self.rng.random() < SKIPS, self.rng.choice(CHOICES)
+        receipt = self._until_told(query, "skip") if skips else self._until_told(query, "answer", choice)
         self.ledger.offered(Offer(str(query), self.client, since, min(until, self.sent)))
         if receipt is not None:
-            self.ledger.told(receipt, self.client)
+            self._note(receipt)
             self.told += 1
             self.times.append(time.monotonic() - asked)
-            self._ask_too_much(query, choice, receipt)
+            if not skips:
+                self._ask_too_much(query, choice, receipt)
+            self._think_again(query)
 
-    def _until_told(self, query: int | str, choice: str) -> dict[str, Any] | None:
-        """Send an answer until a reply says what became of it: its receipt, or None where it was refused."""
+    def _note(self, receipt: dict[str, Any] | None) -> None:
+        """Write a receipt down. That of a skip that was stored before has no number."""
+        if receipt is not None and receipt["number"] is not None:
+            self.ledger.told({"choice": "skip", **receipt}, self.client)
+
+    def _think_again(self, query: int | str) -> None:
+        """Change an answer, or take it back and give another one; what was heard can only be changed."""
+        if self.rng.random() < SECOND_THOUGHTS:
+            self._note(self._until_told(query, "change", self.rng.choice(CHOICES)))
+        if self.rng.random() < SECOND_THOUGHTS:
+            found = self._until_told(query, "withdraw")
+            if found is not None:
+                verb = "answer" if found["outcome"] == "withdrawn" else "change"
+                self._note(self._until_told(query, verb, self.rng.choice(CHOICES)))
+
+    def _until_told(self, query: int | str, verb: str, choice: str | None = None) -> dict[str, Any] | None:
+        """Send something until a reply says what became of it: its receipt, or None where it was refused."""
         self.sent = time.monotonic()
         while not self.leaving.is_set():
-            reply = self._send(f"queries/{query}/answer", {"choice": choice})
+            reply = self._send(f"queries/{query}/{verb}", {} if choice is None else {"choice": choice})
             if reply is not None and reply.status_code < 300:
                 receipt: dict[str, Any] = reply.json()
                 return receipt
