@@ -129,9 +129,9 @@ class Worker:
         self.signs.round()
         ticked = self._round()
         self.signs.if_due(at_once=self.patience.doubts)
-        self._claim()
+        fresh = self._claim()
         self.chores.go_on()
-        if not ticked:
+        if not (ticked or fresh):
             self.notifier.wait(self._soonest)
 
     def _give_sign(self) -> None:
@@ -144,23 +144,24 @@ class Worker:
             runs.let_go(self.db, hung)
         self.jobs.renew()
 
-    def _claim(self) -> None:
+    def _claim(self) -> bool:
         """Look for runs that nobody raises, up to a fair share, and give up what is above it.
 
-        Without a commit of anybody, nothing but time can have freed a run.
+        Without a commit of anybody, nothing but time can have freed a run. Return whether one was claimed.
         """
         late = time.monotonic() - self._claimed_at
         if late < (CLAIM_EVERY if self._committed else min(self.settings.claim_seconds / 2, QUIET_SECONDS)):
-            return
-        seconds = self.settings.claim_seconds
+            return False
+        seconds, fresh = self.settings.claim_seconds, list[runs.Claim]()
         most, free = prospect(self.db, self.name, seconds)
         self._give_up(most)
         if free and (more := most - len(self.claims)) > 0:
             hung = self.turns.working(HUNG_SECONDS)
-            fresh = runs.claim(self.db, self.name, seconds, more, hung)
+            fresh += runs.claim(self.db, self.name, seconds, more, hung)
             self.claims.update({claim.run_id: claim for claim in fresh})
             self.held.lives.claimed(self.db, [claim.run_id for claim in fresh], len(self.claims))
         self._claimed_at, self._committed = time.monotonic(), False
+        return bool(fresh)
 
     def _give_up(self, most: int) -> None:
         """Choose the runs that other workers should raise; each that has a life in memory has a last turn."""
