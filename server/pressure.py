@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
+PRESSED_SECONDS = 1.0
+"""Pressure lasts so long after people waited: in a crowd the next ones come at once."""
 PUT_OFF_SECONDS = 5.0
 """A turn that comes so long after the last such work does it even while people wait for other runs."""
 
@@ -14,9 +17,17 @@ class Pressure:
     """The state that the main thread of a worker writes, and turns in other threads read."""
 
     waiting: bool = False
-    """People wait for turns of other runs."""
+    """People wait for turns of other runs, or did so just before."""
     runs: int = 1
     """Runs with a life in memory."""
+    _until: float = -math.inf
+
+    def press(self, people_wait: bool, runs: int) -> None:
+        """Take note of whether people wait for other runs, and of how many runs there are."""
+        now = time.monotonic()
+        if people_wait:
+            self._until = now + PRESSED_SECONDS
+        self.waiting, self.runs = now < self._until, runs
 
 
 ALONE = Pressure()

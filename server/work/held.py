@@ -64,7 +64,7 @@ class HeldRuns:
 
     def pressed(self, people_wait: bool) -> None:
         """Take note of what other runs ask of this worker, before a turn begins."""
-        self.pressure.waiting, self.pressure.runs = people_wait, len(self.sessions)
+        self.pressure.press(people_wait, len(self.sessions))
 
     def turn(self, run_id: int, seen: Watch) -> float:
         """Give one run its turn, and return when the next is due. A store error never fails a run."""

@@ -9,8 +9,10 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from parenting.server.queue.worker_side import Watch
 
 NOW, AT_NEWS, AT_LEISURE = 0.0, math.inf, -1.0
-"""When the next turn of a run is due: at once, when something is new for it, or at once if nobody waits for
-another one, as it only writes down what has happened."""
+"""When the next turn of a run is due: at once, when something is new for it, or in `WRITE_SECONDS` if nobody
+waits for another one, as it only writes down what has happened."""
+WRITE_SECONDS = 2.0
+"""Seconds until a turn at leisure: a person who answers before has one row for both answers."""
 OVERDUE_SECONDS = 1.0
 """A turn that is due for so long is overdue: not all others for which a person waits go before it."""
 LEISURE_SECONDS = 5.0
@@ -99,7 +101,7 @@ class Schedule:
                 due = due if seen is given or (due == AT_LEISURE and seen.at_leisure) else NOW
                 self._since.pop(run_id, None)  # it has not waited while its own turn went on
                 self._set(run_id, due)
-                at_once |= due in (NOW, AT_LEISURE)
+                at_once |= due == NOW
         return at_once
 
     def soonest(self, most: float) -> float:
@@ -142,4 +144,4 @@ class Schedule:
         self._at[run_id], self._since[run_id] = at, max(at, min(before, now))
         if at == AT_LEISURE:
             self._leisurely.add(run_id)
-            self._since[run_id] = now + LEISURE_SECONDS
+            self._at[run_id], self._since[run_id] = now + WRITE_SECONDS, now + LEISURE_SECONDS

@@ -34,8 +34,8 @@ QUEUE = [
     Mutant(
         "a person waits for rows of another run",
         "server/work/schedule.py",
-        "self._since[run_id] = now + LEISURE_SECONDS",
-        "self._since[run_id] = now",
+        "= now + WRITE_SECONDS, now + LEISURE_SECONDS",
+        "= now + WRITE_SECONDS, now",
         f"{SCHEDULE}::test_what_is_only_written_down_keeps_nobody_waiting_for_six_seconds",
     ),
     Mutant(

@@ -13,7 +13,7 @@ from parenting.server.board_tables import BoardSnapshot
 from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.operator_events import add_operator_event
-from parenting.server.pressure import PUT_OFF_SECONDS, Pressure, PutOff
+from parenting.server.pressure import PRESSED_SECONDS, PUT_OFF_SECONDS, Pressure, PutOff
 from parenting.server.queue import answers
 from parenting.server.queue.worker_side import watch
 from parenting.server.runs import claim, get_run, set_status
@@ -45,6 +45,19 @@ def test_it_is_put_off_for_a_bounded_time(now: list[float]) -> None:
     assert rest.may_wait(), "and has just been done"
     pressure.waiting = False
     assert not rest.may_wait()
+
+
+def test_pressure_lasts_for_a_second_after_people_waited(now: list[float]) -> None:
+    pressure = Pressure()
+    pressure.press(people_wait=False, runs=3)
+    assert (pressure.waiting, pressure.runs) == (False, 3)
+    pressure.press(people_wait=True, runs=3)
+    now[0] += PRESSED_SECONDS / 2
+    pressure.press(people_wait=False, runs=3)
+    assert pressure.waiting, "in a crowd the next one comes at once"
+    now[0] += PRESSED_SECONDS / 2
+    pressure.press(people_wait=False, runs=3)
+    assert not pressure.waiting
 
 
 def begin(db: Database, pressure: Pressure, finish: str | None = None) -> RunSession:

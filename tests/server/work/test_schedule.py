@@ -16,6 +16,7 @@ from parenting.server.work.schedule import (
     LEISURE_SECONDS,
     NOW,
     OVERDUE_SECONDS,
+    WRITE_SECONDS,
     Schedule,
 )
 from parenting.server.work.turns import LONG_AT_ONCE, QUICK_AT_ONCE, URGENT_AT_ONCE, Turns
@@ -118,9 +119,18 @@ def turns_until(schedule: Schedule, now: list[float], seconds: int) -> list[int]
 def test_what_is_only_written_down_keeps_nobody_waiting_for_six_seconds(now: list[float]) -> None:
     schedule = Schedule()
     at_leisure(schedule)
-    assert schedule.due() == [PERSON], "nobody waits for another one"
     assert schedule.waited() == 0.0
     assert min(turns_until(schedule, now, 9)) == LEISURE_SECONDS + OVERDUE_SECONDS + 1
+
+
+def test_what_is_only_written_down_waits_for_the_next_answer(now: list[float]) -> None:
+    """A person who answers within two seconds has one turn for both answers; else nobody need wait for it."""
+    schedule = Schedule()
+    at_leisure(schedule)
+    assert schedule.due() == []
+    assert schedule.soonest(9.0) == pytest.approx(WRITE_SECONDS)
+    now[0] += WRITE_SECONDS
+    assert schedule.due() == [PERSON]
 
 
 @pytest.mark.parametrize("end", ["news", "a turn that goes on", "somebody else", "no room"])
