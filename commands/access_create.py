@@ -15,6 +15,7 @@ from parenting.commands.printing import say
 from parenting.envs.people_text import read_name
 from parenting.server.access.roles import Role
 from parenting.server.access.tokens import DAYS, TokenKind, make
+from parenting.server.public import address_of
 
 
 class What(StrEnum):
@@ -50,7 +51,10 @@ def command(
     ] = None,
     url: Annotated[
         str | None,
-        typer.Option(help="The server's address.", show_default="http://localhost:PORT"),
+        typer.Option(
+            help="The server's address.",
+            show_default="http://localhost:PORT, or https://HOST of a public server",
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
@@ -66,7 +70,8 @@ def command(
     with friendly_errors():
         kind, chosen = KINDS[what], role or (Role.PARENT if what is What.LINK else Role.RESEARCHER)
         called = _read_name(name)
-        base = (url or f"http://localhost:{settings().port}").rstrip("/")
+        configured = settings()
+        base = (url or address_of(configured, configured.port)).rstrip("/")
         with database() as db:
             made = make(
                 db,

@@ -148,6 +148,12 @@ class NotReadyError(ServerError):
     status, code = 503, "not_ready"
 
 
+class StoppingError(ServerError):
+    """This server is stopping. Send the same again once it is back."""
+
+    status, code = 503, "stopping"
+
+
 class TooLargeError(ServerError):
     """The body of this request is too large: it may have {most} bytes. Send less, or in several requests."""
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 import time
 
 import structlog
 from starlette.datastructures import MutableHeaders
+from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from parenting.server.errors import StoppingError
 from parenting.server.log_lines import request
 from parenting.server.meters import Meters
 from parenting.server.route_names import route_of
@@ -29,17 +32,22 @@ class RequestMiddleware:
             return
         scope["request_id"] = secrets.token_hex(8)
         request.set(scope)
-        status, began = 500, time.perf_counter()
+        status, began, replied = 500, time.perf_counter(), False
 
         async def counted(message: Message) -> None:
-            nonlocal status
+            nonlocal status, replied
             if message["type"] == "http.response.start":
-                status = message["status"]
+                status, replied = message["status"], True
                 MutableHeaders(scope=message)["X-Request-Id"] = scope["request_id"]
             await send(message)
 
         try:
             await self.app(scope, receive, counted)
+        except asyncio.CancelledError:  # uvicorn cancels what goes on a second after the signal to stop
+            if replied:
+                raise
+            stopping = StoppingError()
+            await JSONResponse(stopping.body(), stopping.status)(scope, receive, counted)
         finally:
             seconds, route = time.perf_counter() - began, route_of(scope)
             self.meters.count(scope["method"], route, status, seconds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import logging
 import sys
 from types import FrameType
 
@@ -31,6 +32,13 @@ SWITCH_SECONDS = 0.001
 and with Python's 5 ms it would hold the store's lock for that long each time the event loop is busy."""
 
 
+def expected(record: logging.LogRecord) -> bool:
+    """Have the log take requests that the end of the process cuts off for what they are: no error."""
+    if str(record.msg).startswith("Cancel %s running task"):
+        record.levelno, record.levelname = logging.WARNING, "WARNING"
+    return True
+
+
 class Server(uvicorn.Server):
     """A uvicorn server that ends open streams first; uvicorn alone would wait for their browsers."""
 
@@ -51,6 +59,7 @@ def make_server(settings: Settings) -> Server:
     sys.setswitchinterval(SWITCH_SECONDS)
     share_heaps()
     set_up_log(settings, "web")
+    logging.getLogger("uvicorn.error").addFilter(expected)
     for broken in registry.INSTALLED.broken().values():
         log.warning(broken)
     app = create_app(settings)

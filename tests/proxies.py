@@ -48,6 +48,7 @@ def nginx(folder: Path, port: int, upstream: int) -> list[str]:
         "127.0.0.1:8765": f"127.0.0.1:{upstream}",
         "/etc/ssl/parenting.pem": f"{folder}/certificate.pem",
         "/etc/ssl/private/parenting.key": f"{folder}/key.pem",
+        "/var/log/nginx/parenting.log": f"{folder}/log",
     }
     (folder / "site.conf").write_text(configuration("nginx", changes))
     (folder / "nginx.conf").write_text(NGINX.replace("FOLDER", str(folder)))

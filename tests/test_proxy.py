@@ -121,6 +121,19 @@ def test_forms_of_other_sites_are_refused_whatever_the_browser_names(client: htt
     assert client.post("/runs", data={"world": "unsafe-exploration"}, headers=older).status_code == 303
 
 
+def test_the_secret_of_a_link_is_in_no_log(
+    client: httpx2.Client, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    assert client.get("/open", params={"token": "pl_a-secret"}).status_code == 410
+    folder = f"{request.node.callspec.params['client']}0"
+    files = [tmp_path_factory.getbasetemp() / folder / name for name in ("log", "said")]
+    end = time.monotonic() + 10
+    while "/open" not in (told := "".join(one.read_text() for one in files if one.exists())):
+        assert time.monotonic() < end, told
+        time.sleep(0.02)
+    assert "pl_a-secret" not in told
+
+
 def test_requests_under_another_name_are_refused(client: httpx2.Client) -> None:
     for name in ("evil.example", "localhost", "127.0.0.1"):
         assert client.get("/", headers={"Host": name}).status_code == 421

@@ -33,7 +33,8 @@ def test_the_address_of_a_public_server_is_that_of_its_proxy(
     monkeypatch.setenv("PARENTING_HOSTS", "lab.example")
     assert access("open").stdout.startswith("http://localhost:8765/open?token=")
     monkeypatch.setenv("PARENTING_PUBLIC", "true")
-    assert access("open").stdout.startswith("https://lab.example/open?token=")
+    for made in (("open",), ("create", "link", "--role", "viewer")):
+        assert access(*made).stdout.startswith("https://lab.example/open?token="), made
 
 
 def test_links_and_tokens_are_made_listed_and_ended(db: Database) -> None:

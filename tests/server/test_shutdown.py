@@ -57,6 +57,24 @@ def test_web_stops_with_a_tab_open(data: Path, number: signal.Signals) -> None:
         assert "parenting access open" in said[0]
 
 
+def test_a_request_that_is_still_sent_at_the_end_is_told_to_come_again(data: Path) -> None:
+    """The second that it takes is the one that open requests have after the signal."""
+    port = free_port()
+    with parenting("web", "--port", str(port), data=data) as web:
+        until_up(f"http://127.0.0.1:{port}")
+        with socket.create_connection(("127.0.0.1", port)) as slow:
+            head = "POST /open HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n"
+            slow.sendall(f"{head}Content-Type: application/x-www-form-urlencoded\r\n\r\nabc".encode())
+            time.sleep(0.2)  # the head is read
+            stop(web, signal.SIGTERM)
+            reply = slow.recv(4096).decode()
+        said = web.communicate()[1]
+    assert reply.startswith("HTTP/1.1 503")
+    assert '"stopping"' in reply
+    assert "Traceback" not in said
+    assert "[error" not in said
+
+
 @pytest.mark.parametrize("number", SIGNALS)
 def test_up_stops_both_with_a_tab_open(tmp_path: Path, number: signal.Signals) -> None:
     with parenting("up", "--port", "0", "--no-browser", data=tmp_path) as up:
