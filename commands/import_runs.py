@@ -74,7 +74,7 @@ def import_runs(
             else:
                 given.refuse(path)
                 with bar("bytes") as checked, bar("rows") as show:
-                    runs = import_export(db, path, checked, show)
+                    runs = import_export(db, path, checked, show, settings().runs)
         Notifier(settings().data, "worker").notify()
     for run in runs:
         other = "" if run.public_id == run.was else f" It was {run.was}, which this database has or had."

@@ -64,7 +64,8 @@ def import_one(db: Database, path: Path, given: OfTable) -> Imported:
     try:
         fields |= weights_of(db, fields, chosen.weights, given.pretrain, NO_ORIGIN, quiet=False)
         with bar("ticks") as show:
-            return import_table(db, table, read_form(fields), chosen.weights, chosen.bound, show)
+            form, own = read_form(fields), (chosen.weights, chosen.bound)
+            return import_table(db, table, form, *own, progress=show, most=chosen.runs)
     except InvalidFieldsError as error:
         raise UsageError("\n".join(said(field, fields, rule) for field, rule in error.fields)) from None
 

@@ -136,20 +136,22 @@ def _of(format: str, lines: Sequence[Line], seen: Sequence[str]) -> list[Foreign
     if any(whole):
         _check(format, runs, whole)
     found: list[ForeignMap] = []
-    above = ""
+    above, titles_above = "", _titles_stand_above(runs, whole)
     for run, is_map in zip(runs, whole, strict=True):
         if is_map:
             found.append(replace(_map(format, run), name=above))
             above = ""
         elif not run.is_rows:
-            title = next((text for text in run.seen if _is_title(text)), None)
-            if title and found and not found[-1].name:
-                found[-1] = replace(found[-1], name=title.partition(":")[2].strip())
-            above = _name_above(run.seen)
+            titles = [text.partition(":")[2].strip() for text in run.seen if _is_title(text)]
+            if titles and found and not found[-1].name and not titles_above:
+                found[-1] = replace(found[-1], name=titles[0])
+            above = titles[-1] if titles and titles_above else _name_above(run.seen)
     return found
 
 
-ABOUT = re.compile(r"(title|author|comment|collection|copyright|date|email|homepage|url|website):", re.I)
+ABOUT = re.compile(
+    r"(title|author|comment(-end)?|collection|copyright|date[^:]*|email|homepage|set|url|website):", re.I
+)
 """The beginning of a line that tells of a map, or of the collection that it is from."""
 
 
@@ -157,8 +159,27 @@ def _is_title(text: str) -> bool:
     return text.lower().startswith("title:")
 
 
+def _titles_stand_above(runs: Sequence[_Run], whole: Sequence[bool]) -> bool:
+    """Return whether titles stand above their maps: one before the first map, and none behind the last.
+
+    A collection whose titles stand below may have one of its own at the top.
+    """
+    at = [place for place, is_map in enumerate(whole) if is_map]
+    titled = [any(map(_is_title, one.seen)) for one in runs]
+    return bool(at) and any(titled[: at[0]]) and not any(titled[at[-1] :])
+
+
+def _without_comments(seen: Sequence[str]) -> list[str]:
+    """Return lines without those between `Comment:` and `Comment-End:`."""
+    starts = [place for place, text in enumerate(seen) if text.lower().startswith("comment:")]
+    ends = [place for place, text in enumerate(seen) if text.lower().startswith("comment-end:")]
+    whole = starts and ends and starts[0] < ends[-1]
+    return [*seen[: starts[0]], *seen[ends[-1] + 1 :]] if whole else list(seen)
+
+
 def _name_above(seen: Sequence[str]) -> str:
     """Return the name that the lines above a map give it; above a code fence only a comment does."""
+    seen = _without_comments(seen)
     fences = [place for place, text in enumerate(seen) if FENCE.fullmatch(text)]
     named = [
         text
@@ -199,7 +220,8 @@ def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:
     for place, run in enumerate(runs):
         before, after = place > 0 and whole[place - 1], place + 1 < len(runs) and whole[place + 1]
         if run.is_rows:
-            if not whole[place] and len(run.lines) > 1:
+            lone = len(run.lines) == 1 and not _fits(format, run, runs, whole)
+            if not whole[place] and not lone:
                 signs = " or ".join(f"'{one}'" for one in MARKS[format])
                 said = f"these rows of {FORMATS[format]} do not make a map by themselves: none has {signs}"
                 raise MapRowError(run.lines[0].number, f"{said}. Join them to their map, or leave them out.")
@@ -213,6 +235,12 @@ def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:
             alike = _is_nearly_a_row(format, text) or (at == 0 and width == len(text) and not after)
             if parts or (alike and ABOUT.match(text) is None):
                 raise _strange(format, run.lines[at], text)
+
+
+def _fits(format: str, row: _Run, runs: Sequence[_Run], whole: Sequence[bool]) -> bool:
+    """Return whether a lone row is as long as the rows of a map, in a format whose rows are of one length."""
+    others = (one.seen[0] for one, is_map in zip(runs, whole, strict=True) if is_map)
+    return format in OF_ONE_LENGTH and any(len(other) == len(row.seen[0]) for other in others)
 
 
 def _check_all(format: str, lines: Sequence[Line]) -> None:

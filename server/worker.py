@@ -168,7 +168,9 @@ class Worker:
         self.held.surplus = set(surplus(self.schedule.busy_first(self.claims), most))
         working = self.turns.working()
         if idle := self.held.surplus - self.sessions.keys() - working:
-            runs.let_go(self.db, [self.claims[run_id] for run_id in idle])
+            # Other threads drop claims meanwhile, so each is asked for once.
+            mine = [claim for run_id in idle if (claim := self.claims.get(run_id))]
+            runs.let_go(self.db, mine)
             for run_id in idle:
                 self.held.drop(run_id)
         self.schedule.hurry(self.held.surplus - idle)

@@ -43,6 +43,7 @@ def import_table(
     folder: Path | None = None,
     bound: Bound = BOUND,
     progress: Progress = lambda done, total: None,
+    most: int | None = None,
 ) -> Imported:
     """Add the run of a table.
 
@@ -53,9 +54,11 @@ def import_table(
         folder: The folder of weights of one's own.
         bound: The most that a run may cost.
         progress: Told of ticks.
+        most: The number of runs that may live; None is any.
 
     Raises:
         InvalidFieldsError: a setting is wrong.
+        TooManyRunsError: as many live as may.
         SetupError: with these settings the agent asks something else than the table has. Nothing was stored.
     """
     columns = plan(new, folder, db=db, bound=bound)
@@ -63,7 +66,7 @@ def import_table(
     world = world_of(new.world, columns["level_text"], config)
     began_with = _weights(db, columns["weights"], world)
     relived = relive_table(table, world, config, new.seed, began_with, progress)
-    run = start(db, new, folder, bound=bound, fill=partial(_fill, db, table, relived))
+    run = start(db, new, folder, bound=bound, most=most, fill=partial(_fill, db, table, relived))
     was = table.lines[0].run_public_id or run.public_id
     return Imported(run.id, run.public_id, was, len(table.lines))
 

@@ -35,6 +35,8 @@ from parenting.server.identity import unused_number
 from parenting.server.origins import IMPORTED
 from parenting.server.public_ids import is_public_id, public_id
 from parenting.server.rollback import SETTINGS
+from parenting.server.run_limits import require_room
+from parenting.server.statuses import LIVING
 from parenting.server.store.relay import announce
 from parenting.server.tables import Run, Tombstone
 
@@ -57,6 +59,7 @@ def import_export(
     path: Path,
     checked: Progress = lambda done, total: None,
     progress: Progress = lambda d, t: None,
+    most: int | None = None,
 ) -> list[Imported]:
     """Add the runs of an export.
 
@@ -65,8 +68,10 @@ def import_export(
         path: The folder or the zip.
         checked: Told of bytes that were held against their hashes.
         progress: Told of rows.
+        most: The number of runs that may live; None is any.
 
     Raises:
+        TooManyRunsError: more would live than may. Nothing was stored.
         SetupError: it is not an export, is damaged, or holds what cannot be used here. Nothing was stored.
     """
     with source(path) as found:
@@ -75,7 +80,7 @@ def import_export(
             _require_world(path, entry)
         try:
             with db.write() as session:
-                return _put(session, db, found, progress)
+                return _put(session, db, found, progress, most)
         except (SQLAlchemyError, ValidationError, *UNREADABLE) as error:
             raise SetupError(
                 f"{path} cannot be imported: {type(error).__name__}: {str(error).splitlines()[0][:200]}. "
@@ -83,10 +88,14 @@ def import_export(
             ) from None
 
 
-def _put(session: Session, db: Database, found: Source, progress: Progress) -> list[Imported]:
+def _put(
+    session: Session, db: Database, found: Source, progress: Progress, most: int | None
+) -> list[Imported]:
     naming = {}
     runs = []
     for entry in found.manifest.runs:
+        if most is not None and entry.settings["status"] in LIVING:
+            require_room(session, most)
         run = _run(session, db.clock(), found, entry)
         naming[entry.run] = Naming(run.id, run.public_id, entry.run)
         put_blobs(session, db.clock(), found, entry, run)

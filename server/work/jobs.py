@@ -65,13 +65,13 @@ class Jobs:
         late = time.monotonic() - self._looked_at
         if not free or late < (LOOK_SECONDS if self._news else self.seconds / 2):
             return
-        self._looked_at, self._news = time.monotonic(), False
+        self._looked_at, self._news = time.monotonic(), True  # should the store refuse to tell
         long = not any(mine.run_id == jobs.NO_RUN for mine in self._working)
         if not jobs.waits(self.db, self.seconds, long):
+            self._news = False
             return
         for mine in jobs.claim(self.db, worker, free, self.seconds, long):
-            self._working[mine] = self._pool.submit(self._do, mine)
-        self._news = True  # there may be more of them
+            self._working[mine] = self._pool.submit(self._do, mine)  # there may be more: it stays news
 
     def renew(self) -> None:
         """Give a sign of life of every job that goes on."""

@@ -17,8 +17,9 @@ from parenting.server.db import Database
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import watch
-from parenting.server.runs import claim, get_run, list_runs
+from parenting.server.runs import claim, get_run, list_runs, set_status
 from parenting.server.session import RunSession
+from parenting.server.statuses import RunStatus
 from tests.tree import ROOT
 
 
@@ -56,7 +57,24 @@ def test_what_is_refused(db: Database, tmp_path: Path, name: str, told: str) -> 
     assert told in said.stderr
 
 
-def test_one_table_is_a_run_again_with_its_settings(db: Database, tmp_path: Path) -> None:
+def test_an_imported_run_that_lives_has_to_find_room(
+    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start(db, NewRun(world="unsafe-exploration"))
+    with target(tmp_path / "out.zip") as files:
+        write_export(db, [1], files)
+    monkeypatch.setenv("PARENTING_RUNS", "1")
+    refused = imported(tmp_path / "out.zip")
+    assert (refused.exit_code, refused.stdout) == (2, "")
+    assert refused.stderr.startswith("1 runs live, and no more may: nothing was started.")
+    set_status(db, 1, RunStatus.STOPPED)
+    assert imported(tmp_path / "out.zip").exit_code == 0
+    assert len(list_runs(db)) == 2
+
+
+def test_one_table_is_a_run_again_with_its_settings(
+    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     start(db, NewRun(world="unsafe-exploration", seed=7, config={"pretrain": False, "stages": 2}))
     (mine,) = claim(db, "worker", -1)
     session = RunSession(db, mine, get_run(db, 1), lambda: None)
@@ -81,6 +99,8 @@ def test_one_table_is_a_run_again_with_its_settings(db: Database, tmp_path: Path
         refused = imported(file, *wrong)
         assert (refused.exit_code, refused.stdout) == (2, "")
         assert told in refused.stderr
+    monkeypatch.setenv("PARENTING_RUNS", "2")
+    assert imported(file, *given).stderr.startswith("2 runs live, and no more may")
     assert len(list_runs(db)) == 2
 
 

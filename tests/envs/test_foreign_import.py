@@ -58,6 +58,8 @@ LOST = {
     "alone": ("SFFF\nFFxF\nFFFG\n", 2, "'x' makes"),
     "in the last row": ("SFFF\nFFFG\nxxxx\n", 3, "'x' makes"),
     "a row apart": ("SFFF\nFFFG\n\nFFFF\nFFFF\n", 4, "none has 'S'"),
+    "one row apart": ("SFFF\nFHFF\nFFFG\n\nHFFG\n", 5, "none has 'S'"),
+    "one row behind a title": ("SFFF\nFHFF\nTitle: x\nHHHG\n", 4, "none has 'S'"),
     "like another letter": ("SFFF\nFF\u0421F\nFFFG\n", 2, "'\u0421' (cyrillic capital letter es) makes"),
     "behind words": ("SFFF\nFHFF\nFFFG\nAuthor: x\nHFFG\n", 4, "makes"),
     "in XSB": (CRATE.replace("#  .", "# x ."), 4, "'x' makes this line no row of Sokoban's XSB"),
@@ -103,3 +105,16 @@ def test_lines_about_a_map_below_it_are_no_rows_of_it() -> None:
     assert len(imported(text)) == 1
     two = imported(f"{CRATE}Title: one\nAuthor: bar\n\n{CRATE}Title: two\nAuthor: bar\n")
     assert [one.level.name for one in two] == ["one", "two"]
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        (f"Title: one\n{CRATE}\nTitle: two\n{CRATE}", ["one", "two"]),
+        (f"Title: all\n\n{CRATE}Title: one\n\n{CRATE}Title: two\n", ["one", "two"]),
+        (f"{CRATE}Title: one\nComment: a\nb\nComment-End:\n\n{CRATE}Title: two\n", ["one", "two"]),
+        (f"Set: mine\nDate of Last Change: today\n\n{CRATE}", ["map"]),
+    ],
+)
+def test_titles_stand_above_their_maps_or_below(text: str, names: list[str]) -> None:
+    assert [one.level.name for one in imported(text)] == names

@@ -10,11 +10,13 @@ import pytest
 
 from parenting.server import jobs
 from parenting.server.db import Database
+from parenting.server.errors import BusyError
 from parenting.server.new_run import NewRun, start
 from parenting.server.runs import get_run
 from parenting.server.settings import Settings
 from parenting.server.statuses import JobState
 from parenting.server.tables import Job
+from parenting.server.work.jobs import LOOK_SECONDS
 from parenting.server.worker import Worker
 from tests.server.conftest import Clock
 from tests.server.raising import same_bits
@@ -139,3 +141,21 @@ def test_a_worker_that_ends_gives_its_jobs_back(
     gate.set()
     wait(ending.jobs._working.values(), 60)
     assert jobs.get(db, asked.public_id).result is None  # its claim holds no more
+
+
+@ONE_STORE
+def test_a_job_is_looked_for_soon_after_the_store_refused(
+    db: Database, worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> bool:
+        raise BusyError
+
+    monkeypatch.setattr(jobs, "waits", refuse)
+    worker.jobs._looked_at = -1e9
+    with pytest.raises(BusyError):
+        worker.jobs.begin(worker.name)
+    looks = list[object]()
+    monkeypatch.setattr(jobs, "waits", lambda *_: looks.append(True))
+    worker.jobs._looked_at -= LOOK_SECONDS
+    worker.jobs.begin(worker.name)
+    assert looks == [True], "what it was told before is not forgotten"

@@ -101,3 +101,24 @@ def test_a_paused_run_is_given_up_too(db: Database, pair: tuple[Worker, Worker])
         set_status(db, run_id, RunStatus.PAUSED)
     together(one, other)
     assert (len(one.claims), len(other.claims)) == (1, 1)
+
+
+def test_a_run_that_is_lost_just_then_is_not_given_up(
+    db: Database, pair: tuple[Worker, Worker], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Turns drop claims in threads of their own."""
+    one, _ = pair
+    ids = begin(db, 2)
+    together(one)
+    for run_id in ids:
+        one.sessions.pop(run_id, None)
+    working = one.turns.working
+
+    def lost(*seconds: float) -> set[int]:
+        for run_id in list(one.held.surplus):
+            one.held.drop(run_id)
+        return working(*seconds)
+
+    monkeypatch.setattr(one.turns, "working", lost)
+    one._give_up(1)
+    assert len(one.claims) == 1
