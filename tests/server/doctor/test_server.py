@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
+from sqlalchemy import text
 
+from parenting.commands import up
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
 from parenting.server.doctor.examination import examine
 from parenting.server.doctor.findings import State
 from parenting.server.doctor.server import OLDEST
-from parenting.server.errors import SetupError
+from parenting.server.errors import RefusedError, SetupError
 from parenting.server.settings import Settings
 from parenting.server.worker_process import main
 from tests.postgres import Cluster, programs
@@ -81,6 +84,15 @@ def test_a_standby_is_an_error_and_nothing_starts_on_it(server: Cluster, setting
             create_app(settings)
         with pytest.raises(SetupError, match="is a standby"):
             main(settings)
+        with pytest.raises(SetupError, match="is a standby"):
+            up._migrate(settings)
+        with (
+            closing(connect(settings)) as db,
+            pytest.raises(RefusedError) as refused,
+            db.write() as session,
+        ):
+            session.execute(text("CREATE TABLE more (x integer)"))
+        assert "Name the primary server in PARENTING_DATABASE_URL" in refused.value.message
     finally:
         server._run("pg_ctl", "stop", "-m", "immediate")
 
