@@ -77,7 +77,7 @@ STATES = {
     "25006": "The database takes no writes, as a standby or by a setting: {cause}. Nothing was stored. "
     f"{PRIMARY}",
 }
-"""What commands and logs say of a refusal by PostgreSQL, with its own reason; pages keep to the class's."""
+"""The words of commands and logs for a refusal by PostgreSQL, with its reason; pages keep to the class's."""
 
 
 @contextmanager
