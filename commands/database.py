@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sqlalchemy import make_url
-
 from parenting.commands.errors import settings
 from parenting.server.db import Database, connect
 from parenting.server.errors import SetupError
 from parenting.server.migrate import require_current
 from parenting.server.settings import Settings
 from parenting.server.store import high_water
+from parenting.server.store.url import database_url
 
 
 @contextmanager
@@ -41,7 +40,7 @@ def require_file(chosen: Settings) -> None:
     """
     if not chosen.url.startswith("sqlite"):
         return
-    database = Path(make_url(chosen.url).database or "")
+    database = Path(database_url(chosen.url).database or "")
     if not database.exists() and high_water.read(database) is None:
         raise SetupError(
             f"There is no database at {database}. Set PARENTING_DATA to its folder, "

@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.text import Text
-from sqlalchemy import make_url
 
 from parenting.commands.errors import exit_on_interrupt, friendly_errors, settings
 from parenting.commands.printing import say
@@ -19,6 +18,7 @@ from parenting.server.doctor.findings import Finding, State, worst
 from parenting.server.errors import SetupError
 from parenting.server.settings import Settings
 from parenting.server.store import high_water
+from parenting.server.store.url import database_url
 
 EXIT_CODES = {State.OK: 0, State.WARNING: 1, State.ERROR: 2}
 STYLES = {State.OK: "green", State.WARNING: "yellow", State.ERROR: "red"}
@@ -63,7 +63,7 @@ def _accept(chosen: Settings) -> None:
     Raises:
         SetupError: the database is damaged, or is not a file.
     """
-    url = make_url(chosen.url)
+    url = database_url(chosen.url)
     if url.get_backend_name() != "sqlite":
         raise SetupError("--accept is for SQLite: a PostgreSQL database has no mark beside it.")
     high_water.accept(Path(str(url.database)))

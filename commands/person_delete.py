@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from sqlalchemy import make_url
 
 from parenting._plural import counted
 from parenting.commands.database import database
@@ -19,6 +18,7 @@ from parenting.server.db import Database
 from parenting.server.erasure import Plan, finish, nameless, plan, under_way
 from parenting.server.errors import NotFound
 from parenting.server.settings import Settings
+from parenting.server.store.url import database_url
 
 
 def command(
@@ -129,7 +129,7 @@ def _list(runs: object) -> str:
 
 def _copies(chosen: Settings) -> list[Path]:
     """Return the files in the folder of backups, each of which may hold the same data."""
-    url = make_url(chosen.url)
+    url = database_url(chosen.url)
     beside = Path(url.database or "").parent if url.get_backend_name() == "sqlite" else chosen.data
     return sorted(file for file in (beside / FOLDER).glob("*") if file.is_file())
 

@@ -122,9 +122,11 @@ def _migrate(chosen: Settings) -> str:
     from parenting.server.access.tokens import make
     from parenting.server.backups.before_migrating import migrate  # loads SQLAlchemy while the others start
     from parenting.server.db import connect
+    from parenting.server.migrate import require_primary
 
     db = connect(chosen)
     try:
+        require_primary(db)
         migrate(db, chosen.data)
         return make(db, "opening", Role.RESEARCHER, made_by="parenting up").secret
     finally:

@@ -206,7 +206,8 @@ def _add_errors(app: FastAPI) -> None:
     @app.exception_handler(ServerError)
     async def refused(request: Request, error: ServerError) -> Response:
         if error.status >= 500:
-            limit.say(error.code, log.warning, "refused", path=request.url.path, code=error.code)
+            why = {"why": error.message} if isinstance(error, StoreError) else {}
+            limit.say(error.code, log.warning, "refused", path=request.url.path, code=error.code, **why)
             request.app.state.meters.refuse(error.code)
         headers = {"Retry-After": "1"} if isinstance(error, StoreError) else None
         if isinstance(error, TooManyGuessesError):

@@ -17,12 +17,11 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from sqlalchemy import Engine, make_url
-from sqlalchemy.exc import ArgumentError
+from sqlalchemy import Engine
 from sqlalchemy.orm import Session
 
 from parenting.server.columns import loads
-from parenting.server.errors import BusyError, GoneError, SetupError, StoreError
+from parenting.server.errors import BusyError, GoneError, StoreError
 from parenting.server.settings import Settings
 from parenting.server.store import postgresql, sqlite
 from parenting.server.store.ballast import Ballast
@@ -32,13 +31,14 @@ from parenting.server.store.patience import remaining
 from parenting.server.store.refusals import translated
 from parenting.server.store.sqlite import BUSY_SECONDS
 from parenting.server.store.turn import Turn
+from parenting.server.store.url import database_url
 
 REFUSED_SECONDS = 10.0
 """A refused write counts for this long, unless another one succeeds: a full disk lets a transaction begin."""
 SEEN_AT_ONCE = (BusyError, GoneError)
 """Refusals that the beginning of a transaction meets as well, so that they need not be remembered."""
 Seen = TypeVar("Seen")
-STORES = {"sqlite": sqlite, "postgresql": postgresql, "postgres": postgresql}
+STORES = {"sqlite": sqlite, "postgresql": postgresql}
 
 
 def utc_now() -> datetime:
@@ -215,23 +215,11 @@ def connect(
         SetupError: the URL cannot be read, a driver is missing, SQLite is too old to be safe, or the file is
             damaged or lacks what it held (`server.store.check`).
     """
-    try:
-        url = make_url(settings.url)
-    except (ArgumentError, ValueError):  # its text would repeat the URL, and so its password
-        raise _unreadable("this is not a URL") from None
+    url = database_url(settings.url)
     name = url.get_backend_name()
-    if name not in STORES:
-        raise _unreadable(f"{name} is neither sqlite nor postgresql")
     options = {"reading": reading} if name == "sqlite" else {}
     engine = STORES[name].open_engine(url, json_serializer=_dumps, json_deserializer=loads, **options)
     return Database(engine, clock, mark)
-
-
-def _unreadable(why: object) -> SetupError:
-    return SetupError(
-        f"PARENTING_DATABASE_URL: {why}. Write it as sqlite:////folder/parenting.db "
-        "or postgresql://user@host/database."
-    )
 
 
 _dumps = partial(json.dumps, allow_nan=False, separators=(",", ":"))

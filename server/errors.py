@@ -165,6 +165,12 @@ class StoreError(ServerError):
 
     status, code = 503, "store"
 
+    def __init__(self, message: str | None = None, *, why: str | None = None) -> None:
+        """`why`: what commands and logs say in its place, with names that are not for everybody's eyes."""
+        super().__init__(message)
+        self.message = why or self.message
+        self.args = (self.message,)
+
 
 class BusyError(StoreError):
     """The database was busy for five seconds; nothing was stored. Send the same again."""

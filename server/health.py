@@ -78,4 +78,4 @@ def _look(db: Database) -> dict[str, str]:
 
 
 def _refused(error: StoreError) -> NotReadyError:
-    return NotReadyError(f"store: {error.code}. {error.message}")
+    return NotReadyError(f"store: {error.code}. {error.sentence}")  # `message` may name what is not for all

@@ -100,12 +100,22 @@ def require_ready(db: Database) -> None:
     Raises:
         SetupError: the database is a standby of PostgreSQL, or `require_current` refuses it.
     """
+    require_primary(db)
+    require_current(db)
+
+
+def require_primary(db: Database) -> None:
+    """Refuse a server of PostgreSQL that follows another one, and so takes no writes.
+
+    Raises:
+        SetupError: it does; the sentence names the remedy.
+    """
+    if db.engine.dialect.name != "postgresql":
+        return
     with db.read() as session:
-        connection = session.connection()
-        standby = connection.dialect.name == "postgresql" and is_standby(connection)
+        standby = is_standby(session.connection())
     if standby:
         raise SetupError(f"{_place(db)} is a standby, which takes no answers. {PRIMARY}")
-    require_current(db)
 
 
 def revision(db: Database) -> str | None:

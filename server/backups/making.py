@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from sqlalchemy import URL, make_url
+from sqlalchemy import URL
 
 from parenting.server.backups import copies, dumps
 from parenting.server.backups.whole import require_room, size, whole
 from parenting.server.db import utc_now
 from parenting.server.errors import SetupError
 from parenting.server.settings import Settings
+from parenting.server.store.url import database_url
 
 FOLDER = "backups"
 
@@ -36,7 +37,7 @@ def back_up(settings: Settings, to: Path | None = None, force: bool = False) -> 
     Raises:
         SetupError: the database cannot be used, or the file exists or cannot be written.
     """
-    url = make_url(settings.url)
+    url = database_url(settings.url)
     if url.get_backend_name() == "postgresql":
         target = settings.data / FOLDER / f"{stamp(utc_now())}.dump" if to is None else to
         with whole(target, force) as part:

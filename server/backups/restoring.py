@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
 
-from sqlalchemy import URL, inspect, make_url, text
+from sqlalchemy import URL, inspect, text
 
 from parenting.server import identity
 from parenting.server.backups import copies, dumps
@@ -22,6 +22,7 @@ from parenting.server.migrate import known_revisions, newest, revision, upgrade
 from parenting.server.settings import Settings
 from parenting.server.store import high_water
 from parenting.server.store.sqlite import make_folder
+from parenting.server.store.url import database_url
 
 BESIDE = ("-wal", "-shm", "-journal")
 
@@ -49,7 +50,7 @@ def restore(settings: Settings, file: Path, replace: bool = False, new_identity:
     Raises:
         SetupError: the database is in use or exists, or the file is damaged, of a newer version or no backup.
     """
-    url = make_url(settings.url)
+    url = database_url(settings.url)
     require_stopped(settings.data)
     if url.get_backend_name() == "postgresql":
         done = _restore_dump(settings, url, file, replace)

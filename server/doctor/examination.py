@@ -6,13 +6,15 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from sqlalchemy import URL, NullPool, create_engine, make_url
+from sqlalchemy import URL, NullPool, create_engine
 
 from parenting.server.columns import loads
 from parenting.server.db import Database, connect
 from parenting.server.doctor import files, machine, rows, server, store
 from parenting.server.doctor.findings import Finding, error, guarded, ok
+from parenting.server.errors import SetupError
 from parenting.server.settings import Settings
+from parenting.server.store.url import database_url
 
 
 def examine(settings: Settings) -> Iterator[Finding]:
@@ -22,7 +24,11 @@ def examine(settings: Settings) -> Iterator[Finding]:
     yield from guarded("limits", partial(machine.limits, settings))
     yield from guarded("weights", machine.shipped_weights)
     yield from guarded("packages", machine.packages)
-    url = make_url(settings.url)
+    try:
+        url = database_url(settings.url)
+    except SetupError as refused:
+        yield error("database", refused.message, "Correct it in the environment or in .env.")
+        return
     if url.get_backend_name() == "sqlite":
         yield from _sqlite(settings, url)
     else:

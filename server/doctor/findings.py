@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 
 from parenting.server.errors import BusyError, DamagedError, GoneError, ServerError
+from parenting.server.store.refusals import refusal
 
 
 class State(StrEnum):
@@ -48,8 +49,8 @@ def error(name: str, said: str, remedy: str) -> Finding:
 
 PAGE = "docs/operations.md explains this message."
 REMEDIES: dict[type[ServerError], str] = {
-    BusyError: "End the program that holds the database, or try again.",
-    GoneError: "Check that the database runs and that PARENTING_DATABASE_URL names it.",
+    BusyError: "End the program that holds the database or its connections, or try again.",
+    GoneError: "Check that the database is there and runs, and the names in PARENTING_DATABASE_URL.",
     DamagedError: "Put a backup in its place: parenting restore FILE --replace",
 }
 
@@ -61,14 +62,15 @@ def guarded(name: str, look: Look) -> Iterator[Finding]:
     try:
         yield from look()
     except ServerError as refused:
-        yield error(name, refused.message, _remedy(refused))
+        yield error(name, refused.message, _remedy(type(refused)))
     except Exception as failed:
         reason = " ".join(str(failed).split())[:300]
-        yield error(name, f"It cannot be examined: {type(failed).__name__}: {reason}", PAGE)
+        said = f"It cannot be examined: {type(failed).__name__}: {reason}"
+        yield error(name, said, _remedy(refusal(failed) or ServerError))
 
 
-def _remedy(refused: ServerError) -> str:
-    return next((said for kind, said in REMEDIES.items() if isinstance(refused, kind)), PAGE)
+def _remedy(refused: type[ServerError]) -> str:
+    return next((said for kind, said in REMEDIES.items() if issubclass(refused, kind)), PAGE)
 
 
 def worst(findings: Iterable[Finding]) -> State:

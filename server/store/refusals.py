@@ -7,6 +7,7 @@ does not hold or a mistake in our SQL, is not the store's refusal and passes thr
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -21,6 +22,7 @@ from parenting.server.errors import (
     RefusedError,
     StoreError,
 )
+from parenting.server.store.postgresql import PRIMARY
 
 # The longest beginning of a name that fits decides.
 SQLITE: dict[str, type[StoreError]] = {
@@ -63,6 +65,19 @@ POSTGRESQL: dict[str, type[StoreError]] = {
     "XX001": DamagedError,
     "XX002": DamagedError,
 }
+CROWDED = re.compile("too many (clients|connections)|remaining connection slots")
+"""Words of a server that lets nobody more in: libpq has no SQLSTATE before there is a connection."""
+UNCONNECTED: dict[type[StoreError], str] = {
+    GoneError: "The database cannot be reached: {cause}. Nothing was stored.",
+    BusyError: "The database takes no more connections: {cause}. Nothing was stored.",
+}
+STATES = {
+    "42501": "The database does not let its role do this: {cause}. Nothing was stored. Grant the role this "
+    "right, or name another role in PARENTING_DATABASE_URL.",
+    "25006": "The database takes no writes, as a standby or by a setting: {cause}. Nothing was stored. "
+    f"{PRIMARY}",
+}
+"""The words of commands and logs for a refusal by PostgreSQL, with its reason; pages keep to the class's."""
 
 
 @contextmanager
@@ -80,23 +95,54 @@ def translated() -> Iterator[None]:
         kind = refusal(error)
         if kind is None:
             raise
-        raise kind() from error
+        raise kind(why=_why(error, kind)) from error
 
 
 def refusal(error: BaseException) -> type[StoreError] | None:
     """Return the kind of refusal that an error is, or None if it is not the store's."""
     if isinstance(error, NoConnectionError):  # every connection of the pool was in use for five seconds
         return BusyError
-    said = error.orig if isinstance(error, DBAPIError) else error
+    said = _said(error)
     name = getattr(said, "sqlite_errorname", None)
     if name is not None:
         return _longest(SQLITE, str(name))
-    if type(said).__module__.partition(".")[0] != "psycopg":
+    if not _is_psycopgs(said):
         return None
     state = getattr(said, "sqlstate", None)
-    if state is None:  # no word from the server: the connection could not be made, or broke
-        return GoneError if type(said).__name__ in ("OperationalError", "ConnectionTimeout") else None
+    if state is None:  # the connection could not be made, or broke
+        lost = type(said).__name__ in ("OperationalError", "ConnectionTimeout")
+        return (BusyError if CROWDED.search(str(said)) else GoneError) if lost else None
     return _longest(POSTGRESQL, str(state))
+
+
+def _said(error: BaseException) -> BaseException | None:
+    return error.orig if isinstance(error, DBAPIError) else error
+
+
+def _is_psycopgs(said: BaseException | None) -> bool:
+    return type(said).__module__.partition(".")[0] == "psycopg"
+
+
+def _why(error: BaseException, kind: type[StoreError]) -> str | None:
+    """Return what commands and logs say of a refusal by PostgreSQL, where its own reason helps."""
+    said = _said(error)
+    if not _is_psycopgs(said) or not (cause := _cause(str(said))):
+        return None
+    state = getattr(said, "sqlstate", None)
+    sentence = STATES.get(str(state))
+    if sentence is None and (state is None or kind is GoneError):
+        sentence = UNCONNECTED.get(kind)
+    return sentence and sentence.format(cause=cause)
+
+
+def _cause(said: str) -> str:
+    """Return the last line that libpq says of a failure, without what leads to it and without its hints.
+
+    It names hosts, roles and databases, and never a password.
+    """
+    lines = re.split(r"\n(?=DETAIL|HINT|CONTEXT|LINE \d)", said.strip())[0].splitlines()
+    own = [line for line in lines if line.strip() and not line.startswith(("\t", " "))]
+    return re.split("connection (?:failed|is bad): |FATAL: +", own[-1])[-1].rstrip(". ") if own else ""
 
 
 def _longest(kinds: dict[str, type[StoreError]], said: str) -> type[StoreError] | None:

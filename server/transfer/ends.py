@@ -12,8 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import URL, Connection, NullPool, create_engine, event, inspect, make_url, text
-from sqlalchemy.exc import ArgumentError
+from sqlalchemy import URL, Connection, NullPool, create_engine, event, inspect, text
 
 from parenting.server.backups import copies
 from parenting.server.backups.in_use import STOP, alone, others_connected, require_stopped
@@ -24,6 +23,7 @@ from parenting.server.migrate import VERSIONS, create_tables, newest, require_cu
 from parenting.server.settings import Settings
 from parenting.server.store.driver import can_write, sqlite_module
 from parenting.server.store.postgresql import begin_migration, lift_limits
+from parenting.server.store.url import WrongUrlError, parsed
 from parenting.server.tables import Identity
 from parenting.server.tables import Table as Root
 from parenting.server.transfer import rows
@@ -43,12 +43,9 @@ def place(named: str) -> URL:
     if "://" not in named:
         return URL.create("sqlite", database=str(Path(named).absolute()))
     try:
-        url = make_url(named)
-    except (ArgumentError, ValueError):
-        raise SetupError(f"{named.partition('://')[0]}://...: this is not a URL. {_REMEDY}") from None
-    if url.get_backend_name() not in ("sqlite", "postgresql"):
-        raise SetupError(f"{url.get_backend_name()} is neither sqlite nor postgresql. {_REMEDY}")
-    return url
+        return parsed(named)
+    except WrongUrlError as error:
+        raise SetupError(f"{named.partition('://')[0]}://...: {error}. {_REMEDY}") from None
 
 
 @contextmanager

@@ -111,6 +111,25 @@ def test_a_file_that_is_missing_is_not_made(settings: Settings, command: str) ->
     assert list(settings.data.glob("*")) == []
 
 
+@pytest.mark.parametrize(
+    "url",
+    [
+        "sqlite:parenting.db",
+        "sqlite+aiosqlite:////tmp/x.db",
+        "sqlite:////tmp/x.db?mode=ro",
+        "postgresql://me@127.0.0.1:1/x?bogus=1",
+        "mysql://me@host/x",
+    ],
+)
+@pytest.mark.parametrize("command", ["migrate", "runs", "worker", "worker --check", "backup", "doctor"])
+def test_a_wrong_url_is_a_sentence(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, command: str, url: str
+) -> None:
+    monkeypatch.setenv("PARENTING_DATA", str(tmp_path))
+    monkeypatch.setenv("PARENTING_DATABASE_URL", url)
+    assert "PARENTING_DATABASE_URL: " in said_by(command)
+
+
 @pytest.mark.parametrize("way", ["from", "to"])
 def test_a_copy_names_the_host_that_is_away(settings: Settings, tmp_path: Path, way: str) -> None:
     migrated(settings).close()

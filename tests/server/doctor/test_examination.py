@@ -16,6 +16,7 @@ from parenting.commands.main import app
 from parenting.server.checkpoints import save_checkpoint
 from parenting.server.db import Database, connect
 from parenting.server.doctor import machine
+from parenting.server.doctor.findings import Finding, guarded
 from parenting.server.migrate import downgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.worker_side import post_query
@@ -88,6 +89,26 @@ def test_for_people_it_is_a_line_each_with_a_remedy_behind_a_fault(settings: Set
     at = lines.index(f"error   database: there is none at {settings.data}/parenting.db")
     assert lines[at + 1].startswith("        -> parenting up makes one; parenting restore FILE")
     assert not settings.data.exists(), "it makes no folder"
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [
+        ("SQLITE_NOTADB", "parenting restore FILE --replace"),
+        ("SQLITE_CANTOPEN", "PARENTING_DATABASE_URL"),
+        ("SQLITE_BUSY", "End the program that holds the database"),
+        ("SQLITE_ERROR", "docs/operations.md explains"),
+    ],
+)
+def test_what_cannot_be_examined_has_the_remedy_of_its_refusal(name: str, remedy: str) -> None:
+    def look() -> list[Finding]:
+        error = sqlite_module().DatabaseError("it says so")
+        error.sqlite_errorname = name
+        raise error
+
+    (found,) = guarded("database", look)
+    assert found.said == "It cannot be examined: DatabaseError: it says so"
+    assert remedy in str(found.remedy)
 
 
 @pytest.mark.parametrize("size", [0, 1, 100, 5_000, 60_000])

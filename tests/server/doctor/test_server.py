@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
+from sqlalchemy import text
 
+from parenting.commands import up
 from parenting.server.app import create_app
 from parenting.server.db import Database, connect
 from parenting.server.doctor.examination import examine
 from parenting.server.doctor.findings import State
 from parenting.server.doctor.server import OLDEST
-from parenting.server.errors import SetupError
+from parenting.server.errors import RefusedError, SetupError
+from parenting.server.migrate import upgrade
 from parenting.server.settings import Settings
 from parenting.server.worker_process import main
-from tests.postgres import Cluster, programs
+from tests.postgres import USER, Cluster, programs
 from tests.tree import ROOT
 
 pytestmark = pytest.mark.postgresql
@@ -65,6 +69,35 @@ def test_a_server_is_told_with_its_settings_and_connections(server: Cluster, set
     assert told["connections"][0] is State.WARNING
 
 
+def test_a_limit_of_the_role_or_the_database_counts(server: Cluster, settings: Settings) -> None:
+    for limited in ("ROLE parenting", "DATABASE home"):
+        server.admin.execute(f"ALTER {limited} CONNECTION LIMIT 20")
+        state, said = found(settings, "connections")["connections"]
+        assert state is State.WARNING
+        assert f"1 of 20 (the CONNECTION LIMIT of the {limited.split()[0].lower()}) in use" in said
+        server.admin.execute(f"ALTER {limited} CONNECTION LIMIT 0")
+        told = found(settings, "database")["database"][1]
+        assert told.startswith("The database takes no more connections: too many connections for")
+        server.admin.execute(f"ALTER {limited} CONNECTION LIMIT -1")
+
+
+def test_a_role_that_may_only_read_is_an_error(server: Cluster, settings: Settings) -> None:
+    reader = Settings(data=settings.data, database_url=server.url("home").replace(f"{USER}@", "reader@"))
+    server.admin.execute("CREATE ROLE reader LOGIN")
+    assert found(reader, "server")["server"][1].endswith("where this role may not make tables")
+    with closing(connect(settings)) as db:
+        upgrade(db)
+    with server._connected("home") as owner:
+        owner.execute("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader")
+        state, said = found(reader, "server")["server"]
+        assert state is State.ERROR
+        assert "where this role may not write to access_session, " in said, said
+        owner.execute("GRANT ALL ON ALL TABLES IN SCHEMA public TO reader")
+        assert "may not write to access_session_id_seq, " in found(reader, "server")["server"][1]
+        owner.execute("GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO reader")
+    assert found(reader, "server")["server"][0] is State.OK
+
+
 def test_a_standby_is_an_error_and_nothing_starts_on_it(server: Cluster, settings: Settings) -> None:
     server.admin.close()
     server._run("pg_ctl", "stop", "-m", "fast")
@@ -81,6 +114,15 @@ def test_a_standby_is_an_error_and_nothing_starts_on_it(server: Cluster, setting
             create_app(settings)
         with pytest.raises(SetupError, match="is a standby"):
             main(settings)
+        with pytest.raises(SetupError, match="is a standby"):
+            up._migrate(settings)
+        with (
+            closing(connect(settings)) as db,
+            pytest.raises(RefusedError) as refused,
+            db.write() as session,
+        ):
+            session.execute(text("CREATE TABLE more (x integer)"))
+        assert "Name the primary server in PARENTING_DATABASE_URL" in refused.value.message
     finally:
         server._run("pg_ctl", "stop", "-m", "immediate")
 

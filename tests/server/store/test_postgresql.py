@@ -141,7 +141,17 @@ def test_server_that_is_away_is_gone_within_the_bound(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "url", ["oracle+nothing://me:s3cret@host/a", "mysql://me:s3cret@host/a", "s3cret@host:"]
+    "url",
+    [
+        "oracle+nothing://me:s3cret@host/a",
+        "mysql://me:s3cret@host/a",
+        "s3cret@host:",
+        "postgresql+asyncpg://me:s3cret@host/a",
+        "postgresql://me:s3cret@host/a?bogus=1",
+        "postgresql://me:s3cret@host/a?port=many",
+        "postgresql://me:s3cret@host/a?connect_timeout=long",
+        "postgresql://me:x@s3cret@host/a",
+    ],
 )
 def test_what_a_wrong_url_says_holds_no_password(url: str, tmp_path: Path) -> None:
     with pytest.raises(SetupError, match="PARENTING_DATABASE_URL") as said:

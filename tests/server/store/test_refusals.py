@@ -76,6 +76,48 @@ def test_each_state_of_postgresql_has_its_kind(state: str | None, kind: type[Sto
     assert refusal(postgresql_says(state)) is kind
 
 
+AT = 'connection failed: connection to server at "127.0.0.1", port 5432 failed: '
+
+
+@pytest.mark.parametrize(
+    ("said", "kind", "told"),
+    [
+        (f'{AT}FATAL:  password authentication failed for user "x"', GoneError, 'failed for user "x".'),
+        (
+            f'{AT}FATAL:  x\n{AT}FATAL:  no database "y"',
+            GoneError,
+            'no database "y".',
+        ),
+        ("failed to resolve host 'z': [Errno -2] Unknown", GoneError, "failed to resolve host 'z': "),
+        (f"{AT}Connection refused\n\tIs the server running?", GoneError, "failed: Connection refused."),
+        (f"{AT}FATAL:  starting up\nDETAIL:  Wait.", GoneError, "starting up."),
+        (f"{AT}FATAL:  sorry, too many clients already", BusyError, "too many clients already."),
+        (f"{AT}FATAL:  remaining connection slots are reserved", BusyError, "slots are reserved."),
+        (f'{AT}FATAL:  too many connections for role "x"', BusyError, 'for role "x".'),
+        ("", GoneError, "cannot be reached; nothing was stored."),
+    ],
+)
+def test_commands_and_logs_have_the_reason_of_a_connection_that_failed(
+    said: str, kind: type[StoreError], told: str
+) -> None:
+    with pytest.raises(kind) as refused, translated():
+        raise OperationalError("", {}, psycopg.OperationalError(said))
+    assert told in refused.value.message
+    assert "connection failed: " not in refused.value.message
+    assert refused.value.body()["error"]["message"] == kind().message, "pages keep to the general sentence"
+
+
+@pytest.mark.parametrize(
+    ("state", "told"),
+    [("42501", "does not let its role do this: no. "), ("25006", "Name the primary server in PARENTING_")],
+)
+def test_a_right_that_lacks_and_a_standby_have_sentences_of_their_own(state: str, told: str) -> None:
+    with pytest.raises(RefusedError) as refused, translated():
+        raise psycopg.errors.lookup(state)("no\nLINE 1: INSERT")
+    assert told in refused.value.message
+    assert "quota" not in refused.value.message
+
+
 def test_no_connection_free_in_time_is_busy() -> None:
     assert refusal(NoConnectionError("QueuePool limit")) is BusyError
 
