@@ -22,7 +22,7 @@ from structlog.typing import Processor
 from parenting.server.errors import SetupError
 from parenting.server.log_lines import Limit, about_request, hide_secrets, on_one_line
 from parenting.server.settings import Settings
-from parenting.server.store.sqlite import make_folder
+from parenting.server.store.owner import give
 
 MOST_PROCESSES = 64
 _locks: list[int] = []
@@ -92,12 +92,14 @@ def _handler(settings: Settings, process: str) -> logging.Handler:
     if settings.log_folder is None:
         return logging.StreamHandler(sys.stderr)
     try:
-        make_folder(settings.log_folder)
+        settings.log_folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        give(settings.log_folder)
         file = _unshared(settings.log_folder, process)
         return PrivateFiles(file, "a", settings.log_bytes, settings.log_files, "utf-8")
     except OSError as error:
         raise SetupError(
-            f"PARENTING_LOG_FOLDER: {settings.log_folder} cannot be written to: {error.strerror}."
+            f"PARENTING_LOG_FOLDER: {settings.log_folder} cannot be written to: {error.strerror}. "
+            "Name another folder."
         ) from None
 
 
@@ -125,4 +127,6 @@ def _unshared(folder: Path, process: str) -> Path:
 
 
 def _private(name: str, flags: int) -> int:
-    return os.open(name, flags, 0o600)
+    descriptor = os.open(name, flags, 0o600)
+    give(Path(name))
+    return descriptor

@@ -224,6 +224,20 @@ def test_little_space_few_files_and_an_old_sqlite_are_told(
     assert found["database"]["state"] == "error"
 
 
+@pytest.mark.parametrize(("flags", "remedy"), [(os.ST_RDONLY, "read-only"), (0, "chmod u+rwx ")])
+def test_no_folder_is_given_to_whom_it_belongs_already(
+    settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch, flags: int, remedy: str
+) -> None:
+    class Mounted:
+        f_flag = flags
+
+    monkeypatch.setattr("parenting.server.doctor.files.os.access", lambda *_: False)
+    monkeypatch.setattr("parenting.server.doctor.files.os.statvfs", lambda _: Mounted())
+    found = examined()[1]["permissions"]
+    assert found["state"] == "error"
+    assert remedy in found["remedy"]
+
+
 def test_a_misspelt_setting_is_told(settings: Settings, db: Database) -> None:
     Path(".env").write_text("PARENTNG_DATA=elsewhere\n", encoding="utf-8")
     assert "Did you mean PARENTING_DATA?" in examined()[1]["settings"]["said"]
