@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from sqlalchemy import Engine, make_url
+from sqlalchemy import URL, Engine, make_url
 from sqlalchemy.exc import ArgumentError
 from sqlalchemy.orm import Session
 
@@ -215,16 +215,25 @@ def connect(
         SetupError: the URL cannot be read, a driver is missing, SQLite is too old to be safe, or the file is
             damaged or lacks what it held (`server.store.check`).
     """
-    try:
-        url = make_url(settings.url)
-    except (ArgumentError, ValueError):  # its text would repeat the URL, and so its password
-        raise _unreadable("this is not a URL") from None
+    url = url_of(settings)
     name = url.get_backend_name()
     if name not in STORES:
         raise _unreadable(f"{name} is neither sqlite nor postgresql")
     options = {"reading": reading} if name == "sqlite" else {}
     engine = STORES[name].open_engine(url, json_serializer=_dumps, json_deserializer=loads, **options)
     return Database(engine, clock, mark)
+
+
+def url_of(settings: Settings) -> URL:
+    """Return the URL of the database.
+
+    Raises:
+        SetupError: it cannot be read.
+    """
+    try:
+        return make_url(settings.url)
+    except (ArgumentError, ValueError):  # its text would repeat the URL, and so its password
+        raise _unreadable("this is not a URL") from None
 
 
 def _unreadable(why: object) -> SetupError:
