@@ -1,4 +1,4 @@
-"""Logs of web and worker: one line a message, for people or as JSON, to standard error or to rotating files.
+"""Logs of web, worker and `up`: one line a message, for people or as JSON, on standard error or in files.
 
 Quiet unless something is wrong; `PARENTING_LOG_LEVEL=info` shows more. Messages of our own, of uvicorn and of
 every other library take the same way: they name the request, the run and the question that they are about,
@@ -33,7 +33,7 @@ def set_up_log(settings: Settings, process: str) -> None:
 
     Args:
         settings: The settings of log level, format and folder.
-        process: The kind of this process, web or worker, which names its file.
+        process: The kind of this process, web, worker or up, which names its file.
 
     Raises:
         SetupError: the level is unknown, or the folder cannot be written to.
