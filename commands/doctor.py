@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -14,13 +15,14 @@ from parenting.commands.errors import exit_on_interrupt, friendly_errors, settin
 from parenting.commands.printing import say
 from parenting.envs.people_text import printable
 from parenting.server.doctor.examination import examine
-from parenting.server.doctor.findings import Finding, State, worst
-from parenting.server.errors import SetupError
+from parenting.server.doctor.findings import Finding, State, error, worst
+from parenting.server.errors import ServerError, SetupError
 from parenting.server.settings import Settings
 from parenting.server.store import high_water
 from parenting.server.store.url import database_url
 
 EXIT_CODES = {State.OK: 0, State.WARNING: 1, State.ERROR: 2}
+SETTINGS = "Correct it; docs/commands.md lists the settings."
 STYLES = {State.OK: "green", State.WARNING: "yellow", State.ERROR: "red"}
 
 
@@ -45,16 +47,26 @@ def doctor(
     Example: parenting doctor
     """
     with exit_on_interrupt(), friendly_errors():
-        chosen, found = settings(), []
-        if accept:
-            _accept(chosen)
-        for finding in examine(chosen):
+        found = []
+        for finding in _findings(accept):
             found.append(finding)
             if not as_json:
                 _show(finding)
     if as_json:
         say(json.dumps([finding.row() for finding in found]))
     raise typer.Exit(EXIT_CODES[worst(found)])
+
+
+def _findings(accept: bool) -> Iterator[Finding]:
+    """Yield what there is to say; of wrong settings alone, where nothing else can be looked at."""
+    try:
+        chosen = settings()
+    except ServerError as refused:
+        yield from (error("settings", said, SETTINGS) for said in refused.message.splitlines())
+        return
+    if accept:
+        _accept(chosen)
+    yield from examine(chosen)
 
 
 def _accept(chosen: Settings) -> None:

@@ -18,6 +18,7 @@ from functools import partial
 from types import FrameType
 from typing import Annotated
 
+import structlog
 import typer
 
 from parenting.commands import children
@@ -29,10 +30,13 @@ from parenting.commands.printing import say
 from parenting.commands.sizing import Sizing, most_workers
 from parenting.server.lifeline import follow
 from parenting.server.listener import bind
+from parenting.server.log import set_up_log
 from parenting.server.public import address_of
 from parenting.server.settings import Settings
 from parenting.server.signal_event import SignalEvent
 from parenting.server.store.private import make_files_private
+
+log = structlog.get_logger()
 
 MOST_WORKERS = 64
 """A larger number would be a slip of the hand."""
@@ -64,6 +68,7 @@ def up(
     make_files_private()
     with friendly_errors():
         chosen = settings(port=port, public=public)
+        set_up_log(chosen, "up")
         listener = bind(chosen)
         with listener, _signals() as told, _children(chosen, listener, number or 1) as (web, crew, migrated):
             secret = _migrate(chosen)
@@ -106,13 +111,13 @@ def _sized(crew: Crew, chosen: Settings, number: int | None) -> Iterator[None]:
 def _watch(web: Child, crew: Crew, told: SignalEvent, url: str, browser: bool) -> None:
     """Say where the pages are, and keep the processes running until told to stop."""
     say(f"Parenting is at {url}  (Ctrl-C stops it)")
-    say("The address lets one browser in, once. Another one: parenting access open", err=True)
+    say("The address lets one browser in, once. Another one: parenting access open")
     if browser and _has_screen():
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
     try:
         children.watch([web, crew], told)
     except children.RefusedError as error:
-        _tell(str(error))
+        log.error(str(error))
         raise typer.Exit(children.REFUSED) from None
 
 
@@ -164,17 +169,13 @@ def _children(
         serve = ["web", "--fd", str(fd), *after, *(["--public"] if chosen.public else [])]
         web = partial(children.start, serve, followed, [fd, gate])
         try:
-            pages = Child("web", web, _tell)
+            pages = Child("web", web, log.warning)
             started.append(lambda: [pages])
-            crew = Crew(partial(children.start, ["worker", *after], followed, [gate]), _tell, workers)
+            crew = Crew(partial(children.start, ["worker", *after], followed, [gate]), log.warning, workers)
             started.append(crew.all)
             yield pages, crew, opened
         finally:
             children.stop([child for these in started for child in these()])
-
-
-def _tell(sentence: str) -> None:
-    say(sentence, err=True)
 
 
 def _has_screen() -> bool:

@@ -45,5 +45,5 @@ def web(
         listener = bind(chosen) if fd is None else socket.socket(fileno=fd)
         if fd is None:
             say(f"Parenting's pages: http://localhost:{listener.getsockname()[1]}/  (Ctrl-C stops them)")
-            say("An address that lets a browser in: parenting access open", err=True)
+            say("An address that lets a browser in: parenting access open")
         server.run(sockets=[listener])

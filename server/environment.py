@@ -14,6 +14,7 @@ from io import StringIO
 from os.path import expanduser
 from pathlib import Path
 
+from dotenv import dotenv_values
 from dotenv.parser import Binding, parse_stream
 from pydantic_settings import DotEnvSettingsSource
 
@@ -46,17 +47,24 @@ class EnvironmentFile(DotEnvSettingsSource):
     """The settings of a file of lines `NAME=value`."""
 
     def _read_env_file(self, file_path: Path) -> Mapping[str, str | None]:
-        read(file_path)
-        logging.getLogger("dotenv.main").setLevel(
-            logging.ERROR
-        )  # `warnings` tells it, once and with the file
-        return {name: self._home(name, value) for name, value in super()._read_env_file(file_path).items()}
+        stored = values(file_path)
+        return {name.lower(): self._home(name, value) for name, value in stored.items() if value != ""}
 
     def _home(self, name: str, value: str | None) -> str | None:
         """Return a folder with its ~ replaced as a shell replaces it, and any other value as it is."""
         field = self.settings_cls.model_fields.get(name.lower().removeprefix(PREFIX.lower()))
         is_folder = field is not None and field.annotation in (Path, Path | None)
         return expanduser(value) if value is not None and is_folder else value
+
+
+def values(file: Path) -> dict[str, str | None]:
+    """Return the names and values of a file of settings; a ${NAME} in a value stands for itself.
+
+    Raises:
+        SetupError: the file cannot be read, or is not text in UTF-8.
+    """
+    logging.getLogger("dotenv.main").setLevel(logging.ERROR)  # `warnings` tells it, once and with the file
+    return dotenv_values(stream=StringIO(read(file)), interpolate=False)
 
 
 def read(file: Path) -> str:

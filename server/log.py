@@ -1,4 +1,4 @@
-"""Logs of web and worker: one line a message, for people or as JSON, to standard error or to rotating files.
+"""Logs of web, worker and `up`: one line a message, for people or as JSON, on standard error or in files.
 
 Quiet unless something is wrong; `PARENTING_LOG_LEVEL=info` shows more. Messages of our own, of uvicorn and of
 every other library take the same way: they name the request, the run and the question that they are about,
@@ -22,7 +22,7 @@ from structlog.typing import Processor
 from parenting.server.errors import SetupError
 from parenting.server.log_lines import Limit, about_request, hide_secrets, on_one_line
 from parenting.server.settings import Settings
-from parenting.server.store.sqlite import make_folder
+from parenting.server.store.owner import give
 
 MOST_PROCESSES = 64
 _locks: list[int] = []
@@ -33,7 +33,7 @@ def set_up_log(settings: Settings, process: str) -> None:
 
     Args:
         settings: The settings of log level, format and folder.
-        process: The kind of this process, web or worker, which names its file.
+        process: The kind of this process, web, worker or up, which names its file.
 
     Raises:
         SetupError: the level is unknown, or the folder cannot be written to.
@@ -92,12 +92,14 @@ def _handler(settings: Settings, process: str) -> logging.Handler:
     if settings.log_folder is None:
         return logging.StreamHandler(sys.stderr)
     try:
-        make_folder(settings.log_folder)
+        settings.log_folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        give(settings.log_folder)
         file = _unshared(settings.log_folder, process)
         return PrivateFiles(file, "a", settings.log_bytes, settings.log_files, "utf-8")
     except OSError as error:
         raise SetupError(
-            f"PARENTING_LOG_FOLDER: {settings.log_folder} cannot be written to: {error.strerror}."
+            f"PARENTING_LOG_FOLDER: {settings.log_folder} cannot be written to: {error.strerror}. "
+            "Name another folder."
         ) from None
 
 
@@ -125,4 +127,6 @@ def _unshared(folder: Path, process: str) -> Path:
 
 
 def _private(name: str, flags: int) -> int:
-    return os.open(name, flags, 0o600)
+    descriptor = os.open(name, flags, 0o600)
+    give(Path(name))
+    return descriptor

@@ -18,14 +18,14 @@ class LogLimit:
         self._seconds, self._clock = seconds, clock
         self._lock = threading.Lock()
         self._said: dict[str, float] = {}
-        self._left_out: dict[str, int] = {}
+        self._repeated: dict[str, int] = {}
 
     def say(self, key: str, log: Callable[..., Any], event: str, **fields: Any) -> None:
         """Call `log(event, ...)`, unless the same key was logged within the second."""
         with self._lock:
             now = self._clock()
             if now - self._said.get(key, float("-inf")) < self._seconds:
-                self._left_out[key] = self._left_out.get(key, 0) + 1
+                self._repeated[key] = self._repeated.get(key, 0) + 1
                 return
-            self._said[key], left_out = now, self._left_out.pop(key, 0)
-        log(event, **fields, **({"left_out": left_out} if left_out else {}))
+            self._said[key], repeated = now, self._repeated.pop(key, 0)
+        log(event, **fields, **({"repeated": repeated} if repeated else {}))

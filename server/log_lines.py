@@ -103,7 +103,7 @@ class Limit(logging.Filter):
             self._seen = {old: seen for old, seen in self._seen.items() if now - seen[0] < SECONDS}
         self._seen[key] = now, 0
         if held and isinstance(record.msg, dict):
-            record.msg["repeated"] = held
+            record.msg["repeated"] = held + record.msg.get("repeated", 0)  # of `log_limit`
         elif held:
             record.msg = f"{record.msg} (and {held} more)"
         return True

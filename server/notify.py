@@ -19,6 +19,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from parenting.server.store.owner import give
+
 MAX_PATH_BYTES = 100
 """The longest path of a Unix socket that we use; the operating systems allow 104 to 108 bytes."""
 
@@ -129,6 +131,7 @@ def _bound(path: Path, tries: int = 3) -> socket.socket:
     try:
         listener.setblocking(False)
         listener.bind(str(path))
+        give(path.parent.parent, path.parent, path)
     except OSError as error:
         listener.close()
         if isinstance(error, FileNotFoundError) and tries > 1:

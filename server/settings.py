@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, SecretStr
+from pydantic import Field, SecretStr, field_validator
+from pydantic_core import PydanticCustomError
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 from sqlalchemy import URL
 
@@ -19,6 +21,8 @@ YEAR = 31_536_000
 """Seconds of a year: much longer times have no date."""
 MOST = 10**9
 """The largest number of what is counted; a column of the database holds little more."""
+SOURCES = re.compile(r"[!-+\--:<-~]+(?: +[!-+\--:<-~]+)*")
+"""Source expressions of a Content-Security-Policy: a ; or , would begin another directive or policy."""
 
 
 def state_folder() -> Path:
@@ -167,6 +171,22 @@ class Settings(BaseSettings):
         description="Size at which a log file is renamed and a new one begun.",
     )
     log_files: int = Field(5, ge=1, le=1000, description="How many renamed log files are kept.")
+
+    @field_validator("frame_ancestors")
+    @classmethod
+    def _only_sources(cls, value: str) -> str:
+        if not SOURCES.fullmatch(value):
+            raise PydanticCustomError(
+                "sources", "write sources in printable ASCII, with spaces between them, without ; and ,"
+            )
+        return value
+
+    @field_validator("languages")
+    @classmethod
+    def _is_there(cls, value: Path | None) -> Path | None:
+        if value is not None and not os.path.isdir(value):
+            raise PydanticCustomError("folder", "there is no such folder; make it, or leave this setting out")
+        return value
 
     @classmethod
     def settings_customise_sources(

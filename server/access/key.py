@@ -16,6 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from parenting.server.errors import SetupError
+from parenting.server.store.owner import give
 from parenting.server.store.private import OTHERS
 
 FILE = "access.key"
@@ -50,6 +51,7 @@ def _write(path: Path) -> None:
     fresh = path.with_name(f"{FILE}.{os.getpid()}.{secrets.token_hex(4)}")
     fd = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
+        give(fresh)
         with os.fdopen(fd, "w", encoding="ascii") as file:
             file.write(secrets.token_hex(32))
         with suppress(FileExistsError):

@@ -7,11 +7,12 @@ from itertools import chain, count
 from pathlib import Path
 
 from parenting.server.backups import dumps
-from parenting.server.backups.making import FOLDER, stamp, write_copy
+from parenting.server.backups.making import FOLDER, give_kept, stamp, write_copy
 from parenting.server.backups.whole import require_room, size, whole
 from parenting.server.db import Database, utc_now
 from parenting.server.errors import SetupError
 from parenting.server.migrate import downgrade, upgrade
+from parenting.server.store.owner import exists
 
 KIND = "before-migration-"
 KEPT = 3
@@ -60,6 +61,7 @@ def keep(db: Database, data: Path, revision: str) -> Path:
     if postgresql:
         try:
             with whole(target) as part:
+                give_kept(part, data)
                 dumps.dump(url, part)
         except SetupError as error:
             raise SetupError(f"No copy can be made before the migration. {error.message} {ROOM}") from None
@@ -80,7 +82,7 @@ def prune(folder: Path) -> None:
 def _free(folder: Path, name: str, end: str) -> Path:
     """Return a name that is free, also within the second in which a migration was killed."""
     names = (folder / f"{name}{more}{end}" for more in chain([""], (f"_{n}" for n in count(2))))
-    return next(path for path in names if not path.exists())
+    return next(path for path in names if not exists(path))
 
 
 def _folder(db: Database, data: Path) -> Path:

@@ -13,6 +13,7 @@ from parenting.server.backups.whole import require_room, size, whole
 from parenting.server.db import utc_now
 from parenting.server.errors import SetupError
 from parenting.server.settings import Settings
+from parenting.server.store.owner import exists, give
 from parenting.server.store.url import database_url
 
 FOLDER = "backups"
@@ -41,11 +42,12 @@ def back_up(settings: Settings, to: Path | None = None, force: bool = False) -> 
     if url.get_backend_name() == "postgresql":
         target = settings.data / FOLDER / f"{stamp(utc_now())}.dump" if to is None else to
         with whole(target, force) as part:
+            give_kept(part, settings.data)
             number = dumps.dump(url, part)
         return Made(target, f"{number} tables")
     file = database_file(url)
     target = file.parent / FOLDER / f"{stamp(utc_now())}.db" if to is None else to
-    if target.exists() and target.samefile(file):
+    if exists(target) and target.samefile(file):
         raise SetupError(f"{target} is the database itself. Name another file.")
     copies.require_database(file)
     return Made(target, str(write_copy(file, target, force)))
@@ -61,10 +63,17 @@ def write_copy(file: Path, target: Path, force: bool = False) -> copies.Contents
     """
     require_room(target.parent, size(file), "Free some space, or name a file on another disk.")
     with whole(target, force) as part:
+        give_kept(part, file.parent)
         told = copies.copy(file, part)
         if (found := copies.check(part)) != told:
             raise SetupError(f"The copy of {file} has {found}, but the database {told}. Try again.")
     return told
+
+
+def give_kept(part: Path, data: Path) -> None:
+    """Give what root writes into the folder of backups to the owner of the data folder."""
+    if part.parent == data / FOLDER:
+        give(part.parent, part)
 
 
 def database_file(url: URL) -> Path:

@@ -21,6 +21,7 @@ from parenting.server.errors import SetupError
 from parenting.server.migrate import known_revisions, newest, revision, upgrade
 from parenting.server.settings import Settings
 from parenting.server.store import high_water
+from parenting.server.store.owner import exists, give
 from parenting.server.store.sqlite import make_folder
 from parenting.server.store.url import database_url
 
@@ -77,6 +78,7 @@ def _restore_copy(url: URL, file: Path, replace: bool) -> Restored:
     make_folder(target.parent)
     require_room(target.parent, size(file), "Free some space first.")
     with ExitStack() as until_replaced, whole(target, force=True) as part:
+        give(part)
         copies.copy(file, part)
         copies.end_access(part)
         holds = copies.check(part)
@@ -97,6 +99,7 @@ def _put_aside(target: Path) -> Path:
     """
     aside = _aside(target.parent / FOLDER, ".db")
     aside.parent.mkdir(exist_ok=True, mode=0o700)
+    give(aside.parent)
     os.link(target, aside)
     aside.chmod(0o600)
     for end in BESIDE:
@@ -165,4 +168,4 @@ def _aside(folder: Path, end: str) -> Path:
     """Return a name that is free for a former database, also for a second one within the same second."""
     name = f"before-restore-{stamp(utc_now())}"
     names = (folder / f"{name}{more}{end}" for more in chain([""], (f"-{n}" for n in count(2))))
-    return next(path for path in names if not path.exists())
+    return next(path for path in names if not exists(path))

@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from parenting.server.errors import SetupError
+from parenting.server.store.owner import exists
 
 SPARE_BYTES = 8 * 1024 * 1024
 """Room that must be left on the disk beside a copy."""
@@ -26,7 +27,7 @@ def whole(target: Path, force: bool = False) -> Iterator[Path]:
         SetupError: `target` exists and `force` is not given, is not a file, or cannot be written.
     """
     target = file_at(target)
-    if target.exists() and not force:
+    if exists(target) and not force:
         raise _exists(target)
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:

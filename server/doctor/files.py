@@ -10,10 +10,13 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from parenting.server.access.key import FILE as KEY
 from parenting.server.backups.making import FOLDER
 from parenting.server.backups.whole import size
 from parenting.server.doctor.findings import Finding, error, ok, warning
+from parenting.server.notify import SOCKETS
 from parenting.server.store import high_water
+from parenting.server.store.ballast import Ballast
 from parenting.server.store.file_system import UNKNOWN, is_network, kind_of
 from parenting.server.store.sqlite import sqlite_module
 
@@ -30,16 +33,17 @@ def permissions(data: Path, database: Path | None) -> Iterator[Finding]:
         yield warning(name, f"the data folder {folder} does not exist yet", "parenting up makes it.")
         return
     if not os.access(folder, os.W_OK | os.X_OK):
-        yield error(name, f"{folder} cannot be written to", f"Give it to this user: chown {_user()} {folder}")
+        yield error(name, f"{folder} cannot be written to", _way_in(folder))
+        return
+    if locked_out := list(_locked_out(folder, database)):
+        yield from locked_out
         return
     open_to = [path for path in (folder, database) if path is not None and _others(path)]
     if open_to:
         listed = " ".join(map(str, open_to))
         yield warning(name, f"others can read {listed}", f"chmod -R go-rwx {folder}")
     elif database is not None and database.exists() and not os.access(database, os.W_OK):
-        yield error(
-            name, f"{database} cannot be written to", f"Give it to this user: chown {_user()} {database}"
-        )
+        yield error(name, f"{database} cannot be written to", _way_in(database))
     else:
         yield ok(name, f"{folder} is its owner's alone")
 
@@ -72,7 +76,10 @@ def space(place: Path, database: Path | None) -> Iterator[Finding]:
 
 def beside(database: Path) -> Iterator[Finding]:
     """Look for a log of another file, and for a mark without a database, before anything is opened."""
-    if database.is_file():
+    mark = high_water.mark_of(database)
+    if mark.exists() and not os.access(mark, os.R_OK):
+        yield error("mark", f"{mark} cannot be read, so a loss would not be noticed", _way_in(mark))
+    elif database.is_file():
         foreign = high_water.foreign_log(database)
         if foreign is not None:
             yield error("mark", *_halves(foreign))
@@ -106,6 +113,9 @@ def soundness(database: Path) -> Iterator[Finding]:
 def backups(place: Path) -> Iterator[Finding]:
     """Name the newest backup in the usual folder."""
     folder = place / FOLDER
+    if folder.is_dir() and not os.access(folder, os.R_OK | os.X_OK):
+        yield error("backups", f"{folder} cannot be read", _way_in(folder))
+        return
     found = [one for one in folder.glob("*") if one.suffix in (".db", ".dump")] if folder.is_dir() else []
     if found:
         newest = max(found, key=lambda one: one.stat().st_mtime)
@@ -131,5 +141,26 @@ def _others(path: Path) -> bool:
     return path.exists() and bool(stat.S_IMODE(path.stat().st_mode) & 0o077)
 
 
-def _user() -> str:
-    return str(os.getuid())
+def _locked_out(folder: Path, database: Path | None) -> Iterator[Finding]:
+    """Look for what commands of another user may have made here, which locks out whoever runs the program."""
+    made = [folder / FOLDER, folder / KEY, folder / SOCKETS, *(folder / SOCKETS).glob("*")]
+    if database is not None:
+        made += [high_water.mark_of(database), Ballast(database).path, database.parent / FOLDER]
+        made += [database] if os.geteuid() == 0 else []
+    for path in filter(Path.exists, dict.fromkeys(made)):
+        owner = path.parent.stat().st_uid
+        if os.geteuid() == 0:  # who may use everything
+            if path.stat().st_uid == 0 != owner:
+                said = f"{path} is root's, but its folder is not"
+                yield error("permissions", said, f"chown -R {owner} {path}")
+        elif not os.access(path, os.R_OK | os.W_OK | (os.X_OK if path.is_dir() else 0)):
+            yield error("permissions", f"{path} cannot be used by this user", _way_in(path))
+
+
+def _way_in(path: Path) -> str:
+    """Return the remedy for what this user cannot write."""
+    if os.statvfs(path).f_flag & os.ST_RDONLY:
+        return "Its file system is read-only: mount it for writing, or set PARENTING_DATA to another folder."
+    if path.stat().st_uid == os.geteuid():
+        return f"chmod u+rw{'x' if path.is_dir() else ''} {path}"
+    return f"Give it to this user: chown {os.geteuid()} {path}"

@@ -10,8 +10,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 from parenting.envs import registry
 from parenting.server.doctor.findings import Finding, error, ok, warning
-from parenting.server.environment import warnings
+from parenting.server.environment import values, warnings
 from parenting.server.errors import SetupError
+from parenting.server.log_lines import SECRET, hidden
 from parenting.server.settings import FILE, Settings, names
 from parenting.server.store.driver import SAFE_SQLITE, sqlite_module
 from parenting.weights.store import SHIPPED, SUFFIX, digest
@@ -32,7 +33,13 @@ def settings_file() -> Iterator[Finding]:
     told = warnings(os.environ, FILE, names())
     for said in told:
         yield warning("settings", said.removeprefix("Warning: "), "Correct the name or remove it.")
-    if not told:
+    secret = FILE.is_file() and FILE.stat().st_mode & 0o077 and _holds_secret()
+    if secret:
+        file = FILE.absolute()
+        yield warning(
+            "settings", f"others can read {file}, which holds a password or token", f"chmod 600 {file}"
+        )
+    if not told and not secret:
         where = f"{FILE.absolute()} is read" if FILE.is_file() else "no .env in this folder"
         yield ok("settings", where)
 
@@ -96,6 +103,13 @@ def packages() -> Iterator[Finding]:
         yield warning("packages", said, "parenting worlds lists the worlds that can be used.")
     if names and not broken:
         yield ok("packages", f"worlds of other packages: {', '.join(names)}")
+
+
+def _holds_secret() -> bool:
+    """Return whether the file of settings has a password or a token, alone or in a URL."""
+    return any(
+        value and (SECRET.search(name) or hidden(value) != value) for name, value in values(FILE).items()
+    )
 
 
 def _version(name: str) -> str | None:

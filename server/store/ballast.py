@@ -17,6 +17,7 @@ from pathlib import Path
 import structlog
 
 from parenting.server.errors import DiskFullError, RefusedError, StoreError
+from parenting.server.store.owner import give
 
 log = structlog.get_logger()
 
@@ -47,6 +48,7 @@ class Ballast:
             if shutil.disk_usage(self.path.parent).free < 2 * BYTES:
                 return False
             _allocate(part, BYTES)
+            give(part)
             part.replace(self.path)
         except OSError:
             return False

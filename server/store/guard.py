@@ -20,6 +20,7 @@ from parenting.server.store import high_water
 from parenting.server.store.check import require_sound
 from parenting.server.store.held import Held, hold, node
 from parenting.server.store.high_water import Counts
+from parenting.server.store.owner import give
 from parenting.server.store.rescue import rescue
 
 Info = MutableMapping[Any, Any]
@@ -55,6 +56,7 @@ class Guard:
                 # SQLite gives the log the mode of the file. A file that came meanwhile is as good.
                 with suppress(OSError):
                     os.close(os.open(self.path, os.O_CREAT | os.O_EXCL | os.O_RDWR | os.O_CLOEXEC, 0o600))
+                    give(self.path)
         elif there is None or self._held.left_behind() or not self._is_same():
             self._held.look()
         else:
@@ -82,16 +84,16 @@ class Guard:
         """Return whether the file at the path is this database, with all that is known to be stored.
 
         Raises:
-            GoneError: it is damaged.
+            GoneError: it is damaged, or its mark cannot be read.
         """
         if self._counts is None:
             return True
         try:
             require_sound(self.path)
             found = high_water.counted(self.path)
+            mark = high_water.read(self.path)
         except SetupError as error:
             raise GoneError(error.message) from error
-        mark = high_water.read(self.path)
         known = [self._counts] if mark is None else [self._counts, mark.counts]
         return found is not None and all(
             found.database == one.database and not found.below(one) for one in known

@@ -23,6 +23,7 @@ from parenting._plural import counted as number_of
 from parenting.server.errors import SetupError
 from parenting.server.store.driver import open_file, sqlite_module
 from parenting.server.store.held import Held, hold, log_of
+from parenting.server.store.owner import give
 
 LENGTH = 200
 """Bytes of a mark, always the same, so that it is written over in one piece."""
@@ -103,13 +104,18 @@ def write(database: Path, held: Held, counts: Counts) -> None:
             os.pwrite(descriptor, line.encode(), 0)
         finally:
             os.close(descriptor)
+        give(mark_of(database))
 
 
 def read(database: Path) -> Mark | None:
-    """Return the mark of a database; None if there is none, or a power cut left only a part of it."""
+    """Return the mark of a database; None if there is none, or a power cut left only a part of it.
+
+    Raises:
+        SetupError: it cannot be read.
+    """
     for _ in range(3):  # another process may be writing it
-        with suppress(OSError, ValueError):
-            words, _, told = mark_of(database).read_text("ascii").strip().rpartition(" ")
+        with suppress(FileNotFoundError, NotADirectoryError, ValueError):
+            words, _, told = _text(mark_of(database)).strip().rpartition(" ")
             head, inode, log, uuid, *numbers = words.split(" ")
             if head in (HEAD, FORMER) and told == f"{zlib.crc32(words.encode()):08x}":
                 answers, questions, runs = map(int, numbers)
@@ -117,8 +123,29 @@ def read(database: Path) -> Mark | None:
     return None
 
 
+def _text(mark: Path) -> str:
+    """Return the text of a mark; one that cannot be read must not pass for none.
+
+    Raises:
+        SetupError: it cannot be read.
+    """
+    try:
+        return mark.read_text("ascii")
+    except (FileNotFoundError, NotADirectoryError):
+        raise
+    except OSError as error:
+        remedy = f"Give it to this user: chown {os.geteuid()} {mark}"
+        raise SetupError(
+            f"The mark {mark} of the database cannot be read: {error.strerror}. {remedy}"
+        ) from None
+
+
 def lost(database: Path) -> str | None:
-    """Return a sentence if a database lacks what it held at its last durable commit, else None."""
+    """Return a sentence if a database lacks what it held at its last durable commit, else None.
+
+    Raises:
+        SetupError: its mark cannot be read.
+    """
     mark = read(database)  # first: the database only grows meanwhile
     if mark is None:
         return None
@@ -145,7 +172,11 @@ def lost(database: Path) -> str | None:
 
 
 def foreign_log(database: Path) -> str | None:
-    """Return a sentence if another file was put beside the log of the one before, else None."""
+    """Return a sentence if another file was put beside the log of the one before, else None.
+
+    Raises:
+        SetupError: its mark cannot be read.
+    """
     mark, log = read(database), log_of(database)
     if mark is None or database.stat().st_ino == mark.inode:
         return None

@@ -14,6 +14,7 @@ from typing import Any
 
 from parenting.server.store.driver import sqlite_module
 from parenting.server.store.held import Held, Node
+from parenting.server.store.owner import give
 
 FOLDER = "backups"
 DESCRIPTORS = Path("/proc/self/fd")
@@ -37,6 +38,7 @@ def rescue(connection: Any, held: Held) -> Path | None:
         try:
             target.parent.mkdir(exist_ok=True, mode=0o700)
             os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o600))
+            give(target.parent, part)
             with closing(sqlite_module().connect(str(part), isolation_level=None)) as copy:
                 connection.backup(copy)
                 copy.execute("PRAGMA journal_mode=delete").fetchall()  # one file

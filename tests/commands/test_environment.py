@@ -90,6 +90,13 @@ def test_a_name_without_a_value_is_told_and_a_folder_at_home_is_found(
     assert (Settings().data, Settings().hosts) == (folder / "me" / "x", "~a")
 
 
+def test_a_password_stands_as_it_is_written(folder: Path) -> None:
+    (folder / ".env").write_text("PARENTING_TOKEN=a${HOME}b\n", encoding="utf-8")
+    token = Settings().token
+    assert token is not None
+    assert token.get_secret_value() == "a${HOME}b"
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_refuses_it(folder: Path, command: str) -> None:
     (folder / ".env").write_bytes(NO_UTF8["latin-1"])

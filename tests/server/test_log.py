@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import logging
+import socket
 import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import httpx2
 import pytest
 import structlog
 from sqlalchemy import text
 
+from parenting.commands import up
 from parenting.server.db import Database
 from parenting.server.errors import SetupError
 from parenting.server.log import set_up_log
@@ -175,5 +178,24 @@ def test_wrong_settings_of_it_are_named(settings: Settings, tmp_path: Path) -> N
     with pytest.raises(SetupError, match="log_level: loud"):
         set_up_log(settings.model_copy(update={"log_level": "loud"}), "web")
     (tmp_path / "file").touch()
-    with pytest.raises(SetupError, match="file"):
-        set_up_log(settings.model_copy(update={"log_folder": tmp_path / "file"}), "web")
+    for folder in (tmp_path / "file", Path("/proc/x")):
+        with pytest.raises(SetupError, match=f"^PARENTING_LOG_FOLDER: {folder} cannot be written to"):
+            set_up_log(settings.model_copy(update={"log_folder": folder}), "web")
+
+
+def test_up_tells_deaths_by_the_log(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    killed = Mock(**{"poll.return_value": -9})
+    monkeypatch.setattr("parenting.commands.children.start", lambda *_: killed)
+    set_up_log(settings.model_copy(update={"log_format": "json"}), "up")
+    with socket.socket() as listener, up._children(settings, listener, 1) as (web, crew, _):
+        web.look()
+        crew.look()
+    said = [json.loads(line) for line in capsys.readouterr().err.splitlines()]
+    assert [
+        line["message"].partition(" process ended by itself (killed by SIGKILL)")[0] for line in said
+    ] == [
+        "The web",
+        "The worker",
+    ]

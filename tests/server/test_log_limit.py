@@ -20,5 +20,5 @@ def test_one_line_a_second_says_how_many_were_left_out() -> None:
     assert lines == [
         ("refused", {"path": "/"}),
         ("refused", {"path": "/"}),
-        ("refused", {"path": "/", "left_out": 99}),
+        ("refused", {"path": "/", "repeated": 99}),
     ]

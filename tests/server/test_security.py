@@ -2,7 +2,9 @@
 
 import httpx2
 import pytest
+from pydantic import ValidationError
 
+from parenting.server.settings import Settings
 from parenting.server.tables import Run
 
 pytestmark = pytest.mark.only("sqlite", "such requests are refused before the store is asked")
@@ -71,3 +73,12 @@ def test_headers_stand_on_every_reply(client: httpx2.Client, path: str) -> None:
 @pytest.mark.parametrize("length", ["-1", "x", "9" * 30, "1e3"])
 def test_odd_length_is_refused(client: httpx2.Client, length: str) -> None:
     assert client.get("/healthz", headers={"Content-Length": length}).status_code == 413
+
+
+@pytest.mark.parametrize(
+    "sources", ["http://a;script-src *", "http://a, *", "http://a\nX: b", "http://ä", " ", "a\t b"]
+)
+def test_only_sources_come_into_the_policy(sources: str) -> None:
+    with pytest.raises(ValidationError, match="sources in printable ASCII"):
+        Settings(frame_ancestors=sources)
+    assert Settings(frame_ancestors="'self' http://localhost:*").frame_ancestors.endswith(":*")

@@ -245,9 +245,56 @@ def test_little_space_few_files_and_an_old_sqlite_are_told(
     assert found["database"]["state"] == "error"
 
 
+@pytest.mark.parametrize(("flags", "remedy"), [(os.ST_RDONLY, "read-only"), (0, "chmod u+rwx ")])
+def test_no_folder_is_given_to_whom_it_belongs_already(
+    settings: Settings, db: Database, monkeypatch: pytest.MonkeyPatch, flags: int, remedy: str
+) -> None:
+    class Mounted:
+        f_flag = flags
+
+    monkeypatch.setattr("parenting.server.doctor.files.os.access", lambda *_: False)
+    monkeypatch.setattr("parenting.server.doctor.files.os.statvfs", lambda _: Mounted())
+    found = examined()[1]["permissions"]
+    assert found["state"] == "error"
+    assert remedy in found["remedy"]
+
+
 def test_a_misspelt_setting_is_told(settings: Settings, db: Database) -> None:
     Path(".env").write_text("PARENTNG_DATA=elsewhere\n", encoding="utf-8")
     assert "Did you mean PARENTING_DATA?" in examined()[1]["settings"]["said"]
+
+
+@pytest.mark.parametrize(
+    ("line", "mode", "told"),
+    [
+        ("PARENTING_DATABASE_URL=sqlite:///x.db", 0o644, False),
+        ("PARENTING_DATABASE_URL=postgresql://me:pa55@127.0.0.1:1/x", 0o600, False),
+        ("PARENTING_DATABASE_URL=postgresql://me:pa55@127.0.0.1:1/x", 0o640, True),
+        ("PARENTING_DATABASE_URL=postgresql://127.0.0.1:1/x?password=pa55", 0o604, True),
+        ("PARENTING_TOKEN=pa55", 0o644, True),
+    ],
+)
+def test_a_file_with_a_password_is_its_owners_alone(
+    settings: Settings, line: str, mode: int, told: bool
+) -> None:
+    file = Path(".env").absolute()
+    file.write_text(f"{line}\n", encoding="utf-8")
+    file.chmod(mode)
+    found = list(machine.settings_file())
+    assert [one.remedy for one in found if one.state == "warning"] == [f"chmod 600 {file}"] * told
+    assert "pa55" not in str(found)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("PORT", "x"), ("DATABASE_URL", "nothing"), ("DATABASE_URL", "a://b:c/d")]
+)
+def test_a_wrong_setting_is_a_finding(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch, name: str, value: str
+) -> None:
+    monkeypatch.setenv(f"PARENTING_{name}", value)
+    code, found = examined()
+    assert (code, states(found)) == (2, {"settings": "error"})
+    assert found["settings"]["said"].startswith(f"PARENTING_{name}: ")
 
 
 def test_a_table_that_is_gone_costs_its_own_line(settings: Settings, db: Database) -> None:
