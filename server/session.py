@@ -30,6 +30,7 @@ from parenting.server.growth import Growth
 from parenting.server.lived import Lived
 from parenting.server.machine import diverged, follow, take_up
 from parenting.server.metrics_row import NOTHING_LEARNT, Row, learnt, measure
+from parenting.server.optimality import Optimality
 from parenting.server.pressure import ALONE, Pressure, PutOff
 from parenting.server.progress import report_progress
 from parenting.server.queue import worker_side
@@ -79,15 +80,14 @@ class RunSession:
         self.lived = Lived(self.world, db, claim, self.saved)
         self.board = BoardWriter(self.world, db, claim, self.evaluation, self.saved, pressure)
         self.why = Why(self.world, db, claim, self.saved, self.growth.lesson)
-        self.finish = read_finish(run.finish)
-        self.optimal, self.waiting, self.stage = run.optimal, run.waiting, run.maturity
-        self._pace = CheckpointPace(pressure=pressure)
-        self._saved_tick, self._measured_at = self.last_tick, 0.0
-        self._measured_tick, self.lived_at, self._heard_at, self._look_cost = self.last_tick, 0.0, 0.0, 0.0
-        self._stuck_at, self._news, self._rest = -1, False, PutOff(pressure)
+        self.finish, self.waiting, self.stage = read_finish(run.finish), run.waiting, run.maturity
+        self.optimality = Optimality(self.finish, self.evaluation, self.saved.state, run.optimal)
+        self._pace, self._rest = CheckpointPace(pressure=pressure), PutOff(pressure)
+        self._saved_tick = self._measured_tick = self.last_tick
+        self.lived_at = self._measured_at = self._heard_at = self._look_cost = 0.0
+        self._stuck_at, self._news, self.over = -1, False, False  # over: somebody has stopped it
         self.told: Callable[[int, Row], None] = lambda tick, row: None  # trackers take each row of metrics
         self.whole, self._told, self._told_at, self._learnt = True, False, 0.0, NOTHING_LEARNT
-        self.over = False  # somebody has stopped it
         sweep_parts(db, claim)  # of a worker that was killed while it wrote a checkpoint
         self.parent.follow_until = take_up(db, claim, run, self._recalled, self.record_ends)
 
@@ -168,6 +168,7 @@ class RunSession:
         self.lived.see(state, tally, events)
         self.board.see(state, tally, answer)
         self.why.see(self.saved, query)
+        self.optimality.see(state)
         if self.last_tick <= self.record_ends:
             self._hold_to_the_record(query)
         self._note(answer)
@@ -229,8 +230,8 @@ class RunSession:
             return
         speed = (self.last_tick - self._measured_tick) / late if self._measured_at and late else None
         began = time.monotonic()
-        grown = self.growth.row(self.saved.state)
-        row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed, **grown}
+        row = {**measure(self.saved, self.evaluation), **self._learnt, "speed": speed}
+        row |= self.growth.row(self.saved.state)
         optimal = bool(row["optimal"])
         shown: dict[str, Any] = {"maturity": row["maturity"], "speed": speed, "optimal": optimal}
         sure = self.run.parent == "human" and not self.over
@@ -238,7 +239,8 @@ class RunSession:
         shown |= {"tick": self.last_tick, "waiting": reason, **self.growth.news(self.saved.state)}
         metrics.write_metrics(self.db, self.claim, {self.last_tick: row}, shown)
         self.told(self.last_tick, row)
-        self.optimal, self.waiting, self.stage, self._news = optimal, reason, stage, False
+        self.optimality.measured(optimal)
+        self.waiting, self.stage, self._news = reason, stage, False
         self._measured_at, self._measured_tick = time.monotonic(), self.last_tick
         self._look_cost = self._measured_at - began
 
@@ -259,9 +261,7 @@ class RunSession:
         """Return whether its rule ends the run, which first goes back to where it was before a restart."""
         if self.finish.kind == "never" or self.last_tick < max(self.record_ends, self.run.tick or 0):
             return False
-        state, heard = self.saved.state, int(self.saved.tally.kinds.sum())
-        stage, in_stage = int(state.maturity[0]), int(state.answered[0])
-        return self.finish.is_met(self.optimal, heard, stage, in_stage, self.saved.config)
+        return self.optimality.ends(self.saved)
 
     # Checkpoints
 

@@ -7,6 +7,7 @@ from typing import Any
 import httpx2
 import pytest
 
+import parenting as pt
 from parenting.agent.config import Config
 from parenting.server import deletion
 from parenting.server.db import Database
@@ -15,13 +16,16 @@ from parenting.server.finishes import read_finish
 from parenting.server.migrate import downgrade, upgrade
 from parenting.server.new_run import NewRun, start
 from parenting.server.queue.answers import answer
+from parenting.server.queue.worker_side import watch
 from parenting.server.reads.metrics import latest_metrics
 from parenting.server.run_form import read_form
-from parenting.server.runs import get_run
+from parenting.server.runs import claim, get_run
+from parenting.server.session import RunSession
 from parenting.server.settings import Settings
 from parenting.server.tables import Query, Run
 from parenting.server.worker import Worker
 
+WORLD = "unsafe-exploration"
 STAGES = Config(max_clip_length=3, queries_per_stage=4)
 
 
@@ -132,3 +136,23 @@ def test_runs_of_before_keep_the_rule_that_they_had(db: Database) -> None:
     deletion.begin(db, 1)
     with pytest.raises(SetupError, match="Run 1 ends by a rule"):
         downgrade(db, "0021")
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("crash", [False, True])
+def test_a_run_ends_at_the_tick_at_which_a_batch_does_whatever_the_clock_shows(
+    db: Database, monkeypatch: pytest.MonkeyPatch, seed: int, crash: bool
+) -> None:
+    """Metrics follow the clock, and here there are none."""
+    monkeypatch.setattr(RunSession, "_measure", lambda *_: None)
+    changes: dict[str, Any] = {"max_open_preferences": 0}
+    (alone,) = pt.train(WORLD, preset="direct", seed=seed, progress=False, **changes).trials
+    start(db, NewRun(world=WORLD, preset="direct", seed=seed, parent="scripted", config=changes))
+    (mine,) = claim(db, "test")
+    life = RunSession(db, mine, get_run(db, 1), lambda: None)
+    while not life.finished() and life.last_tick < 500:
+        life.tick(watch(db, [1])[1])
+        if crash and life.last_tick == alone["ticks"]:
+            life.save()
+            life = RunSession(db, mine, get_run(db, 1), lambda: None)
+    assert life.last_tick == alone["ticks"]
