@@ -61,6 +61,7 @@ def _findings(accept: bool) -> Iterator[Finding]:
     """Yield what there is to say; of wrong settings alone, where nothing else can be looked at."""
     try:
         chosen = settings()
+        database_url(chosen.url)
     except ServerError as refused:
         yield from (error("settings", said, SETTINGS) for said in refused.message.splitlines())
         return

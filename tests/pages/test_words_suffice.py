@@ -90,7 +90,7 @@ def test_words_suffice(settings: Settings, db: Database, screen: Page, world: st
         listener = Listener(web, screen)
         order = Order(run, until_optimal=False, end_episodes=True)
         parent = Answering(Client("http://localhost", web), order, listener, lambda receipt: None)
-        while (answered := parent.told.answered) < LEAST or (not life.optimal and answered < MOST):
+        while (answered := parent.told.answered) < LEAST or (not life.optimality.found and answered < MOST):
             seen = worker_side.watch(db, [run])[run]
             if life.ready(seen):
                 life.tick(seen)
@@ -98,7 +98,7 @@ def test_words_suffice(settings: Settings, db: Database, screen: Page, world: st
             life.report_waiting(seen)
             if not parent.answer_one():
                 parent._look()  # an episode without acceptable moves is ended
-    assert life.optimal
+    assert life.optimality.found
     guided = [said for said in listener.answers if "scripted" in said]
     assert len(guided) > 10
     assert [said for said in listener.answers if len(set(said.values())) > 1] == []
