@@ -57,12 +57,15 @@ def hold_look(page: Page, other: Page) -> Route:
     held: list[Route] = []
 
     def hold(route: Route) -> None:
-        held.append(route)
+        if held:
+            route.continue_()
+        else:
+            held.append(route)
 
     page.route("**/runs/*/parent", hold)
     other.keyboard.press("a")
-    until(lambda: page.wait_for_timeout(20) or bool(held))
-    page.unroute("**/runs/*/parent")
+    while not held:
+        page.wait_for_timeout(20)
     return held[0]
 
 
