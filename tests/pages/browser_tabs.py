@@ -12,6 +12,10 @@ from sqlalchemy import select
 from parenting.server.db import Database
 from parenting.server.tables import Answer
 
+KEPT = """() => Object.entries(localStorage)
+  .filter(([name]) => name === "parenting.answers" || name.startsWith("parenting.answer."))
+  .flatMap(([, value]) => JSON.parse(value))"""
+
 
 class BrowserTabs:
     """Opens pages of one site. `wrong` lists what went wrong in any of them."""
@@ -56,6 +60,12 @@ def given(db: Database) -> list[tuple[int, str]]:
     with db.read() as session:
         rows = session.scalars(select(Answer).order_by(Answer.number)).all()
         return [(row.query_id, row.choice) for row in rows]
+
+
+def kept(page: Page) -> list[dict[str, Any]]:
+    """The answers that the browser keeps."""
+    found: list[dict[str, Any]] = page.evaluate(KEPT)
+    return found
 
 
 def until(holds: Callable[[], bool], seconds: float = 30.0) -> None:

@@ -13,7 +13,7 @@ from parenting.server.queue import answers
 from parenting.server.runs import Claim
 from parenting.server.statuses import RunStatus
 from parenting.server.tables import Query
-from tests.pages.browser_tabs import BrowserTabs, given, until
+from tests.pages.browser_tabs import BrowserTabs, given, kept, until
 from tests.pages.parent_page import address, shown
 
 
@@ -113,8 +113,7 @@ def test_an_answer_survives_a_closed_tab(tabs: BrowserTabs, db: Database, ask: C
     again = page.context.new_page()
     again.goto(f"{tabs.address}/runs/1/parent")
     until(lambda: given(db) == [(number, "neither")])
-    # not wait_for_function: where it waits, it evaluates text in the page, which our policy forbids
-    until(lambda: again.evaluate("localStorage.getItem('parenting.answers') === '[]'"))
+    until(lambda: kept(again) == [])
 
 
 def test_a_lost_reply_is_asked_for_again(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:

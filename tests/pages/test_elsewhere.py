@@ -6,12 +6,11 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import httpx2
 import pytest
 from fastapi import FastAPI
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Route, expect
 from sqlalchemy import text
 
 from parenting.server import runs
@@ -23,7 +22,7 @@ from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
 from tests.database import migrated
 from tests.pages import island_fixtures as fixtures
-from tests.pages.browser_tabs import BrowserTabs, given, until
+from tests.pages.browser_tabs import BrowserTabs, given, kept, until
 from tests.pages.parent_page import address, form, look, public_id, shown
 
 RUN, QUESTION = 471100, 882200
@@ -46,12 +45,6 @@ def serve(site: FastAPI, database: Database) -> None:
     """Let another database come to the address, for reads and for the group of writes."""
     site.state.group_commit.close()
     site.state.db, site.state.group_commit = database, GroupCommit(database)
-
-
-def kept(page: Page) -> list[dict[str, Any]]:
-    """The answers that the browser keeps."""
-    found: list[dict[str, Any]] = json.loads(page.evaluate("localStorage.getItem('parenting.answers')"))
-    return found
 
 
 def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(

@@ -6,13 +6,13 @@ import re
 from collections.abc import Callable
 
 import httpx2
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 from sqlalchemy import select
 
 from parenting.server.db import Database
 from parenting.server.notify import Notifier
 from parenting.server.queue.answers import answer, get_query
-from parenting.server.queue.worker_side import take_answer
+from parenting.server.queue.worker_side import post_query, take_answer
 from parenting.server.runs import Claim, get_run, set_status
 from parenting.server.settings import Settings
 from parenting.server.statuses import RunStatus
@@ -186,40 +186,20 @@ def test_a_run_that_is_over_offers_no_undo(
     expect(page.locator("#undo")).to_be_hidden()
 
 
-def two_tabs(tabs: BrowserTabs, db: Database, first: int, second: int) -> tuple[Page, Page]:
-    """Two tabs of one browser: in one the first question was answered, and both show the second."""
+def test_a_refused_undo_gives_way_to_the_one_before(tabs: BrowserTabs, db: Database, mine: Claim) -> None:
+    """Somebody else has answered what was skipped here."""
+    tabs.expected = ("409",)
+    clips = fixtures.guidance("left", "down", start=(1, 2))
+    first, second = (post_query(db, mine, tick, "preference", 1, clips) for tick in (1, 2))
     page = tabs.open(address(db))
     shown(page, first)
     page.keyboard.press("b")
     shown(page, second)
-    until(lambda: stored(db) == [("right", True)])
-    other = page.context.new_page()
-    other.goto(page.url)
-    shown(other, second)
-    return page, other
-
-
-def test_the_last_answer_is_that_of_another_tab(
-    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
-) -> None:
-    first, second = ask(), ask()
-    page, other = two_tabs(tabs, db, first, second)
-    other.keyboard.press("a")
-    expect(page.locator("#undo button")).to_contain_text("Undo: A, left")
-    page.bring_to_front()
+    page.keyboard.press("s")
+    until(lambda: len(stored(db)) == 2)
+    answer(db, second, "right", OTHER, "human")
     page.keyboard.press("z")
-    until(lambda: stored(db) == [("right", True), ("left", False)])
-    shown(page, second)
-
-
-def test_an_answer_of_somebody_else_between_changes_nothing(
-    tabs: BrowserTabs, db: Database, ask: Callable[..., int]
-) -> None:
-    """It is counted before that of the other tab is stored, and is nobody's to take back here."""
-    first, second, third = ask(), ask(), ask()
-    page, other = two_tabs(tabs, db, first, second)
-    answer(db, third, "right", OTHER, "human")
-    page.wait_for_timeout(700)  # by then the stream has told of it
-    expect(page.locator("#undo button")).to_contain_text("Undo: B, down")
-    other.keyboard.press("a")
-    expect(page.locator("#undo button")).to_contain_text("Undo: A, left")
+    expect(page.locator("#alert")).to_contain_text("answered by someone else")
+    expect(page.locator("#undo button")).to_contain_text("Undo: Right")
+    page.keyboard.press("z")
+    until(lambda: stored(db)[0] == ("right", False))

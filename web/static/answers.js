@@ -1,8 +1,9 @@
 // Answers: takes one for the question on the stage, keeps it, sends it, and says what became of it.
 import { listens } from "./arming.js";
 import { recordAnswer, timeLeft } from "./eta.js";
+import { ANSWERED, keep, unsaved } from "./kept.js";
 import { measure } from "./measuring.js";
-import { flush, keep } from "./outbox.js";
+import { flush } from "./outbox.js";
 import { number } from "./numbers.js";
 import { $, alarm, client, given, name, page, painted, run, waiting } from "./page.js";
 import { next, show } from "./questions.js";
@@ -47,7 +48,6 @@ export function answer(choice) {
   given.add(query);
   for (const button of question.querySelectorAll("[aria-pressed][value]")) button.removeAttribute("aria-pressed");
   for (const button of question.querySelectorAll(`[value=${choice}]`)) button.classList.add("chosen");
-  page.unsaved++;
   $("saved").textContent = t("Saving");
   $("alert").textContent = "";
   performance.mark("answer", { detail: query });
@@ -64,10 +64,15 @@ export function answer(choice) {
 
 // A page that changes twice is painted twice: what was saved is told together with the next question, if that comes soon.
 export function settle() {
-  for (const told of saved.splice(0)) report("saved", ...told);
+  for (const told of saved.splice(0)) tell("saved", ...told);
 }
 
 export function report(outcome, reply, answer) {
+  if (outcome === "saved") stored(reply.run_public_id, answer.question);
+  tell(outcome, reply, answer);
+}
+
+function tell(outcome, reply, answer) {
   if (reply?.outcome === "put_back" && given.delete(reply.query_public_id) && !page.current) next(); // it is shown once more
   if (outcome === "saved" && page.quiet) return saved.push([reply, answer]);
   $("saved").classList.toggle("kept", outcome === "kept");
@@ -76,16 +81,25 @@ export function report(outcome, reply, answer) {
     if (!page.current) wait(reply.state);
     return;
   }
-  page.unsaved = Math.max(0, page.unsaved - 1);
   relieve(answer.question);
   if (outcome === "saved") {
     if (reply.run_public_id === run && answer.choice !== "skip" && !answer.change) count(reply.number);
-    stored(reply.run_public_id, answer.question);
     heed();
-    if (!page.unsaved) $("saved").textContent = t("Saved");
+    if (!unsaved()) $("saved").textContent = t("Saved");
   } else {
-    if (!page.unsaved) $("saved").textContent = outcome === "elsewhere" ? t("Kept here, not stored") : "";
+    if (!unsaved()) $("saved").textContent = outcome === "elsewhere" ? t("Kept here, not stored") : "";
     alarm(outcome !== "elsewhere" ? reply.message : reply?.code === "not_allowed" ? OTHER_LINK : elsewhere(answer));
     if (outcome === "elsewhere" && given.delete(answer.question) && !page.current) next(); // a copy of its database asks the same
   }
 }
+
+// The outbox of another tab may have sent what this page waits for, or given it up.
+function look({ key, newValue }) {
+  const line = $("saved"), sent = key === ANSWERED && given.has(newValue?.split(" ")[1]);
+  if (unsaved() || !(sent || line.classList.contains("kept"))) return;
+  line.classList.remove("kept");
+  line.textContent = sent ? t("Saved") : "";
+}
+
+addEventListener("storage", look);
+addEventListener("pageshow", look);

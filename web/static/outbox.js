@@ -1,7 +1,7 @@
 // Answers on their way. Each is kept in the browser until the server has acknowledged it, and sent again until then.
 // An answer names the database, the run and the question that it is meant for. A server that has another database, or a
 // copy with an identity of its own, does not store it; the browser keeps it for the server that does.
-import { elsewhere, key, meant, read, write } from "./kept.js";
+import { defer, drop, elsewhere, key, meant, read } from "./kept.js";
 import { sent } from "./measuring.js";
 
 const LATE = 15_000; // ms after which a reply is not waited for any more; the answer is sent again
@@ -31,28 +31,20 @@ async function send({ database, run, question, choice, change, replays, measured
   } finally { clearTimeout(timer); }
 }
 
-// An answer may have been changed while it was on its way.
-const same = (answer) => (other) => key(other) === key(answer) && other.given === answer.given;
-
 async function drain(report) {
   for (let answers = read().filter(meant); answers.length; answers = read().filter(meant)) {
     const [answer] = answers, [outcome, reply] = await send(answer);
     if (outcome === "elsewhere") elsewhere.add(key(answer));
+    if (["saved", "refused"].includes(outcome)) drop(answer);
     report(outcome, reply, answer);
     if (outcome === "kept") {
-      if (reply.alone && read().some(same(answer))) keep(answer); // the fault may be this question's alone: the others go first
+      if (reply.alone) defer(answer); // the fault may be this question's alone: the others go first
       await wait(delay);
       delay = Math.min(5000, delay * 2);
       continue;
     }
     delay = 500;
-    if (outcome !== "elsewhere") write(read().filter((other) => !same(answer)(other)));
   }
-}
-
-// Keep an answer, to be sent.
-export function keep(answer) {
-  write([...read().filter((other) => key(other) !== key(answer)), answer]);
 }
 
 // Send whatever is kept, oldest first; resolves when nothing is left that this server would have.

@@ -23,7 +23,6 @@ export const page = {
   answers: Number($("count").dataset.standing) + Number(main.dataset.retracted), // as they are numbered
   retracted: Number(main.dataset.retracted), // of these, those that stand no more
   goal: Number($("goal").dataset.goal),
-  unsaved: 0,
   opening: false, // a dialog is on its way, and no key answers
   quiet: 0, // the timer after which the page says that the agent explores
 };
