@@ -41,9 +41,9 @@ def check_parent(parent: object) -> Parent:
         ValueError: the message names what was given, and what to give.
     """
     if isinstance(parent, type):
-        raise ValueError(
-            f"parent: {parent.__name__} is a class, not a parent. Call it: parent=pt.{parent.__name__}()."
-        )
+        ours = parent.__module__.partition(".")[0] == "parenting"
+        call = f"pt.{parent.__name__}" if ours else parent.__name__
+        raise ValueError(f"parent: {parent.__name__} is a class, not a parent. Call it: parent={call}().")
     if not all(hasattr(parent, verb) for verb in ("events", "take", "post")):
         raise ValueError(
             f"parent: {parent!r} is not a parent. Give an instance of pt.ScriptedParent or of your own"
