@@ -44,5 +44,5 @@ def require_file(chosen: Settings) -> None:
     if not database.exists() and high_water.read(database) is None:
         raise SetupError(
             f"There is no database at {database}. Set PARENTING_DATA to its folder, "
-            "or make one: parenting up."
+            "or make one: parenting migrate, or parenting up with its pages."
         )

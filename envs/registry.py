@@ -90,8 +90,12 @@ class Worlds(MutableMapping[str, WorldSpec]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
+    def names(self) -> list[str]:
+        """Return every name, also of worlds that cannot be used. No package is imported."""
+        return [*dict.fromkeys([*self._known, *INSTALLED.names()])]
 
-WORLDS: MutableMapping[str, WorldSpec] = Worlds()
+
+WORLDS = Worlds()
 """Every world by its name."""
 
 

@@ -12,6 +12,8 @@ from parenting.drawing.query_tensors import ACTIONS
 COLUMNS = ("trial", "asked", "answered", "kind", "stage", "left", "right", "row", "column", "choice")
 """Of a record: `asked` and `answered` are ticks, `left` and `right` the moves, (row, column) is where both
 clips begin."""
+EVENT_COLUMNS = ("tick", "kind", "name", "value")
+"""Of the record of an operator's event."""
 
 Row = tuple[Any, ...]
 Asked = tuple[str, int, str, str, int, int]
@@ -75,4 +77,5 @@ def describe(query: Query, row: int) -> Asked:
 
 def event_record(tick: int | None, event: Mapping[str, Any]) -> dict[str, Any]:
     """Return an operator's event as a record; each record has the same columns."""
-    return {"tick": tick, "kind": event["kind"], "name": event.get("name"), "value": event.get("value")}
+    values = (tick, event["kind"], event.get("name"), event.get("value"))
+    return dict(zip(EVENT_COLUMNS, values, strict=True))

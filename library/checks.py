@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import index
 from pathlib import Path
 
 import torch
@@ -9,14 +10,19 @@ import torch
 from parenting.agent.parent import Parent
 
 
-def check_number(name: str, value: object, least: int, most: int) -> None:
-    """Refuse an argument that is not a whole number within bounds.
+def check_number(name: str, value: object, least: int, most: int) -> int:
+    """Return an argument, such as an integer of NumPy; refuse what is not a whole number within bounds.
 
     Raises:
         ValueError: the message names the argument, its value and the bounds.
     """
-    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        raise ValueError(f"{name}: {value!r} is not a whole number from {least} to {most}.")
+    try:
+        found = least - 1 if isinstance(value, bool) else index(value)  # type: ignore[arg-type]
+    except TypeError:
+        found = least - 1
+    if least <= found <= most:
+        return found
+    raise ValueError(f"{name}: {value!r} is not a whole number from {least} to {most}.")
 
 
 def check_device(device: object) -> None:
@@ -41,9 +47,9 @@ def check_parent(parent: object) -> Parent:
         ValueError: the message names what was given, and what to give.
     """
     if isinstance(parent, type):
-        raise ValueError(
-            f"parent: {parent.__name__} is a class, not a parent. Call it: parent=pt.{parent.__name__}()."
-        )
+        ours = parent.__module__.partition(".")[0] == "parenting"
+        call = f"pt.{parent.__name__}" if ours else parent.__name__
+        raise ValueError(f"parent: {parent.__name__} is a class, not a parent. Call it: parent={call}().")
     if not all(hasattr(parent, verb) for verb in ("events", "take", "post")):
         raise ValueError(
             f"parent: {parent!r} is not a parent. Give an instance of pt.ScriptedParent or of your own"

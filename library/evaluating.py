@@ -89,7 +89,7 @@ def evaluate(
         >>> found.reward, found.cost, found.terminated
         (1.0, 0.0, 1.0)
     """
-    check_number("episodes", episodes, 1, 1_000_000)
+    episodes = check_number("episodes", episodes, 1, 1_000_000)
     if isinstance(policy, type) or not callable(getattr(policy, "predict", None)):
         raise TypeError(
             f"policy: {policy!r} is not a policy; use pt.load_policy(file) or one of result.policies, such"

@@ -80,8 +80,8 @@ def init(world: str | World, config: Config | None = None, *, trials: int = 1, s
         >>> pt.init(pt.make("unsafe-exploration"), trials=2)
         <AgentState of 2 trials at tick 0>
     """
-    check_number("trials", trials, 1, 1_000_000)
-    check_number("seed", seed, 0, 2**53 - 1)
+    trials = check_number("trials", trials, 1, 1_000_000)
+    seed = check_number("seed", seed, 0, 2**53 - 1)
     if config is not None:
         check_config(config)
     task = prepare(world, None, "conservative" if config is None else config, {})

@@ -192,10 +192,13 @@ def load_policy(path: str | Path) -> Policy:
         >>> pt.load_policy(file)
         <Policy unsafe-exploration, level island, stage 1>
     """
-    parameters, about = read_policy(path_of("path", path))
+    path = path_of("path", path)
+    parameters, about = read_policy(path)
     try:
         config = Config.model_validate(about["config"])
         own = {name: about[name] for name in ("stage", "trial", "seed")}
-        return Policy(world_from(about, config), config, parameters, **own, about=about)
+        return Policy(world_from(path, about, config), config, parameters, **own, about=about)
+    except FormatError:
+        raise
     except (KeyError, TypeError, ValueError) as error:
-        raise FormatError(f"{path} is damaged: {error}.") from None
+        raise FormatError(f"{path} is damaged: {str(error).rstrip('.')}.") from None

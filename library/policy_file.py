@@ -16,6 +16,8 @@ from torch import Tensor
 
 from parenting.agent.config import Config
 from parenting.envs import registry
+from parenting.envs.installed import BrokenPackageError
+from parenting.envs.names import UnknownNameError
 from parenting.library.worlds import World
 from parenting.weights import policy_file
 from parenting.weights.policy_file import FORMAT, PolicyFileError, check_header
@@ -47,10 +49,24 @@ def about_world(world: World) -> dict[str, Any]:
     }
 
 
-def world_from(about: dict[str, Any], config: Config) -> World:
-    """Make the world that `about_world` described."""
-    levels = [registry.level(about["world"], text) for text in about["levels"]]
-    return registry.make(about["world"], levels, time_limit=config.max_episode_steps, **about["options"])
+def world_from(path: Path, about: dict[str, Any], config: Config) -> World:
+    """Make the world that `about_world` described in a file or folder.
+
+    Raises:
+        FormatError: this process does not know the world, or its package cannot be used.
+    """
+    name, levels = about["world"], about["levels"]
+    try:
+        registry.spec(name, levels[0] if levels else None)
+    except BrokenPackageError as error:
+        raise FormatError(f"{path} cannot be read: {error}") from None
+    except UnknownNameError:
+        raise FormatError(
+            f"{path} was trained in the world '{name}', which this process does not know. Import the module"
+            " that registers it (pt.register), or install its package."
+        ) from None
+    made = [registry.level(name, text) for text in levels]
+    return registry.make(name, made, time_limit=config.max_episode_steps, **about["options"])
 
 
 def write_tensors(path: Path, tensors: dict[str, Tensor], kind: str, about: dict[str, Any]) -> None:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import torch
 
 from parenting.agent.config import Config
+from parenting.library.answer_log import COLUMNS, EVENT_COLUMNS
 from parenting.library.policy import Policy
 from parenting.library.policy_file import (
     FORMAT,
@@ -29,6 +30,8 @@ from parenting.library.worlds import World
 Record = dict[str, Any]
 
 TABLES = ("trials", "answers", "events")
+EMPTY: Mapping[str, Sequence[str]] = {"trials": (), "answers": COLUMNS, "events": EVENT_COLUMNS}
+"""The columns of tables without a row, since pandas refuses a file without any."""
 ABOUT, POLICIES = "result.json", "policies.safetensors"
 READERS: Mapping[str, Callable[[str], Any]] = {
     "bool": lambda text: text == "true",
@@ -92,7 +95,7 @@ def read(folder: Path) -> Fields:
     except FormatError:
         raise
     except (KeyError, OSError, TypeError, ValueError) as error:
-        raise FormatError(f"{folder} is damaged: {error}.") from None
+        raise FormatError(f"{folder} is damaged: {str(error).rstrip('.')}.") from None
 
 
 def _fill(folder: Path, result: Fields, mean: Mapping[str, float | None]) -> None:
@@ -109,14 +112,14 @@ def _fill(folder: Path, result: Fields, mean: Mapping[str, float | None]) -> Non
     }
     (folder / ABOUT).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
     for name in TABLES:
-        (folder / f"{name}.csv").write_text(_csv(getattr(result, name)), encoding="utf-8")
+        (folder / f"{name}.csv").write_text(_csv(getattr(result, name), EMPTY[name]), encoding="utf-8")
     parameters = torch.stack([policy.parameters for policy in result.policies])
     write_tensors(folder / POLICIES, {"parameters": parameters}, "policies", about_world(result.world))
 
 
 def _read(folder: Path, about: dict[str, Any]) -> Fields:
     config = Config.model_validate(about["config"])
-    world = world_from(about, config)
+    world = world_from(folder, about, config)
     tables = {name: _rows(folder / f"{name}.csv", about["columns"][name]) for name in TABLES}
     parameters = read_tensors(folder / POLICIES, "policies")[0]["parameters"]
     policies = [
@@ -137,9 +140,9 @@ def _types(records: Sequence[Record]) -> dict[str, str]:
     return found
 
 
-def _csv(records: Sequence[Record]) -> str:
+def _csv(records: Sequence[Record], empty: Sequence[str]) -> str:
     out = io.StringIO()
-    columns = list(_types(records))
+    columns = list(_types(records) or empty)
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows([_cell(record.get(name)) for name in columns] for record in records)

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
 from pydantic import ValidationError
 from torch import Tensor
 
@@ -80,6 +81,7 @@ def prepare(
 
 def compose_config(world: WorldSpec, preset: str | Config, changes: Mapping[str, object]) -> Config:
     """Return the config of a run in a world, with a sentence for everything that is wrong."""
+    changes = {name: one.item() if isinstance(one, np.generic) else one for name, one in changes.items()}
     for name in changes:
         if name not in Config.model_fields:
             hint, known = did_you_mean(name, Config.model_fields), ", ".join(Config.model_fields)

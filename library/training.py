@@ -97,9 +97,9 @@ def train(
     """
     task = prepare(world, level, preset, changes, origin_of(from_policy, from_answers))
     rule = stop_rule(task.world, until)
-    check_number("trials", trials, 1, 1_000_000)
-    check_number("seed", seed, 0, 2**53 - 1)
-    check_number("max_ticks", max_ticks, 1, 10**9)
+    trials = check_number("trials", trials, 1, 1_000_000)
+    seed = check_number("seed", seed, 0, 2**53 - 1)
+    max_ticks = check_number("max_ticks", max_ticks, 1, 10**9)
     check_callback(callback)
     check_progress(progress)
     tracking = Tracking(feeds_of(trackers))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from parenting.envs import registry
+from parenting.envs import gym_ids, registry
 from parenting.envs.gridworld import Gridworld as World
 from parenting.envs.level_bytes import decode, name_by_file
 from parenting.envs.levels.spec import Level, LevelError, WorldSpec
@@ -79,7 +80,7 @@ def make(
     name, found = named(world, level)
     _check_options(registry.spec(name, found), options)
     if max_episode_steps is not None:
-        check_number("max_episode_steps", max_episode_steps, 1, 10**9)
+        max_episode_steps = check_number("max_episode_steps", max_episode_steps, 1, 10**9)
     if device is not None:
         check_device(device)
     return registry.make(name, found, device=device, time_limit=max_episode_steps, **options)
@@ -88,7 +89,9 @@ def make(
 def register(spec: WorldSpec) -> None:
     """Make a world of your own known by its name, to `make`, `train` and all else in this process.
 
-    docs/python.md has a small one from its first line to a trained agent.
+    It takes the place of an earlier one of its name whose rules stand under the same "module:class", as
+    after `importlib.reload` or in a notebook's cell that runs again. docs/python.md has a small one from its
+    first line to a trained agent.
 
     Args:
         spec: What the world is; `spec.rules` names the class of its rules, as "module:class".
@@ -103,14 +106,21 @@ def register(spec: WorldSpec) -> None:
     """
     if not isinstance(spec, WorldSpec):
         raise TypeError(f"spec: {spec!r} is not a WorldSpec. Give pt.WorldSpec(name=..., rules=..., ...).")
-    if registry.WORLDS.setdefault(spec.name, spec) is not spec:
+    before = registry.WORLDS.get(spec.name, spec)
+    if before is not spec and (spec.name in registry.BUILT_IN or before.rules != spec.rules):
         raise ValueError(f"spec: there is another world '{spec.name}' already. Choose another name.")
+    registry.WORLDS[spec.name] = spec
     for name in spec.levels:
         try:
             registry.level(spec.name, name)
         except LevelError:
             del registry.WORLDS[spec.name]
+            if before is not spec:
+                registry.WORLDS[spec.name] = before
             raise
+    gymnasium = sys.modules.get("gymnasium")
+    if gymnasium is not None:
+        gym_ids.register(gymnasium, spec.name)
 
 
 def of_table(world: TableWorld, level: object) -> str:

@@ -11,6 +11,7 @@ from sqlalchemy import select
 
 from parenting.server.damage import damage
 from parenting.server.db import Database
+from parenting.server.origins import ROLLED_BACK
 from parenting.server.reads.metrics import latest_metrics
 from parenting.server.statuses import OVER
 from parenting.server.tables import Run
@@ -117,10 +118,19 @@ def settings(run: Run) -> dict[str, Any]:
         "level": run.level,
         "level's text": run.level_text,
         "parent": run.script or run.parent,
-        "began with": run.origin,
+        "began with": began_with(run.origin or {}),
         "weights": run.weights and run.weights[:SHORT],
         **run.config,
     }
+
+
+def began_with(origin: Mapping[str, Any]) -> str | None:
+    """Name what a run began with; None: nothing earlier. The database it was imported from is no part."""
+    parts = [f"{name} {origin[name]['sha256'][:SHORT]}" for name in ("policy", "answers") if name in origin]
+    if ROLLED_BACK in origin:
+        source = origin[ROLLED_BACK]
+        parts.append(f"run {source['number']} ({source['run']}) up to tick {source['tick']}")
+    return "; ".join(parts) or None
 
 
 def differences(groups: Sequence[Group]) -> list[tuple[str, list[Any]]]:

@@ -64,7 +64,7 @@ def test_without_a_database_nothing_is_trained(
     monkeypatch.setenv("PARENTING_DATA", str(tmp_path_factory.mktemp("none")))
     said = run("unsafe-exploration", "--store")
     assert (said.exit_code, said.stdout) == (2, "")
-    assert re.search("There is no database at .*parenting up", said.stderr, re.DOTALL)
+    assert re.search("There is no database at .*parenting migrate, or parenting up", said.stderr, re.DOTALL)
 
 
 def test_a_name_needs_runs_to_be_named() -> None:

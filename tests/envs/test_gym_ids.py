@@ -41,6 +41,23 @@ def test_ids_are_registered_once_and_load_nothing() -> None:
     assert run(script) == "5 False"
 
 
+@pytest.mark.parametrize("order", [["adapter", "mine"], ["mine", "adapter"]])
+def test_a_world_of_ones_own_has_an_id_whatever_comes_first(order: list[str]) -> None:
+    steps = {
+        "adapter": "import gymnasium, parenting.envs.gym",
+        "mine": (
+            "from dataclasses import replace\nimport parenting as pt\n"
+            "from parenting.envs.unsafe_exploration import UnsafeExploration\n"
+            "class Mine(UnsafeExploration):\n"
+            "    spec = replace(UnsafeExploration.spec, name='my-world', rules='__main__:Mine')\n"
+            "for name in ('my-world', 'no id'):\n"
+            "    pt.register(replace(Mine.spec, name=name))"
+        ),
+    }
+    made = "env = gymnasium.make('parenting/MyWorld-v0'); env.reset(seed=0); print(env.step(1)[1])"
+    assert run("\n".join([*(steps[one] for one in order), made])) == "-1.0"
+
+
 @pytest.mark.faults
 def test_many_processes() -> None:
     """Each spawned process finds the worlds by the module. Three processes load torch."""

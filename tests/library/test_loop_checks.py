@@ -73,6 +73,7 @@ def test_other_types_are_named_with_what_makes_the_right_one(
     others: list[tuple[Any, str]] = [
         ("scripted", "'scripted' is not a parent.*pt.ScriptedParent"),
         (pt.ScriptedParent, r"is a class.*Call it: parent=pt.ScriptedParent\(\)"),
+        (type("Slow", (pt.ScriptedParent,), {}), r"is a class.*Call it: parent=Slow\(\)"),
     ]
     for parent, remedy in others:
         with pytest.raises(ValueError, match=remedy):

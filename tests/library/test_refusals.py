@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 import parenting as pt
 
@@ -33,6 +35,25 @@ CALLS: list[tuple[Any, str]] = [
 def test_a_wrong_argument_is_told_in_a_sentence(call: Any, words: str) -> None:
     with pytest.raises((TypeError, ValueError), match=words):
         call()
+
+
+def test_numbers_of_numpy_are_numbers(tmp_path: Path) -> None:
+    given: Any = {"seed": np.int64(3), "trials": np.uint8(2), "max_ticks": np.int32(2)}
+    changes: Any = {"gradient_steps": np.int64(2), "p_guid": np.float32(0.5), "reuse_answers": np.bool_(True)}
+    two: Any = np.int16(2)
+    result = pt.train(WORLD, until="ticks:2", progress=False, **given, **changes)
+    assert (type(result.seed), len(result.trials), result.config.gradient_steps) == (int, 2, 2)
+    assert pt.load_result(result.save(tmp_path / "result")).config == result.config
+    assert pt.evaluate(result.policies[0], episodes=two).episodes == 2
+    assert pt.init(WORLD, trials=two, seed=two).waiting.shape == (2,)
+
+
+@pytest.mark.parametrize(
+    "wrong", [True, np.bool_(True), np.float64(3), np.int64(-1), torch.tensor([1, 2]), "3"]
+)
+def test_what_is_no_whole_number_is_refused(wrong: Any) -> None:
+    with pytest.raises(ValueError, match=r"seed: .* is not a whole number from 0"):
+        pt.train(WORLD, seed=wrong, progress=False)
 
 
 def test_a_result_is_not_a_policy_and_the_message_says_where_its_policies_are(

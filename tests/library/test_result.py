@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import torch
 
 import parenting as pt
+from parenting.envs import registry
 from parenting.library import result_folder
 
 
@@ -36,6 +38,29 @@ def test_people_can_read_it(trained: pt.TrainResult, tmp_path: Path) -> None:
     with (folder / "trials.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["guidance"]) for row in rows] == [row["guidance"] for row in trained.trials]
+
+
+def test_tables_without_a_row_have_their_columns(trained: pt.TrainResult, tmp_path: Path) -> None:
+    """Pandas refuses a file without columns."""
+    folder = replace(trained, answers=[], events=[]).save(tmp_path / "result")
+    assert (folder / "events.csv").read_text() == "tick,kind,name,value\n"
+    assert (folder / "answers.csv").read_text().startswith("trial,asked,answered,kind,")
+    assert pt.load_result(folder).answers == []
+
+
+def test_a_result_of_an_unknown_world_is_not_damaged(
+    trained: pt.TrainResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = trained.save(tmp_path / "result")
+    file = trained.policies[0].save(tmp_path / "policy")
+    monkeypatch.delitem(registry.WORLDS, "unsafe-exploration")
+    for load, path in ((pt.load_result, folder), (pt.load_policy, file)):
+        with pytest.raises(pt.FormatError) as found:
+            load(path)
+        assert str(found.value) == (
+            f"{path} was trained in the world 'unsafe-exploration', which this process does not know."
+            " Import the module that registers it (pt.register), or install its package."
+        )
 
 
 def test_a_folder_is_not_written_over_unless_told(trained: pt.TrainResult, tmp_path: Path) -> None:

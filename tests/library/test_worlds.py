@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
+import sys
 from typing import Any
 
 import gymnasium
@@ -96,3 +97,25 @@ def test_the_name_of_a_level_obeys_the_rule_of_the_pages(tmp_path: pathlib.Path,
             pt.make("unsafe-exploration", level)
     with pytest.raises(pt.LevelError, match=r"name of the level|control character"):
         pt.make(text)
+
+
+def mine(**changes: Any) -> pt.WorldSpec:
+    return dataclasses.replace(registry.spec(WORLD), **{"name": "mine", "rules": "mine:Mine", **changes})
+
+
+def test_a_world_that_is_registered_again_takes_the_place_of_the_earlier(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As after importlib.reload, or where a cell of a notebook runs again."""
+    monkeypatch.setattr(registry, "WORLDS", dict(registry.WORLDS))
+    monkeypatch.delitem(sys.modules, "gymnasium")
+    first, again = mine(), mine(title="Again")
+    for spec in (first, again, again):
+        pt.register(spec)
+        assert registry.WORLDS["mine"] is spec
+    with pytest.raises(pt.LevelError):
+        pt.register(mine(levels={"bad": "world: mine\n\nx"}))
+    for other in (mine(rules="other:Mine"), dataclasses.replace(registry.spec(WORLD))):
+        with pytest.raises(ValueError, match="there is another world"):
+            pt.register(other)
+    assert (registry.WORLDS["mine"], WORLD in registry.WORLDS) == (again, True)

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from parenting.envs import registry
 from parenting.server import jobs
+from parenting.server.archive.importing import import_export
+from parenting.server.archive.target import target
+from parenting.server.archive.writing import write_export
 from parenting.server.batches import EndedTrial, store_batch
 from parenting.server.db import Database
 from parenting.server.errors import Conflict, NotFound, SetupError
 from parenting.server.migrate import downgrade
 from parenting.server.new_run import NewRun, plan, start
 from parenting.server.policies import present_policy
-from parenting.server.reads.comparison import found_runs, grouped
+from parenting.server.reads.comparison import began_with, found_runs, grouped
 from parenting.server.reads.curves import read_curves
 from parenting.server.reads.schemas import run_schema
 from parenting.server.replay import relive
@@ -64,6 +68,35 @@ def test_they_are_compared_beside_a_run_of_a_worker(db: Database, batch: list[in
     assert deaths.value == 1.0
     assert read_curves(db, batch[1], ["deaths"], "minute").curves["deaths"] == ([0.0, 1.5], [0.0, 1.0])
     assert read_curves(db, batch[1], ["deaths"], "question").curves["deaths"][0] == [5.0, 5.0]
+
+
+def test_they_are_the_same_after_an_export_and_an_import(
+    db: Database, batch: list[int], tmp_path: Path
+) -> None:
+    with target(tmp_path / "out") as files:
+        write_export(db, batch, files)
+    (one, *_) = (get_run(db, imported.number) for imported in import_export(db, tmp_path / "out"))
+    before = get_run(db, batch[0])
+    assert [(run.batch, run.trial, run.answers) for run in (one, before)] == [
+        (before.batch, 0, before.answers)
+    ] * 2
+    (group,) = grouped(db, [before, one])
+    assert len(group.runs) == 2, "where a run was imported from is no setting"
+
+
+@pytest.mark.parametrize(
+    ("origin", "words"),
+    [
+        ({"imported": {"run": "x", "number": 1}}, None),
+        (
+            {"policy": {"sha256": "a" * 64}, "answers": {"sha256": "b" * 64}},
+            f"policy {'a' * 12}; answers {'b' * 12}",
+        ),
+        ({"rolled_back": {"run": "x", "number": 3, "tick": 9}, "imported": {}}, "run 3 (x) up to tick 9"),
+    ],
+)
+def test_a_beginning_is_told_in_words(origin: dict[str, Any], words: str | None) -> None:
+    assert began_with(origin) == words
 
 
 @pytest.mark.parametrize(
