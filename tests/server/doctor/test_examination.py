@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
@@ -28,14 +27,7 @@ from parenting.server.workers import sign
 from parenting.weights.store import SHIPPED, SUFFIX, digest
 from tests.database import migrated
 from tests.server.conftest import CLIPS
-
-
-@pytest.fixture
-def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Settings:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PARENTING_DATA", str(tmp_path / "data"))
-    monkeypatch.delenv("PARENTING_DATABASE_URL", raising=False)
-    return Settings(data=tmp_path / "data", database_url=None)
+from tests.server.doctor.examined import examined, states
 
 
 @pytest.fixture
@@ -46,18 +38,6 @@ def db(settings: Settings) -> Iterator[Database]:
     sign(database, "worker")
     yield database
     database.close()
-
-
-def examined(*arguments: str) -> tuple[int, dict[str, dict[str, str]]]:
-    """The exit code, and each finding by its name."""
-    done = CliRunner().invoke(app, ["doctor", "--json", *arguments])
-    assert isinstance(done.exception, SystemExit | None), done.exception
-    return done.exit_code, {row["name"]: row for row in json.loads(done.stdout)}
-
-
-def states(found: dict[str, dict[str, str]]) -> dict[str, str]:
-    """Those that are not in order."""
-    return {name: row["state"] for name, row in found.items() if row["state"] != "ok"}
 
 
 def snapshot(folder: Path) -> dict[str, bytes]:
@@ -262,39 +242,6 @@ def test_no_folder_is_given_to_whom_it_belongs_already(
 def test_a_misspelt_setting_is_told(settings: Settings, db: Database) -> None:
     Path(".env").write_text("PARENTNG_DATA=elsewhere\n", encoding="utf-8")
     assert "Did you mean PARENTING_DATA?" in examined()[1]["settings"]["said"]
-
-
-@pytest.mark.parametrize(
-    ("line", "mode", "told"),
-    [
-        ("PARENTING_DATABASE_URL=sqlite:///x.db", 0o644, False),
-        ("PARENTING_DATABASE_URL=postgresql://me:pa55@127.0.0.1:1/x", 0o600, False),
-        ("PARENTING_DATABASE_URL=postgresql://me:pa55@127.0.0.1:1/x", 0o640, True),
-        ("PARENTING_DATABASE_URL=postgresql://127.0.0.1:1/x?password=pa55", 0o604, True),
-        ("PARENTING_TOKEN=pa55", 0o644, True),
-    ],
-)
-def test_a_file_with_a_password_is_its_owners_alone(
-    settings: Settings, line: str, mode: int, told: bool
-) -> None:
-    file = Path(".env").absolute()
-    file.write_text(f"{line}\n", encoding="utf-8")
-    file.chmod(mode)
-    found = list(machine.settings_file())
-    assert [one.remedy for one in found if one.state == "warning"] == [f"chmod 600 {file}"] * told
-    assert "pa55" not in str(found)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("PORT", "x"), ("DATABASE_URL", "nothing"), ("DATABASE_URL", "a://b:c/d")]
-)
-def test_a_wrong_setting_is_a_finding(
-    settings: Settings, monkeypatch: pytest.MonkeyPatch, name: str, value: str
-) -> None:
-    monkeypatch.setenv(f"PARENTING_{name}", value)
-    code, found = examined()
-    assert (code, states(found)) == (2, {"settings": "error"})
-    assert found["settings"]["said"].startswith(f"PARENTING_{name}: ")
 
 
 def test_a_table_that_is_gone_costs_its_own_line(settings: Settings, db: Database) -> None:
