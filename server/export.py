@@ -1,8 +1,8 @@
 """The answers of a run as JSON lines: the question, the choice, who answered and when, and the policy.
 
 Each answer and each skip is a line, with the same keys in every line, so that other programs read the file as
-a table (for example `datasets.load_dataset("json", data_files="run-1.jsonl")`). A superseded answer keeps its
-own line.
+a table (for example `datasets.load_dataset("json", data_files="run-1.jsonl")`); only damaged and erased lines
+have a key more. A superseded answer keeps its own line.
 """
 
 from __future__ import annotations
@@ -113,6 +113,8 @@ def _row(db: Database, database: str, run: Run, answered: Answered) -> dict[str,
         "votes": sound(query, "votes"),  # heard before on the same pair: above 0, it was asked again
         "script": sound(run, "script"),  # the errors of a scripted parent; null: people answer
     }
+    if sound(answer, "erased") is not None:  # its person's data were deleted; other rows have no such key
+        row["erased"] = True
     return row if found is None else {**row, "damaged": found}
 
 

@@ -125,7 +125,7 @@ def settings(run: Run) -> dict[str, Any]:
 
 
 def began_with(origin: Mapping[str, Any]) -> str | None:
-    """Name what a run began with; None: nothing earlier. The database it was imported from is not a part."""
+    """Name what a run began with; None: nothing earlier. From which database it came does not count."""
     parts = [f"{name} {origin[name]['sha256'][:SHORT]}" for name in ("policy", "answers") if name in origin]
     if ROLLED_BACK in origin:
         source = origin[ROLLED_BACK]

@@ -7,10 +7,12 @@ import torch
 
 from parenting.agent.query import Answer, empty
 from parenting.server import tables
+from parenting.server.archive.format1 import Line
 from parenting.server.codec import CHOICES
 from parenting.server.db import Database
 from parenting.server.errors import NotFound
 from parenting.server.export import MU, lines, rows
+from parenting.server.exports import Format, exported
 from parenting.server.identity import database_id
 from parenting.server.queue.answers import answer, get_query
 from parenting.server.queue.revisions import supersede
@@ -97,6 +99,18 @@ def test_a_line_a_row_with_the_same_keys(db: Database, run_id: int) -> None:
     assert len({tuple(row) for row in read}) == 1
     assert len({len(row["received"]) for row in read}) == 1
     assert all(line.endswith("\n") and line.count("\n") == 1 for line in lines(db, run_id))
+
+
+def test_only_an_erased_answer_is_marked_so_and_readers_take_it(db: Database, run_id: int) -> None:
+    with db.write() as session:
+        first = session.get_one(tables.Answer, 1)
+        first.erased, first.choice = db.clock(), tables.SKIP
+    told = list(rows(db, run_id))
+    assert [row.get("erased") for row in told] == [True, *[None] * (len(told) - 1)]
+    assert set(told[0]) - set(told[1]) == {"erased"}
+    assert Line.model_validate(told[0]).choice == "skip"
+    header = next(exported(db, run_id, form=Format.CSV))
+    assert "erased" in header
 
 
 def test_unknown_run_is_refused_before_the_first_row(db: Database) -> None:
