@@ -81,7 +81,7 @@ def test_they_are_the_same_after_an_export_and_an_import(
         (before.batch, 0, before.answers)
     ] * 2
     (group,) = grouped(db, [before, one])
-    assert len(group.runs) == 2, "where a run was imported from is not a setting"
+    assert len(group.runs) == 2, "where a run was imported from does not count"
 
 
 @pytest.mark.parametrize(
