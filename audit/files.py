@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import IO, Any
 from zipfile import BadZipFile, ZipFile
 
+MANIFEST = "manifest.json"
 PIECE = 2**20
 BROKEN = (BadZipFile, EOFError, KeyError, OSError, RuntimeError, ValueError, zlib.error)
 
@@ -27,7 +28,7 @@ class Files:
             ValueError: there is none.
         """
         self._zip: ZipFile | None = None
-        self._folder = path
+        self._folder, self._named = path, set[str]()
         if not path.is_dir():
             try:
                 self._zip = ZipFile(path)
@@ -40,7 +41,13 @@ class Files:
             self._zip.close()
 
     def open(self, name: str) -> IO[bytes]:
-        """Open a file by its name in the manifest."""
+        """Open the manifest, or a file that it names.
+
+        Raises:
+            ValueError: it does not name this one, so there is no hash of it.
+        """
+        if name != MANIFEST and name not in self._named:
+            raise ValueError(f"{name} is not named in the manifest")
         if self._zip is not None:
             return self._zip.open(name)
         file = (self._folder / name).resolve()
@@ -55,7 +62,7 @@ class Files:
             ValueError: it is missing, or not of an export of format 2.
         """
         try:
-            with self.open("manifest.json") as file:
+            with self.open(MANIFEST) as file:
                 found = json.load(file)
         except BROKEN:
             raise ValueError("manifest.json is missing or cannot be read") from None
@@ -64,6 +71,7 @@ class Files:
             2,
         ):
             raise ValueError("it is not an export of Parenting of format 2")
+        self._named = set(found["files"])
         return found
 
     def digest(self, name: str) -> tuple[str, int]:

@@ -12,11 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from parenting.audit.checks import chain_holds, counts_agree, metrics_follow, rows_agree
-from parenting.audit.files import BROKEN, Files, unpacked_lines
+from parenting.audit.files import BROKEN, MANIFEST, Files, unpacked_lines
 from parenting.audit.findings import Findings
 from parenting.audit.store import load
-
-MANIFEST = "manifest.json"
 
 
 @dataclass

@@ -240,6 +240,16 @@ def test_a_file_is_held_against_its_hash(tmp_path: Path, name: str, how: str) ->
     assert any(one.startswith(name) for one in found.problems), found
 
 
+@pytest.mark.parametrize("name", ["answers.jsonl", "questions.jsonl", "metrics.csv", "events.csv"])
+def test_a_table_that_the_manifest_does_not_name_is_not_read(tmp_path: Path, name: str) -> None:
+    write(tmp_path, sound())
+    manifest = tmp_path / "manifest.json"
+    told = json.loads(manifest.read_text())
+    del told["files"][name]
+    manifest.write_text(json.dumps(told))
+    assert any(f"{name} is not named in the manifest" in one for one in audit(tmp_path).problems)
+
+
 def test_where_every_row_is_wrong_a_few_sentences_say_so(tmp_path: Path) -> None:
     whole = sound()
     whole["csv"] = table(whole["answers"]).replace("guidance", "preference")

@@ -21,10 +21,20 @@ from parenting.server.errors import SetupError
 from parenting.server.notes import AGENT_KINDS
 from parenting.weights.answers_file import MOST_BYTES
 
-Tick = Annotated[int, Field(ge=0, le=2**53)]
-Time = Annotated[
-    datetime, AfterValidator(lambda time: time.replace(tzinfo=time.tzinfo or UTC).astimezone(UTC))
-]
+MOST = 10**9
+"""The largest number of ticks, as of a training, and of what is counted."""
+
+
+def _in_utc(time: datetime) -> datetime:
+    try:
+        return time.replace(tzinfo=time.tzinfo or UTC).astimezone(UTC)
+    except OverflowError:
+        raise ValueError("there is no such time in UTC") from None
+
+
+Tick = Annotated[int, Field(ge=0, le=MOST)]
+Count = Annotated[int, Field(ge=0, le=MOST)]
+Time = Annotated[datetime, AfterValidator(_in_utc)]
 EVENT: TypeAdapter[Event] = TypeAdapter(Event)
 
 
@@ -60,7 +70,7 @@ class Line(_Read):
     standing: bool
     supersedes: int | None
     leased: Time | None = None
-    replays: int | None = None
+    replays: Count | None = None
     script: str | None = None
     guidance_layout: str = "one"
     practice: str = "offered"

@@ -32,6 +32,7 @@ from parenting.server.damage import damage
 from parenting.server.db import Database
 from parenting.server.errors import SetupError
 from parenting.server.identity import unused_number
+from parenting.server.new_run import NewRun
 from parenting.server.origins import IMPORTED
 from parenting.server.public_ids import is_public_id, public_id
 from parenting.server.rollback import SETTINGS
@@ -78,6 +79,7 @@ def import_export(
         found.verify(checked)
         for entry in found.manifest.runs:
             _require_world(path, entry)
+            _require_settings(path, entry)
         try:
             with db.write() as session:
                 return _put(session, db, found, progress, most)
@@ -143,6 +145,19 @@ def _require_world(path: Path, entry: RunEntry) -> None:
         registry.level(world, text)
     except LevelError as error:
         raise SetupError(f"{path}: run {entry.number}: its level cannot be read: {error}") from None
+
+
+def _require_settings(path: Path, entry: RunEntry) -> None:
+    """Hold what a worker would stumble over to the rules of a new run."""
+    told = {name: entry.settings.get(name) for name in ("world", "seed", "goal", "pace", "script", "finish")}
+    try:
+        NewRun.model_validate(told)
+    except ValidationError as error:
+        wrong = error.errors(include_url=False)[0]
+        field = ".".join(map(str, wrong["loc"]))
+        raise SetupError(
+            f"{path}: run {entry.number}: {field}: {wrong['input']!r}: {wrong['msg']}. Nothing was imported."
+        ) from None
 
 
 def _time(text: str) -> datetime:

@@ -88,8 +88,11 @@ class Source:
         """Yield the rows of a table.
 
         Raises:
-            SetupError: one is not as its columns say, or was damaged in the database that it is of.
+            SetupError: the manifest does not name it, or a row is not as its columns say, or was damaged in
+                the database that it is of.
         """
+        if name not in self.manifest.files:
+            raise SetupError(f"{self._path}: {name} is not in the manifest, so there is no hash of it.")
         with self.open(name) as file:
             read: Iterable[str | bytes] = _csv_lines(file, columns) if name.endswith(".csv") else file
             try:
@@ -101,7 +104,7 @@ class Source:
                             f"{row.damaged}. Nothing was imported."
                         )
                     yield row
-            except (ValidationError, ValueError, TypeError, RecursionError) as error:
+            except (ValidationError, ValueError, TypeError, RecursionError, csv.Error) as error:
                 raise SetupError(f"{self._path}: {name}: a row cannot be read: {_said(error)}.") from None
 
     def _read_manifest(self, blob: bytes) -> Manifest:
@@ -109,11 +112,14 @@ class Source:
             found = json.loads(blob) if len(blob) <= LARGEST_MANIFEST else None
             if not isinstance(found, dict) or found.get("format") != "parenting-export":
                 raise SetupError(f"{self._path} is not an export of Parenting of format 2.")
-            if found.get("version") != 2:
+            version = found.get("version")
+            if isinstance(version, int) and version > 2:
                 raise SetupError(
-                    f"{self._path} is an export of format {found.get('version')}, which is newer than this "
-                    "version of Parenting. Install a newer one."
+                    f"{self._path} is an export of format {version}, which is newer than this version of "
+                    "Parenting. Install a newer one."
                 )
+            if version != 2:
+                raise SetupError(f"{self._path}: {MANIFEST}: version: {version!r} is not 2.")
             return Manifest.model_validate(found)
         except (ValueError, RecursionError) as error:
             raise SetupError(f"{self._path}: {MANIFEST} cannot be read: {_said(error)}.") from None

@@ -159,6 +159,14 @@ def settings(folder: Path, **values: Any) -> None:
     (folder / "manifest.json").write_text(json.dumps(told))
 
 
+def unnamed(folder: Path, name: str) -> None:
+    """Change a file of which the manifest says nothing."""
+    told = json.loads((folder / "manifest.json").read_bytes())
+    del told["files"][name]
+    (folder / "manifest.json").write_text(json.dumps(told))
+    (folder / name).write_bytes((folder / name).read_bytes() + b"\n")
+
+
 DAMAGES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "a file is missing": (lambda f: (f / "events.csv").unlink(), "events.csv is missing"),
     "a file was changed": (lambda f: (f / "answers.csv").write_text("x"), "answers.csv is not the file"),
@@ -184,6 +192,17 @@ DAMAGES: dict[str, tuple[Callable[[Path], Any], str]] = {
         lambda f: change(f, "questions.jsonl", lambda b: b.replace(b'"run":"', b'"run":"x', 1)),
         "which the manifest does not name",
     ),
+    "a file that is not named": (lambda f: unnamed(f, "metrics.csv"), "metrics.csv is not in the manifest"),
+    "a cell without an end": (
+        lambda f: change(f, "events.csv", lambda b: b + b"x" * 200_000),
+        "events.csv: a row cannot be read",
+    ),
+    "another version": (
+        lambda f: (f / "manifest.json").write_text('{"format": "parenting-export", "version": "2"}'),
+        "version: '2' is not 2",
+    ),
+    "a seed of no run": (lambda f: settings(f, seed=-1), "run 1: seed: -1"),
+    "a script of no parent": (lambda f: settings(f, script="os.system"), "run 1: script: 'os.system'"),
     "a word for a number": (
         lambda f: change(f, "answers.jsonl", lambda b: b.replace(b'"tick":1,', b'"tick":"one",', 1)),
         "answers.jsonl: a row cannot be read",

@@ -152,6 +152,12 @@ DAMAGES: dict[str, tuple[Callable[[list[dict[str, Any]]], Any], str]] = {
     "a board of another size": (lambda rows: rows[3]["left"]["frames"].append({}), "do not fit"),
     "damaged there": (lambda rows: rows[3].update(damaged="choice"), "was damaged in its database: choice"),
     "no answers": (lambda rows: rows.clear(), "has no answers"),
+    "a time beyond all": (
+        lambda rows: rows[3].update(received="9999-12-31T23:59:59-14:00"),
+        "line 4: received: Value error, there is no such time in UTC",
+    ),
+    "replays beyond all": (lambda rows: rows[3].update(replays=2**70), "line 4: replays"),
+    "a tick beyond all": (lambda rows: rows[-1].update(tick=2**53), "tick"),
     "a word for a number": (lambda rows: rows[3].update(tick="one"), "line 4: tick"),
 }
 
