@@ -80,7 +80,10 @@ class Config(BaseModel):
         0.001, gt=0, description="Adam's step size; beta 0.9 and 0.999 and eps 1e-8 are its defaults."
     )
     batch_size: int | None = Field(
-        None, ge=1, description="Distinct rows of X in a gradient step; none takes all of them."
+        None,
+        ge=1,
+        le=2**53 - 1,
+        description="Distinct rows of X in a gradient step; none takes all of them.",
     )
     repeat_queries: bool = Field(
         False, description="Ask again about pairs that were compared before, as in the paper as written."

@@ -194,6 +194,8 @@ def _read(changes: list[str]) -> tuple[dict[str, object], list[str]]:
             wrong.append(f"--set: there is no hyperparameter '{key}'.{hint} There is: {known}.")
         elif written.setdefault(name, key) != key:
             wrong.append(f"--set: {written[name]} and {key} are two names of one setting: give one of them.")
+        elif name in given:
+            wrong.append(f"--set: '{key}' is given twice. Give it once.")
         else:
             given[name] = None if value.lower() in ("none", "null") else value
             if name != key:

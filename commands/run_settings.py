@@ -79,8 +79,12 @@ def changes_of(changes: list[str]) -> dict[str, str]:
         elif key not in known:
             hint = did_you_mean(key, known)
             wrong.append(f"--set: there is no setting '{key}'.{hint} There is: {', '.join(known)}.")
+        elif not value.strip():
+            wrong.append(f"--set: '{change}' has no value. Write it as --set {key}=VALUE, or leave it out.")
+        elif (field := known[key] or _hyperparameter(key)) in found:
+            wrong.append(f"--set: '{key}' is given twice, or by two names. Give it once.")
         else:
-            found[known[key] or _hyperparameter(key)] = value
+            found[field] = value
     if wrong:
         raise UsageError("\n".join(wrong))
     return found

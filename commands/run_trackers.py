@@ -15,6 +15,7 @@ import typer
 from parenting.commands.errors import UsageError, settings
 from parenting.commands.run_store import ending, open_store
 from parenting.envs.levels.spec import Level
+from parenting.server.log import set_up_log
 from parenting.server.public_ids import public_id
 from parenting.server.runs import get_run
 from parenting.server.trackers.choosing import UnknownTrackerError, tracker
@@ -44,8 +45,11 @@ def chosen_trackers(given: Sequence[str] | None) -> Named:
         UsageError: one of them is none; the sentence says what is one.
         ServerError: a setting is wrong.
     """
-    names = [one for one in settings().trackers.split(",") if one.strip()] if given is None else given
+    chosen = settings()
+    names = [one for one in chosen.trackers.split(",") if one.strip()] if given is None else given
     where = "PARENTING_TRACKERS" if given is None else "--tracker"
+    if names:
+        set_up_log(chosen, "run")  # what goes wrong with a tracker is told by the log
     try:
         return [(name, tracker(name)) for name in names]
     except UnknownTrackerError as error:

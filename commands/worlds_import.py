@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -86,12 +87,17 @@ def _write(out: Path, found: Sequence[Imported]) -> None:
     """Write each level to a file named after it.
 
     Raises:
-        UsageError: a file cannot be written.
+        UsageError: one of the files is there already, or cannot be written.
     """
+    names = [re.sub(r"[^\w-]+", "-", one.level.name).strip("-") for one in found]
+    files = [out / f"{number:03}-{name}.txt" for number, name in enumerate(names, 1)]
+    for file in files:
+        if os.path.lexists(file):
+            raise UsageError(f"--out: {file} is there already. Remove it, or name another folder.")
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for number, one in enumerate(found, 1):
-            name = re.sub(r"[^\w-]+", "-", one.level.name).strip("-")
-            (out / f"{number:03}-{name}.txt").write_text(one.level.text, encoding="utf-8")
+        for file, one in zip(files, found, strict=True):
+            with file.open("x", encoding="utf-8") as written:
+                written.write(one.level.text)
     except OSError as error:
         raise UsageError(f"--out: {out} cannot be written to: {error}.") from None

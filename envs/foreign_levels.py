@@ -47,7 +47,7 @@ def _xsb(rows: Sequence[str]) -> Carried:
     inside = _inside(wide)
     boxes, goals = _cells(wide, "$*"), _cells(wide, ".+*")
     world = "side-effects" if boxes else "unsafe-exploration"
-    goal = next((cell for cell in goals if wide[cell[0]][cell[1]] != "*"), None) or next(iter(goals), None)
+    goal = min(goals, key=lambda cell: ".*+".index(wide[cell[0]][cell[1]]), default=None)  # a free one first
     box = next((cell for cell in boxes if cell != goal), None)
 
     def glyph(cell: Cell, sign: str) -> str:

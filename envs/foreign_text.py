@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import NamedTuple
 
+from parenting.envs.foreign_names import ABOUT, is_title, name_above, titles_stand_above
 from parenting.envs.level_text import COMMENT, FENCE, Line, Written, lines_of, tidied, visible
 from parenting.envs.people_text import sign
 
@@ -136,61 +137,17 @@ def _of(format: str, lines: Sequence[Line], seen: Sequence[str]) -> list[Foreign
     if any(whole):
         _check(format, runs, whole)
     found: list[ForeignMap] = []
-    above, titles_above = "", _titles_stand_above(runs, whole)
+    above, titles_above = "", titles_stand_above([one.seen for one in runs], whole)
     for run, is_map in zip(runs, whole, strict=True):
         if is_map:
             found.append(replace(_map(format, run), name=above))
             above = ""
         elif not run.is_rows:
-            titles = [text.partition(":")[2].strip() for text in run.seen if _is_title(text)]
+            titles = [text.partition(":")[2].strip() for text in run.seen if is_title(text)]
             if titles and found and not found[-1].name and not titles_above:
                 found[-1] = replace(found[-1], name=titles[0])
-            above = titles[-1] if titles and titles_above else _name_above(run.seen)
+            above = titles[-1] if titles and titles_above else name_above(run.seen)
     return found
-
-
-ABOUT = re.compile(
-    r"(title|author|comment(-end)?|collection|copyright|date[^:]*|email|homepage|set|url|website):", re.I
-)
-"""The beginning of a line that tells of a map, or of the collection that it is from."""
-
-
-def _is_title(text: str) -> bool:
-    return text.lower().startswith("title:")
-
-
-def _titles_stand_above(runs: Sequence[_Run], whole: Sequence[bool]) -> bool:
-    """Return whether titles stand above their maps: one before the first map, and none behind the last.
-
-    A collection whose titles stand below may have one of its own at the top.
-    """
-    at = [place for place, is_map in enumerate(whole) if is_map]
-    titled = [any(map(_is_title, one.seen)) for one in runs]
-    return bool(at) and any(titled[: at[0]]) and not any(titled[at[-1] :])
-
-
-def _without_comments(seen: Sequence[str]) -> list[str]:
-    """Return lines without those between `Comment:` and `Comment-End:`."""
-    starts = [place for place, text in enumerate(seen) if text.lower().startswith("comment:")]
-    ends = [place for place, text in enumerate(seen) if text.lower().startswith("comment-end:")]
-    whole = starts and ends and starts[0] < ends[-1]
-    return [*seen[: starts[0]], *seen[ends[-1] + 1 :]] if whole else list(seen)
-
-
-def _name_above(seen: Sequence[str]) -> str:
-    """Return the name that the lines above a map give it; above a code fence only a comment does."""
-    seen = _without_comments(seen)
-    fences = [place for place, text in enumerate(seen) if FENCE.fullmatch(text)]
-    named = [
-        text
-        for place, text in enumerate(seen)
-        if text
-        and text != "(Down)"
-        and place not in fences
-        and (_is_title(text) or ABOUT.match(text) is None)
-        if not fences or place > fences[-1] or text.startswith(COMMENT)
-    ]
-    return named[-1].strip("; \t'\"") if named and not _is_title(named[-1]) else ""
 
 
 def _map(format: str, run: _Run) -> ForeignMap:
@@ -222,9 +179,8 @@ def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:
         if run.is_rows:
             lone = len(run.lines) == 1 and not _fits(format, run, runs, whole)
             if not whole[place] and not lone:
-                signs = " or ".join(f"'{one}'" for one in MARKS[format])
-                said = f"these rows of {FORMATS[format]} do not make a map by themselves: none has {signs}"
-                raise MapRowError(run.lines[0].number, f"{said}. Join them to their map, or leave them out.")
+                said = f"{_unmarked(format)}. Join them to their map, or leave them out."
+                raise MapRowError(run.lines[0].number, said)
             continue
         parts = before != after and 0 < place < len(runs) - 1 and all(run.seen)
         width = len(runs[place - 1].seen[-1]) if before else 0
@@ -235,6 +191,11 @@ def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:
             alike = _is_nearly_a_row(format, text) or (at == 0 and width == len(text) and not after)
             if parts or (alike and ABOUT.match(text) is None):
                 raise _strange(format, run.lines[at], text)
+
+
+def _unmarked(format: str) -> str:
+    signs = " or ".join(f"'{one}'" for one in MARKS[format])
+    return f"these rows of {FORMATS[format]} do not make a map by themselves: none has {signs}"
 
 
 def _fits(format: str, row: _Run, runs: Sequence[_Run], whole: Sequence[bool]) -> bool:
@@ -253,11 +214,13 @@ def _check_all(format: str, lines: Sequence[Line]) -> None:
     wrong = [one for one in shown if ROWS[format].fullmatch(one[1]) is None]
     if wrong and len(shown) > 1 and all(_is_nearly_a_row(format, text) for _, text in shown):
         raise _strange(format, *wrong[0])
+    if not wrong and len(shown) > 2:
+        raise MapRowError(shown[0][0].number, f"{_unmarked(format)}, where its agent starts.")
 
 
 def _is_apart(text: str) -> bool:
     """Return whether a line is not a row of any map: it is empty, a comment, a title or a code fence."""
-    return not text or text.startswith(COMMENT) or _is_title(text) or FENCE.fullmatch(text) is not None
+    return not text or text.startswith(COMMENT) or is_title(text) or FENCE.fullmatch(text) is not None
 
 
 def _is_nearly_a_row(format: str, text: str) -> bool:

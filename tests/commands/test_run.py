@@ -129,6 +129,12 @@ def test_an_old_name_is_set_and_the_new_one_is_said(old: str) -> None:
     assert FIELDS[old] not in config
 
 
+def test_a_setting_is_given_once() -> None:
+    said = run("unsafe-exploration", "--set", "stages=2", "--set", "stages=3", "--json")
+    assert (said.exit_code, said.stdout) == (2, "")
+    assert "--set: 'stages' is given twice. Give it once." in said.stderr
+
+
 def test_two_names_of_one_setting_are_both_named() -> None:
     said = run("unsafe-exploration", "--set", "stages=2", "--set", "max_clip_length=2", "--json")
     assert (said.exit_code, said.stdout) == (2, "")

@@ -78,6 +78,7 @@ def test_one_that_hangs_or_is_none_is_told_of(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(run_trackers, "PATIENCE", 0.05)
     said = run("--tracker", f"{__name__}:Hanging")
     assert (said.exit_code, Hanging.begun) == (0, 1), said.output
+    assert json.loads(said.stdout), "what went wrong is told on standard error"
     wrong = run("--tracker", "tensorbord:x")
     assert wrong.exit_code == 2
     assert "--tracker: 'tensorbord:x' cannot be loaded" in wrong.output

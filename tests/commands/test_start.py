@@ -84,6 +84,8 @@ def test_a_level_of_ones_own(db: Database, tmp_path: Path) -> None:
         (["side-effects", "--set", "p_guid=2"], "p_guid=2: "),
         (["side-effects", "--set", "practise=required"], "Did you mean 'practice'?"),
         (["side-effects", "--set", "pace"], "'pace' is not KEY=VALUE"),
+        (["side-effects", "--set", "pace="], "'pace=' has no value. Write it as --set pace=VALUE"),
+        (["side-effects", "--set", "batch=5", "--set", "batch_size=6"], "'batch_size' is given twice"),
         (["side-effects", "--set", "goal=3"], "'goal' has an option of its own: --goal."),
         (["side-effects", "--parent", "nobody"], "--parent: There is no parent 'nobody'."),
         (["side-effects", "--set", "script=noisy"], "'script' has an option of its own: --parent."),

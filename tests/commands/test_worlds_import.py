@@ -121,7 +121,12 @@ def test_a_level_that_breaks_a_rule_is_printed_with_the_rule(tmp_path: Path) -> 
     assert result.exit_code == 1
     assert result.stdout.endswith("\n# X A #\n# G####\n#######\n")
     assert "crate: side-effects refuses this level at row 4, column 3: the goal must be in" in result.stderr
-    assert (tmp_path / "new" / "001-crate.txt").read_text() == result.stdout
+    written = tmp_path / "new" / "001-crate.txt"
+    assert written.read_text() == result.stdout
+    written.write_text("my own\n")
+    again = CliRunner().invoke(app, ["worlds", "import", str(file), "--out", str(tmp_path / "new")])
+    assert (again.exit_code, written.read_text()) == (2, "my own\n")
+    assert f"--out: {written} is there already." in again.stderr
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,7 @@ LOST = {
     "alone": ("SFFF\nFFxF\nFFFG\n", 2, "'x' makes"),
     "in the last row": ("SFFF\nFFFG\nxxxx\n", 3, "'x' makes"),
     "a row apart": ("SFFF\nFFFG\n\nFFFF\nFFFF\n", 4, "none has 'S'"),
+    "no start": ("#####\n# $.#\n#   #\n#####\n", 1, "none has '@' or '+', where its agent starts"),
     "one row apart": ("SFFF\nFHFF\nFFFG\n\nHFFG\n", 5, "none has 'S'"),
     "one row behind a title": ("SFFF\nFHFF\nTitle: x\nHHHG\n", 4, "none has 'S'"),
     "like another letter": ("SFFF\nFF\u0421F\nFFFG\n", 2, "'\u0421' (cyrillic capital letter es) makes"),
@@ -118,3 +119,8 @@ def test_lines_about_a_map_below_it_are_no_rows_of_it() -> None:
 )
 def test_titles_stand_above_their_maps_or_below(text: str, names: list[str]) -> None:
     assert [one.level.name for one in imported(text)] == names
+
+
+def test_a_goal_without_anything_on_it_is_the_one_that_is_kept() -> None:
+    (level,) = imported("#######\n#+$ . #\n#     #\n#######\n")
+    assert (level.level.rows[1], level.refused) == ("#AX G #", None)
