@@ -228,26 +228,20 @@ def test_a_sabotage_is_found(tmp_path: Path, sabotage: str) -> None:
 @pytest.mark.parametrize(
     "name", ["answers.jsonl", "questions.jsonl", "metrics.csv", "events.csv", "answers.csv"]
 )
-@pytest.mark.parametrize("how", ["changed", "missing", "not what it was"])
+@pytest.mark.parametrize("how", ["changed", "missing", "not what it was", "not named"])
 def test_a_file_is_held_against_its_hash(tmp_path: Path, name: str, how: str) -> None:
     write(tmp_path, sound())
     file = tmp_path / name
     if how == "missing":
         file.unlink()
+    elif how == "not named":
+        told = json.loads((manifest := tmp_path / "manifest.json").read_text())
+        del told["files"][name]
+        manifest.write_text(json.dumps(told))
     else:
         file.write_bytes(b"\xff\x00{" if how == "not what it was" else file.read_bytes() + b"\n")
     found = audit(tmp_path)
-    assert any(one.startswith(name) for one in found.problems), found
-
-
-@pytest.mark.parametrize("name", ["answers.jsonl", "questions.jsonl", "metrics.csv", "events.csv"])
-def test_a_table_that_the_manifest_does_not_name_is_not_read(tmp_path: Path, name: str) -> None:
-    write(tmp_path, sound())
-    manifest = tmp_path / "manifest.json"
-    told = json.loads(manifest.read_text())
-    del told["files"][name]
-    manifest.write_text(json.dumps(told))
-    assert any(f"{name} is not named in the manifest" in one for one in audit(tmp_path).problems)
+    assert any(name in one for one in found.problems), found
 
 
 def test_where_every_row_is_wrong_a_few_sentences_say_so(tmp_path: Path) -> None:
