@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import NamedTuple
@@ -44,6 +45,8 @@ SIGNS = {
 """The signs of each format that make most of a row, so that a row with a strange sign is known by them."""
 EVERY = {"xsb": "#", "frozenlake": "FH", "cliffwalking": "oC", "taxi": "+|", "gridworlds": "#W"}
 """The signs of which nearly every row of each format has one."""
+REMARKED = re.compile(r"[ \-_]*[#*$][ #@+$*.\-_]*;.*")
+"""A row of XSB with a remark behind it."""
 OF_ONE_LENGTH = ("frozenlake", "cliffwalking", "taxi")
 """The formats whose rows are of one length; XSB's need not be, and art of gridworlds is refused later."""
 QUOTED = re.compile(r"""(?i:(r[bu]?|[bu]r)|[bu])?("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')""")
@@ -118,11 +121,32 @@ def maps(text: str, wanted: str | None = None) -> list[ForeignMap]:
         seen = [visible(line) for line in view]
         for format in (wanted,) if wanted else FORMATS:
             if found := _of(format, view, seen):
+                if wanted is None:
+                    _refuse_others(found, view, seen)
                 return found
     for format in (wanted,) if wanted else FORMATS:
         _check_all(format, lines)
     what = FORMATS[wanted] if wanted else ", ".join(FORMATS.values())
     raise ValueError(f"no map is here. A map is {what}.")
+
+
+def _refuse_others(found: Sequence[ForeignMap], lines: Sequence[Line], seen: Sequence[str]) -> None:
+    """Refuse a text that has maps of another format besides those that were found.
+
+    Raises:
+        MapRowError: It has.
+    """
+    taken = {one.line + row for one in found for row in range(len(one.rows))}
+    rest = [(line, text) for line, text in zip(lines, seen, strict=True) if line.number not in taken]
+    format = found[0].format
+    for other in FORMATS.keys() - {format}:
+        with suppress(MapRowError):
+            if more := _of(other, [line for line, _ in rest], [text for _, text in rest]):
+                break
+    else:
+        return
+    said = f"{FORMATS[other]} begins here, and line {found[0].line} is of {FORMATS[format]}"
+    raise MapRowError(more[0].line, f"{said}. Choose one by --format, or give each a file of its own.")
 
 
 def _of(format: str, lines: Sequence[Line], seen: Sequence[str]) -> list[ForeignMap]:
@@ -224,7 +248,9 @@ def _is_apart(text: str) -> bool:
 
 
 def _is_nearly_a_row(format: str, text: str) -> bool:
-    """Return whether more than half of the signs of a line are those of a row."""
+    """Return whether most signs of a line are those of a row, or it is a row of XSB with a remark."""
+    if format == "xsb" and REMARKED.fullmatch(text):
+        return True
     signs = "".join(text.split())
     known = sum(one in SIGNS[format] for one in signs)
     return 2 * known > len(signs) and any(one in EVERY[format] for one in signs)

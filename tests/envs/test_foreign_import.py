@@ -59,6 +59,8 @@ LOST = {
     "in the last row": ("SFFF\nFFFG\nxxxx\n", 3, "'x' makes"),
     "a row apart": ("SFFF\nFFFG\n\nFFFF\nFFFF\n", 4, "none has 'S'"),
     "no start": ("#####\n# $.#\n#   #\n#####\n", 1, "none has '@' or '+', where its agent starts"),
+    "a row with a remark": (f"#####  ; note\n{CRATE}", 1, "';' makes this line no row of Sokoban's XSB"),
+    "another format": (f"{CRATE}\nSFFF\nFHFG\n", 8, "FrozenLake begins here, and line 1 is of Sokoban's XSB"),
     "one row apart": ("SFFF\nFHFF\nFFFG\n\nHFFG\n", 5, "none has 'S'"),
     "one row behind a title": ("SFFF\nFHFF\nTitle: x\nHHHG\n", 4, "none has 'S'"),
     "like another letter": ("SFFF\nFF\u0421F\nFFFG\n", 2, "'\u0421' (cyrillic capital letter es) makes"),
