@@ -14,7 +14,7 @@ from parenting.server.db import Database
 from parenting.server.origins import ROLLED_BACK
 from parenting.server.reads.metrics import latest_metrics
 from parenting.server.statuses import OVER
-from parenting.server.tables import Run
+from parenting.server.tables import OperatorEvent, Run
 
 NUMBERS = ("deaths", "guidance", "preference", "return")
 """Metrics whose last values are compared, besides the ticks and whether the policy is optimal."""
@@ -99,10 +99,10 @@ def found_runs(db: Database, numbers: Sequence[int]) -> tuple[list[Run], list[in
 
 def grouped(db: Database, runs: Sequence[Run]) -> list[Group]:
     """Return the groups of runs with the same settings, in the order of their first runs."""
-    latest = latest_metrics(db, [run.id for run in runs])
+    latest, changed = latest_metrics(db, [run.id for run in runs]), _changed(db, [run.id for run in runs])
     groups: dict[str, Group] = {}
     for run in runs:
-        known = settings(run)
+        known = {**settings(run), "changed since": changed.get(run.id)}
         key = json.dumps(known, sort_keys=True)
         group = groups.setdefault(key, Group(letter(len(groups)), known))
         values = latest[run.id].values if run.id in latest else {}
@@ -122,6 +122,19 @@ def settings(run: Run) -> dict[str, Any]:
         "weights": run.weights and run.weights[:SHORT],
         **run.config,
     }
+
+
+def _changed(db: Database, numbers: Sequence[int]) -> dict[int, str]:
+    """Return the changes of hyperparameters that runs have heard, in words; their ticks do not count."""
+    heard = select(OperatorEvent.run_id, OperatorEvent.payload).order_by(OperatorEvent.id)
+    heard = heard.where(OperatorEvent.run_id.in_(numbers), OperatorEvent.kind == "change")
+    with db.read() as session:
+        rows = session.execute(heard.where(OperatorEvent.applied_tick.is_not(None))).all()
+    told: dict[int, list[str]] = {}
+    for run, payload in rows:
+        if isinstance(payload, dict):
+            told.setdefault(run, []).append(f"{payload.get('name')} to {json.dumps(payload.get('value'))}")
+    return {run: ", then ".join(changes) for run, changes in told.items()}
 
 
 def began_with(origin: Mapping[str, Any]) -> str | None:

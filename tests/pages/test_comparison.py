@@ -20,7 +20,7 @@ from parenting.server.reads.comparison import Compared, Group, labels, letter, r
 from parenting.server.runs import claim as claims
 from parenting.server.runs import set_status
 from parenting.server.statuses import RunStatus
-from parenting.server.tables import Run
+from parenting.server.tables import OperatorEvent, Run
 from tests.pages import island_fixtures as fixtures
 from tests.pages.axe import violated
 from tests.pages.browser_tabs import BrowserTabs, until
@@ -72,6 +72,18 @@ def test_only_what_differs_is_told(client: httpx2.Client, db: Database, runs: No
     names = [name for name, *_ in rows(client.get("/compare?runs=1,5").text, "Settings by group")]
     assert names[:4] == ["world", "level", "parent", "weights"]
     assert "seed" not in names
+
+
+def test_a_hyperparameter_that_was_changed_is_another_setting(
+    client: httpx2.Client, db: Database, runs: None
+) -> None:
+    change = {"kind": "change", "payload": {"name": "p_rec", "value": 0.5}, "created": db.clock()}
+    with db.write() as session:
+        session.add(OperatorEvent(run_id=1, applied_tick=None, **change))  # not heard yet
+        session.add(OperatorEvent(run_id=2, applied_tick=5, **change))
+    assert "All of them have the same settings" in client.get("/compare?runs=1,3").text
+    told = rows(client.get("/compare?runs=1-3").text, "Settings by group")
+    assert told == [["changed since", "none", "p_rec to 0.5"]]
 
 
 def test_filters_narrow_the_runs_and_stand_in_the_address(client: httpx2.Client, runs: None) -> None:
