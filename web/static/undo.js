@@ -78,6 +78,11 @@ function look() {
   return looking;
 }
 
+// A look that is under way may know too little, and then another one follows.
+async function learn() {
+  for (let turn = 0; turn < 2 && stale(); turn++) await look();
+}
+
 // The run has changed.
 export function heed() {
   offer();
@@ -104,7 +109,7 @@ const patient = (promise) => Promise.race([promise, new Promise((done) => { setT
 async function catchUp(query) {
   await patient(flush(report));
   if (kept().includes(query)) throw hinder(UNSENT, query);
-  for (let turn = 0; turn < 2 && stale(); turn++) await patient(look()); // a look that was under way may know too little
+  await patient(learn());
   if (stale()) throw hinder(AWAY);
 }
 
@@ -115,7 +120,7 @@ function strike(query) {
   nameLast();
   if (!answered.length) {
     news++;
-    look();
+    learn();
   }
   return struck;
 }
