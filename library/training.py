@@ -71,7 +71,8 @@ def train(
         until: When a trial is finished: "optimal" (its argmax policy takes a shortest safe path),
             "queries:N" (N answered queries) or "ticks:N".
         seed: Seed of all randomness, from 0 to 2**53 - 1.
-        callback: Called with a `Progress` after each tick; training ends early where it returns False.
+        callback: Called with a `Progress` after each tick; training ends early where it returns False. Trials
+            that have not begun by then have 0 ticks.
         progress: Show a progress bar; None shows one on a terminal.
         max_ticks: Ticks after which a trial is left unfinished.
         from_policy: Begin with the weights of a `Policy` or its file, not with fresh or pre-trained ones.
@@ -138,11 +139,12 @@ def _train(
     with one_thread():
         for chunk in chunks(trials):
             trainer = _trainer(task, rule, seed, chunk, _logged(behind, log, task, trials, chunk))
+            if ended:  # before these have begun
+                parts.append(_ended(trainer))
+                continue
             report = tracking.watching(trainer, _report(chunk, trials, parts, told))
             trained, ended = _run(trainer, max_ticks, report)
             parts.append(trained)
-            if ended:
-                break
     return collect(task, parts, log.records(), seed=seed, until=str(rule), events=log.events), ended
 
 
@@ -193,8 +195,13 @@ def _run(
     try:
         return trainer.run(max_ticks, report), False
     except EndedError:
-        trainer.save(~trainer.counts.done)
-        return batch.TrainResult(trainer.result, trainer.policies, trainer.evaluation), True
+        return _ended(trainer), True
+
+
+def _ended(trainer: BatchTrainer) -> batch.TrainResult:
+    """Return the result of a batch where it is."""
+    trainer.save(~trainer.counts.done)
+    return batch.TrainResult(trainer.result, trainer.policies, trainer.evaluation)
 
 
 def _report(

@@ -92,6 +92,17 @@ def test_a_callback_sees_every_tick_and_may_end_the_training() -> None:
     assert [(row["ticks"], row["finished"]) for row in result.trials] == [(5, False)]
 
 
+def test_trials_that_have_not_begun_are_in_the_result() -> None:
+    result = pt.train("unsafe-exploration", trials=4, callback=lambda now: now.tick < 5, progress=False)
+    assert [(one["trial"], one["ticks"], one["finished"]) for one in result.trials] == [
+        (0, 5, False),
+        (1, 5, False),
+        (2, 0, False),
+        (3, 0, False),
+    ]
+    assert len(result.policies) == 4
+
+
 def test_a_callback_that_returns_nothing_ends_nothing(trained: pt.TrainResult) -> None:
     same = pt.train("unsafe-exploration", trials=3, seed=5, callback=lambda _: None, progress=False)
     assert same.trials == trained.trials
