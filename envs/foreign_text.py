@@ -45,6 +45,8 @@ SIGNS = {
 """The signs of each format that make most of a row, so that a row with a strange sign is known by them."""
 EVERY = {"xsb": "#", "frozenlake": "FH", "cliffwalking": "oC", "taxi": "+|", "gridworlds": "#W"}
 """The signs of which nearly every row of each format has one."""
+COLOUR = re.compile("\x1b\\[[0-9;]*m")
+"""The code by which Gymnasium colours a sign for a terminal."""
 REMARKED = re.compile(r"[ \-_]*[#*$][ #@+$*.\-_]*;.*")
 """A row of XSB with a remark behind it."""
 OF_ONE_LENGTH = ("frozenlake", "cliffwalking", "taxi")
@@ -115,7 +117,7 @@ def maps(text: str, wanted: str | None = None) -> list[ForeignMap]:
         MapRowError: A line is nearly a row of a map, and the map cannot be whole without it.
         ValueError: There is none.
     """
-    lines = lines_of(text)
+    lines = lines_of(COLOUR.sub("", text))
     quoted = any(QUOTED.search(line.text) for line in lines)
     for view in ([_unquoted(lines)] if quoted else []) + [lines]:
         seen = [visible(line) for line in view]

@@ -24,8 +24,8 @@ ENTRY = re.compile(r"\s*[a-z_]+\s*:\s*\S.*")
 COMMENT = ";"
 """The sign before a line that names the level below it, as in collections of Sokoban levels."""
 BLANKS = " \t"
-ENDS = re.compile("\r\n|[\n\r\u2028\u2029]")
-"""The ends of lines: of Unix, Windows, old Macs and Unicode."""
+ENDS = re.compile("\r+\n|\n\r(?!\n)|[\n\r\u2028\u2029]")
+"""The ends of lines: of Unix, Windows, old Macs and Unicode, and what programs make of them in turn."""
 PROSE = "the text outside of the code fences was left out"
 SPACES = {"\u00a0": "non-breaking space"}
 """The words for a space whose name in Unicode few people know."""

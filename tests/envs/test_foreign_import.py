@@ -126,3 +126,9 @@ def test_titles_stand_above_their_maps_or_below(text: str, names: list[str]) -> 
 def test_a_goal_without_anything_on_it_is_the_one_that_is_kept() -> None:
     (level,) = imported("#######\n#+$ . #\n#     #\n#######\n")
     assert (level.level.rows[1], level.refused) == ("#AX G #", None)
+
+
+def test_the_colours_of_a_terminal_are_no_signs() -> None:
+    """As Gymnasium prints a lake."""
+    (level,) = imported("  (Down)\n\x1b[41mS\x1b[0mFFF\nFHFG\n")
+    assert level.level.rows[1] == "#A   #"
