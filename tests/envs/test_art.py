@@ -32,8 +32,6 @@ FORGIVEN = {
     "byte order mark": "\ufeff" + PLAIN,
     "Windows": PLAIN.replace("\n", "\r\n"),
     "Windows, with a header": HEADED.replace("\n", "\r\n"),
-    "Windows, twice": PLAIN.replace("\n", "\r\r\n"),
-    "the other way round": PLAIN.replace("\n", "\n\r"),
     "spaces": "name:my island\n \n\n" + PLAIN,
 }
 

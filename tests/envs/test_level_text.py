@@ -55,6 +55,8 @@ DISGUISED = {
     "blank lines": (f"   \n{POND}\n  \t\n", "2 blank rows around the art were cut"),
     "old Mac": (POND.replace("\n", "\r"), None),
     "Windows": (f"\ufeff{POND}".replace("\n", "\r\n"), None),
+    "Windows, twice": (POND.replace("\n", "\r\r\n"), None),
+    "the other way round": (POND.replace("\n", "\n\r"), None),
 }
 
 
