@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from math import isfinite
 from pathlib import Path
 
 from parenting.agent.config import FIELDS, Config, v1_names
@@ -17,6 +19,7 @@ from parenting.server.missing_weights import missing_weights
 from parenting.server.run_form import FORM_FIELDS, read_form
 from parenting.weights.origin import Origin
 
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?", re.I)
 OPTIONS = ("world", "level", "level_text", "preset", "parent", "script", "seed", "goal", "finish", "name")
 """The settings of a run that are arguments or options of their own; `--set` sets the others."""
 
@@ -84,10 +87,20 @@ def changes_of(changes: list[str]) -> dict[str, str]:
         elif (field := known[key] or _hyperparameter(key)) in found:
             wrong.append(f"--set: '{key}' is given twice, or by two names. Give it once.")
         else:
-            found[field] = value
+            found[field] = _as_json(value) if field.startswith("config.") else value
     if wrong:
         raise UsageError("\n".join(wrong))
     return found
+
+
+def _as_json(value: str) -> str:
+    """Write a value in JSON, which the form reads, where it is none or a number such as .5 and +0.5."""
+    text = value.strip()
+    if text.lower() == "none":
+        return "null"
+    if NUMBER.fullmatch(text) is None or not isfinite(float(text)):
+        return value
+    return str(int(text)) if text.lstrip("+-").isdigit() else repr(float(text))
 
 
 def _hyperparameter(key: str) -> str:

@@ -100,6 +100,20 @@ def test_what_is_wrong_is_named_and_nothing_is_started(
     assert list_runs(db) == []
 
 
+def test_values_are_read_as_a_batch_reads_them(db: Database) -> None:
+    given = ("p_guid=.5", "p_rec=+0.25", "batch_size=none", "gradient_steps=+3")
+    result = said("side-effects", *(part for one in given for part in ("--set", one)), "--json")
+    assert result.exit_code == 0, result.output
+    config = json.loads(result.stdout)["config"]
+    assert (config["p_guid"], config["p_rec"], config["batch"], config["gradient_steps"]) == (
+        0.5,
+        0.25,
+        None,
+        3,
+    )
+    assert "p_guid=1e999: " in said("side-effects", "--set", "p_guid=1e999").stderr
+
+
 def test_hyperparameters_have_either_name(db: Database) -> None:
     for name in (*Config.model_fields, *FIELDS):
         assert "there is no setting" not in said("side-effects", "--set", f"{name}=no").output
