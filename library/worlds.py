@@ -106,21 +106,27 @@ def register(spec: WorldSpec) -> None:
     """
     if not isinstance(spec, WorldSpec):
         raise TypeError(f"spec: {spec!r} is not a WorldSpec. Give pt.WorldSpec(name=..., rules=..., ...).")
-    before = registry.WORLDS.get(spec.name, spec)
-    if before is not spec and (spec.name in registry.BUILT_IN or before.rules != spec.rules):
-        raise ValueError(f"spec: there is another world '{spec.name}' already. Choose another name.")
+    before = registry.WORLDS.get(spec.name)
+    if before is not spec:  # that of an installed package stays its own
+        if before is not None and (spec.name in registry.BUILT_IN or before.rules != spec.rules):
+            raise ValueError(f"spec: there is another world '{spec.name}' already. Choose another name.")
+        _put(spec, before)
+    gymnasium = sys.modules.get("gymnasium")
+    if gymnasium is not None:
+        gym_ids.register(gymnasium, spec.name)
+
+
+def _put(spec: WorldSpec, before: WorldSpec | None) -> None:
+    """Put a world in the place of an earlier one, unless one of its levels breaks a rule."""
     registry.WORLDS[spec.name] = spec
     for name in spec.levels:
         try:
             registry.level(spec.name, name)
         except LevelError:
             del registry.WORLDS[spec.name]
-            if before is not spec:
+            if before is not None:
                 registry.WORLDS[spec.name] = before
             raise
-    gymnasium = sys.modules.get("gymnasium")
-    if gymnasium is not None:
-        gym_ids.register(gymnasium, spec.name)
 
 
 def of_table(world: TableWorld, level: object) -> str:
