@@ -29,6 +29,9 @@ export function read() {
   return [...new Map([...found, ...memory.values()].map((answer) => [key(answer), answer])).values()].sort((one, other) => turn(one) - turn(other));
 }
 
+// Whether an answer is kept still: another tab may have sent it.
+export const holds = (answer) => read().some(same(answer));
+
 // Keep an answer, in place of an earlier one to its question.
 export function keep(answer) {
   memory.set(key(answer), answer);
@@ -40,12 +43,12 @@ export function keep(answer) {
 
 // The others are to be sent before this one.
 export function defer(answer) {
-  if (read().some(same(answer))) keep({ ...answer, after: Date.now() });
+  if (holds(answer)) keep({ ...answer, after: Date.now() });
 }
 
 // The server has acknowledged an answer.
 export function drop(answer) {
-  if (!read().some(same(answer))) return;
+  if (!holds(answer)) return;
   memory.delete(key(answer));
   try {
     localStorage.removeItem(EACH + key(answer));

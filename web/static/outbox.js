@@ -1,7 +1,7 @@
 // Answers on their way. Each is kept in the browser until the server has acknowledged it, and sent again until then.
 // An answer names the database, the run and the question that it is meant for. A server that has another database, or a
 // copy with an identity of its own, does not store it; the browser keeps it for the server that does.
-import { defer, drop, elsewhere, key, meant, read } from "./kept.js";
+import { defer, drop, elsewhere, holds, key, meant, read } from "./kept.js";
 import { sent } from "./measuring.js";
 
 const LATE = 15_000; // ms after which a reply is not waited for any more; the answer is sent again
@@ -34,6 +34,7 @@ async function send({ database, run, question, choice, change, replays, measured
 async function drain(report) {
   for (let answers = read().filter(meant); answers.length; answers = read().filter(meant)) {
     const [answer] = answers, [outcome, reply] = await send(answer);
+    if (outcome === "kept" && !holds(answer)) continue; // another tab has sent it meanwhile, and said so
     if (outcome === "elsewhere") elsewhere.add(key(answer));
     if (["saved", "refused"].includes(outcome)) drop(answer);
     report(outcome, reply, answer);
