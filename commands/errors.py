@@ -77,4 +77,4 @@ def _wrong(item: Any, given: Mapping[str, Any]) -> str:
     option = given.get(name) is not None
     where = f"--{name.replace('_', '-')}" if option else f"PARENTING_{name.upper()}"
     about = Settings.model_fields[name].description
-    return f"{where}: '{item['input']}' is wrong: {item['msg']}. {about}"
+    return f"{where}: '{item['input']}' is wrong: {item['msg'].removeprefix('Value error, ')}. {about}"

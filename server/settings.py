@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, SecretStr, field_validator
-from pydantic_core import PydanticCustomError
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 from sqlalchemy import URL
 
@@ -176,16 +175,14 @@ class Settings(BaseSettings):
     @classmethod
     def _only_sources(cls, value: str) -> str:
         if not SOURCES.fullmatch(value):
-            raise PydanticCustomError(
-                "sources", "write sources in printable ASCII, with spaces between them, without ; and ,"
-            )
+            raise ValueError("write sources in printable ASCII, with spaces between them, without ; and ,")
         return value
 
     @field_validator("languages")
     @classmethod
     def _is_there(cls, value: Path | None) -> Path | None:
         if value is not None and not os.path.isdir(value):
-            raise PydanticCustomError("folder", "there is no such folder; make it, or leave this setting out")
+            raise ValueError("there is no such folder; make it, or leave this setting out")
         return value
 
     @classmethod

@@ -47,7 +47,10 @@ def test_a_correction_that_was_heard_is_heard_after_a_crash_of_the_server(
     assert found == ["on"]
 
 
-def test_what_a_worker_forgets_once_it_is_stored_is_there_after_a_crash_of_the_server(db: Database) -> None:
+def test_what_a_worker_forgets_once_it_is_stored_is_there_after_a_crash_of_the_server(
+    db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("parenting.server.why.WRITE_SECONDS", 1e9)  # a slow tick would write at its end
     run = start(db, NewRun(world="unsafe-exploration"))
     life = RunSession(db, next(one for one in claim(db, "me") if one.run_id == run.id), run, lambda: None)
     life.tick(watch(db, [run.id])[run.id])
