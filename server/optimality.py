@@ -24,12 +24,14 @@ class Optimality:
             finish: The rule that ends the run.
             evaluation: The evaluation of its world.
             state: The agent after that tick.
-            known: The verdict of the last row of metrics.
+            known: The verdict of the last row of metrics. It counts where no tick is judged by itself;
+                elsewhere it may be that of a later tick than the state's.
         """
         self._finish, self._evaluation = finish, evaluation
         self._looks = finish.kind == "optimal" and not evaluation.refresh_seconds
         self._owed = _owes(state)
-        self.found = known or (self._looks and int(state.keys.tick[0]) > 0 and self._is_optimal(state))
+        begun = int(state.keys.tick[0]) > 0
+        self.found = begun and self._is_optimal(state) if self._looks else known
 
     def see(self, state: AgentState) -> None:
         """Judge after a tick that may have changed the policy, and after the first."""

@@ -18,7 +18,7 @@ from sqlalchemy import make_url
 from parenting.server.settings import Settings
 from tests.faults.auditor import Store, audit
 from tests.faults.ledger import Ledger, read
-from tests.faults.parent import Parent
+from tests.faults.parent import SKIPS, Parent
 from tests.faults.points import Point, arm, marked
 from tests.server.processes import Command
 from tests.server.serving import free_port
@@ -142,13 +142,18 @@ class House:
         """Send a signal to a process."""
         os.kill(self.commands[name].process.pid, number)
 
-    def move_in(self, runs: Sequence[int | str], parents: int, rng: random.Random) -> None:
-        """Let so many parents a run begin to answer, by all web processes, and an operator to interfere."""
+    def move_in(
+        self, runs: Sequence[int | str], parents: int, rng: random.Random, skips: float = SKIPS
+    ) -> None:
+        """Let so many parents a run begin to answer, by all web processes, and an operator to interfere.
+
+        `skips` is the share of questions that they skip.
+        """
         urls = [self.url, *self.others]
         for run in runs:
             for number in range(parents):
                 url, name = urls[number % len(urls)], f"{number}.of.{run}"
-                self.parents.append(Parent(url, run, name, self.ledger, rng.random()))
+                self.parents.append(Parent(url, run, name, self.ledger, rng.random(), skips))
         self.operator = Operator(self.url, runs, rng.random())
         for thread in (*self.parents, self.operator):
             thread.start()

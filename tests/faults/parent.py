@@ -29,10 +29,13 @@ SECOND_THOUGHTS, SKIPS = 0.1, 0.05
 class Parent(threading.Thread):
     """One client of a run. `complaints` are replies that break a promise."""
 
-    def __init__(self, url: str, run: int | str, name: str, ledger: Ledger, seed: float) -> None:
+    def __init__(
+        self, url: str, run: int | str, name: str, ledger: Ledger, seed: float, skips: float = SKIPS
+    ) -> None:
         super().__init__(daemon=True)
         self.http = httpx2.Client(base_url=f"{url}/api/v1/", timeout=SECONDS, trust_env=False)
         self.run_id, self.client, self.ledger, self.rng = run, name, ledger, random.Random(seed)
+        self.skips = skips
         self.complaints: list[str] = []
         self.told = self.refused = self.resent = 0
         self.times: list[float] = []
@@ -57,7 +60,7 @@ class Parent(threading.Thread):
             if self._send(f"queries/{query}/release", {}) is not None:
                 self.ledger.offered(Offer(str(query), self.client, since, since))
             return
-        skips, choice = self.rng.random() < SKIPS, self.rng.choice(CHOICES)
+        skips, choice = self.rng.random() < self.skips, self.rng.choice(CHOICES)
         receipt = self._until_told(query, "skip") if skips else self._until_told(query, "answer", choice)
         self.ledger.offered(Offer(str(query), self.client, since, min(until, self.sent)))
         if receipt is not None:

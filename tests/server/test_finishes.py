@@ -15,6 +15,7 @@ from parenting.server.errors import InvalidFieldsError, SetupError
 from parenting.server.finishes import read_finish
 from parenting.server.migrate import downgrade, upgrade
 from parenting.server.new_run import NewRun, start
+from parenting.server.optimality import Optimality
 from parenting.server.queue.answers import answer
 from parenting.server.queue.worker_side import watch
 from parenting.server.reads.metrics import latest_metrics
@@ -156,3 +157,17 @@ def test_a_run_ends_at_the_tick_at_which_a_batch_does_whatever_the_clock_shows(
             life.save()
             life = RunSession(db, mine, get_run(db, 1), lambda: None)
     assert life.last_tick == alone["ticks"]
+
+
+@pytest.mark.parametrize("rest", [0.0, 9.0])
+def test_a_restarted_run_judges_the_policy_that_it_has_and_not_one_that_came_later(
+    db: Database, monkeypatch: pytest.MonkeyPatch, rest: float
+) -> None:
+    """Unless a look is expensive: there the last row of metrics is the verdict."""
+    start(db, NewRun(world=WORLD, parent="scripted"))
+    (mine,) = claim(db, "test")
+    life = RunSession(db, mine, get_run(db, 1), lambda: None)
+    life.tick(watch(db, [1])[1])
+    monkeypatch.setattr(life.evaluation, "refresh_seconds", rest, raising=False)
+    again = Optimality(life.finish, life.evaluation, life.saved.state, known=True)
+    assert again.found is bool(rest)
