@@ -14,6 +14,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from parenting.envs.foreign_names import ABOUT, is_title, name_above, titles_stand_above
+from parenting.envs.foreign_rle import ENCODED, MapRowError, decoded
 from parenting.envs.level_text import COMMENT, FENCE, Line, Written, lines_of, tidied, visible
 from parenting.envs.people_text import sign
 
@@ -59,14 +60,6 @@ ESCAPE = re.compile(
 """An escape that Python reads; any other one stays as it stands."""
 
 
-class MapRowError(ValueError):
-    """A line that parts a map, or that looks like a row of one and is none."""
-
-    def __init__(self, line: int, said: str) -> None:
-        super().__init__(said)
-        self.line = line
-
-
 class _Run(NamedTuple):
     """Lines that follow one another and are all rows of one format, or all none, and what is seen of each."""
 
@@ -82,6 +75,7 @@ class ForeignMap:
     format: str
     rows: tuple[str, ...]
     line: int  # of its first row, counted from 1
+    last: int  # of its last row
     name: str = ""
     said: tuple[str, ...] = ()  # what was cut around it
 
@@ -94,14 +88,6 @@ def recognise(rows: Sequence[str]) -> str | None:
         if whole and any(sign in row for row in shown for sign in MARKS[name]):
             return name
     return None
-
-
-def hint(rows: Sequence[str]) -> str:
-    """Return a remedy for rows that are of another format, with a sign before it; nothing for others."""
-    found = recognise(rows)
-    if found is None or found == "gridworlds":
-        return ""
-    return f"; this reads like {FORMATS[found]}, which `parenting worlds import FILE` makes a level of"
 
 
 def maps(text: str, wanted: str | None = None) -> list[ForeignMap]:
@@ -119,13 +105,14 @@ def maps(text: str, wanted: str | None = None) -> list[ForeignMap]:
     """
     lines = lines_of(COLOUR.sub("", text))
     quoted = any(QUOTED.search(line.text) for line in lines)
-    for view in ([_unquoted(lines)] if quoted else []) + [lines]:
+    for given in ([_unquoted(lines)] if quoted else []) + [lines]:
+        view, encoded = decoded(given) if wanted in (None, "xsb") else (given, set[int]())
         seen = [visible(line) for line in view]
         for format in (wanted,) if wanted else FORMATS:
             if found := _of(format, view, seen):
                 if wanted is None:
                     _refuse_others(found, view, seen)
-                return found
+                return [replace(one, said=(*one.said, *[ENCODED][: one.line in encoded])) for one in found]
     for format in (wanted,) if wanted else FORMATS:
         _check_all(format, lines)
     what = FORMATS[wanted] if wanted else ", ".join(FORMATS.values())
@@ -138,7 +125,7 @@ def _refuse_others(found: Sequence[ForeignMap], lines: Sequence[Line], seen: Seq
     Raises:
         MapRowError: It has.
     """
-    taken = {one.line + row for one in found for row in range(len(one.rows))}
+    taken = {number for one in found for number in range(one.line, one.last + 1)}
     rest = [(line, text) for line, text in zip(lines, seen, strict=True) if line.number not in taken]
     format = found[0].format
     for other in FORMATS.keys() - {format}:
@@ -191,7 +178,8 @@ def _map(format: str, run: _Run) -> ForeignMap:
         if format in OF_ONE_LENGTH and length != lengths[0]:
             said = f"this row has {length} signs, and the map's first row has {lengths[0]}. Mend it"
             raise MapRowError(line.number, f"{said}.")
-    return ForeignMap(format, tuple(rows), run.lines[0].number, said=art.said)
+    first, last = run.lines[0].number, run.lines[-1].number
+    return ForeignMap(format, tuple(rows), first, last, said=art.said)
 
 
 def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from parenting.agent.config import PRESETS, Config, merge
 from parenting.envs import registry
-from parenting.envs.foreign_import import ForeignMapError, foreign_format, imported
+from parenting.envs.foreign_hint import foreign_format
+from parenting.envs.foreign_import import ForeignMapError, imported
 from parenting.envs.foreign_text import FORMATS
 from parenting.envs.level_text import SeveralLevelsError, Written, choose, written
 from parenting.envs.levels.spec import LevelError
