@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import NamedTuple
 
-from parenting.envs.foreign_names import ABOUT, is_title, name_above, titles_stand_above
+from parenting.envs.foreign_names import ABOUT, is_title, name_above, title_of, titles_stand_above
 from parenting.envs.foreign_rle import ENCODED, MapRowError, decoded
 from parenting.envs.level_text import COMMENT, FENCE, Line, Written, lines_of, tidied, visible
 from parenting.envs.people_text import sign
@@ -54,6 +54,8 @@ OF_ONE_LENGTH = ("frozenlake", "cliffwalking", "taxi")
 """The formats whose rows are of one length; XSB's need not be, and art of gridworlds is refused later."""
 QUOTED = re.compile(r"""(?i:(r[bu]?|[bu]r)|[bu])?("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')""")
 """A string in Python: whether it is a raw one, and its text in quotation marks."""
+KEY = re.compile(r"\s*:")
+"""The sign behind a string that is a key."""
 ESCAPE = re.compile(
     r"""\\(?:[\\'"abfnrtv]|[0-3]?[0-7]{1,2}|x[0-9a-fA-F]{2}|u(?![dD][89a-fA-F])[0-9a-fA-F]{4}|U00(?:0[0-9a-fA-F]|10)[0-9a-fA-F]{4})"""
 )
@@ -156,7 +158,7 @@ def _of(format: str, lines: Sequence[Line], seen: Sequence[str]) -> list[Foreign
             found.append(replace(_map(format, run), name=above))
             above = ""
         elif not run.is_rows:
-            titles = [text.partition(":")[2].strip() for text in run.seen if is_title(text)]
+            titles = [title_of(text) for text in run.seen if is_title(text)]
             if titles and found and not found[-1].name and not titles_above:
                 found[-1] = replace(found[-1], name=titles[0])
             above = titles[-1] if titles and titles_above else name_above(run.seen)
@@ -256,18 +258,32 @@ def _strange(format: str, line: Line, text: str) -> MapRowError:
 
 
 def _unquoted(lines: Sequence[Line]) -> list[Line]:
-    """Return lines of a list in Python as the strings in them; the end of an inner list parts two maps.
+    """Return lines of a list in Python or JSON as their strings; the end of an inner list parts two maps.
 
-    Each has the number of the line where it stood.
+    Each has the number of the line where it stood. A key stands before its value, or else parts two maps.
     """
     found: list[Line] = []
     for line in lines:
         parts = [_string(one) for one in QUOTED.finditer(line.text)]
         by_cell = all(len(part) == 1 for part in parts)
-        texts = ["".join(parts)] if by_cell else parts
+        texts = ["".join(parts)] if by_cell else _with_keys(line.text)
         if not by_cell and "]" in QUOTED.sub("", line.text):
             texts.append("")
         found += [Line(line.number, text, tuple(range(1, len(text) + 1))) for text in texts]
+    return found
+
+
+def _with_keys(text: str) -> list[str]:
+    """Return the strings of a line; a key and a string behind it are one, `key: value`."""
+    found, key, end = list[str](), "", 0
+    for quoted in QUOTED.finditer(text):
+        value = _string(quoted)
+        if key and text[end : quoted.start()].strip() == ":":
+            value = f"{key}: {value}"
+        end = quoted.end()
+        is_key = KEY.match(text, end) is not None
+        found.append("" if is_key else value)
+        key = value if is_key else ""
     return found
 
 

@@ -182,3 +182,39 @@ def test_an_encoded_row_that_may_mean_something_else_is_refused(text: str, line:
         imported(text)
     assert refused.value.line == line
     assert why in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("above", "name"),
+    [
+        ("Lake\nSolution\nuuLLdd\nrr\n", "Lake"),
+        ("Solution/Moves: 12\nuuLLddRRuu\n\n", "map"),
+        ("Lake\nuu2(Ld)Rrdd\n", "Lake"),
+        ("Lake\n\n---\n", "Lake"),
+        ("Lake\n====\n\n", "Lake"),
+        ("name: Lake\n\n", "Lake"),
+        ("; Title: Lake\n", "Lake"),
+        ("Name: 'Lake'\nAuthor: me\n", "Lake"),
+        ("// Lake\n;\n", "Lake"),
+        ("## Lake ##\n\n", "Lake"),
+        ("/* Lake */\n", "Lake"),
+        ("---\ntitle: Lake\nlayout: post\n---\n\n", "Lake"),
+        ("---\nlayout: post\n---\n\n", "map"),
+        ("Level #1\n", "Level #1"),
+    ],
+)
+def test_a_name_is_no_solution_ruler_mark_or_key(above: str, name: str) -> None:
+    assert [one.level.name for one in imported(f"{above}{CRATE}")] == [name]
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ('{"map": ["SFFF", "FHFG"]}', ["map"]),
+        ('{"desc":\n ["SFFF",\n "FHFG"]}', ["map"]),
+        ('{"name": "Lake", "author": "me", "desc": ["SFFF", "FHFG"]}', ["Lake"]),
+        ('{"4x2": ("SFFF", "FHFG"), "two": ("SFFF", "FFHG")}', ["map 1", "map 2"]),
+    ],
+)
+def test_a_key_of_json_is_no_name(text: str, names: list[str]) -> None:
+    assert [one.level.name for one in imported(text)] == names
