@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 from parenting.envs import options as settings
 from parenting.envs.art import check_text, parse
 from parenting.envs.foreign_hint import hint
+from parenting.envs.front_matter import check_front_matter
 from parenting.envs.installed import Installed
-from parenting.envs.level_text import FILE_CHARACTERS, SeveralLevelsError, Written, choose, written
+from parenting.envs.level_text import FILE_CHARACTERS, Written, choose, lines_of, written
 from parenting.envs.levels.spec import Level, LevelError, Setting, WorldSpec
 from parenting.envs.names import UnknownNameError
 from parenting.envs.people_text import read_name
@@ -177,12 +178,13 @@ def read_level(
     glyphs = spec(world, text).glyphs
     check_text(text, source, FILE_CHARACTERS)
     try:
+        check_front_matter([line.text for line in lines_of(text)], glyphs, source)
         chosen = choose(written(text, glyphs), which, source)
-        found = read_written(world, chosen, source, text)
-    except SeveralLevelsError as error:
+    except LevelError as error:
         if remedy := hint(text):
             raise LevelError(source, error.line, error.column, error.rule + remedy) from None
         raise
+    found = read_written(world, chosen, source, text)
     return replace(found, name=name) if name is not None and found.name == source else found
 
 

@@ -7,6 +7,7 @@ import pytest
 from parenting.envs import registry
 from parenting.envs.foreign_hint import foreign_format
 from parenting.envs.foreign_import import ForeignMapError, imported
+from parenting.envs.levels.spec import LevelError
 
 CRATE = "  #####\n###   #\n# $ @ #\n#  .  #\n#     #\n#######\n"
 LAKE = '["SFFF", "FHFF",\n "FFHF", "HFFG"]\n'
@@ -218,3 +219,23 @@ def test_a_name_is_no_solution_ruler_mark_or_key(above: str, name: str) -> None:
 )
 def test_a_key_of_json_is_no_name(text: str, names: list[str]) -> None:
     assert [one.level.name for one in imported(text)] == names
+
+
+ABOVE = (
+    "My crate\n\n",
+    "Title: x\nAuthor: y\n\n",
+    "---\ntitle: x\ntags: [a, b]\n---\n\n",
+    "---\ntags:\n  - a\n---\n",
+    "# Crates\n\nThey are from far away.\nThey are hard.\nHave fun.\nOr none.\n\n",
+    f"; one\n{CRATE}\n; two\n",
+    f"{CRATE}Title: one\n\n",
+)
+
+
+@pytest.mark.parametrize("above", ABOVE)
+def test_maps_behind_other_lines_are_recognised_where_a_level_is_wanted(above: str) -> None:
+    assert foreign_format(f"{above}{CRATE}") == "xsb"
+    with pytest.raises(
+        LevelError, match="this reads like Sokoban's XSB, which `parenting worlds import FILE`"
+    ):
+        registry.read_level("side-effects", f"{above}{CRATE}")
