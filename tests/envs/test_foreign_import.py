@@ -235,7 +235,5 @@ ABOVE = (
 @pytest.mark.parametrize("above", ABOVE)
 def test_maps_behind_other_lines_are_recognised_where_a_level_is_wanted(above: str) -> None:
     assert foreign_format(f"{above}{CRATE}") == "xsb"
-    with pytest.raises(
-        LevelError, match="this reads like Sokoban's XSB, which `parenting worlds import FILE`"
-    ):
+    with pytest.raises(LevelError, match="reads like Sokoban's XSB, which `parenting worlds import FILE`"):
         registry.read_level("side-effects", f"{above}{CRATE}")
