@@ -179,18 +179,21 @@ DAMAGES: dict[str, tuple[Callable[[Path], Any], str]] = {
     ),
     "an unknown world": (lambda f: settings(f, world="mars"), "world mars, which is not installed"),
     "a broken config": (lambda f: settings(f, config={"p_guid": 7}), "config"),
-    "a status of no run": (lambda f: settings(f, status="happy"), "cannot be imported"),
+    "a status of no run": (
+        lambda f: settings(f, status="happy"),
+        "run 1: status: 'happy': one of these stands",
+    ),
     "an answer too few": (
         lambda f: change(f, "answers.jsonl", lambda b: b"\n".join(b.splitlines()[:3]) + b"\n"),
         "has not the answers",
     ),
     "an answer to nothing": (
         lambda f: change(f, "questions.jsonl", lambda b: b"".join(b.splitlines(True)[1:])),
-        "names a question that is not there",
+        "this question is not there",
     ),
     "a row of another run": (
         lambda f: change(f, "questions.jsonl", lambda b: b.replace(b'"run":"', b'"run":"x', 1)),
-        "which the manifest does not name",
+        "questions.jsonl: row 1: run: 'x",
     ),
     "a file that is not named": (lambda f: unnamed(f, "metrics.csv"), "metrics.csv is not in the manifest"),
     "a cell without an end": (
@@ -205,9 +208,118 @@ DAMAGES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "a script of no parent": (lambda f: settings(f, script="os.system"), "run 1: script: 'os.system'"),
     "a word for a number": (
         lambda f: change(f, "answers.jsonl", lambda b: b.replace(b'"tick":1,', b'"tick":"one",', 1)),
-        "answers.jsonl: a row cannot be read",
+        "answers.jsonl: row 1: tick: 'one': Input should be a valid integer. Nothing was imported.",
     ),
 }
+
+
+def lines(name: str, make: Callable[[list[dict[str, Any]]], Any]) -> Callable[[Path], None]:
+    """Change the rows of a table of JSON lines."""
+
+    def changed(blob: bytes) -> bytes:
+        rows = [json.loads(line) for line in blob.splitlines()]
+        make(rows)
+        return b"".join(json.dumps(row).encode() + b"\n" for row in rows)
+
+    return lambda folder: change(folder, name, changed)
+
+
+def twice(folder: Path) -> None:
+    """Name the first run a second time."""
+    told = json.loads((folder / "manifest.json").read_bytes())
+    told["runs"] *= 2
+    (folder / "manifest.json").write_text(json.dumps(told))
+
+
+def without(folder: Path, name: str) -> None:
+    told = json.loads((folder / "manifest.json").read_bytes())
+    del told["runs"][0]["settings"][name]
+    (folder / "manifest.json").write_text(json.dumps(told))
+
+
+ASKED, SAID = "questions.jsonl", "answers.jsonl"
+DAMAGES |= {
+    "a long name": (lambda f: settings(f, name="x" * 101), "manifest.json: run 1: name: 'xxx"),
+    "a name with a control character": (lambda f: settings(f, name="a\x07"), "U+0007 is not allowed here"),
+    "a long tag": (lambda f: settings(f, tags=f",{'x' * 41},"), "run 1: tags: ',xxx"),
+    "tags without commas": (lambda f: settings(f, tags="pilot"), "tags stand between commas"),
+    "a description of much": (lambda f: settings(f, description="x" * 2001), "run 1: description: 'xxx"),
+    "a day that is none": (
+        lambda f: settings(f, created="2026-02-30T00:00:00.000000Z"),
+        "run 1: created: '2026-02-30T00:00:00.000000Z': this is no time in UTC, such as 2026-01-31T",
+    ),
+    "a time of no zone": (
+        lambda f: settings(f, created="2026-02-03"),
+        "created: '2026-02-03': this is no time",
+    ),
+    "a count below zero": (lambda f: settings(f, answers=-1), "run 1: answers: -1: a whole number from 0"),
+    "a setting too few": (lambda f: without(f, "tags"), "run 1: tags: it is missing. Nothing was imported."),
+    "a run twice": (twice, "another run of the manifest has this id"),
+    "a time of a row": (
+        lines(ASKED, lambda rows: rows[1].update(asked="yesterday")),
+        "questions.jsonl: row 2: asked: 'yesterday': this is no time in UTC",
+    ),
+    "a long pseudonym": (
+        lines(SAID, lambda rows: rows[2].update(pseudonym="x" * 101)),
+        "answers.jsonl: row 3: pseudonym: 'xxx",
+    ),
+    "a cell too few": (
+        lines(SAID, lambda rows: rows[1].pop("received")),
+        "answers.jsonl: row 2: received: it is missing. Nothing was imported. Take another copy",
+    ),
+    "a null": (
+        lines(ASKED, lambda rows: rows[3].update(tick=None)),
+        "questions.jsonl: row 4: tick: it is missing",
+    ),
+    "a kind of no question": (
+        lines(ASKED, lambda rows: rows[0].update(kind="quiz")),
+        "row 1: kind: 'quiz': one of these stands here: guidance, preference",
+    ),
+    "a clip of another length": (lines(ASKED, lambda rows: rows[0]["left"].update(length=9)), "row 1: left:"),
+    "a question twice": (
+        lines(ASKED, lambda rows: rows[2].update(question=rows[0]["question"])),
+        "row 1 has the same one",
+    ),
+    "a tick twice": (
+        lines(ASKED, lambda rows: rows[2].update(tick=1)),
+        "questions.jsonl: row 3: tick: 1: row 1 has the same one. Nothing was imported.",
+    ),
+    "a number twice": (
+        lines(SAID, lambda rows: rows[1].update(number=1)),
+        "answers.jsonl: row 2: number: 1: row 1 has the same one",
+    ),
+    "two answers in a tick": (
+        lines(SAID, lambda rows: rows[3].update(applied_tick=2)),
+        "answers.jsonl: row 4: applied_tick: 2: row 1 has the same one",
+    ),
+    "an answer in place of none": (
+        lines(SAID, lambda rows: rows[3].update(supersedes=9)),
+        "answers.jsonl: row 4: supersedes: 9: no answer of this number comes before it",
+    ),
+    "a payload of no event": (
+        lambda f: change(f, "events.csv", lambda b: b.replace(b"p_rec", b"p_what")),
+        "events.csv: row 1: payload: ",
+    ),
+    "a payload that is no JSON": (
+        lambda f: change(f, "events.csv", lambda b: b.replace(b'"{', b'"')),
+        "events.csv: row 1: payload: ",
+    ),
+    "a cell too many": (
+        lambda f: change(f, "events.csv", lambda b: b.rstrip() + b",more\n"),
+        "events.csv: line 2: its cells are 9, and the columns are 8. Remove or add cells, or quote a cell",
+    ),
+    "a column twice": (
+        lambda f: change(f, "events.csv", lambda b: b.replace(b"heard", b"kind", 1)),
+        "events.csv: line 1: the column 'kind' stands there twice",
+    ),
+}
+
+
+@pytest.mark.only("sqlite", "nothing of it depends on the store")
+def test_blank_last_lines_are_no_rows(folder: Path, other: Database) -> None:
+    for name in ("answers.jsonl", "questions.jsonl", "events.csv"):
+        change(folder, name, lambda blob: blob + b"\n \n" if blob.startswith(b"{") else blob + b"\n\n")
+    assert len(import_export(other, folder)) == 5
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
