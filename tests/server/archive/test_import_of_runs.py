@@ -306,7 +306,7 @@ DAMAGES |= {
     ),
     "a cell too many": (
         lambda f: change(f, "events.csv", lambda b: b.rstrip() + b",more\n"),
-        "events.csv: line 2: its cells are 9, and the columns are 8. Remove or add cells, or quote a cell",
+        "events.csv: line 2: its cells are 9, the columns 8. Remove or add cells, or quote a cell",
     ),
     "a column twice": (
         lambda f: change(f, "events.csv", lambda b: b.replace(b"heard", b"kind", 1)),
