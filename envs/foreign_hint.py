@@ -1,4 +1,4 @@
-"""Whether a text that is no level of ours has maps of another collection. No torch here."""
+"""Maps of another collection in a text that should be a level of ours: its format. No torch here."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from parenting.envs.foreign_text import FORMATS, maps, recognise
 from parenting.envs.level_text import lines_of
 
 ROW = re.compile("^[^;]*[#A-Zt]")
-"""A line with a wall or a letter of ours that is no comment."""
+"""A line with a wall or a letter of ours outside of comments."""
 PROSE = re.compile("[a-su-z]")
 """A letter that no glyph of ours is: a line with one is a title, an entry or a text rather than a row."""
 

@@ -244,22 +244,6 @@ def test_a_file_is_held_against_its_hash(tmp_path: Path, name: str, how: str) ->
     assert any(name in one for one in found.problems), found
 
 
-def test_blank_last_lines_are_no_rows_and_a_cell_too_many_is_named(tmp_path: Path) -> None:
-    write(tmp_path, sound())
-    told = json.loads((manifest := tmp_path / "manifest.json").read_text())
-
-    def longer(name: str, more: bytes) -> list[str]:
-        blob = (tmp_path / name).read_bytes() + more
-        (tmp_path / name).write_bytes(blob)
-        told["files"][name] |= {"sha256": hashlib.sha256(blob).hexdigest(), "bytes": len(blob)}
-        manifest.write_text(json.dumps(told))
-        return audit(tmp_path).problems
-
-    assert longer("answers.jsonl", b"\n") == longer("metrics.csv", b"\n") == []
-    assert "metrics.csv: line " in (said := longer("metrics.csv", b"1," * 99 + b"1\n")[0])
-    assert "its cells are 100, the columns" in said
-
-
 def test_where_every_row_is_wrong_a_few_sentences_say_so(tmp_path: Path) -> None:
     whole = sound()
     whole["csv"] = table(whole["answers"]).replace("guidance", "preference")

@@ -39,7 +39,7 @@ def time(text: str) -> datetime:
             return found.astimezone(UTC)
     except (ValueError, TypeError, OverflowError):
         pass
-    raise ValueError("this is no time in UTC, such as 2026-01-31T12:00:00.000000Z")
+    raise ValueError("a time in UTC stands here, such as 2026-01-31T12:00:00.000000Z")
 
 
 def _count(value: Any, least: int = 0) -> None:

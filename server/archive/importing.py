@@ -148,12 +148,14 @@ def _require_runs(path: Path, entries: Sequence[RunEntry]) -> None:
     Raises:
         SetupError: there is one.
     """
-    for place, entry in enumerate(entries):
+    seen = set[str]()
+    for entry in entries:
         _require_settings(path, entry)
         _require_world(path, entry)
-        if entry.run in [other.run for other in entries[:place]]:
+        if entry.run in seen:
             twice = shown("run", entry.run, "another run of the manifest has this id")
             raise SetupError(f"{path}: {MANIFEST}: run {entry.number}: {twice}. {REMEDY}")
+        seen.add(entry.run)
 
 
 def _require_world(path: Path, entry: RunEntry) -> None:
