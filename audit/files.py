@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import io
 import json
@@ -12,6 +11,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import IO, Any
 from zipfile import BadZipFile, ZipFile
+
+from parenting._cells import whole_rows
 
 MANIFEST = "manifest.json"
 PIECE = 2**20
@@ -86,12 +87,16 @@ class Files:
     def lines(self, name: str) -> Iterator[dict[str, Any]]:
         """Yield the objects of a file of JSON lines."""
         with closing(self.open(name)) as file:
-            yield from map(json.loads, file)
+            yield from map(json.loads, filter(bytes.strip, file))
 
     def cells(self, name: str) -> Iterator[dict[str, str]]:
-        """Yield the rows of a CSV file as text."""
+        """Yield the rows of a CSV file as text.
+
+        Raises:
+            ValueError: a row has not a cell for each column.
+        """
         with io.TextIOWrapper(self.open(name), encoding="utf-8", newline="") as text:
-            yield from csv.DictReader(text)
+            yield from whole_rows(text, name)
 
 
 def unpacked_lines(file: IO[bytes]) -> Iterator[bytes]:

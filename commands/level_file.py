@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from errno import EBADF
-from os.path import exists
+from os.path import exists, isdir
 from pathlib import Path
 
 import typer
@@ -86,11 +86,15 @@ def _bytes(file: str) -> bytes:
 
 
 def _parted(text: str) -> tuple[str, str | None]:
-    """Take FILE:WHICH apart; a file whose name holds the colon is that file."""
-    file, colon, which = text.rpartition(":")
-    if not colon or exists(text) or not which or not file:
+    """Take FILE:WHICH apart behind the longest file that exists; its path and WHICH may hold colons."""
+    if exists(text):
         return text, None
-    return (file, which) if file == STANDARD_INPUT or exists(file) else (text, None)
+    parts = text.split(":")
+    for count in range(len(parts) - 1, 0, -1):
+        file, which = ":".join(parts[:count]), ":".join(parts[count:])
+        if file == STANDARD_INPUT or (exists(file) and not isdir(file)):
+            return file, which
+    return text, None
 
 
 def _said(level: Level, said: tuple[str, ...]) -> Level:

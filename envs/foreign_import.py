@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 from parenting.envs import registry
 from parenting.envs.foreign_levels import carry
-from parenting.envs.foreign_text import ForeignMap, MapRowError, maps
+from parenting.envs.foreign_rle import MapRowError
+from parenting.envs.foreign_text import ForeignMap, maps
 from parenting.envs.levels.spec import Level, LevelError
 
 
@@ -63,20 +64,6 @@ def imported(
     except ValueError as error:
         raise ForeignMapError(str(error)) from None
     return [_one(one, name, world) for one, name in zip(found, _names(found, stem), strict=True)]
-
-
-def foreign_format(text: str) -> str | None:
-    """Return the format of the maps of which most of a text consists; None of levels of ours.
-
-    Art of gridworlds is not told, since its signs are nearly ours.
-    """
-    try:
-        found = maps(text)
-    except ValueError:
-        return None
-    lines = sum(bool(line.strip()) for line in text.splitlines())
-    rows = sum(len(one.rows) for one in found)
-    return found[0].format if 2 * rows >= lines and found[0].format != "gridworlds" else None
 
 
 def _one(one: ForeignMap, name: str, world: str | None) -> Imported:

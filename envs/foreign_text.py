@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import NamedTuple
 
-from parenting.envs.foreign_names import ABOUT, is_title, name_above, titles_stand_above
+from parenting.envs.foreign_names import ABOUT, is_title, name_above, title_of, titles_stand_above
+from parenting.envs.foreign_rle import ENCODED, MapRowError, decoded
 from parenting.envs.level_text import COMMENT, FENCE, Line, Written, lines_of, tidied, visible
 from parenting.envs.people_text import sign
 
@@ -53,18 +54,12 @@ OF_ONE_LENGTH = ("frozenlake", "cliffwalking", "taxi")
 """The formats whose rows are of one length; XSB's need not be, and art of gridworlds is refused later."""
 QUOTED = re.compile(r"""(?i:(r[bu]?|[bu]r)|[bu])?("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')""")
 """A string in Python: whether it is a raw one, and its text in quotation marks."""
+KEY = re.compile(r"\s*:")
+"""The sign behind a string that is a key."""
 ESCAPE = re.compile(
     r"""\\(?:[\\'"abfnrtv]|[0-3]?[0-7]{1,2}|x[0-9a-fA-F]{2}|u(?![dD][89a-fA-F])[0-9a-fA-F]{4}|U00(?:0[0-9a-fA-F]|10)[0-9a-fA-F]{4})"""
 )
 """An escape that Python reads; any other one stays as it stands."""
-
-
-class MapRowError(ValueError):
-    """A line that parts a map, or that looks like a row of one and is none."""
-
-    def __init__(self, line: int, said: str) -> None:
-        super().__init__(said)
-        self.line = line
 
 
 class _Run(NamedTuple):
@@ -82,6 +77,7 @@ class ForeignMap:
     format: str
     rows: tuple[str, ...]
     line: int  # of its first row, counted from 1
+    last: int  # of its last row
     name: str = ""
     said: tuple[str, ...] = ()  # what was cut around it
 
@@ -94,14 +90,6 @@ def recognise(rows: Sequence[str]) -> str | None:
         if whole and any(sign in row for row in shown for sign in MARKS[name]):
             return name
     return None
-
-
-def hint(rows: Sequence[str]) -> str:
-    """Return a remedy for rows that are of another format, with a sign before it; nothing for others."""
-    found = recognise(rows)
-    if found is None or found == "gridworlds":
-        return ""
-    return f"; this reads like {FORMATS[found]}, which `parenting worlds import FILE` makes a level of"
 
 
 def maps(text: str, wanted: str | None = None) -> list[ForeignMap]:
@@ -119,13 +107,14 @@ def maps(text: str, wanted: str | None = None) -> list[ForeignMap]:
     """
     lines = lines_of(COLOUR.sub("", text))
     quoted = any(QUOTED.search(line.text) for line in lines)
-    for view in ([_unquoted(lines)] if quoted else []) + [lines]:
+    for given in ([_unquoted(lines)] if quoted else []) + [lines]:
+        view, encoded = decoded(given) if wanted in (None, "xsb") else (given, set[int]())
         seen = [visible(line) for line in view]
         for format in (wanted,) if wanted else FORMATS:
             if found := _of(format, view, seen):
                 if wanted is None:
                     _refuse_others(found, view, seen)
-                return found
+                return [replace(one, said=(*one.said, *[ENCODED][: one.line in encoded])) for one in found]
     for format in (wanted,) if wanted else FORMATS:
         _check_all(format, lines)
     what = FORMATS[wanted] if wanted else ", ".join(FORMATS.values())
@@ -138,7 +127,7 @@ def _refuse_others(found: Sequence[ForeignMap], lines: Sequence[Line], seen: Seq
     Raises:
         MapRowError: It has.
     """
-    taken = {one.line + row for one in found for row in range(len(one.rows))}
+    taken = {number for one in found for number in range(one.line, one.last + 1)}
     rest = [(line, text) for line, text in zip(lines, seen, strict=True) if line.number not in taken]
     format = found[0].format
     for other in FORMATS.keys() - {format}:
@@ -169,7 +158,7 @@ def _of(format: str, lines: Sequence[Line], seen: Sequence[str]) -> list[Foreign
             found.append(replace(_map(format, run), name=above))
             above = ""
         elif not run.is_rows:
-            titles = [text.partition(":")[2].strip() for text in run.seen if is_title(text)]
+            titles = [title_of(text) for text in run.seen if is_title(text)]
             if titles and found and not found[-1].name and not titles_above:
                 found[-1] = replace(found[-1], name=titles[0])
             above = titles[-1] if titles and titles_above else name_above(run.seen)
@@ -191,7 +180,8 @@ def _map(format: str, run: _Run) -> ForeignMap:
         if format in OF_ONE_LENGTH and length != lengths[0]:
             said = f"this row has {length} signs, and the map's first row has {lengths[0]}. Mend it"
             raise MapRowError(line.number, f"{said}.")
-    return ForeignMap(format, tuple(rows), run.lines[0].number, said=art.said)
+    first, last = run.lines[0].number, run.lines[-1].number
+    return ForeignMap(format, tuple(rows), first, last, said=art.said)
 
 
 def _check(format: str, runs: Sequence[_Run], whole: Sequence[bool]) -> None:
@@ -268,18 +258,32 @@ def _strange(format: str, line: Line, text: str) -> MapRowError:
 
 
 def _unquoted(lines: Sequence[Line]) -> list[Line]:
-    """Return lines of a list in Python as the strings in them; the end of an inner list parts two maps.
+    """Return lines of a list in Python or JSON as their strings; the end of an inner list parts two maps.
 
-    Each has the number of the line where it stood.
+    Each has the number of the line where it stood. A key stands before its value, or else parts two maps.
     """
     found: list[Line] = []
     for line in lines:
         parts = [_string(one) for one in QUOTED.finditer(line.text)]
         by_cell = all(len(part) == 1 for part in parts)
-        texts = ["".join(parts)] if by_cell else parts
+        texts = ["".join(parts)] if by_cell else _with_keys(line.text)
         if not by_cell and "]" in QUOTED.sub("", line.text):
             texts.append("")
         found += [Line(line.number, text, tuple(range(1, len(text) + 1))) for text in texts]
+    return found
+
+
+def _with_keys(text: str) -> list[str]:
+    """Return the strings of a line; a key and a string behind it are one, `key: value`."""
+    found, key, end = list[str](), "", 0
+    for quoted in QUOTED.finditer(text):
+        value = _string(quoted)
+        if key and text[end : quoted.start()].strip() == ":":
+            value = f"{key}: {value}"
+        end = quoted.end()
+        is_key = KEY.match(text, end) is not None
+        found.append("" if is_key else value)
+        key = value if is_key else ""
     return found
 
 

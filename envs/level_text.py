@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby, takewhile
 
+from parenting.envs.front_matter import RULERS, rulers
 from parenting.envs.levels.spec import AGENT, Cell, LevelError
 
 FILE_CHARACTERS = 1_000_000
@@ -101,7 +102,8 @@ def lines_of(text: str) -> list[Line]:
 def written(text: str, glyphs: str) -> list[Written]:
     """Take a text apart into its levels, at least one; `glyphs` are the world's."""
     lines = lines_of(text)
-    prose = _prose(lines, glyphs)
+    matter = rulers([line.text for line in lines], glyphs)
+    prose = _prose(lines, glyphs) | {lines[place].number for place in matter or ()}
     lines = [replace(line, text="", columns=()) if line.number in prose else line for line in lines]
     found: list[Written] = []
     now = Written()
@@ -120,8 +122,12 @@ def written(text: str, glyphs: str) -> list[Written]:
             now = replace(now, art=[*now.art, *block])
     if now.art or now.header or not found:
         found += _apart(now, lines)
-    said = (*([PROSE] if prose else []), *_around(lines, found, glyphs))
+    said = (*_left_out(prose, matter), *_around(lines, found, glyphs))
     return [tidied(one, glyphs, said) for one in found]
+
+
+def _left_out(prose: set[int], matter: tuple[int, int] | None) -> tuple[str, ...]:
+    return (*([RULERS] if matter else []), *([PROSE] if len(prose) > 2 * (matter is not None) else []))
 
 
 def choose(found: Sequence[Written], which: str | None, source: str) -> Written:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from parenting.envs import options as settings
 from parenting.envs.art import check_text, parse
-from parenting.envs.foreign_text import hint
+from parenting.envs.foreign_hint import hint
+from parenting.envs.front_matter import check_front_matter
 from parenting.envs.installed import Installed
-from parenting.envs.level_text import FILE_CHARACTERS, Written, choose, written
+from parenting.envs.level_text import FILE_CHARACTERS, Written, choose, lines_of, written
 from parenting.envs.levels.spec import Level, LevelError, Setting, WorldSpec
 from parenting.envs.names import UnknownNameError
 from parenting.envs.people_text import read_name
@@ -176,13 +177,19 @@ def read_level(
     """
     glyphs = spec(world, text).glyphs
     check_text(text, source, FILE_CHARACTERS)
-    chosen = choose(written(text, glyphs), which, source)
-    found = read_written(world, chosen, source)
+    try:
+        check_front_matter([line.text for line in lines_of(text)], glyphs, source)
+        chosen = choose(written(text, glyphs), which, source)
+    except LevelError as error:
+        if remedy := hint(text):
+            raise LevelError(source, error.line, error.column, error.rule + remedy) from None
+        raise
+    found = read_written(world, chosen, source, text)
     return replace(found, name=name) if name is not None and found.name == source else found
 
 
-def read_written(world: str, chosen: Written, source: str = "level") -> Level:
-    """A level that was found in a person's text.
+def read_written(world: str, chosen: Written, source: str = "level", text: str = "") -> Level:
+    """A level that was found in a person's text; an error tells the format of a foreign one.
 
     Raises:
         LevelError: as `read_level`.
@@ -196,7 +203,9 @@ def read_written(world: str, chosen: Written, source: str = "level") -> Level:
         return replace(named_by_a_person(found), said=chosen.said)
     except LevelError as error:
         place = chosen.place(error.line, error.column)
-        raise LevelError(source, *place, error.rule + hint([line.text for line in chosen.art])) from None
+        raise LevelError(
+            source, *place, error.rule + hint(text, [line.text for line in chosen.art])
+        ) from None
 
 
 def named_by_a_person(found: Level) -> Level:

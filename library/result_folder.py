@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import torch
 
+from parenting._cells import whole_rows
 from parenting.agent.config import Config
 from parenting.library.answer_log import COLUMNS, EVENT_COLUMNS
 from parenting.library.policy import Policy
@@ -162,7 +163,7 @@ def _cell(value: Any) -> str:
 
 
 def _rows(path: Path, types: Mapping[str, str]) -> list[Record]:
-    rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"))))
+    rows = list(whole_rows(io.StringIO(path.read_text(encoding="utf-8")), path.name))
     return [
         {name: READERS[kind](row[name]) if row[name] != "" else None for name, kind in types.items()}
         for row in rows

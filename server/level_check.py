@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from parenting.agent.config import PRESETS, Config, merge
 from parenting.envs import registry
-from parenting.envs.foreign_import import ForeignMapError, foreign_format, imported
+from parenting.envs.foreign_hint import foreign_format
+from parenting.envs.foreign_import import ForeignMapError, imported
 from parenting.envs.foreign_text import FORMATS
-from parenting.envs.level_text import SeveralLevelsError, Written, choose, written
+from parenting.envs.front_matter import check_front_matter
+from parenting.envs.level_text import SeveralLevelsError, Written, choose, lines_of, written
 from parenting.envs.levels.spec import LevelError
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.schemas import Schema
@@ -111,9 +113,11 @@ def check(world: str, text: str, which: str | None = None) -> CheckedLevelSchema
         InvalidFieldsError: there is no such world.
     """
     _know(world)
-    found = written(text, registry.spec(world).glyphs)
+    glyphs = registry.spec(world).glyphs
+    found = written(text, glyphs)
     names, chosen = [one.name for one in found], Written()
     try:
+        check_front_matter([line.text for line in lines_of(text)], glyphs, SOURCE)
         chosen = choose(found, which, SOURCE)
         level = registry.read_level(world, text, SOURCE, which)
     except LevelError as error:

@@ -249,3 +249,9 @@ def test_the_form_offers_frugal_exactly_where_the_page_shows_it_to_be_no_worse()
         levels = [level for of, level in tried if of == world]
         good = bool(levels) and all(shown[level] for level in levels)
         assert offered_preset(world) == ("frugal" if good else "conservative"), world
+
+
+def test_a_row_of_trials_with_too_many_cells_is_named(tmp_path: Path) -> None:
+    (tmp_path / TRIALS).write_text("trial,deaths\n1,2\n\n2,3,4\n\n")
+    with pytest.raises(ValueError, match=rf"{TRIALS}: line 4: its cells are 3, the columns 2. Remove or add"):
+        read_rows(tmp_path / TRIALS)

@@ -62,7 +62,7 @@ def _rows(files: Mapping[str, Any], told: dict[str, Any], name: str) -> Iterator
     blob = files[name]()
     if hashlib.sha256(blob).hexdigest() != entry["sha256"]:
         raise AnswersFileError(f"{name} is not the file that was written: its hash differs")
-    return map(json.loads, blob.splitlines())
+    return map(json.loads, blob.rstrip().splitlines())
 
 
 def _line(row: dict[str, Any], asked: Mapping[str, Any], source: dict[str, Any]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import torch
 
+from parenting._cells import whole_rows
 from parenting.experiments.reporting.comparison import count_verdicts
 from parenting.experiments.reporting.markdown import RESULTS, TRIALS, page
 from parenting.experiments.runner import provenance
@@ -73,11 +74,11 @@ def read_rows(path: Path) -> list[Row]:
 
     Raises:
         OSError: The file cannot be read.
+        ValueError: A row has not a cell for each column.
     """
     with path.open(encoding="utf-8", newline="") as file:
-        return [
-            {name: _value(cell) for name, cell in row.items() if cell != ""} for row in csv.DictReader(file)
-        ]
+        rows = whole_rows(file, str(path))
+        return [{name: _value(cell) for name, cell in row.items() if cell != ""} for row in rows]
 
 
 def command(one: str, request: Request, out: Path) -> str:

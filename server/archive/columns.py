@@ -8,9 +8,9 @@ UTC, of equal length. A column is only ever added.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, create_model
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, PrivateAttr, create_model
 
 DAMAGED = "the stored value is damaged"
 NOT_KEPT = "the version that stored it did not keep it"
@@ -30,6 +30,17 @@ class Row(BaseModel):
     """The root of the models of rows."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, strict=True)
+    _place: str = PrivateAttr("")
+
+    @property
+    def place(self) -> str:
+        """The file and the number of a row that was read; empty of another one."""
+        return self._place
+
+    def at(self, place: str) -> Self:
+        """Return the row with its place."""
+        self._place = place
+        return self
 
 
 def row_model(name: str, doc: str, columns: Sequence[Column]) -> type[Row]:

@@ -142,7 +142,7 @@ def _bytes(path: Path) -> bytes:
 
 
 def _rows(path: Path, blob: bytes) -> Iterator[tuple[int, Mapping[str, Any]]]:
-    for number, line in enumerate(blob.splitlines(), start=1):
+    for number, line in enumerate(blob.rstrip().splitlines(), start=1):
         try:
             row = json.loads(line)
         except (ValueError, RecursionError):

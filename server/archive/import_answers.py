@@ -15,11 +15,10 @@ from parenting.server import chain
 from parenting.server.answer_tables import SCRIPT
 from parenting.server.archive.answer_columns import ANSWERS, EFFECTS, AnswerRow
 from parenting.server.archive.columns import MOVES
-from parenting.server.archive.import_names import Names, Naming, needed, run_of, same, time_of
+from parenting.server.archive.import_names import Names, Naming, needed, refused, run_of, same, time_of
 from parenting.server.archive.measured_columns import MEASURED
 from parenting.server.archive.people import client_of
 from parenting.server.archive.source import Source
-from parenting.server.errors import SetupError
 from parenting.server.reads.why import TICKS
 from parenting.server.tables import SKIP, Answer, Effect, Query
 
@@ -64,7 +63,7 @@ def _put(session: Session, portion: Portion, links: dict[int, str]) -> None:
     for mine, row in portion:
         query = asked.get((mine.number, mine.question(row.question)))
         if query is None:
-            raise SetupError(f"Answer {row.number} names a question that is not there. Nothing was imported.")
+            raise refused(row, "question", row.question, "this question is not there")
         values: dict[str, Any] = {
             **same(row, "number", "standing", "replays", "applied_tick"),
             "query_id": query["id"],
@@ -122,9 +121,7 @@ def _superseded(earlier: Mapping[tuple[int, int], int], mine: Naming, row: Any) 
     if row.supersedes is None:
         return None
     if (mine.number, row.supersedes) not in earlier:
-        raise SetupError(
-            f"Answer {row.number} supersedes one that does not come before it. Nothing was imported."
-        )
+        raise refused(row, "supersedes", row.supersedes, "no answer of this number comes before it")
     return earlier[mine.number, row.supersedes]
 
 

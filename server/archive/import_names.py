@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Mapping
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any, NamedTuple
 
+from parenting.server.archive.import_rules import shown, time
 from parenting.server.errors import SetupError
 from parenting.server.public_ids import ALPHABET, LENGTH
+
+REMEDY = "Nothing was imported. Take another copy of the export, or export the run again."
 
 
 class Naming(NamedTuple):
@@ -37,10 +39,13 @@ def run_of(names: Names, row: Any) -> Naming:
         SetupError: the manifest does not name it.
     """
     if row.run not in names:
-        raise SetupError(
-            f"A row is of the run {row.run}, which the manifest does not name. Nothing was imported."
-        )
+        raise refused(row, "run", row.run, "the manifest does not name this run")
     return names[row.run]
+
+
+def refused(row: Any, field: str, value: Any, said: str) -> SetupError:
+    """Return the refusal of a row, with its file, its number and the field."""
+    return SetupError(f"{row.place}: {shown(field, value, said)}. {REMEDY}")
 
 
 def same(row: Any, *names: str) -> dict[str, Any]:
@@ -61,4 +66,4 @@ def needed(value: datetime | None) -> datetime:
 
 def time_of(text: str | None) -> datetime | None:
     """Return the time that a cell tells, in UTC."""
-    return None if text is None else datetime.fromisoformat(re.sub(r"Z$", "+00:00", text)).astimezone(UTC)
+    return None if text is None else time(text)

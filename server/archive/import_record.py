@@ -11,14 +11,15 @@ from sqlalchemy.orm import Session
 
 from parenting.server.archive.columns import MOVES
 from parenting.server.archive.import_answers import put_answers
-from parenting.server.archive.import_names import Names, needed, run_of, same, time_of
+from parenting.server.archive.import_names import Names, needed, refused, run_of, same, time_of
 from parenting.server.archive.log_columns import EVENTS, FIGURES, METRICS, EventRow, MetricRow
 from parenting.server.archive.question_columns import QUESTIONS, QuestionRow
 from parenting.server.archive.source import Source
+from parenting.server.damage import damage
 from parenting.server.errors import SetupError
 from parenting.server.identity import unused_number
 from parenting.server.statuses import QueryStatus
-from parenting.server.tables import Answer, Metric, OperatorEvent, Query, Reason, Run
+from parenting.server.tables import Answer, Metric, OperatorEvent, Query, Reason, Run, Table
 
 AT_ONCE = 200
 """Rows that are in memory at once."""
@@ -72,7 +73,9 @@ def _questions(session: Session, found: Source, names: Names) -> Iterator[None]:
         )
         why = _why(row)
         if why is not None:
-            session.add(Reason(run_id=mine.number, tick=row.tick, why=why))
+            reason = Reason(run_id=mine.number, tick=row.tick, why=why)
+            _require_sound(row, reason, "why_draw")
+            session.add(reason)
         yield
 
 
@@ -98,6 +101,7 @@ def _events(session: Session, found: Source, names: Names) -> Iterator[None]:
         event.created, event.applied_tick = needed(time_of(row.created)), row.applied_tick
         session.add(event)
         session.flush()  # their order is that of their numbers
+        _require_sound(row, event, "payload")
         yield
 
 
@@ -107,5 +111,17 @@ def _metrics(session: Session, found: Source, names: Names) -> Iterator[None]:
         late = ("cells", "safe_cells")
         values = {name: value for name, value in told.items() if name not in late or value is not None}
         values |= {} if row.more is None else json.loads(row.more)
-        session.add(Metric(run_id=run_of(names, row).number, tick=row.tick, values=values))
+        metric = Metric(run_id=run_of(names, row).number, tick=row.tick, values=values)
+        _require_sound(row, metric, "more")
+        session.add(metric)
         yield
+
+
+def _require_sound(row: Any, stored: Table, field: str) -> None:
+    """Refuse what could not be read once it is stored.
+
+    Raises:
+        SetupError: it could not.
+    """
+    if wrong := damage(stored):
+        raise refused(row, field, getattr(row, field), wrong)

@@ -6,25 +6,28 @@ has it or had it; its answers are chained afresh, and its origin names the run a
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
-from datetime import UTC, datetime
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 from sqlalchemy import select
-from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from parenting.envs import registry
 from parenting.envs.levels.spec import LevelError
+from parenting.server.archive.contradictions import contradiction
 from parenting.server.archive.import_blobs import put_blobs
-from parenting.server.archive.import_names import Naming
+from parenting.server.archive.import_names import REMEDY, Naming
 from parenting.server.archive.import_record import put_record
+from parenting.server.archive.import_rules import SETTINGS as RULES
+from parenting.server.archive.import_rules import shown, time, wrong_value
 from parenting.server.archive.manifest import RunEntry
 from parenting.server.archive.runs import STATE
 from parenting.server.archive.source import Source, source
+from parenting.server.archive.target import MANIFEST
 from parenting.server.audit.recording import record
 from parenting.server.audit.table import Kind
 from parenting.server.columns import UNREADABLE
@@ -43,6 +46,11 @@ from parenting.server.tables import Run, Tombstone
 
 Progress = Callable[[int, int], None]
 TIMES = ("created",)
+NEW = (
+    *("world", "seed", "parent", "script", "goal", "pace", "finish"),
+    *("guidance_layout", "practice", "words", "remarks"),
+)
+"""The settings that have the rules of `NewRun`."""
 LOST = ("waiting",)
 
 
@@ -77,12 +85,12 @@ def import_export(
     """
     with source(path) as found:
         found.verify(checked)
-        for entry in found.manifest.runs:
-            _require_world(path, entry)
-            _require_settings(path, entry)
+        _require_runs(path, found.manifest.runs)
         try:
             with db.write() as session:
                 return _put(session, db, found, progress, most)
+        except (IntegrityError, DataError):
+            raise SetupError(f"{path}: {contradiction(found)}. {REMEDY}") from None
         except (SQLAlchemyError, ValidationError, *UNREADABLE) as error:
             raise SetupError(
                 f"{path} cannot be imported: {type(error).__name__}: {str(error).splitlines()[0][:200]}. "
@@ -114,7 +122,7 @@ def _run(session: Session, now: datetime, found: Source, entry: RunEntry) -> Run
     run = Run(id=unused_number(session, Run), public_id=unused_id(session, entry.run))
     for name in (*SETTINGS, *STATE):
         value = None if name in LOST else told[name]
-        setattr(run, name, _time(value) if name in TIMES and value is not None else value)
+        setattr(run, name, time(value) if name in TIMES and value is not None else value)
     where = {"run": entry.run, "number": entry.number, "database": found.manifest.database}
     run.origin = {**(run.origin or {}), IMPORTED: {**where, "manifest": found.sha256}}
     run.created = now if told["created"] is None else run.created
@@ -134,6 +142,22 @@ def unused_id(session: Session, wanted: str) -> str:
     return public_id() if taken or buried or not is_public_id(wanted) else wanted
 
 
+def _require_runs(path: Path, entries: Sequence[RunEntry]) -> None:
+    """Refuse runs that could not go on here, and one that the manifest names twice.
+
+    Raises:
+        SetupError: there is one.
+    """
+    seen = set[str]()
+    for entry in entries:
+        _require_settings(path, entry)
+        _require_world(path, entry)
+        if entry.run in seen:
+            twice = shown("run", entry.run, "another run of the manifest has this id")
+            raise SetupError(f"{path}: {MANIFEST}: run {entry.number}: {twice}. {REMEDY}")
+        seen.add(entry.run)
+
+
 def _require_world(path: Path, entry: RunEntry) -> None:
     world, text = str(entry.settings.get("world")), str(entry.settings.get("level_text"))
     if not registry.knows(world, text):
@@ -148,17 +172,18 @@ def _require_world(path: Path, entry: RunEntry) -> None:
 
 
 def _require_settings(path: Path, entry: RunEntry) -> None:
-    """Hold what a worker would stumble over to the rules of a new run."""
-    told = {name: entry.settings.get(name) for name in ("world", "seed", "goal", "pace", "script", "finish")}
+    """Hold a run to the rules of a new one, which its name, its times and its numbers have to keep, too."""
+    told = entry.settings
+    lacking = next((name for name in (*SETTINGS, *STATE) if name not in told), None)
+    wrong = _of_new(told) if lacking is None else (lacking, None, "it is missing")
+    if wrong is not None:
+        raise SetupError(f"{path}: {MANIFEST}: run {entry.number}: {shown(*wrong)}. {REMEDY}")
+
+
+def _of_new(told: Mapping[str, Any]) -> tuple[str, Any, str] | None:
     try:
-        NewRun.model_validate(told)
+        NewRun.model_validate({name: told[name] for name in NEW})
     except ValidationError as error:
-        wrong = error.errors(include_url=False)[0]
-        field = ".".join(map(str, wrong["loc"]))
-        raise SetupError(
-            f"{path}: run {entry.number}: {field}: {wrong['input']!r}: {wrong['msg']}. Nothing was imported."
-        ) from None
-
-
-def _time(text: str) -> datetime:
-    return datetime.fromisoformat(re.sub(r"Z$", "+00:00", text)).astimezone(UTC)
+        first = error.errors(include_url=False)[0]
+        return ".".join(map(str, first["loc"])), first["input"], first["msg"].removeprefix("Value error, ")
+    return wrong_value(RULES, told)

@@ -9,12 +9,15 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, cast
 from zipfile import BadZipFile, ZipFile
 
 from pydantic import TypeAdapter, ValidationError
 
+from parenting._cells import whole_rows
 from parenting.server.archive.columns import Column, Row
+from parenting.server.archive.import_names import REMEDY
+from parenting.server.archive.import_rules import ROWS, shown, wrong_value
 from parenting.server.archive.manifest import Manifest
 from parenting.server.archive.target import MANIFEST
 from parenting.server.errors import SetupError
@@ -97,15 +100,13 @@ class Source:
             read: Iterable[str | bytes] = _csv_lines(file, columns) if name.endswith(".csv") else file
             try:
                 for number, line in enumerate(read, start=1):
-                    row: Any = model.model_validate_json(line)
-                    if row.damaged is not None:
-                        raise SetupError(
-                            f"{self._path}: row {number} of {name} was damaged in its database: "
-                            f"{row.damaged}. Nothing was imported."
-                        )
-                    yield row
-            except (ValidationError, ValueError, TypeError, RecursionError, csv.Error) as error:
-                raise SetupError(f"{self._path}: {name}: a row cannot be read: {_said(error)}.") from None
+                    place = f"{self._path}: {name}: row {number}"
+                    if line.strip():
+                        yield _row(model, name, line, place)
+            except csv.Error as error:
+                raise SetupError(f"{self._path}: {name}: a row cannot be read: {error}. {REMEDY}") from None
+            except ValueError as error:
+                raise SetupError(f"{self._path}: {name}: {error}. {REMEDY}") from None
 
     def _read_manifest(self, blob: bytes) -> Manifest:
         try:
@@ -149,18 +150,41 @@ def _inside(folder: Path, name: str) -> IO[bytes]:
     return file.open("rb")
 
 
+def _row(model: type[Row], name: str, line: str | bytes, place: str) -> Row:
+    """Return a row of a table.
+
+    Raises:
+        SetupError: a value is missing, of a wrong type or against a rule, or was damaged in its database.
+    """
+    try:
+        row: Any = model.model_validate_json(line)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field, missing = ".".join(map(str, first["loc"])) or "it", first["type"] == "missing"
+        value = None if missing or not first["loc"] else first["input"]
+        raise SetupError(f"{place}: {shown(field, value, first['msg'])}. {REMEDY}") from None
+    if row.damaged is not None:
+        raise SetupError(f"{place} was damaged in its database: {row.damaged}. Nothing was imported.")
+    if (wrong := wrong_value(ROWS[name], dict(row))) is not None:
+        raise SetupError(f"{place}: {shown(*wrong)}. {REMEDY}")
+    return cast(Row, row.at(place))
+
+
 def _csv_lines(file: IO[bytes], columns: list[Column]) -> Iterator[str]:
     """Yield the rows of a CSV file as JSON."""
     kinds = {column.name: column.type for column in columns}
     with io.TextIOWrapper(file, encoding="utf-8", newline="") as text:
-        for cells in csv.DictReader(text):
+        for cells in whole_rows(text):
             yield json.dumps({name: _value(kinds.get(name, str), cell) for name, cell in cells.items()})
 
 
 def _value(kind: type, cell: str) -> Any:
     if cell == "":
         return None
-    return cell if kind is str else _JSON.validate_json(cell)
+    try:
+        return cell if kind is str else _JSON.validate_json(cell)
+    except ValidationError:
+        return cell  # which the row's model refuses with its place
 
 
 def _said(error: Exception) -> str:

@@ -48,6 +48,22 @@ def test_a_file_whose_name_holds_a_colon_is_that_file(tmp_path: Path) -> None:
     assert chosen_level(WORLD, str(tmp_path / "two:first")).rows == rows(POND)
 
 
+@pytest.mark.parametrize("file", ["two.txt", "C:two.txt", "a:b:c.txt"])
+def test_names_and_paths_hold_colons_and_the_longest_file_is_meant(tmp_path: Path, file: str) -> None:
+    (tmp_path / "a").write_text(POND)
+    (tmp_path / "a:b").mkdir()
+    path = tmp_path / file
+    path.write_text(f"; part 1: pond\n{POND}\n; part 2: a:b\n{SECOND}")
+    assert chosen_level(WORLD, f"{path}:part 2: a:b").rows == rows(SECOND)
+    assert chosen_level(WORLD, f"{path}:1").rows == rows(POND)
+    for which in ("part 2", "part 2: a", "b:c.txt", ""):
+        said = f"no level is called '{which}' here. The levels are: 1 part 1: pond, 2 part 2: a:b"
+        with pytest.raises(UsageError, match=said):
+            chosen_level(WORLD, f"{path}:{which}")
+    with pytest.raises(UsageError, match="a:b:d' is neither a level of"):
+        chosen_level(WORLD, str(tmp_path / "b" / "a:b:d"))
+
+
 def test_what_cannot_be_read_has_a_remedy(tmp_path: Path) -> None:
     file = tmp_path / "two.txt"
     file.write_text(TWO)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 from parenting.envs import registry
-from parenting.envs.foreign_import import ForeignMapError, foreign_format, imported
+from parenting.envs.foreign_hint import foreign_format
+from parenting.envs.foreign_import import ForeignMapError, imported
+from parenting.envs.levels.spec import LevelError
 
 CRATE = "  #####\n###   #\n# $ @ #\n#  .  #\n#     #\n#######\n"
 LAKE = '["SFFF", "FHFF",\n "FFHF", "HFFG"]\n'
@@ -132,3 +134,106 @@ def test_the_colours_of_a_terminal_are_no_signs() -> None:
     """As Gymnasium prints a lake."""
     (level,) = imported("  (Down)\n\x1b[41mS\x1b[0mFFF\nFHFG\n")
     assert level.level.rows[1] == "#A   #"
+
+
+ENCODED = (
+    "6#|#@2-.#|#-$2-#|6#",
+    "6#|\n#@--.#|\n#-$2-#|\n6#",
+    "; Level #1\n6#\n#@2-.#\n#-$2-#\n6#\nAuthor: 2#\n",
+    "6#|#p2-o#|#-b2-#|6#|",
+    "2(3#)|#@2(-).#|#-$2-#|6#",
+    '["6#", "#@2-.#", "#-$2-#", "6#"]',
+)
+
+
+@pytest.mark.parametrize("text", ENCODED)
+def test_run_length_encoded_rows_are_written_out_and_said(text: str) -> None:
+    (level,) = imported(text)
+    assert level.level.rows == ("######", "#A  G#", "# X  #", "######")
+    assert level.lost[0] == "its rows were run-length encoded, and are written out here"
+    assert foreign_format(text) == "xsb"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "why"),
+    [
+        (
+            "7#\n#@-1-.#\n7#",
+            2,
+            "the row '#@-1-.#' looks run-length encoded, and cannot be read as such: a count",
+        ),
+        ("7#|#@2 -.#|7#", 1, "the row '#@2 -.#'"),
+        ("8#\n#@-2-.#\n8#", 2, "equal signs have one count"),
+        ("#######\n#@-2$.#\n#--$--#\n#######", 2, "all rows are of one length, so that digits may be signs"),
+        ("6#\n#@2-.#\n#-x2-#\n6#", 3, "it has another sign, or parts the map"),
+        ("7#|#@$2-.-|7#", 1, "it does not reach from wall to wall"),
+        ("6#|#@4|6#", 1, "a count stands before no sign"),
+        ("6#|#2(@-.#|6#", 1, "a bracket has no other one"),
+        (
+            "6#|#999999@#|6#",
+            1,
+            "longer than 1000 signs. Decode it: write its signs out, such as #### for 4#.",
+        ),
+        ("6#|9999(9999(#))@#|6#", 1, "longer than 1000 signs"),
+        ("5#|#@.#|5#\nSFFF\nFFFG", 2, "FrozenLake begins here, and line 1 is of Sokoban's XSB"),
+    ],
+)
+def test_an_encoded_row_that_may_mean_something_else_is_refused(text: str, line: int, why: str) -> None:
+    with pytest.raises(ForeignMapError) as refused:
+        imported(text)
+    assert refused.value.line == line
+    assert why in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("above", "name"),
+    [
+        ("Lake\nSolution\nuuLLdd\nrr\n", "Lake"),
+        ("Solution/Moves: 12\nuuLLddRRuu\n\n", "map"),
+        ("Lake\nuu2(Ld)Rrdd\n", "Lake"),
+        ("Lake\n\n---\n", "Lake"),
+        ("Lake\n====\n\n", "Lake"),
+        ("name: Lake\n\n", "Lake"),
+        ("; Title: Lake\n", "Lake"),
+        ("Name: 'Lake'\nAuthor: me\n", "Lake"),
+        ("// Lake\n;\n", "Lake"),
+        ("## Lake ##\n\n", "Lake"),
+        ("/* Lake */\n", "Lake"),
+        ("---\ntitle: Lake\nlayout: post\n---\n\n", "Lake"),
+        ("---\nlayout: post\n---\n\n", "map"),
+        ("Level #1\n", "Level #1"),
+    ],
+)
+def test_a_name_is_no_solution_ruler_mark_or_key(above: str, name: str) -> None:
+    assert [one.level.name for one in imported(f"{above}{CRATE}")] == [name]
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ('{"map": ["SFFF", "FHFG"]}', ["map"]),
+        ('{"desc":\n ["SFFF",\n "FHFG"]}', ["map"]),
+        ('{"name": "Lake", "author": "me", "desc": ["SFFF", "FHFG"]}', ["Lake"]),
+        ('{"4x2": ("SFFF", "FHFG"), "two": ("SFFF", "FFHG")}', ["map 1", "map 2"]),
+    ],
+)
+def test_a_key_of_json_is_no_name(text: str, names: list[str]) -> None:
+    assert [one.level.name for one in imported(text)] == names
+
+
+ABOVE = (
+    "My crate\n\n",
+    "Title: x\nAuthor: y\n\n",
+    "---\ntitle: x\ntags: [a, b]\n---\n\n",
+    "---\ntags:\n  - a\n---\n",
+    "# Crates\n\nThey are from far away.\nThey are hard.\nHave fun.\nOr none.\n\n",
+    f"; one\n{CRATE}\n; two\n",
+    f"{CRATE}Title: one\n\n",
+)
+
+
+@pytest.mark.parametrize("above", ABOVE)
+def test_maps_behind_other_lines_are_recognised_where_a_level_is_wanted(above: str) -> None:
+    assert foreign_format(f"{above}{CRATE}") == "xsb"
+    with pytest.raises(LevelError, match="reads like Sokoban's XSB, which `parenting worlds import FILE`"):
+        registry.read_level("side-effects", f"{above}{CRATE}")

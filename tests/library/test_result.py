@@ -94,6 +94,14 @@ def test_a_write_that_fails_leaves_the_older_result(
     assert [path.name for path in tmp_path.iterdir()] == ["result"]
 
 
+def test_a_row_with_too_many_cells_is_named(trained: pt.TrainResult, tmp_path: Path) -> None:
+    folder = trained.save(tmp_path / "result")
+    with (folder / "answers.csv").open("a") as file:
+        file.write("\n" + "," * 99 + "\n")
+    with pytest.raises(pt.FormatError, match=r"answers\.csv: line \d+: its cells are 100, the columns"):
+        pt.load_result(folder)
+
+
 @pytest.mark.parametrize("missing", ["result.json", "trials.csv", "answers.csv", "policies.safetensors"])
 def test_a_folder_that_lacks_a_file_is_told(missing: str, trained: pt.TrainResult, tmp_path: Path) -> None:
     folder = trained.save(tmp_path / "result")

@@ -12,6 +12,7 @@ from parenting.server.archive.writing import write_export
 from parenting.server.db import Database
 from parenting.server.export import lines
 from parenting.weights.origin import UnreadableOriginError, read_origin
+from tests.server.archive.test_import_of_runs import change
 
 pytestmark = pytest.mark.only("sqlite", "the files are the same from every store")
 
@@ -30,6 +31,10 @@ def test_both_formats_hold_the_same_answers(db: Database, five: list[int], tmp_p
     assert len(first.rows) == 5
     for name in ("run-1", "run-1.zip"):
         assert read_origin(None, export(db, [1], tmp_path / name)).answers == first
+    folder = tmp_path / "run-1"
+    for name in ("answers.jsonl", "questions.jsonl"):
+        change(folder, name, lambda blob: blob + b"\n\n")
+    assert read_origin(None, folder).answers == first
 
 
 def test_what_is_no_export_of_one_run_is_refused(db: Database, five: list[int], tmp_path: Path) -> None:

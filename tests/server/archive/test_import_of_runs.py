@@ -179,18 +179,21 @@ DAMAGES: dict[str, tuple[Callable[[Path], Any], str]] = {
     ),
     "an unknown world": (lambda f: settings(f, world="mars"), "world mars, which is not installed"),
     "a broken config": (lambda f: settings(f, config={"p_guid": 7}), "config"),
-    "a status of no run": (lambda f: settings(f, status="happy"), "cannot be imported"),
+    "a status of no run": (
+        lambda f: settings(f, status="happy"),
+        "run 1: status: 'happy': one of these stands",
+    ),
     "an answer too few": (
         lambda f: change(f, "answers.jsonl", lambda b: b"\n".join(b.splitlines()[:3]) + b"\n"),
         "has not the answers",
     ),
     "an answer to nothing": (
         lambda f: change(f, "questions.jsonl", lambda b: b"".join(b.splitlines(True)[1:])),
-        "names a question that is not there",
+        "this question is not there",
     ),
     "a row of another run": (
         lambda f: change(f, "questions.jsonl", lambda b: b.replace(b'"run":"', b'"run":"x', 1)),
-        "which the manifest does not name",
+        "questions.jsonl: row 1: run: 'x",
     ),
     "a file that is not named": (lambda f: unnamed(f, "metrics.csv"), "metrics.csv is not in the manifest"),
     "a cell without an end": (
@@ -205,7 +208,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "a script of no parent": (lambda f: settings(f, script="os.system"), "run 1: script: 'os.system'"),
     "a word for a number": (
         lambda f: change(f, "answers.jsonl", lambda b: b.replace(b'"tick":1,', b'"tick":"one",', 1)),
-        "answers.jsonl: a row cannot be read",
+        "answers.jsonl: row 1: tick: 'one': Input should be a valid integer. Nothing was imported.",
     ),
 }
 
@@ -215,8 +218,12 @@ DAMAGES: dict[str, tuple[Callable[[Path], Any], str]] = {
 def test_what_is_damaged_or_foreign_is_refused(
     written: tuple[Path, Database], tmp_path: Path, damage: str
 ) -> None:
-    (make, told), other = DAMAGES[damage], written[1]
-    folder = Path(shutil.copytree(written[0], tmp_path / "out"))
+    refuse(written, tmp_path, *DAMAGES[damage])
+
+
+def refuse(written: tuple[Path, Database], tmp_path: Path, make: Callable[[Path], Any], told: str) -> None:
+    """Damage an export; its import has to say so and to leave nothing."""
+    folder, other = Path(shutil.copytree(written[0], tmp_path / "out")), written[1]
     make(folder)
     with pytest.raises(SetupError) as refused:
         import_export(other, folder)

@@ -169,6 +169,12 @@ def test_a_table_in_another_encoding_is_refused_by_its_name(tmp_path: Path) -> N
         read_table(file)
 
 
+def test_blank_last_lines_are_no_answers(table: tuple[Path, Path], tmp_path: Path) -> None:
+    file = tmp_path / "run-1.jsonl"
+    file.write_bytes(table[0].read_bytes() + b"\n  \n")
+    assert read_table(file).lines == read_table(table[0]).lines
+
+
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_table_that_was_changed_is_refused(
     table: tuple[Path, Path], other: Database, tmp_path: Path, damage: str
