@@ -3,10 +3,11 @@
 Keep this file small: a fixture for one folder belongs in that folder's conftest.py.
 """
 
+import asyncio
 import gc
 import os
 import shutil
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import hypothesis
@@ -45,6 +46,21 @@ def chromium_path() -> str:
     if os.environ.get("CI") == "true":
         pytest.fail(reason)
     pytest.skip(reason)
+
+
+@pytest.fixture(autouse=True)
+def without_the_loop_of_browsers(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Hide the loop of Playwright, which runs in this thread as long as its browser is open for later tests.
+
+    Else a test without a browser could run no coroutine, if it comes after one with a browser.
+    """
+    running = None if "browser" in request.fixturenames else asyncio._get_running_loop()
+    if running is None:
+        yield
+        return
+    asyncio._set_running_loop(None)
+    yield
+    asyncio._set_running_loop(running)
 
 
 @pytest.hookimpl(wrapper=True)
