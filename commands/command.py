@@ -86,8 +86,13 @@ def replace_unprintable() -> None:
 
 
 def paragraphs(text: str) -> str:
-    """Join the lines of each paragraph, which the terminal wraps at its own width."""
-    return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
+    """Join the lines of each paragraph, which the terminal wraps at its own width; brackets stay brackets."""
+    told = "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
+    if "[" not in told:
+        return told
+    from rich.markup import escape  # else rich takes them for markup, and they vanish
+
+    return str(escape(told))
 
 
 def _sentence(option: Any, error: ValidationError) -> str:

@@ -40,6 +40,11 @@ def test_what_stands_in_brackets_is_shown(name: str) -> None:
     assert "[default:" not in source
 
 
+def test_the_help_of_a_command_keeps_its_brackets() -> None:
+    said = " ".join(plain(run(app, ["export", "--help"]).output).split())
+    assert "pip install 'parenting[minari]'" in said
+
+
 @pytest.mark.parametrize("name", ["answer", "runs", "export", "replay"])
 def test_exit_codes_are_in_its_help(name: str) -> None:
     assert "Exit codes: 0" in run(app, [name, "--help"]).output
