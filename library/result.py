@@ -44,6 +44,11 @@ class TrainResult:
         events: One record for each act of an operator: `tick`, `kind`, and of a changed probability `name`
             and `value`.
         origin: The earlier policy and answers that it began with, each with its hash; empty without any.
+        parent: The parent who judged: the text of a scripted one with all its parameters, such as "scripted"
+            or "noisy:eps=0.1"; "human" for a `Person`; else the class, as "my_module.StayDry". None in
+            folders of earlier versions, which did not keep it.
+        max_ticks: The ticks after which a trial was left unfinished; None on a page, which has no such limit,
+            and in folders of earlier versions.
     """
 
     world: World
@@ -55,6 +60,8 @@ class TrainResult:
     answers: list[Record]
     events: list[Record] = field(default_factory=list)
     origin: Record = field(default_factory=dict)
+    parent: str | None = None
+    max_ticks: int | None = None
 
     def mean(self) -> dict[str, float | None]:
         """Return the means over trials.
@@ -76,7 +83,7 @@ class TrainResult:
     def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
         """Write the result to a folder, whole or not at all.
 
-        The folder holds `result.json` (what was trained, and the format's version), `trials.csv`,
+        The folder holds `result.json` (what was trained, by whom, and the format's version), `trials.csv`,
         `answers.csv`, `events.csv` and `policies.safetensors`. `parenting.load_result` reads it.
 
         Args:
@@ -137,6 +144,8 @@ def collect(
     *,
     seed: int,
     until: str,
+    parent: str,
+    max_ticks: int | None = None,
     events: Sequence[Record] = (),
 ) -> TrainResult:
     """Collect the batches of a run, one after the other."""
@@ -153,7 +162,8 @@ def collect(
             own: dict[str, Any] = {"stage": stage, "trial": number, "seed": seed, "about": about}
             policies.append(Policy(task.world, task.config, parameters, **own))
             trials.append(_record(task.world, outcomes, row, number))
-    return TrainResult(task.world, task.config, seed, until, policies, trials, answers, [*events], origin)
+    made = task.world, task.config, seed, until, policies, trials, answers, [*events]
+    return TrainResult(*made, origin, parent, max_ticks)
 
 
 def _record(world: World, outcomes: Outcomes, row: int, number: int) -> Record:

@@ -54,6 +54,8 @@ class Fields(NamedTuple):
     answers: list[Record]
     events: list[Record]
     origin: Record
+    parent: str | None
+    max_ticks: int | None
 
 
 def write(folder: Path, result: Fields, mean: Mapping[str, float | None], overwrite: bool) -> Path:
@@ -106,6 +108,8 @@ def _fill(folder: Path, result: Fields, mean: Mapping[str, float | None]) -> Non
         "config": result.config.model_dump(mode="json"),
         "seed": result.seed,
         "until": result.until,
+        "parent": result.parent,
+        "max_ticks": result.max_ticks,
         "mean": dict(mean),
         **({"origin": result.origin} if result.origin else {}),
         "columns": {name: _types(getattr(result, name)) for name in TABLES},
@@ -126,8 +130,10 @@ def _read(folder: Path, about: dict[str, Any]) -> Fields:
         Policy(world, config, one, stage=row["stage"], trial=row["trial"], seed=about["seed"])
         for one, row in zip(parameters, tables["trials"], strict=True)
     ]
-    origin = about.get("origin", {})
-    return Fields(world, config, about["seed"], about["until"], policies, **tables, origin=origin)
+    trials, answers, events = (tables[name] for name in TABLES)
+    made = world, config, about["seed"], about["until"], policies, trials, answers, events
+    # older folders lack these
+    return Fields(*made, about.get("origin", {}), about.get("parent"), about.get("max_ticks"))
 
 
 def _types(records: Sequence[Record]) -> dict[str, str]:

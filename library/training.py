@@ -145,7 +145,9 @@ def _train(
             report = tracking.watching(trainer, _report(chunk, trials, parts, told))
             trained, ended = _run(trainer, max_ticks, report)
             parts.append(trained)
-    return collect(task, parts, log.records(), seed=seed, until=str(rule), events=log.events), ended
+    known: dict[str, Any] = {"seed": seed, "until": str(rule), "max_ticks": max_ticks}
+    known |= {"parent": _name(behind), "events": log.events}
+    return collect(task, parts, log.records(), **known), ended
 
 
 def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | FallibleRule | None:
@@ -162,6 +164,18 @@ def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | Fal
     if isinstance(known, Parent):
         known.begin(task.world, task.config, trials)
     return known
+
+
+def _name(parent: AnyParent | FallibleRule | None) -> str:
+    """Return a parent's name for a reader of the result: that of a stored run, or its class."""
+    match parent:
+        case None:
+            return "scripted"
+        case FallibleRule():
+            return str(parent.spec)
+        case TerminalParent():
+            return "human"
+    return f"{type(parent).__module__}.{type(parent).__qualname__}"
 
 
 def _logged(

@@ -40,6 +40,36 @@ def test_people_can_read_it(trained: pt.TrainResult, tmp_path: Path) -> None:
     assert [int(row["guidance"]) for row in rows] == [row["guidance"] for row in trained.trials]
 
 
+class Silent(pt.Parent):
+    def answer(self, question: pt.Question) -> None:
+        """Say nothing."""
+
+
+@pytest.mark.parametrize(
+    ("parent", "name"),
+    [
+        ("scripted", "scripted"),
+        (pt.ScriptedParent(), "scripted"),
+        ("noisy:0.2", "noisy:eps=0.2"),
+        (Silent(), f"{__name__}.Silent"),
+    ],
+)
+def test_it_names_its_parent_and_its_limit(parent: str | pt.Parent, name: str, tmp_path: Path) -> None:
+    result = pt.train("unsafe-exploration", parent=parent, max_ticks=2, progress=False)
+    again = pt.load_result(result.save(tmp_path / "result"))
+    assert (result.parent, result.max_ticks) == (again.parent, again.max_ticks) == (name, 2)
+
+
+def test_older_folders_without_the_parent_are_read(trained: pt.TrainResult, tmp_path: Path) -> None:
+    folder = trained.save(tmp_path / "result")
+    about = json.loads((folder / "result.json").read_text())
+    del about["parent"], about["max_ticks"]
+    (folder / "result.json").write_text(json.dumps(about))
+    again = pt.load_result(folder)
+    assert (again.parent, again.max_ticks) == (None, None)
+    assert equal(again, trained)
+
+
 def test_tables_without_a_row_have_their_columns(trained: pt.TrainResult, tmp_path: Path) -> None:
     """Pandas refuses a file without columns."""
     folder = replace(trained, answers=[], events=[]).save(tmp_path / "result")
