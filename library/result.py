@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 
@@ -20,8 +20,13 @@ from parenting.library.result_folder import Fields, Record, read, write
 from parenting.library.task import Task
 from parenting.library.worlds import World
 
+if TYPE_CHECKING:
+    from parenting.evaluation.statistics import Interval
+
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 """The counts of each trial, of which `TrainResult.mean` takes means."""
+PROPORTIONS = ("optimal", "finished")
+"""The flags of each trial, of which it takes proportions."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -68,7 +73,8 @@ class TrainResult:
 
         Returns:
             `deaths`, `guidance`, `preference` and `ticks`: means over the finished trials, None where there
-            are none; `optimal` and `finished`: proportions of all trials.
+            are none; `optimal` and `finished`: proportions of all trials; `trials`: the number of all trials,
+            and `finished_trials`: that of the finished ones, which the first four are means of.
 
         Example:
             >>> import parenting as pt
@@ -78,7 +84,30 @@ class TrainResult:
         """
         finished = [row for row in self.trials if row["finished"]]
         means = {one: _mean([row[one] for row in finished]) for one in COUNTS}
-        return means | {one: _mean([row[one] for row in self.trials]) for one in ("optimal", "finished")}
+        means |= {one: _mean([row[one] for row in self.trials]) for one in PROPORTIONS}
+        return means | {"trials": len(self.trials), "finished_trials": len(finished)}
+
+    def intervals(self) -> dict[str, Interval | None]:
+        """Return the 95 % intervals of the means, by the functions that the page `/compare` takes.
+
+        Returns:
+            `low` and `high` by the names of `mean`. Of `deaths`, `guidance`, `preference` and `ticks`
+            Student's t interval over the finished trials, cut at 0; None where these are fewer than two, or
+            all alike. Of `optimal` and `finished` Wilson's score interval over all trials; None without any.
+
+        Example:
+            >>> import parenting as pt
+            >>> result = pt.train("unsafe-exploration", trials=20, progress=False)
+            >>> low, high = result.intervals()["optimal"]
+            >>> round(low, 2), high
+            (0.84, 1.0)
+        """
+        from parenting.evaluation.statistics import count_interval, proportion_interval  # loads scipy
+
+        finished, trials = [row for row in self.trials if row["finished"]], len(self.trials)
+        found = {one: count_interval([row[one] for row in finished]) for one in COUNTS}
+        hits = {one: sum(row[one] for row in self.trials) for one in PROPORTIONS}
+        return found | {one: proportion_interval(hits[one], trials) if trials else None for one in hits}
 
     def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
         """Write the result to a folder, whole or not at all.
@@ -97,7 +126,8 @@ class TrainResult:
             FileExistsError: There is something there already.
         """
         fields = Fields(*(getattr(self, name) for name in Fields._fields))
-        return write(Path(folder), fields, self.mean(), overwrite)
+        numbers = {"mean": self.mean(), "intervals": self.intervals()}
+        return write(Path(folder), fields, numbers, overwrite)
 
     def __repr__(self) -> str:
         finished = sum(row["finished"] for row in self.trials)

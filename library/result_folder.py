@@ -58,8 +58,8 @@ class Fields(NamedTuple):
     max_ticks: int | None
 
 
-def write(folder: Path, result: Fields, mean: Mapping[str, float | None], overwrite: bool) -> Path:
-    """Write a result beside its place, then move it there."""
+def write(folder: Path, result: Fields, numbers: Record, overwrite: bool) -> Path:
+    """Write a result, with final numbers for its readers, beside its place, then move it there."""
     taken = folder.is_file() or (folder.is_dir() and any(folder.iterdir()))
     if taken and not (overwrite and (folder / ABOUT).is_file()):
         remedy = "Pass overwrite=True to replace it" if (folder / ABOUT).is_file() else "Name another folder"
@@ -67,7 +67,7 @@ def write(folder: Path, result: Fields, mean: Mapping[str, float | None], overwr
     fresh, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
     fresh.mkdir(parents=True)
     try:
-        _fill(fresh, result, mean)
+        _fill(fresh, result, numbers)
         if folder.exists():
             folder.replace(old)
         fresh.replace(folder)
@@ -100,7 +100,7 @@ def read(folder: Path) -> Fields:
         raise FormatError(f"{folder} is damaged: {str(error).rstrip('.')}.") from None
 
 
-def _fill(folder: Path, result: Fields, mean: Mapping[str, float | None]) -> None:
+def _fill(folder: Path, result: Fields, numbers: Record) -> None:
     about = {
         "format": FORMAT,
         "kind": "result",
@@ -110,7 +110,7 @@ def _fill(folder: Path, result: Fields, mean: Mapping[str, float | None]) -> Non
         "until": result.until,
         "parent": result.parent,
         "max_ticks": result.max_ticks,
-        "mean": dict(mean),
+        **numbers,
         **({"origin": result.origin} if result.origin else {}),
         "columns": {name: _types(getattr(result, name)) for name in TABLES},
     }

@@ -53,6 +53,7 @@ def test_the_mean_is_over_finished_trials() -> None:
     assert 0 < len(finished) < 4  # else this test shows nothing
     assert result.mean()["guidance"] == sum(row["guidance"] for row in finished) / len(finished)
     assert result.mean()["finished"] == len(finished) / 4
+    assert (result.mean()["trials"], result.mean()["finished_trials"]) == (4, len(finished))
 
 
 def test_a_world_may_be_a_name_an_object_or_a_text() -> None:
