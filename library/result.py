@@ -177,8 +177,9 @@ def collect(
     parent: str,
     max_ticks: int | None = None,
     events: Sequence[Record] = (),
+    numbers: Sequence[int] = (0,),
 ) -> TrainResult:
-    """Collect the batches of a run, one after the other."""
+    """Collect the batches of a run, one after the other; `numbers` are those of their trials."""
     trials: list[Record] = []
     policies: list[Policy] = []
     origin = dict(task.origin.about or {})
@@ -188,11 +189,13 @@ def collect(
         last = outcomes.counts.maturity - 1
         final = trained.policies[last, torch.arange(len(last))]
         for row, parameters in enumerate(final):
-            number, stage = len(trials), int(last[row]) + 1
+            number, stage = numbers[len(trials)], int(last[row]) + 1
             own: dict[str, Any] = {"stage": stage, "trial": number, "seed": seed, "about": about}
             policies.append(Policy(task.world, task.config, parameters, **own))
             trials.append(_record(task.world, outcomes, row, number))
-    made = task.world, task.config, seed, until, policies, trials, answers, [*events]
+    known = set(numbers)
+    heard = [row for row in answers if row["trial"] in known]
+    made = task.world, task.config, seed, until, policies, trials, heard, [*events]
     return TrainResult(*made, origin, parent, max_ticks)
 
 
