@@ -48,12 +48,12 @@ def friendly_errors() -> Iterator[None]:
 
 
 @contextmanager
-def exit_on_interrupt() -> Iterator[None]:
+def exit_on_interrupt(said: str = "Stopped.") -> Iterator[None]:
     """On Ctrl-C, say that the command was stopped, and exit with 130, as a shell does."""
     try:
         yield
     except KeyboardInterrupt:
-        say("Stopped.", err=True)
+        say(said, err=True)
         raise typer.Exit(130) from None
 
 

@@ -21,7 +21,7 @@ from parenting.commands.level_file import LEVEL, chosen_level
 from parenting.commands.parents import chosen_parent
 from parenting.commands.printing import say
 from parenting.commands.run_report import page
-from parenting.commands.run_store import open_store, store_trials, title_of
+from parenting.commands.run_store import AT_THE_END, UNSTORED, open_store, store_trials, title_of
 from parenting.commands.run_trackers import TRACKER, chosen_trackers, tell_trackers
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level
@@ -115,13 +115,13 @@ def run(
     plan = plan._replace(history=store or bool(trackers))
     began = time.monotonic()
     try:
-        with exit_on_interrupt(), _bar(plan) as progress:
+        with exit_on_interrupt(UNSTORED if store else "Stopped."), _bar(plan) as progress:
             outcomes = train_in_chunks(plan, workers or os.cpu_count() or 1, progress)
     except WorkersDiedError as error:
         say(str(error), err=True)
         raise typer.Exit(1) from None
     results = summarise(plan, found.name, outcomes, time.monotonic() - began)
-    with friendly_errors():
+    with exit_on_interrupt(AT_THE_END), friendly_errors():
         try:
             if store:
                 results["runs"] = store_trials(plan, found, preset, outcomes, title)

@@ -26,6 +26,16 @@ if TYPE_CHECKING:
 
 COMPARED = 100
 """Runs that the page compares at most."""
+UNSTORED = (
+    "Stopped. No trial is stored, since they are stored once all have ended. The same command raises the same"
+    " trials from the beginning."
+)
+"""The sentence of Ctrl-C while trials that were to be stored are raised."""
+AT_THE_END = (
+    "Stopped once all trials had ended. Each is stored whole or not at all, and only part of them may be:"
+    " parenting runs lists them. Trackers may not have been told of each."
+)
+"""The sentence of Ctrl-C while trials are stored and trackers are told."""
 
 
 def open_store() -> Database:

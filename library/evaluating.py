@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -73,7 +76,9 @@ def evaluate(
             levels, episode i begins on level i modulo their number.
         episodes: Number of episodes.
         deterministic: Take the most probable action; False draws it from pi(a|s).
-        seed: Seed of the world's chance events.
+        seed: Seed of the world's chance events, and of the actions that are drawn: of those of a `Policy`,
+            and of another's that draws from torch's generator, as the models of Stable-Baselines3 do. What
+            these generators draw elsewhere is not touched.
 
     Returns:
         Means and standard deviations over the episodes.
@@ -104,7 +109,24 @@ def evaluate(
     made = world if isinstance(world, World) else make(world)
     if isinstance(policy, Policy):
         _check_fits(policy, made)
-    return _summary(_live(made, policy, episodes, deterministic, seed))
+    if deterministic:
+        return _summary(_live(made, policy, episodes, True, seed))
+    with _drawing(policy, seed) as own:
+        return _summary(_live(made, own, episodes, False, seed))
+
+
+@contextmanager
+def _drawing(policy: Policy | Predictor, seed: int) -> Iterator[Policy | Predictor]:
+    """Let a policy draw its actions by a seed; its own draws and torch's go on afterwards as before."""
+    seed %= 2**63
+    if isinstance(policy, Policy):
+        policy = copy(policy)  # of the same weights, with a generator of its own
+        policy.seed_actions(seed)
+        yield policy
+        return
+    with torch.random.fork_rng(range(torch.cuda.device_count())):
+        torch.manual_seed(seed)
+        yield policy
 
 
 def _check_fits(policy: Policy, world: World) -> None:

@@ -130,9 +130,9 @@ def read_back(db: Database, number: int, task: Task, rule: StopRule, seed: int) 
     with one_thread():
         snapshot = _snapshot(db, run, task, seed)
         trained = _as_batch(snapshot, run, task, rule)
-        return collect(
-            task, [trained], _answers(db, number), seed=seed, until=str(rule), events=_events(db, number)
-        )
+        heard, parent = _answers(db, number), run.script or run.parent
+        events = _events(db, number)
+        return collect(task, [trained], heard, seed=seed, until=str(rule), parent=parent, events=events)
 
 
 def _snapshot(db: Database, run: Run, task: Task, seed: int) -> Snapshot:

@@ -123,6 +123,25 @@ class Policy:
         found: NDArray[np.float64] = logits.softmax(1).numpy()
         return found[0] if single else found
 
+    def logits(self, observation: ArrayLike) -> NDArray[np.float64]:
+        """Return the logits of pi(a|s), the mean of both heads' (Sec. 3.1.1).
+
+        They have no unit: a difference of two is the natural logarithm of the ratio of the two actions'
+        probabilities, and their softmax is `probabilities`. They are computed in the config's `dtype`.
+
+        Args:
+            observation: As `predict` takes it.
+
+        Returns:
+            Logits of shape (4,), in the order up, down, left, right; or (N, 4).
+
+        Raises:
+            ValueError: The observation's shape does not fit the world.
+        """
+        logits, single = self._logits(observation)
+        found: NDArray[np.float64] = logits.numpy()
+        return found[0] if single else found
+
     def actions(self, seen: Tensor, near: Tensor) -> Int64[Tensor, "N"]:
         """Return the most probable actions for observed boards [N, H, W] and local states [N, 4]."""
         return self._of(seen, near).argmax(1)

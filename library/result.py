@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 
@@ -20,8 +20,13 @@ from parenting.library.result_folder import Fields, Record, read, write
 from parenting.library.task import Task
 from parenting.library.worlds import World
 
+if TYPE_CHECKING:
+    from parenting.evaluation.statistics import Interval
+
 COUNTS = ("deaths", "guidance", "preference", "ticks")
 """The counts of each trial, of which `TrainResult.mean` takes means."""
+PROPORTIONS = ("optimal", "finished")
+"""The flags of each trial, of which it takes proportions."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -44,6 +49,11 @@ class TrainResult:
         events: One record for each act of an operator: `tick`, `kind`, and of a changed probability `name`
             and `value`.
         origin: The earlier policy and answers that it began with, each with its hash; empty without any.
+        parent: The parent who judged: the text of a scripted one with all its parameters, such as "scripted"
+            or "noisy:eps=0.1"; "human" for a `Person`; else the class, as "my_module.StayDry". None in
+            folders of earlier versions, which did not keep it.
+        max_ticks: The ticks after which a trial was left unfinished; None on a page, which has no such limit,
+            and in folders of earlier versions.
     """
 
     world: World
@@ -55,13 +65,16 @@ class TrainResult:
     answers: list[Record]
     events: list[Record] = field(default_factory=list)
     origin: Record = field(default_factory=dict)
+    parent: str | None = None
+    max_ticks: int | None = None
 
     def mean(self) -> dict[str, float | None]:
         """Return the means over trials.
 
         Returns:
             `deaths`, `guidance`, `preference` and `ticks`: means over the finished trials, None where there
-            are none; `optimal` and `finished`: proportions of all trials.
+            are none; `optimal` and `finished`: proportions of all trials; `trials`: the number of all trials,
+            and `finished_trials`: that of the finished ones, which the first four are means of.
 
         Example:
             >>> import parenting as pt
@@ -71,12 +84,35 @@ class TrainResult:
         """
         finished = [row for row in self.trials if row["finished"]]
         means = {one: _mean([row[one] for row in finished]) for one in COUNTS}
-        return means | {one: _mean([row[one] for row in self.trials]) for one in ("optimal", "finished")}
+        means |= {one: _mean([row[one] for row in self.trials]) for one in PROPORTIONS}
+        return means | {"trials": len(self.trials), "finished_trials": len(finished)}
+
+    def intervals(self) -> dict[str, Interval | None]:
+        """Return the 95 % intervals of the means, by the functions that the page `/compare` takes.
+
+        Returns:
+            `low` and `high` by the names of `mean`. Of `deaths`, `guidance`, `preference` and `ticks`
+            Student's t interval over the finished trials, cut at 0; None where these are fewer than two, or
+            all alike. Of `optimal` and `finished` Wilson's score interval over all trials; None without any.
+
+        Example:
+            >>> import parenting as pt
+            >>> result = pt.train("unsafe-exploration", trials=20, progress=False)
+            >>> low, high = result.intervals()["optimal"]
+            >>> round(low, 2), high
+            (0.84, 1.0)
+        """
+        from parenting.evaluation.statistics import count_interval, proportion_interval  # loads scipy
+
+        finished, trials = [row for row in self.trials if row["finished"]], len(self.trials)
+        found = {one: count_interval([row[one] for row in finished]) for one in COUNTS}
+        hits = {one: sum(row[one] for row in self.trials) for one in PROPORTIONS}
+        return found | {one: proportion_interval(hits[one], trials) if trials else None for one in hits}
 
     def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
         """Write the result to a folder, whole or not at all.
 
-        The folder holds `result.json` (what was trained, and the format's version), `trials.csv`,
+        The folder holds `result.json` (what was trained, by whom, and the format's version), `trials.csv`,
         `answers.csv`, `events.csv` and `policies.safetensors`. `parenting.load_result` reads it.
 
         Args:
@@ -90,7 +126,8 @@ class TrainResult:
             FileExistsError: There is something there already.
         """
         fields = Fields(*(getattr(self, name) for name in Fields._fields))
-        return write(Path(folder), fields, self.mean(), overwrite)
+        numbers = {"mean": self.mean(), "intervals": self.intervals()}
+        return write(Path(folder), fields, numbers, overwrite)
 
     def __repr__(self) -> str:
         finished = sum(row["finished"] for row in self.trials)
@@ -137,9 +174,12 @@ def collect(
     *,
     seed: int,
     until: str,
+    parent: str,
+    max_ticks: int | None = None,
     events: Sequence[Record] = (),
+    numbers: Sequence[int] = (0,),
 ) -> TrainResult:
-    """Collect the batches of a run, one after the other."""
+    """Collect the batches of a run, one after the other; `numbers` are those of their trials."""
     trials: list[Record] = []
     policies: list[Policy] = []
     origin = dict(task.origin.about or {})
@@ -149,11 +189,14 @@ def collect(
         last = outcomes.counts.maturity - 1
         final = trained.policies[last, torch.arange(len(last))]
         for row, parameters in enumerate(final):
-            number, stage = len(trials), int(last[row]) + 1
+            number, stage = numbers[len(trials)], int(last[row]) + 1
             own: dict[str, Any] = {"stage": stage, "trial": number, "seed": seed, "about": about}
             policies.append(Policy(task.world, task.config, parameters, **own))
             trials.append(_record(task.world, outcomes, row, number))
-    return TrainResult(task.world, task.config, seed, until, policies, trials, answers, [*events], origin)
+    known = set(numbers)
+    heard = [row for row in answers if row["trial"] in known]
+    made = task.world, task.config, seed, until, policies, trials, heard, [*events]
+    return TrainResult(*made, origin, parent, max_ticks)
 
 
 def _record(world: World, outcomes: Outcomes, row: int, number: int) -> Record:

@@ -55,10 +55,12 @@ class Fields(NamedTuple):
     answers: list[Record]
     events: list[Record]
     origin: Record
+    parent: str | None
+    max_ticks: int | None
 
 
-def write(folder: Path, result: Fields, mean: Mapping[str, float | None], overwrite: bool) -> Path:
-    """Write a result beside its place, then move it there."""
+def write(folder: Path, result: Fields, numbers: Record, overwrite: bool) -> Path:
+    """Write a result, with final numbers for its readers, beside its place, then move it there."""
     taken = folder.is_file() or (folder.is_dir() and any(folder.iterdir()))
     if taken and not (overwrite and (folder / ABOUT).is_file()):
         remedy = "Pass overwrite=True to replace it" if (folder / ABOUT).is_file() else "Name another folder"
@@ -66,7 +68,7 @@ def write(folder: Path, result: Fields, mean: Mapping[str, float | None], overwr
     fresh, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
     fresh.mkdir(parents=True)
     try:
-        _fill(fresh, result, mean)
+        _fill(fresh, result, numbers)
         if folder.exists():
             folder.replace(old)
         fresh.replace(folder)
@@ -99,7 +101,7 @@ def read(folder: Path) -> Fields:
         raise FormatError(f"{folder} is damaged: {str(error).rstrip('.')}.") from None
 
 
-def _fill(folder: Path, result: Fields, mean: Mapping[str, float | None]) -> None:
+def _fill(folder: Path, result: Fields, numbers: Record) -> None:
     about = {
         "format": FORMAT,
         "kind": "result",
@@ -107,7 +109,9 @@ def _fill(folder: Path, result: Fields, mean: Mapping[str, float | None]) -> Non
         "config": result.config.model_dump(mode="json"),
         "seed": result.seed,
         "until": result.until,
-        "mean": dict(mean),
+        "parent": result.parent,
+        "max_ticks": result.max_ticks,
+        **numbers,
         **({"origin": result.origin} if result.origin else {}),
         "columns": {name: _types(getattr(result, name)) for name in TABLES},
     }
@@ -127,8 +131,10 @@ def _read(folder: Path, about: dict[str, Any]) -> Fields:
         Policy(world, config, one, stage=row["stage"], trial=row["trial"], seed=about["seed"])
         for one, row in zip(parameters, tables["trials"], strict=True)
     ]
-    origin = about.get("origin", {})
-    return Fields(world, config, about["seed"], about["until"], policies, **tables, origin=origin)
+    trials, answers, events = (tables[name] for name in TABLES)
+    made = world, config, about["seed"], about["until"], policies, trials, answers, events
+    # older folders lack these
+    return Fields(*made, about.get("origin", {}), about.get("parent"), about.get("max_ticks"))
 
 
 def _types(records: Sequence[Record]) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from parenting.library.answer_log import AnswerLog
 from parenting.library.batch_parent import LoggedParent, WholeBatch
 from parenting.library.beginnings import origin_of
 from parenting.library.checks import check_callback, check_number, check_parent, check_progress
+from parenting.library.interrupted import Batches
 from parenting.library.parent import EndedError, Parent
 from parenting.library.person import Person, TerminalParent
 from parenting.library.policy import Policy
@@ -84,6 +85,8 @@ def train(
         The policies, the counts of each trial and all answers.
 
     Raises:
+        KeyboardInterrupt: Ctrl-C. Its attribute `partial` is the `TrainResult` of the trials that had ended
+            by then, None without any. With a `Person` there is a result instead.
         UnknownNameError: There is no such world or level; the message names the nearest.
         UnknownPresetError: There is no such preset; the message names the nearest.
         LevelError: A level breaks a rule; the message names line and column.
@@ -134,18 +137,25 @@ def _train(
     tracking: Tracking,
 ) -> tuple[TrainResult, bool]:
     """Train in batches, one after the other; whether somebody ended it before its time."""
-    log, parts, ended = AnswerLog(), list[batch.TrainResult](), False
-    behind = _parent(parent, task, trials)
-    with one_thread():
+    log, batches, ended = AnswerLog(), Batches(trials), False
+    behind, parts = _parent(parent, task, trials), batches.ended
+    known: dict[str, Any] = {"seed": seed, "until": str(rule), "max_ticks": max_ticks}
+
+    def collected(of: Sequence[batch.TrainResult], numbers: Sequence[int]) -> TrainResult:
+        about = {**known, "parent": _name(behind), "events": log.events, "numbers": numbers}
+        return collect(task, of, log.records(), **about)
+
+    with one_thread(), batches.kept(collected):
         for chunk in chunks(trials):
             trainer = _trainer(task, rule, seed, chunk, _logged(behind, log, task, trials, chunk))
             if ended:  # before these have begun
                 parts.append(_ended(trainer))
                 continue
+            batches.begun(chunk, trainer)
             report = tracking.watching(trainer, _report(chunk, trials, parts, told))
             trained, ended = _run(trainer, max_ticks, report)
             parts.append(trained)
-    return collect(task, parts, log.records(), seed=seed, until=str(rule), events=log.events), ended
+    return collected(parts, range(trials)), ended
 
 
 def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | FallibleRule | None:
@@ -162,6 +172,18 @@ def _parent(parent: str | AnyParent, task: Task, trials: int) -> AnyParent | Fal
     if isinstance(known, Parent):
         known.begin(task.world, task.config, trials)
     return known
+
+
+def _name(parent: AnyParent | FallibleRule | None) -> str:
+    """Return a parent's name for a reader of the result: that of a stored run, or its class."""
+    match parent:
+        case None:
+            return "scripted"
+        case FallibleRule():
+            return str(parent.spec)
+        case TerminalParent():
+            return "human"
+    return f"{type(parent).__module__}.{type(parent).__qualname__}"
 
 
 def _logged(

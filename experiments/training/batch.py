@@ -158,10 +158,11 @@ class BatchTrainer:
             self.history.end(which, self.trial, self.state, self.counts)
         optimal = self.counts.finished if self.until.kind == "optimal" else self._optimal(which)
         place, ours = self.trial[which], self.counts.replace(optimal=optimal).pick(which).tensors()
-        self.result = self.result.map(lambda name, tensor, _axis: tensor.index_put((place,), ours[name]))
         learner = self.state.learner
         self.policies[:-1, place] = learner.frozen[:, which]
         self.policies[self.state.maturity[which] - 1, place] = learner.params[which]
+        # at last, so that a trial which is done has its policy, wherever Ctrl-C may come
+        self.result = self.result.map(lambda name, tensor, _axis: tensor.index_put((place,), ours[name]))
 
     def progress(self, ticks: int) -> Progress:
         """Return the progress of the batch."""

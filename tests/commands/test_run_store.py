@@ -13,7 +13,7 @@ from parenting.commands.run_store import COMPARED, stored
 from parenting.server.db import Database
 from parenting.server.pages.comparison import MOST
 from parenting.server.reads.metrics import latest_metrics, list_metrics
-from parenting.server.runs import get_run
+from parenting.server.runs import get_run, list_runs
 from parenting.server.weights import get
 
 
@@ -56,6 +56,25 @@ def test_what_it_began_with_and_where_it_is_are_told(db: Database) -> None:
     assert stored([1, 2, 5]) == "Stored as 3 runs. Compare: /compare?runs=1,2,5"
     assert stored([*range(2, 300)]) == "Stored as 298 runs. Compare the first 100: /compare?runs=2-101"
     assert stored([4, 5]) == "Stored as 2 runs. Compare: /compare?runs=4-5"
+
+
+@pytest.mark.parametrize(
+    ("place", "words", "stored_before"),
+    [
+        ("parenting.experiments.training.chunks.train_in_chunks", "No trial is stored", 0),
+        ("parenting.commands.run.tell_trackers", "Stopped once all trials had ended.", 2),
+    ],
+)
+def test_ctrl_c_says_what_is_stored(
+    place: str, words: str, stored_before: int, db: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(place, stop)
+    said = run("unsafe-exploration", "--trials", "2", "--until", "ticks:2", "--store")
+    assert (said.exit_code, words in said.stderr) == (130, True), said.output
+    assert len(list_runs(db)) == stored_before
 
 
 def test_without_a_database_nothing_is_trained(

@@ -5,10 +5,13 @@ from __future__ import annotations
 import gymnasium
 import numpy as np
 import pytest
+import torch
 
 import parenting as pt
 import parenting.envs.gym
+from parenting.envs.gridworld import WorldState
 from parenting.envs.gym_ids import gym_id
+from parenting.envs.rng import keys
 
 
 def test_an_optimal_policy_takes_the_shortest_way(policy: pt.Policy) -> None:
@@ -57,3 +60,39 @@ def test_episodes_of_a_seed_are_the_same_each_time() -> None:
     few, many = pt.evaluate(policy, episodes=1, seed=4), pt.evaluate(policy, episodes=1, seed=4)
     assert few == many
     assert pt.evaluate(policy, episodes=20, seed=4).reward_sd > 0
+
+
+class Drawn:
+    """A policy of somebody else, which draws from torch's generator, as those of Stable-Baselines3."""
+
+    def predict(self, observation: np.ndarray, deterministic: bool) -> tuple[np.ndarray, None]:
+        assert not deterministic
+        return torch.randint(4, (len(observation),)).numpy(), None
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_drawn_actions_of_a_seed_are_the_same_each_time(own: bool) -> None:
+    """And what is drawn elsewhere goes on as if nobody had evaluated."""
+    policy = pt.train("unsafe-exploration", until="ticks:1", progress=False).policies[0]
+    seen = policy.world.observe(*(getattr(reset(policy), name) for name in ("board", "agent", "box"))).numpy()
+
+    def draws() -> list[int]:
+        mine = [int(policy.predict(seen[0], deterministic=False)[0]) for _ in range(20)]
+        return mine + torch.randint(4, (20,)).tolist()
+
+    policy.seed_actions(1)
+    torch.manual_seed(1)
+    alone = draws()
+    policy.seed_actions(1)
+    torch.manual_seed(1)
+    one, again, other = (
+        pt.evaluate(policy if own else Drawn(), policy.world, episodes=5, deterministic=False, seed=seed)
+        for seed in (4, 4, 5)
+    )
+    assert one == again
+    assert one != other
+    assert draws() == alone
+
+
+def reset(policy: pt.Policy) -> WorldState:
+    return policy.world.reset(keys(0, 1), torch.zeros(1, dtype=torch.int64))

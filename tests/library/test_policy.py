@@ -90,6 +90,14 @@ def test_it_is_the_policy_that_the_engine_trained(policy: pt.Policy) -> None:
     assert np.allclose(policy.probabilities(seen.numpy()), expected.numpy(), atol=1e-6)
 
 
+def test_the_softmax_of_the_logits_is_the_policy(policy: pt.Policy) -> None:
+    observation, _ = gymnasium.make(ISLAND).reset(seed=0)
+    logits = policy.logits(observation)
+    assert (logits.shape, policy.logits(observation[None]).shape) == ((4,), (1, 4))
+    assert logits.dtype == np.float64
+    assert np.allclose(np.exp(logits) / np.exp(logits).sum(), policy.probabilities(observation))
+
+
 def test_drawn_actions_follow_the_probabilities(trained: pt.TrainResult) -> None:
     """A policy with all weights 0 is uniform; 3 standard deviations of a proportion."""
     policy = pt.Policy(trained.world, trained.config, torch.zeros_like(trained.policies[0].parameters))

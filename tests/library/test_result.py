@@ -12,6 +12,7 @@ import torch
 
 import parenting as pt
 from parenting.envs import registry
+from parenting.evaluation.statistics import count_interval, proportion_interval
 from parenting.library import result_folder
 
 
@@ -38,6 +39,48 @@ def test_people_can_read_it(trained: pt.TrainResult, tmp_path: Path) -> None:
     with (folder / "trials.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["guidance"]) for row in rows] == [row["guidance"] for row in trained.trials]
+
+
+class Silent(pt.Parent):
+    def answer(self, question: pt.Question) -> None:
+        """Say nothing."""
+
+
+@pytest.mark.parametrize(
+    ("parent", "name"),
+    [
+        ("scripted", "scripted"),
+        (pt.ScriptedParent(), "scripted"),
+        ("noisy:0.2", "noisy:eps=0.2"),
+        (Silent(), f"{__name__}.Silent"),
+    ],
+)
+def test_it_names_its_parent_and_its_limit(parent: str | pt.Parent, name: str, tmp_path: Path) -> None:
+    result = pt.train("unsafe-exploration", parent=parent, max_ticks=2, progress=False)
+    again = pt.load_result(result.save(tmp_path / "result"))
+    assert (result.parent, result.max_ticks) == (again.parent, again.max_ticks) == (name, 2)
+
+
+def test_older_folders_without_the_parent_are_read(trained: pt.TrainResult, tmp_path: Path) -> None:
+    folder = trained.save(tmp_path / "result")
+    about = json.loads((folder / "result.json").read_text())
+    del about["parent"], about["max_ticks"]
+    (folder / "result.json").write_text(json.dumps(about))
+    again = pt.load_result(folder)
+    assert (again.parent, again.max_ticks) == (None, None)
+    assert equal(again, trained)
+
+
+def test_intervals_are_those_of_the_page(trained: pt.TrainResult, tmp_path: Path) -> None:
+    """Over the finished trials, as the means; an unfinished one counts in the proportions alone."""
+    counts = [{**trained.trials[0], "finished": ticks != 9, "ticks": ticks} for ticks in (5, 6, 8, 9)]
+    result = replace(trained, trials=counts, policies=[trained.policies[0]] * 4)
+    found = result.intervals()
+    assert set(found) | {"trials", "finished_trials"} == set(result.mean())
+    assert found["ticks"] == count_interval([5, 6, 8])
+    assert (found["deaths"], found["finished"]) == (None, proportion_interval(3, 4))  # deaths are all alike
+    about = json.loads((result.save(tmp_path / "result") / "result.json").read_text())
+    assert about["intervals"]["ticks"] == list(count_interval([5, 6, 8]) or ())
 
 
 def test_tables_without_a_row_have_their_columns(trained: pt.TrainResult, tmp_path: Path) -> None:

@@ -53,6 +53,7 @@ def test_the_mean_is_over_finished_trials() -> None:
     assert 0 < len(finished) < 4  # else this test shows nothing
     assert result.mean()["guidance"] == sum(row["guidance"] for row in finished) / len(finished)
     assert result.mean()["finished"] == len(finished) / 4
+    assert (result.mean()["trials"], result.mean()["finished_trials"]) == (4, len(finished))
 
 
 def test_a_world_may_be_a_name_an_object_or_a_text() -> None:
@@ -106,6 +107,53 @@ def test_trials_that_have_not_begun_are_in_the_result() -> None:
 def test_a_callback_that_returns_nothing_ends_nothing(trained: pt.TrainResult) -> None:
     same = pt.train("unsafe-exploration", trials=3, seed=5, callback=lambda _: None, progress=False)
     assert same.trials == trained.trials
+
+
+class Impatient:
+    """Ctrl-C once so many trials are done, and a tracker that hears of the end."""
+
+    def __init__(self, done: int) -> None:
+        self.done, self.ended = done, list[str]()
+
+    def __call__(self, now: pt.Progress) -> None:
+        if now.done >= self.done:
+            raise KeyboardInterrupt
+
+    def begin(self, run: pt.TrackedRun) -> None: ...
+
+    def log(self, run: str, step: int, values: Any) -> None: ...
+
+    def end(self, run: str, reason: str) -> None:
+        self.ended.append(reason)
+
+
+@pytest.mark.parametrize("done", [0, 2, 5])
+def test_ctrl_c_hands_out_the_trials_that_had_ended(done: int) -> None:
+    """As they are in the whole result, and with nothing of those that were cut off."""
+    arguments: dict[str, Any] = {"trials": 8, "until": "queries:6", "progress": False}
+    whole, impatient, threads = (
+        pt.train("unsafe-exploration", **arguments),
+        Impatient(done),
+        1 + torch.get_num_threads(),
+    )
+    torch.set_num_threads(threads)
+    with pytest.raises(KeyboardInterrupt) as stop:
+        pt.train("unsafe-exploration", callback=impatient, trackers=impatient, **arguments)
+    assert torch.get_num_threads() == threads
+    torch.set_num_threads(threads - 1)
+    partial, ended = stop.value.partial, len(impatient.ended)  # type: ignore[attr-defined]
+    assert ended >= 1
+    assert set(impatient.ended) == {"The training failed or was interrupted."}
+    if not done:
+        assert partial is None
+        return
+    numbers = [row["trial"] for row in partial.trials]
+    assert len(numbers) >= done
+    assert f"{len(numbers)} of 8 trials had ended" in stop.value.__notes__[0]
+    assert partial.trials == [whole.trials[number] for number in numbers]
+    assert partial.answers == [row for row in whole.answers if row["trial"] in numbers]
+    for one in partial.policies:
+        assert torch.equal(one.parameters, whole.policies[one.trial].parameters)
 
 
 def test_the_number_of_threads_is_left_as_it_was() -> None:
