@@ -73,6 +73,10 @@ def test_the_version_is_that_of_the_package() -> None:
             "'--trials': 'x' is not a whole number from 1 to 1000000.",
         ),
         (["runs", "--limit", "0"], "'--limit': '0' is not a whole number from 1 to 10000."),
+        (
+            ["runs", "--sort", "x"],
+            "'--sort': 'x' is not one of 'newest', 'oldest', 'name', 'answers', 'ticks'. ",
+        ),
         (["replay", "abc"], "'run': 'abc' is not a whole number of at least 1."),
         (
             ["answer", "--run", "1", "--timeout", "soon"],
