@@ -180,8 +180,8 @@ PRESETS: dict[str, dict[str, float | bool]] = {
 }
 """The settings of Table 1, by name, the conservative one first; and `frugal`, which is ours."""
 
-LARGEST_RATE = 1.0
-"""The largest `learning_rate` of a new run. Stored runs keep theirs: older versions took any."""
+MOST = {"lambda_global": 100.0, "lambda_local": 100.0, "learning_rate": 1.0}
+"""The largest of these in a new run. Stored runs keep theirs: older versions took any."""
 
 FRUGAL_WORLDS = ("unsafe-exploration", "side-effects")
 """Worlds where `frugal` is shown to need fewer answers than `conservative` and to die no more often, on every
@@ -193,14 +193,20 @@ def offered_preset(world: str) -> str:
     return "frugal" if world in FRUGAL_WORLDS else "conservative"
 
 
-def too_steep(config: Config) -> str | None:
-    """Return why a new run may not have this `learning_rate`, in a sentence; None where it may."""
-    if config.learning_rate <= LARGEST_RATE:
-        return None
-    return (
-        f"{config.learning_rate:g} is more than {LARGEST_RATE:g}: after such steps the policy's weights are"
-        f" soon no finite numbers. Write a number up to {LARGEST_RATE:g}, such as 0.001."
-    )
+def too_large(config: Config) -> dict[str, str]:
+    """Return which hyperparameters a new run may not have so large, each with the reason in a sentence."""
+    return {
+        name: f"{value:g} is more than {most:g}: {_excess(name)}. Write a number up to {most:g}, such as "
+        f"{Config.model_fields[name].default:g}."
+        for name, most in MOST.items()
+        if (value := getattr(config, name)) > most
+    }
+
+
+def _excess(name: str) -> str:
+    if name == "learning_rate":
+        return "after such steps the policy's weights are soon no finite numbers"
+    return "beside such a weight of the entropy the policy learns nothing"
 
 
 def compose(

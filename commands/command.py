@@ -107,6 +107,8 @@ def _sentence(option: Any, error: ValidationError) -> str:
     if kind.startswith(("int_", "float_", "greater_than", "less_than", "finite_")):
         number = "whole number" if option.type_descriptor.annotation in (int, int | None) else "number"
         return f"'{value}' is not a {number}{_bounds(option.min, option.max)}."
+    if kind == "value_error":  # typer's own sentence names the value
+        return str(first["msg"]).removeprefix("Value error, ")
     return f"'{value}': {first['msg']}."
 
 

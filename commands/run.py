@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from pydantic import ValidationError
 
-from parenting.agent.config import FIELDS, PRESETS, Config, UnknownPresetError, compose, too_steep
+from parenting.agent.config import FIELDS, PRESETS, Config, UnknownPresetError, compose, too_large
 from parenting.commands.before_run import PRETRAIN, provide
 from parenting.commands.beginnings import FromAnswers, FromPolicy, begins_with
 from parenting.commands.errors import UsageError, exit_on_interrupt, friendly_errors, settings
@@ -171,8 +171,7 @@ def _config(world: str, preset: str, changes: list[str]) -> Config:
         raise UsageError("\n".join(wrong)) from None
     if config.gamma == 1 and not registry.spec(world).ends_at_goal:
         wrong.append(f"--set: gamma must be below 1 in {world}, where rewards never end; 0.9 is the default.")
-    if (steep := too_steep(config)) is not None:
-        wrong.append(f"--set: learning_rate={steep}")
+    wrong += [f"--set: {name}={said}" for name, said in too_large(config).items()]
     if wrong:
         raise UsageError("\n".join(wrong))
     return config

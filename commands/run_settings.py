@@ -6,7 +6,7 @@ import re
 from math import isfinite
 from pathlib import Path
 
-from parenting.agent.config import FIELDS, Config, v1_names
+from parenting.agent.config import FIELDS, Config
 from parenting.commands.before_run import provide
 from parenting.commands.errors import UsageError
 from parenting.commands.level_file import chosen_level
@@ -69,8 +69,10 @@ def changes_of(changes: list[str]) -> dict[str, str]:
         UsageError: names every change that is not one.
     """
     names = [name for name in FORM_FIELDS if name not in OPTIONS]
-    known = {**{name: name for name in names}, **dict.fromkeys(FIELDS), **dict.fromkeys(Config.model_fields)}
+    hyperparameters = (*FIELDS, *Config.model_fields)
+    known = {**{name: name for name in names}, **{name: f"config.{name}" for name in hyperparameters}}
     found: dict[str, str] = {}
+    seen: set[str] = set()
     wrong: list[str] = []
     for change in changes:
         key, equals, value = change.partition("=")
@@ -84,10 +86,11 @@ def changes_of(changes: list[str]) -> dict[str, str]:
             wrong.append(f"--set: there is no setting '{key}'.{hint} There is: {', '.join(known)}.")
         elif not value.strip():
             wrong.append(f"--set: '{change}' has no value. Write it as --set {key}=VALUE, or leave it out.")
-        elif (field := known[key] or _hyperparameter(key)) in found:
+        elif (meant := FIELDS.get(key, key)) in seen:
             wrong.append(f"--set: '{key}' is given twice, or by two names. Give it once.")
         else:
-            found[field] = _as_json(value) if field.startswith("config.") else value
+            seen.add(meant)
+            found[known[key]] = _as_json(value) if known[key].startswith("config.") else value
     if wrong:
         raise UsageError("\n".join(wrong))
     return found
@@ -101,12 +104,6 @@ def _as_json(value: str) -> str:
     if NUMBER.fullmatch(text) is None or not isfinite(float(text)):
         return value
     return str(int(text)) if text.lstrip("+-").isdigit() else repr(float(text))
-
-
-def _hyperparameter(key: str) -> str:
-    """Return the field of a hyperparameter by the name that the API has for it."""
-    (name,) = v1_names({FIELDS.get(key, key): None})
-    return f"config.{name}"
 
 
 def said(field: str, given: dict[str, str], rule: str) -> str:

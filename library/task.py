@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from torch import Tensor
 
 from parenting.agent.beginning import Beginning
-from parenting.agent.config import FIELDS, Config, compose, merge
+from parenting.agent.config import FIELDS, Config, compose, merge, too_large
 from parenting.agent.init import world_of
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
@@ -80,20 +80,30 @@ def prepare(
 
 
 def compose_config(world: WorldSpec, preset: str | Config, changes: Mapping[str, object]) -> Config:
-    """Return the config of a run in a world, with a sentence for everything that is wrong."""
+    """Return the config of a run in a world, with a sentence for everything that is wrong.
+
+    A `Config` keeps what it has, since it may be that of a stored run, of a version with other bounds.
+    """
     changes = {name: one.item() if isinstance(one, np.generic) else one for name, one in changes.items()}
     for name in changes:
         if name not in Config.model_fields:
             hint, known = did_you_mean(name, Config.model_fields), ", ".join(Config.model_fields)
             raise TypeError(f"There is no argument or hyperparameter '{name}'.{hint} There is: {known}.")
     try:
-        if isinstance(preset, Config):
-            return Config.model_validate(merge(preset.model_dump(by_alias=False), changes), strict=True)
-        if not isinstance(preset, str):
-            raise TypeError(f"preset: {preset!r} is neither the name of a preset nor a Config.")
-        return compose(preset, dict(world.defaults), changes, strict=True)
+        config = _composed(world, preset, changes)
     except ValidationError as error:
         raise ValueError("\n".join(_sentence(one, changes) for one in error.errors())) from None
+    if large := [f"{name}: {said}" for name, said in too_large(config).items() if name in changes]:
+        raise ValueError("\n".join(large))
+    return config
+
+
+def _composed(world: WorldSpec, preset: str | Config, changes: Mapping[str, object]) -> Config:
+    if isinstance(preset, Config):
+        return Config.model_validate(merge(preset.model_dump(by_alias=False), changes), strict=True)
+    if not isinstance(preset, str):
+        raise TypeError(f"preset: {preset!r} is neither the name of a preset nor a Config.")
+    return compose(preset, dict(world.defaults), changes, strict=True)
 
 
 def stop_rule(world: World, until: str) -> StopRule:

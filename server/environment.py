@@ -1,18 +1,20 @@
 """The settings' file `.env` and the names of settings in the environment: what cannot be read or is misspelt.
 
-A file that is not UTF-8 text is refused with a sentence. A name that is not a setting is not an error, since
-other programs share the environment, but it is told with the nearest setting: it may be a slip.
+A file that cannot be read, or is not UTF-8 text, is refused with a sentence. A name that is not a setting is
+no error, since other programs share the environment, but it is told with the nearest setting: a slip, maybe.
 """
 
 from __future__ import annotations
 
 import logging
+import os
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE, BOM_UTF32_BE
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from io import StringIO
 from os.path import expanduser
 from pathlib import Path
+from stat import S_ISCHR, S_ISDIR, S_ISREG
 
 from dotenv import dotenv_values
 from dotenv.parser import Binding, parse_stream
@@ -40,11 +42,18 @@ UNREAD = "Warning: line {} of {} is ignored: it is not NAME=value, or a quotatio
 """The warning of a line that cannot be read; the line itself may hold a secret."""
 NO_VALUE = "Warning: line {} of {} is ignored: {} has no value. Write {}=VALUE."
 """The warning of a name alone."""
+MOVE = "Put a file of settings there that you may read, or rename what is there."
+"""The remedy for a file of settings that is none, or of another user's."""
 SAVE_AGAIN = "Save it as UTF-8, in an editor or by: iconv -f"
 
 
 class EnvironmentFile(DotEnvSettingsSource):
     """The settings of a file of lines `NAME=value`."""
+
+    def _read_env_files(self) -> Mapping[str, str | None]:
+        """Read the one file; pydantic-settings would pass over what is not a file in silence."""
+        assert isinstance(self.env_file, Path)
+        return self._read_env_file(self.env_file)
 
     def _read_env_file(self, file_path: Path) -> Mapping[str, str | None]:
         stored = values(file_path)
@@ -73,12 +82,7 @@ def read(file: Path) -> str:
     Raises:
         SetupError: the file cannot be read, or is not text in UTF-8.
     """
-    if not file.is_file():
-        return ""  # a folder of this name may be somebody's virtual environment
-    try:
-        stored = file.read_bytes()
-    except OSError as error:
-        raise SetupError(f"{file.absolute()} cannot be read: {error.strerror}.") from None
+    stored = _bytes(file)
     encoding = encoding_of(stored)
     if encoding != "utf-8":
         name, marked = encoding[:6].upper(), stored.startswith((BOM_UTF16_LE, BOM_UTF16_BE, BOM_UTF32_BE))
@@ -97,6 +101,28 @@ def read(file: Path) -> str:
             f"{file.absolute()} cannot be read: line {line} is not UTF-8 text (byte 0x{byte:02x}). "
             f"{SAVE_AGAIN} LATIN1 -t UTF-8"
         ) from None
+
+
+def _bytes(file: Path) -> bytes:
+    """Return what a file of settings holds; nothing where there is none, or a virtual environment.
+
+    Raises:
+        SetupError: there is something else, or it cannot be read.
+    """
+    try:
+        kind = os.stat(file).st_mode
+        if S_ISREG(kind):
+            return file.read_bytes()
+        if S_ISCHR(kind) or (file / "pyvenv.cfg").is_file():
+            return b""  # /dev/null, or a folder of Python's that has this name, too
+        said = "it is a folder" if S_ISDIR(kind) else "it is not a file"
+    except FileNotFoundError:
+        if not file.is_symlink():
+            return b""
+        said = f"it is a link to {os.readlink(file)}, which is not there"
+    except OSError as error:
+        said = str(error.strerror)
+    raise SetupError(f"{file.absolute()} cannot be read: {said}. {MOVE}")
 
 
 def warnings(environment: Iterable[str], file: Path, settings: Iterable[str]) -> list[str]:

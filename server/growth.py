@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from parenting.agent.config import Config
+from parenting.agent.config import Config, too_large
 from parenting.agent.parent import Parent
 from parenting.agent.state import AgentState
 from parenting.envs.gridworld import Gridworld
@@ -54,10 +54,11 @@ class Growth:
             NotFiniteError: the policy is not finite after it; the sentence names the remedy.
         """
         if not is_finite(state):
-            rate = Config.model_validate(self._config).learning_rate
+            config = Config.model_validate(self._config)
+            name = next(iter(too_large(config)), "learning_rate")
             raise NotFiniteError(
                 f"The policy's weights are no longer finite at tick {int(state.keys.tick[0])}: "
-                f"a smaller learning_rate than {rate:g} is needed."
+                f"a smaller {name} than {getattr(config, name):g} is needed."
             )
         self.milestones.see(state, tally)
 

@@ -19,7 +19,7 @@ from pydantic import (
 )
 from sqlalchemy.orm import Session
 
-from parenting.agent.config import PRESETS, Config, merge, too_steep
+from parenting.agent.config import PRESETS, Config, merge, too_large
 from parenting.envs import registry
 from parenting.envs.art import LEVEL_CHARACTERS
 from parenting.envs.levels.spec import Level, LevelError
@@ -249,8 +249,7 @@ def _config(new: NewRun, level: Level | None, wrong: Wrong) -> Config | None:
         for field, message in messages(error.errors()):
             wrong.append(("config" if field == "body" else f"config.{field}", message))
         return None
-    if (said := too_steep(config)) is not None:
-        wrong.append(("config.learning_rate", said))
+    wrong += [(f"config.{name}", said) for name, said in too_large(config).items()]
     return config
 
 

@@ -112,7 +112,7 @@ def test_wheel_carries_pages_and_migrations(wheel: zipfile.ZipFile, folder: str,
 
 def test_wheel_installs_the_command(wheel: zipfile.ZipFile) -> None:
     (entry,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
-    assert "parenting = parenting.commands.main:app" in wheel.read(entry).decode()
+    assert "parenting = parenting.__main__:main" in wheel.read(entry).decode()
 
 
 def imported_by(source: str, deep: bool = True) -> set[str]:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import io
+import os
+import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from typer.testing import CliRunner
 
 from parenting.commands.main import COMMANDS, app
 from parenting.server.db import Database
+from parenting.server.environment import MOVE
 from parenting.server.errors import SetupError
 from parenting.server.new_run import NewRun, start
 from parenting.server.settings import Settings
@@ -116,9 +121,44 @@ def test_a_byte_order_mark_and_an_empty_value_are_no_settings(folder: Path) -> N
     assert (Settings().port, Settings().host) == (8801, "127.0.0.1")
 
 
-def test_a_folder_of_that_name_is_not_the_file(folder: Path) -> None:
-    (folder / ".env").mkdir()
+@pytest.mark.parametrize("make", [lambda path: None, lambda path: path.symlink_to("/dev/null")])
+def test_no_file_and_an_empty_one_set_nothing(folder: Path, make: Callable[[Path], None]) -> None:
+    make(folder / ".env")
     assert Settings().port == 8765
+
+
+def test_a_virtual_environment_of_that_name_is_not_the_file(folder: Path) -> None:
+    (folder / ".env").mkdir()
+    (folder / ".env" / "pyvenv.cfg").touch()
+    assert Settings().port == 8765
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (Path.mkdir, "it is a folder"),
+        (os.mkfifo, "it is not a file"),
+        (lambda path: path.symlink_to("away"), "it is a link to away, which is not there"),
+        (lambda path: path.symlink_to(".env"), "Too many levels of symbolic links"),
+    ],
+)
+def test_what_is_no_file_is_refused_with_its_remedy(
+    folder: Path, make: Callable[[Path], None], said: str
+) -> None:
+    make(folder / ".env")
+    told = f"{folder}/.env cannot be read: {said}. {MOVE}"
+    with pytest.raises(SetupError, match=re.escape(told)):
+        Settings()
+    refused = CliRunner().invoke(app, ["worlds"])
+    assert (refused.exit_code, refused.stderr) == (2, f"{told}\n")
+
+
+def test_a_file_of_another_user_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Root may read any, so the system's refusal is played."""
+    (folder / ".env").touch()
+    monkeypatch.setattr(Path, "read_bytes", Mock(side_effect=PermissionError(13, "Permission denied")))
+    with pytest.raises(SetupError, match=r"\.env cannot be read: Permission denied\. "):
+        Settings()
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The command line: every command is listed, says what it does, and shows an example."""
 
+import os
 import subprocess
 import sys
 from importlib.metadata import version
@@ -77,6 +78,10 @@ def test_the_version_is_that_of_the_package() -> None:
             "'--trials': 'x' is not a whole number from 1 to 1000000.",
         ),
         (["runs", "--limit", "0"], "'--limit': '0' is not a whole number from 1 to 10000."),
+        (
+            ["runs", "--sort", "x"],
+            "'--sort': 'x' is not one of 'newest', 'oldest', 'name', 'answers', 'ticks'. ",
+        ),
         (["replay", "abc"], "'run': 'abc' is not a whole number of at least 1."),
         (
             ["answer", "--run", "1", "--timeout", "soon"],
@@ -133,3 +138,20 @@ def test_a_closed_stream_ends_without_a_traceback(command: str, code: int, told:
     program = f"'{sys.executable}' -m parenting.commands.main {command}"
     ended = subprocess.run(["bash", "-c", program], cwd=ROOT, capture_output=True, text=True)
     assert (ended.returncode, ended.stdout, ended.stderr) == (code, "", told)
+
+
+@pytest.mark.parametrize("module", ["typer", "torch"])
+def test_ctrl_c_while_modules_load_ends_without_a_traceback(module: str, tmp_path: Path) -> None:
+    """The command line needs the one, the command the other; both send the signal."""
+    (tmp_path / f"{module}.py").write_text("import signal; signal.raise_signal(signal.SIGINT)")
+    command = [sys.executable, "-m", "parenting", "run", "unsafe-exploration"]
+    path = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    ended = subprocess.run(command, cwd=tmp_path, env=path, capture_output=True, text=True)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
+
+
+def test_a_module_starts_the_same_program() -> None:
+    for module in ("parenting", "parenting.commands.main"):
+        command = [sys.executable, "-m", module, "--version"]
+        said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
+        assert said == f"parenting {version('parenting')}\n"

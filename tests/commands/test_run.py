@@ -79,6 +79,7 @@ def test_order_of_options_is_free() -> None:
         (["unsafe-exploration", "--set", "p_guid"], "p_guid"),
         (["unsafe-exploration", "--set", "p_guid=2"], "p_guid=2"),
         (["unsafe-exploration", "--set", "learning_rate=1e308"], "learning_rate=1e+308 is more than 1: "),
+        (["unsafe-exploration", "--set", "lambda_local=1e308"], "lambda_local=1e+308 is more than 100: "),
         (["unsafe-exploration", "--set", "repeat_queries=perhaps"], "repeat_queries=perhaps"),
         (["unsafe-exploration", "--set", "gradient_steps=1.5"], "gradient_steps=1.5"),
         (["unsafe-exploration", "--until", "never"], "never"),

@@ -114,6 +114,11 @@ def test_values_are_read_as_a_batch_reads_them(db: Database) -> None:
     assert "p_guid=1e999: " in said("side-effects", "--set", "p_guid=1e999").stderr
 
 
+@pytest.mark.parametrize("name", [*FIELDS, *FIELDS.values()])
+def test_a_wrong_hyperparameter_is_named_as_it_was_given(db: Database, name: str) -> None:
+    assert f"{name}=-1: " in said("side-effects", "--set", f"{name}=-1").stderr
+
+
 def test_hyperparameters_have_either_name(db: Database) -> None:
     for name in (*Config.model_fields, *FIELDS):
         assert "there is no setting" not in said("side-effects", "--set", f"{name}=no").output

@@ -178,6 +178,7 @@ def test_the_number_of_threads_is_left_as_it_was() -> None:
         ({"preset": "conservativ"}, ValueError, ["preset", "conservativ", "Did you mean 'conservative'?"]),
         ({"p_gid": 0.5}, TypeError, ["p_gid", "Did you mean 'p_guid'?"]),
         ({"p_guid": 2.0}, ValueError, ["p_guid=2.0", "less than or equal to 1"]),
+        ({"lambda_global": 1e308}, ValueError, ["lambda_global: 1e+308 is more than 100: "]),
         ({"until": "soon"}, ValueError, ["until", "soon", "queries:N"]),
         ({"until": "queries:0"}, ValueError, ["until", "queries:0", "from 1 to"]),
         ({"world": "reward-hacking"}, ValueError, ["until", "no goal", "queries:1000"]),

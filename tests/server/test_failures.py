@@ -43,14 +43,15 @@ def test_neither_does_that_of_a_job() -> None:
     assert told == "The worker could not do this (walk): ValueError: nan"
 
 
+@pytest.mark.parametrize("name", ["learning_rate", "lambda_local"])
 def test_a_policy_that_is_not_finite_fails_its_run_with_a_remedy(
-    db: Database, clock: Clock, settings: Settings
+    db: Database, clock: Clock, settings: Settings, name: str
 ) -> None:
-    """A run of an older version, which took any learning rate."""
+    """A run of an older version, which took any number."""
     run = start(db, NewRun(world="unsafe-exploration", parent="scripted", seed=4)).id
     with db.write() as session:
         stored = session.get_one(Run, run)
-        stored.config = {**stored.config, "learning_rate": 1e308}
+        stored.config = {**stored.config, name: 1e308}
     worker = Worker(db, settings)
     for _ in range(2):  # a resumed run says the same
         clock.pass_seconds(10)
@@ -64,7 +65,7 @@ def test_a_policy_that_is_not_finite_fails_its_run_with_a_remedy(
         tick = int(failed.reason.partition("at tick ")[2].partition(":")[0])
         assert failed.reason == (
             f"The policy's weights are no longer finite at tick {tick}: "
-            "a smaller learning_rate than 1e+308 is needed."
+            f"a smaller {name} than 1e+308 is needed."
         )
         set_status(db, run, RunStatus.ACTIVE)
     worker._close()

@@ -1,8 +1,9 @@
 """A run from a web form: text becomes numbers, an empty field is an absent one."""
 
 import pytest
+from annotated_types import Le, Lt
 
-from parenting.agent.config import Config
+from parenting.agent.config import MOST, Config
 from parenting.server.db import Database
 from parenting.server.errors import InvalidFieldsError
 from parenting.server.new_run import NewRun, plan, start
@@ -71,18 +72,38 @@ def test_wrong_hyperparameter_is_named(text: str, part: str) -> None:
     assert caught.value.field == "config.p_guid"
 
 
-@pytest.mark.parametrize("rate", [1e308, 1.5])
-def test_a_learning_rate_above_one_is_named_with_its_bound(rate: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "value", "most", "usual"),
+    [
+        ("learning_rate", 1e308, 1, "0.001"),
+        ("learning_rate", 1.5, 1, "0.001"),
+        ("lambda_global", 1e308, 100, "0.01"),
+        ("lambda_local", 100.5, 100, "0.01"),
+    ],
+)
+def test_a_number_that_is_too_large_is_named_with_its_bound(
+    name: str, value: float, most: int, usual: str
+) -> None:
     with pytest.raises(InvalidFieldsError) as caught:
-        plan(NewRun(world=WORLD, config={"learning_rate": rate}))
-    assert caught.value.field == "config.learning_rate"
-    assert f"{rate:g} is more than 1: " in caught.value.message
-    assert caught.value.message.endswith("Write a number up to 1, such as 0.001.")
+        plan(NewRun(world=WORLD, config={name: value}))
+    assert caught.value.field == f"config.{name}"
+    assert f"{value:g} is more than {most}: " in caught.value.message
+    assert caught.value.message.endswith(f"Write a number up to {most}, such as {usual}.")
 
 
-def test_a_learning_rate_of_one_is_taken_and_stored_ones_are_read() -> None:
-    assert plan(NewRun(world=WORLD, config={"learning_rate": 1}))["config"]["learning_rate"] == 1
-    assert Config(learning_rate=1e308).learning_rate == 1e308
+@pytest.mark.parametrize("name", MOST)
+def test_a_number_at_its_bound_is_taken_and_stored_ones_are_read(name: str) -> None:
+    assert plan(NewRun(world=WORLD, config={name: MOST[name]}))["config"][name] == MOST[name]
+    assert getattr(Config.model_validate({name: 1e308}), name) == 1e308
+
+
+def test_every_number_of_a_new_run_has_a_largest() -> None:
+    """By its field's own bound, or by `MOST`."""
+    numbers = {name: field for name, field in Config.model_fields.items() if field.annotation is float}
+    bound = {
+        name for name, field in numbers.items() if any(isinstance(one, Le | Lt) for one in field.metadata)
+    }
+    assert set(numbers) - bound == set(MOST)
 
 
 def test_each_of_several_has_its_message() -> None:
