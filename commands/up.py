@@ -66,7 +66,7 @@ def up(
     number = _number(workers)
     follow()
     make_files_private()
-    with friendly_errors():
+    with friendly_errors("up"):
         chosen = settings(port=port, public=public)
         set_up_log(chosen, "up")
         listener = bind(chosen)

@@ -35,7 +35,7 @@ def web(
     """
     follow()
     make_files_private()
-    with friendly_errors():
+    with friendly_errors("web"):
         chosen = settings(port=port, host=host, public=public)
         from parenting.server.serve import make_server  # loads the web's libraries
 

@@ -38,7 +38,7 @@ def worker(
         raise typer.Exit(_check())
     follow()
     make_files_private()
-    with friendly_errors():
+    with friendly_errors("worker"):
         chosen = settings()
         if after_fd is None:
             require_file(chosen)
