@@ -12,8 +12,7 @@ import typer
 from pydantic import ValidationError
 from typer.core import TyperCommand
 
-from parenting.commands.errors import friendly_errors
-from parenting.commands.printing import say
+from parenting.commands.errors import friendly_errors, tell
 from parenting.envs.people_text import printable
 from parenting.server.environment import warnings
 from parenting.server.lifeline import VARIABLE
@@ -46,9 +45,9 @@ class Command(TyperCommand):
         The processes that `parenting up` starts leave that to it.
         """
         if VARIABLE not in os.environ:
-            with friendly_errors():
+            with friendly_errors(self.name or ""):
                 for said in warnings(os.environ, FILE, names()):
-                    say(said, err=True)
+                    tell(said, self.name or "", "warning")
         return super().invoke(ctx)
 
 

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import structlog
+
 from parenting.commands.errors import settings
 from parenting.server.db import Database, connect
 from parenting.server.errors import SetupError
@@ -13,6 +15,8 @@ from parenting.server.migrate import require_current
 from parenting.server.settings import Settings
 from parenting.server.store import high_water
 from parenting.server.store.url import database_url
+
+log = structlog.get_logger()
 
 
 @contextmanager
@@ -30,6 +34,14 @@ def database() -> Iterator[Database]:
         yield db
     finally:
         db.close()
+
+
+def tell_mark(chosen: Settings) -> None:
+    """Say at the start of a process that this user cannot write the mark of a SQLite database."""
+    if chosen.url.startswith("sqlite"):
+        said = high_water.lagging(Path(database_url(chosen.url).database or ""))
+        if said is not None:
+            log.warning(said)
 
 
 def require_file(chosen: Settings) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import typer
 from pydantic import ValidationError
@@ -15,7 +15,7 @@ from parenting.envs.installed import BrokenPackageError
 from parenting.envs.levels.spec import LevelError
 from parenting.envs.names import UnknownNameError
 from parenting.server.errors import ServerError
-from parenting.server.settings import Settings
+from parenting.server.settings import Settings, logs_json
 from parenting.weights.store import NoWeightsError
 
 
@@ -34,17 +34,38 @@ SENTENCES = (
 """The errors of a user that say by themselves what is wrong."""
 
 
+LOGGING = ("up", "web", "worker")
+"""The commands whose standard error is a log."""
+
+
 @contextmanager
-def friendly_errors() -> Iterator[None]:
-    """Print an error of the user's as a sentence, and exit with 2."""
+def friendly_errors(command: str = "") -> Iterator[None]:
+    """Print an error of the user's as a sentence, and exit with 2.
+
+    Args:
+        command: The command; the sentence of one that logs is in the form of its log.
+    """
     try:
         yield
     except ServerError as error:
-        say(error.message, err=True)
+        tell(error.message, command)
         raise typer.Exit(2) from None
     except SENTENCES as error:
-        say(str(error), err=True)
+        tell(str(error), command)
         raise typer.Exit(2) from None
+
+
+def tell(text: str, command: str, level: Literal["error", "warning"] = "error") -> None:
+    """Print a sentence on standard error: as a line of JSON where the command's log is."""
+    if command not in LOGGING or not logs_json():
+        say(text, err=True)
+        return
+    import structlog
+
+    from parenting.server.log import set_up_log
+
+    set_up_log(Settings.model_construct(log_format="json"), command)
+    getattr(structlog.get_logger(), level)(text)
 
 
 @contextmanager

@@ -66,7 +66,7 @@ def up(
     number = _number(workers)
     follow()
     make_files_private()
-    with friendly_errors():
+    with friendly_errors("up"):
         chosen = settings(port=port, public=public)
         set_up_log(chosen, "up")
         listener = bind(chosen)
@@ -123,6 +123,7 @@ def _watch(web: Child, crew: Crew, told: SignalEvent, url: str, browser: bool) -
 
 def _migrate(chosen: Settings) -> str:
     """Bring the database up to date, and return the secret of a token that lets the researcher in."""
+    from parenting.commands.database import tell_mark
     from parenting.server.access.roles import Role
     from parenting.server.access.tokens import make
     from parenting.server.backups.before_migrating import migrate  # loads SQLAlchemy while the others start
@@ -132,6 +133,7 @@ def _migrate(chosen: Settings) -> str:
     db = connect(chosen)
     try:
         require_primary(db)
+        tell_mark(chosen)
         migrate(db, chosen.data)
         return make(db, "opening", Role.RESEARCHER, made_by="parenting up").secret
     finally:

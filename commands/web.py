@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from parenting.commands.database import require_file
+from parenting.commands.database import require_file, tell_mark
 from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.options import AfterFd, Public
 from parenting.commands.printing import say
@@ -35,13 +35,15 @@ def web(
     """
     follow()
     make_files_private()
-    with friendly_errors():
+    with friendly_errors("web"):
         chosen = settings(port=port, host=host, public=public)
         from parenting.server.serve import make_server  # loads the web's libraries
 
         wait_at(after_fd)
         require_file(chosen)
         server = make_server(chosen)
+        if after_fd is None:  # else `up` tells it
+            tell_mark(chosen)
         listener = bind(chosen) if fd is None else socket.socket(fileno=fd)
         if fd is None:
             say(f"Parenting's pages: http://localhost:{listener.getsockname()[1]}/  (Ctrl-C stops them)")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from parenting.commands.database import require_file
+from parenting.commands.database import require_file, tell_mark
 from parenting.commands.errors import friendly_errors, settings
 from parenting.commands.options import AfterFd
 from parenting.commands.printing import say
@@ -38,11 +38,13 @@ def worker(
         raise typer.Exit(_check())
     follow()
     make_files_private()
-    with friendly_errors():
+    with friendly_errors("worker"):
         chosen = settings()
         if after_fd is None:
             require_file(chosen)
         set_up_log(chosen, "worker")
+        if after_fd is None:  # else `up` tells it
+            tell_mark(chosen)
         from parenting.server.worker_process import (
             main,  # loads torch, which takes a second, so the settings are checked before
         )

@@ -10,6 +10,7 @@ import logging
 import os
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE, BOM_UTF32_BE
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from io import StringIO
 from os.path import expanduser
@@ -64,6 +65,15 @@ class EnvironmentFile(DotEnvSettingsSource):
         field = self.settings_cls.model_fields.get(name.lower().removeprefix(PREFIX.lower()))
         is_folder = field is not None and field.annotation in (Path, Path | None)
         return expanduser(value) if value is not None and is_folder else value
+
+
+def wanted(name: str, file: Path) -> str | None:
+    """Return the value of one setting as it is written, even if others are wrong; None if it is not set."""
+    found = {key.upper(): value for key, value in os.environ.items() if value}
+    if name not in found:
+        with suppress(SetupError):
+            found |= {key.upper(): value for key, value in values(file).items() if value}
+    return found.get(name)
 
 
 def values(file: Path) -> dict[str, str | None]:

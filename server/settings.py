@@ -11,7 +11,7 @@ from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 from sqlalchemy import URL
 
-from parenting.server.environment import PREFIX, EnvironmentFile
+from parenting.server.environment import PREFIX, EnvironmentFile, wanted
 from parenting.weights.cost import Bound
 
 FILE = Path(".env")
@@ -215,6 +215,11 @@ class Settings(BaseSettings):
             return self.database_url
         path = (self.data / "parenting.db").absolute()
         return URL.create("sqlite", database=str(path)).render_as_string(hide_password=False)
+
+
+def logs_json() -> bool:
+    """Return whether the log is JSON, as far as can be told while other settings may be wrong."""
+    return wanted(f"{PREFIX}LOG_FORMAT", FILE) == "json"
 
 
 def names() -> list[str]:

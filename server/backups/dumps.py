@@ -86,9 +86,14 @@ def _run(url: URL | None, tool: str, *arguments: str) -> str:
         text=True,
     )
     if done.returncode != 0:
-        reason = (done.stderr.strip().splitlines() or ["it said nothing"])[0]
-        raise SetupError(f"{tool} failed: {reason}. The command was: {said}")
+        raise SetupError(f"{tool} failed: {_reason(done.stderr)}. The command was: {said}")
     return done.stdout
+
+
+def _reason(told: str) -> str:
+    """Return the line of a tool that says why it failed; warnings, and what it was at, may come before."""
+    lines = told.strip().splitlines() or ["it said nothing"]
+    return next((line for line in lines if ": error: " in line), lines[0])
 
 
 def _command(tool: str, arguments: Sequence[str], url: URL | None) -> str:

@@ -18,6 +18,7 @@ from parenting._plural import counted
 from parenting.server.errors import SetupError
 from parenting.server.notify import Notifier
 from parenting.server.store import postgresql
+from parenting.server.store.refusals import cause
 from parenting.server.store.sqlite import sqlite_module
 
 CHANNELS = {"web": "pages are served", "worker": "a worker is running"}
@@ -78,8 +79,8 @@ def require_unconnected(url: URL) -> None:
         with engine.connect() as connection:
             others = others_connected(connection)
     except DBAPIError as error:
-        reason = str(error.orig).strip().splitlines()[0]
-        raise SetupError(f"The database {url.render_as_string()} cannot be reached: {reason}.") from None
+        shown = url.render_as_string()
+        raise SetupError(f"The database {shown} cannot be reached: {cause(error)}.") from None
     finally:
         engine.dispose()
     if others:

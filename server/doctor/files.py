@@ -18,6 +18,7 @@ from parenting.server.notify import SOCKETS
 from parenting.server.store import high_water
 from parenting.server.store.ballast import Ballast
 from parenting.server.store.file_system import UNKNOWN, is_network, kind_of
+from parenting.server.store.owner import way_in
 from parenting.server.store.sqlite import sqlite_module
 
 LITTLE, TOO_LITTLE = 500_000_000, 20_000_000
@@ -33,7 +34,7 @@ def permissions(data: Path, database: Path | None) -> Iterator[Finding]:
         yield warning(name, f"the data folder {folder} does not exist yet", "parenting up makes it.")
         return
     if not os.access(folder, os.W_OK | os.X_OK):
-        yield error(name, f"{folder} cannot be written to", _way_in(folder))
+        yield error(name, f"{folder} cannot be written to", way_in(folder))
         return
     if locked_out := list(_locked_out(folder, database)):
         yield from locked_out
@@ -43,7 +44,7 @@ def permissions(data: Path, database: Path | None) -> Iterator[Finding]:
         listed = " ".join(map(str, open_to))
         yield warning(name, f"others can read {listed}", f"chmod -R go-rwx {folder}")
     elif database is not None and database.exists() and not os.access(database, os.W_OK):
-        yield error(name, f"{database} cannot be written to", _way_in(database))
+        yield error(name, f"{database} cannot be written to", way_in(database))
     else:
         yield ok(name, f"{folder} is its owner's alone")
 
@@ -78,7 +79,7 @@ def beside(database: Path) -> Iterator[Finding]:
     """Look for a log of another file, and for a mark without a database, before anything is opened."""
     mark = high_water.mark_of(database)
     if mark.exists() and not os.access(mark, os.R_OK):
-        yield error("mark", f"{mark} cannot be read, so a loss would not be noticed", _way_in(mark))
+        yield error("mark", f"{mark} cannot be read, so a loss would not be noticed", way_in(mark))
     elif database.is_file():
         foreign = high_water.foreign_log(database)
         if foreign is not None:
@@ -114,7 +115,7 @@ def backups(place: Path) -> Iterator[Finding]:
     """Name the newest backup in the usual folder."""
     folder = place / FOLDER
     if folder.is_dir() and not os.access(folder, os.R_OK | os.X_OK):
-        yield error("backups", f"{folder} cannot be read", _way_in(folder))
+        yield error("backups", f"{folder} cannot be read", way_in(folder))
         return
     found = [one for one in folder.glob("*") if one.suffix in (".db", ".dump")] if folder.is_dir() else []
     if found:
@@ -154,13 +155,4 @@ def _locked_out(folder: Path, database: Path | None) -> Iterator[Finding]:
                 said = f"{path} is root's, but its folder is not"
                 yield error("permissions", said, f"chown -R {owner} {path}")
         elif not os.access(path, os.R_OK | os.W_OK | (os.X_OK if path.is_dir() else 0)):
-            yield error("permissions", f"{path} cannot be used by this user", _way_in(path))
-
-
-def _way_in(path: Path) -> str:
-    """Return the remedy for what this user cannot write."""
-    if os.statvfs(path).f_flag & os.ST_RDONLY:
-        return "Its file system is read-only: mount it for writing, or set PARENTING_DATA to another folder."
-    if path.stat().st_uid == os.geteuid():
-        return f"chmod u+rw{'x' if path.is_dir() else ''} {path}"
-    return f"Give it to this user: chown {os.geteuid()} {path}"
+            yield error("permissions", f"{path} cannot be used by this user", way_in(path))

@@ -23,7 +23,7 @@ from parenting._plural import counted as number_of
 from parenting.server.errors import SetupError
 from parenting.server.store.driver import open_file, sqlite_module
 from parenting.server.store.held import Held, hold, log_of
-from parenting.server.store.owner import give
+from parenting.server.store.owner import give, way_in
 
 LENGTH = 200
 """Bytes of a mark, always the same, so that it is written over in one piece."""
@@ -138,6 +138,17 @@ def _text(mark: Path) -> str:
         raise SetupError(
             f"The mark {mark} of the database cannot be read: {error.strerror}. {remedy}"
         ) from None
+
+
+def lagging(database: Path) -> str | None:
+    """Return a sentence if this user cannot write the mark of a database, which then lags; else None."""
+    mark = mark_of(database)
+    if not mark.exists() or os.access(mark, os.W_OK):
+        return None
+    return (
+        f"The mark {mark} of the database cannot be written, so a loss of what is stored from now on would "
+        f"not be noticed. {way_in(mark)}"
+    )
 
 
 def lost(database: Path) -> str | None:

@@ -57,3 +57,12 @@ def exists(path: Path) -> bool:
             f"{folder} cannot be looked into: {error.strerror}. Give it to this user: "
             f"chown {os.geteuid()} {folder}"
         ) from None
+
+
+def way_in(path: Path) -> str:
+    """Return the remedy for what this user cannot write."""
+    if os.statvfs(path).f_flag & os.ST_RDONLY:
+        return "Its file system is read-only: mount it for writing, or set PARENTING_DATA to another folder."
+    if path.stat().st_uid == os.geteuid():
+        return f"chmod u+rw{'x' if path.is_dir() else ''} {path}"
+    return f"Give it to this user: chown {os.geteuid()} {path}"

@@ -115,6 +115,12 @@ def refusal(error: BaseException) -> type[StoreError] | None:
     return _longest(POSTGRESQL, str(state))
 
 
+def cause(error: BaseException) -> str:
+    """Return PostgreSQL's own reason for an error, without a password; empty where it is not PostgreSQL's."""
+    said = _said(error.__cause__ if isinstance(error, StoreError) and error.__cause__ else error)
+    return _cause(str(said)) if _is_psycopgs(said) else ""
+
+
 def _said(error: BaseException) -> BaseException | None:
     return error.orig if isinstance(error, DBAPIError) else error
 

@@ -23,6 +23,7 @@ from parenting.server.migrate import VERSIONS, create_tables, newest, require_cu
 from parenting.server.settings import Settings
 from parenting.server.store.driver import can_write, sqlite_module
 from parenting.server.store.postgresql import begin_migration, lift_limits
+from parenting.server.store.refusals import cause
 from parenting.server.store.url import WrongUrlError, parsed
 from parenting.server.tables import Identity
 from parenting.server.tables import Table as Root
@@ -50,19 +51,20 @@ def place(named: str) -> URL:
 
 @contextmanager
 def reaching(url: URL) -> Iterator[None]:
-    """Say which end of a transfer it is that cannot be reached, without its password.
+    """Say which end of a transfer it is that cannot be reached, and why, without its password.
 
     Raises:
         SetupError: it cannot be.
     """
     try:
         yield
-    except GoneError:
+    except GoneError as error:
         named = f"database {url.database} at {url.host or 'its socket'}"
         if url.get_backend_name() == "sqlite":
             named = f"database {url.database}"
+        said = cause(error) or "it is not there, or cannot be opened"
         raise SetupError(
-            f"The {named} cannot be reached, or lets nobody in under this name; nothing was copied. "
+            f"The {named} cannot be reached: {said}. Nothing was copied. "
             "Look whether it is there, then give the command again."
         ) from None
 

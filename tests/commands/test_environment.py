@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import re
 import sys
@@ -151,6 +152,27 @@ def test_what_is_no_file_is_refused_with_its_remedy(
         Settings()
     refused = CliRunner().invoke(app, ["worlds"])
     assert (refused.exit_code, refused.stderr) == (2, f"{told}\n")
+
+
+@pytest.mark.parametrize("command", ["up", "web", "worker"])
+@pytest.mark.parametrize("stored", ["", "PARENTING_LOG_FORMAT=json\n"], ids=["environment", "file"])
+def test_a_process_whose_log_is_json_tells_a_wrong_setting_as_a_line_of_it(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, command: str, stored: str
+) -> None:
+    (folder / ".env").write_text(f"{stored}PARENTING_LIVES=0\nPARENTING_LIVE=1\n", encoding="utf-8")
+    if not stored:
+        monkeypatch.setenv("PARENTING_LOG_FORMAT", "json")
+    ended = CliRunner().invoke(app, [command])
+    told = [json.loads(line) for line in ended.stderr.splitlines()]
+    assert (ended.exit_code, [line["level"] for line in told]) == (2, ["warning", "error"])
+    assert told[1]["message"].startswith("PARENTING_LIVES: '0' is wrong: ")
+    assert CliRunner().invoke(app, ["runs"]).stderr.startswith("Warning: ")
+
+
+def test_so_it_does_with_a_file_that_cannot_be_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / ".env").mkdir()
+    monkeypatch.setenv("PARENTING_LOG_FORMAT", "json")
+    assert MOVE in json.loads(CliRunner().invoke(app, ["web"]).stderr)["message"]
 
 
 def test_a_file_of_another_user_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ from sqlalchemy import make_url
 from parenting.server.access import tokens
 from parenting.server.access.roles import Role
 from parenting.server.backups import dumps
+from parenting.server.backups.in_use import require_unconnected
 from parenting.server.backups.making import back_up
 from parenting.server.backups.restoring import restore
 from parenting.server.db import Database, connect
@@ -83,3 +84,22 @@ def test_without_the_tool_the_command_is_told_without_its_password(
     assert "PGHOST=there PGPORT=5433 PGUSER=me PGDATABASE=parenting PGSSLMODE=require pg_dump" in told
     assert "p4ss" not in told
     assert dumps.environment(url)["PGPASSWORD"] == "p4ss"
+
+
+def test_the_reason_of_a_tool_is_its_error_and_not_what_it_was_at(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    told = "pg_restore: while PROCESSING TOC:\npg_restore: error: permission denied for schema public\nmore\n"
+    (tmp_path / "pg_restore").write_text(f"#!/bin/sh\nprintf '{told}' >&2\nexit 1\n")
+    (tmp_path / "pg_restore").chmod(0o700)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    with pytest.raises(
+        SetupError, match="pg_restore failed: pg_restore: error: permission denied for schema"
+    ):
+        dumps.restore(make_url("postgresql://me@there/x"), tmp_path / "x.dump")
+
+
+def test_a_restore_into_a_database_that_is_away_has_the_reason(tmp_path: Path) -> None:
+    url = make_url("postgresql://me:p4ss@127.0.0.1:1/x")
+    with pytest.raises(SetupError, match=r"me:\*\*\*@.* cannot be reached: .*failed: Connection refused\.$"):
+        require_unconnected(url)

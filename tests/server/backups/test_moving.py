@@ -223,3 +223,24 @@ def test_a_place_that_is_no_database_is_refused_without_its_password(
     with pytest.raises(SetupError, match=said) as refused:
         copy(named, str(tmp_path / "new.db"), tmp_path)
     assert "p4ss" not in refused.value.message
+
+
+@pytest.mark.parametrize("store", STORES[:1], indirect=True)
+@pytest.mark.parametrize("there", ["source", "target"])
+@pytest.mark.parametrize(
+    ("named", "said"),
+    [
+        ("postgresql://me:p4ss@127.0.0.1:1/x", "port 1 failed: Connection refused"),
+        ("postgresql://me:p4ss@/nowhere?host=CLUSTER", 'role "me" does not exist'),
+        ("postgresql://parenting:p4ss@/nowhere?host=CLUSTER", 'database "nowhere" does not exist'),
+    ],
+)
+def test_an_end_that_cannot_be_reached_is_told_with_the_reason_of_postgresql(
+    settings: Settings, db: Database, tmp_path: Path, there: str, named: str, said: str
+) -> None:
+    db.close()
+    url = named.replace("CLUSTER", str(cluster().folder)) if "CLUSTER" in named else named
+    home, new = str(settings.data / "parenting.db"), str(tmp_path / "new.db")
+    with pytest.raises(SetupError, match=f"cannot be reached: .*{said}. Nothing was copied") as refused:
+        copy(*((url, new) if there == "source" else (home, url)), tmp_path)
+    assert "p4ss" not in refused.value.message

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import PoolProxiedConnection
+from structlog.testing import capture_logs
 
+from parenting.commands import up
 from parenting.server import deletion, identity
 from parenting.server.db import Database, connect
 from parenting.server.errors import SetupError
@@ -179,6 +181,22 @@ def test_mark_that_was_cut_off_says_nothing(
     assert high_water.read(file) in (None, whole_mark)
     mark.write_bytes(whole.replace(b" 1 ", b" 9 ", 1))
     assert high_water.read(file) is None, "its sum is wrong"
+
+
+def test_a_mark_that_cannot_be_written_is_told_by_up_at_its_start(
+    db: Database, mine: Claim, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Root may write any, so the system's refusal is played."""
+    mark = high_water.mark_of(settings.data / "parenting.db")
+    assert mark.exists()
+    monkeypatch.setattr(os, "access", lambda path, mode: path != mark)
+    with capture_logs() as lines:
+        up._migrate(settings)
+    (line,) = lines
+    assert line["event"] == (
+        f"The mark {mark} of the database cannot be written, so a loss of what is stored from now on would "
+        f"not be noticed. chmod u+rw {mark}"
+    )
 
 
 def test_missing_database_is_not_made_anew_in_silence(db: Database, mine: Claim, settings: Settings) -> None:
