@@ -1,7 +1,7 @@
 """The settings' file `.env` and the names of settings in the environment: what cannot be read or is misspelt.
 
 A file that cannot be read, or is not UTF-8 text, is refused with a sentence. A name that is not a setting is
-not an error, since other programs share the environment, but it is told with the nearest one: it may be a slip.
+not an error, since other programs share the environment. It is told with the nearest one: it may be a slip.
 """
 
 from __future__ import annotations
