@@ -68,6 +68,11 @@ def tell(text: str, command: str, level: Literal["error", "warning"] = "error") 
     getattr(structlog.get_logger(), level)(text)
 
 
+def reason(error: OSError | ValueError) -> str:
+    """Return why a file cannot be used, without the system's number and the file's name."""
+    return str(getattr(error, "strerror", None) or error)
+
+
 @contextmanager
 def exit_on_interrupt(said: str = "Stopped.") -> Iterator[None]:
     """On Ctrl-C, say that the command was stopped, and exit with 130, as a shell does."""

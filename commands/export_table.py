@@ -68,7 +68,7 @@ def _whole(target: Path, force: bool) -> Iterator[TextIO]:
     """
     target = file_at(target)
     if target.exists() and not force:
-        raise UsageError(f"-o: {target} exists already. Name another file, or give --force to replace it.")
+        raise UsageError(f"--out: {target} exists already. Name another file, or give --force to replace it.")
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
         with part.open("x", encoding="utf-8", newline="\n") as file:
@@ -77,7 +77,7 @@ def _whole(target: Path, force: bool) -> Iterator[TextIO]:
             os.fsync(file.fileno())
         part.replace(target)
     except OSError as error:
-        raise UsageError(f"-o: {target} cannot be written: {error.strerror}.") from None
+        raise UsageError(f"--out: {target} cannot be written: {error.strerror}.") from None
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import typer
 
-from parenting.commands.errors import UsageError
+from parenting.commands.errors import UsageError, reason
 from parenting.commands.printing import say
 from parenting.envs import registry
 from parenting.envs.level_bytes import FILE_BYTES, decode, name_by_file
@@ -60,7 +60,7 @@ def read_text(option: str, file: str) -> tuple[str, tuple[str, ...]]:
     try:
         return decode(_bytes(file))
     except (OSError, ValueError) as error:
-        raise UsageError(f"{option}: {file} cannot be read as text: {error}.") from None
+        raise UsageError(f"{option}: {file} cannot be read as text: {reason(error)}.") from None
 
 
 def _name(file: Path) -> str | None:

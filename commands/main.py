@@ -107,6 +107,9 @@ class LazyGroup(TyperGroup):
         try:
             return super().main(*args, **named)
         except OSError as error:
+            if error.errno == errno.ENAMETOOLONG:
+                say(f"{error.filename} cannot be used: {error.strerror}. Give a shorter one.", err=True)
+                sys.exit(2)
             if error.errno not in FULL:
                 raise
             say(f"{error.filename or 'The output'} cannot be written: {error.strerror}.", err=True)

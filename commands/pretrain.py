@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from parenting.commands.errors import UsageError, friendly_errors, settings
+from parenting.commands.errors import UsageError, friendly_errors, reason, settings
 from parenting.commands.printing import say
 from parenting.envs import registry
 from parenting.envs.levels.spec import WorldSpec
@@ -103,7 +103,7 @@ def make(wanted: Wanted, folder: Path, seed: int, max_steps: int, *, quiet: bool
         say(str(error), err=True)
         raise typer.Exit(1) from None
     except OSError as error:
-        say(f"{folder} cannot be written: {error}.", err=True)
+        say(f"{folder} cannot be written: {reason(error)}.", err=True)
         raise typer.Exit(2) from None
     found = _described(done, time.monotonic() - began)
     if not quiet:

@@ -12,6 +12,8 @@ import typer
 
 from parenting._plural import counted
 from parenting.agent.config import v1_names
+from parenting.commands.errors import reason
+from parenting.commands.options import folder
 from parenting.commands.printing import say
 from parenting.envs import registry
 from parenting.envs.levels.spec import Level, WorldSpec
@@ -53,11 +55,16 @@ def worlds(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Write each random level to a file in this folder.")
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", parser=folder, help="Write each random level to a file in this folder."
+        ),
     ] = None,
     draw: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Draw each level as an SVG picture in this folder."),
+        typer.Option(
+            metavar="FOLDER", parser=folder, help="Draw each level as an SVG picture in this folder."
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
@@ -202,7 +209,7 @@ def _write(folder: Path, texts: Iterable[tuple[str, str]]) -> None:
         for name, text in texts:
             (folder / name).write_text(text, encoding="utf-8")
     except OSError as error:
-        raise ValueError(f"{folder} cannot be written to: {error}.") from None
+        raise ValueError(f"{folder} cannot be written to: {reason(error)}.") from None
 
 
 def _page(world: dict[str, Any]) -> str:

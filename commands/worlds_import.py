@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from parenting.commands.errors import UsageError, friendly_errors
+from parenting.commands.errors import UsageError, friendly_errors, reason
 from parenting.commands.level_file import read_text
 from parenting.commands.options import among, folder
 from parenting.commands.printing import say
@@ -100,4 +100,4 @@ def _write(out: Path, found: Sequence[Imported]) -> None:
             with file.open("x", encoding="utf-8") as written:
                 written.write(one.level.text)
     except OSError as error:
-        raise UsageError(f"--out: {out} cannot be written to: {error}.") from None
+        raise UsageError(f"--out: {out} cannot be written to: {reason(error)}.") from None

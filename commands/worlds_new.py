@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from parenting.commands.errors import UsageError, friendly_errors
+from parenting.commands.errors import UsageError, friendly_errors, reason
 from parenting.commands.printing import say
 from parenting.envs import registry
 
@@ -66,7 +66,7 @@ def write_skeleton(name: str, folder: Path) -> None:
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(Template(text).substitute(given), encoding="utf-8")
     except OSError as error:
-        raise UsageError(f"--out: {folder} cannot be written to: {error}.") from None
+        raise UsageError(f"--out: {folder} cannot be written to: {reason(error)}.") from None
 
 
 def _free(name: str) -> str:

@@ -6,6 +6,7 @@ Files of root's would lock that service out.
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from contextlib import suppress
@@ -52,6 +53,8 @@ def exists(path: Path) -> bool:
     try:
         return path.exists()
     except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise SetupError(f"{path} cannot be used: {error.strerror}. Give a shorter one.") from None
         folder = path.parent
         raise SetupError(
             f"{folder} cannot be looked into: {error.strerror}. Give it to this user: "

@@ -116,7 +116,7 @@ def test_a_file_is_replaced_only_by_force(db: Database, tmp_path: Path) -> None:
     file.write_text("precious")
     said = export("1", "-o", str(file))
     assert (said.exit_code, said.stdout) == (2, "")
-    assert said.stderr.startswith(f"-o: {file} exists already.")
+    assert said.stderr.startswith(f"--out: {file} exists already.")
     assert file.read_text() == "precious"
     assert export("1", "-o", str(file), "--force").exit_code == 0
     assert file.read_text() == "".join(lines(db, 1))

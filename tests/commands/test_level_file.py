@@ -73,7 +73,7 @@ def test_what_cannot_be_read_has_a_remedy(tmp_path: Path) -> None:
     assert str(caught.value) == f"{said} Choose one by its number or name, such as --level {file}:1."
     with pytest.raises(UsageError, match=r"no level is called '3' here. The levels are: 1 first, 2 second"):
         chosen_level(WORLD, f"{file}:3")
-    with pytest.raises(UsageError, match=f"--level: {tmp_path} cannot be read as text: .*directory"):
+    with pytest.raises(UsageError, match=f"--level: {tmp_path} cannot be read as text: Is a directory.$"):
         chosen_level(WORLD, str(tmp_path))
     with pytest.raises(UsageError, match="'nowhere:1' is neither a level of unsafe-exploration"):
         chosen_level(WORLD, "nowhere:1")

@@ -149,6 +149,20 @@ def test_random_islands_are_levels_that_run_takes_the_same_for_a_seed() -> None:
     assert output(*arguments, "2") == "\n".join(level["text"] for level in few)
 
 
-def test_a_folder_that_cannot_be_written_to_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("named", "said"),
+    [("file", "is a file. Name another one."), ("", "'' is not a folder: ")],
+)
+@pytest.mark.parametrize("option", ["--draw", "--out"])
+def test_a_folder_that_cannot_be_one_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str, said: str, option: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("")
-    assert "cannot be written to" in refused("--draw", str(tmp_path / "file"))
+    told = refused("--random", "unsafe-exploration", option, named)
+    assert said in " ".join(told.replace("│", " ").split())
+    assert [found.name for found in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_folder_that_cannot_be_written_to_is_told_with_the_reason_alone() -> None:
+    assert refused("--draw", "/proc/x").endswith("/proc/x cannot be written to: No such file or directory.\n")

@@ -7,9 +7,13 @@ from typer.testing import CliRunner
 
 from parenting.commands.main import app
 from parenting.server.db import Database
+from parenting.server.new_run import NewRun, start
+from parenting.server.settings import Settings
 
 LARGE = 2**63
 """The first number that no column of the database holds."""
+LONG = "n" * 300
+"""More characters than a file system takes for a name."""
 NO_TEXT = "a\udcff"
 """A byte that is not UTF-8, as Python reads it."""
 
@@ -60,3 +64,26 @@ def test_bytes_that_are_not_text_are_refused(db: Database, arguments: list[str],
     said = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"}, terminal_width=200)
     assert (said.exit_code, said.stdout) == (2, "")
     assert rf"Invalid value for '{named}': 'a\udcff' holds bytes that are not text." in said.stderr
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "import {}",
+        "export 1 --out {}",
+        "export --check {}",
+        "copy parenting.db {}",
+        "backup --to {}",
+        "restore {}",
+        "start side-effects --from-answers {}",
+        "experiment report --out {}",
+        "worlds --draw {}",
+    ],
+)
+def test_no_file_has_so_long_a_name(db: Database, settings: Settings, command: str) -> None:
+    start(db, NewRun(world="side-effects"))
+    words = command.replace("parenting.db", str(settings.data / "parenting.db")).format(settings.data / LONG)
+    ended = CliRunner().invoke(app, words.split() + ["--snapshot"] * words.startswith("copy"))
+    assert (ended.exit_code, ended.stdout) == (2, "")
+    assert "File name too long" in ended.stderr
+    assert "chown" not in ended.stderr
