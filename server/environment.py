@@ -1,7 +1,8 @@
 """The settings' file `.env` and the names of settings in the environment: what cannot be read or is misspelt.
 
 A file that cannot be read, or is not UTF-8 text, is refused with a sentence. A name that is not a setting is
-no error, since other programs share the environment, but it is told with the nearest setting: a slip, maybe.
+not an error, since other programs share the environment, but it is told with the nearest setting: it may be
+a slip.
 """
 
 from __future__ import annotations

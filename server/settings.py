@@ -218,7 +218,7 @@ class Settings(BaseSettings):
 
 
 def logs_json() -> bool:
-    """Return whether the log is JSON, as far as can be told while other settings may be wrong."""
+    """Return whether the log is to be JSON, even if other settings are wrong."""
     return wanted(f"{PREFIX}LOG_FORMAT", FILE) == "json"
 
 
