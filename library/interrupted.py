@@ -1,4 +1,4 @@
-"""What Ctrl-C leaves of a training: its exception carries the trials that had ended by then."""
+"""The rest that Ctrl-C leaves of a training: its exception carries the trials that had ended by then."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Batches:
     def kept(self, collect: Collect) -> Iterator[None]:
         """Let Ctrl-C through, with the trials that had ended as its attribute `partial`, None without any.
 
-        A tick may have been cut in half, so the other trials of its batch are no result.
+        A tick may have been cut in half, so the other trials of its batch are left out.
         """
         try:
             yield

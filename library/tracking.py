@@ -1,7 +1,7 @@
 """Trackers of `train`: what they are told of trials, outside of their ticks.
 
 One trial is told while it is trained. Of several each is a run of its own, with the rows that `parenting run`
-tells of it, once its batch has ended: a mean over the trials of a batch would begin anew with the next one.
+tells of it, once its batch has ended: a mean over the trials of a batch would start at 0 again with the next.
 """
 
 from __future__ import annotations
