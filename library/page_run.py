@@ -55,6 +55,7 @@ def begin(db: Database, settings: Settings, task: Task, rule: StopRule, seed: in
         seed=seed,
         name="from Python",
         goal=rule.number if rule.kind == "queries" else None,
+        finish="optimal" if rule.kind == "optimal" else None,
     )
     try:
         bound = settings.bound

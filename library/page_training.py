@@ -130,7 +130,8 @@ def _watch(
 def _is_done(now: RunSchema, rule: StopRule) -> bool:
     match rule.kind:
         case "optimal":
-            return now.optimal
+            # else its worker ends it, at the very tick; a row of metrics may come later
+            return now.optimal and now.finish != "optimal"
         case "queries":
             return now.resting
         case "ticks":

@@ -79,6 +79,8 @@ def train(
         from_policy: Begin with the weights of a `Policy` or its file, not with fresh or pre-trained ones.
         from_answers: Begin with X of the answers of an export (`parenting export`) that stand.
         trackers: "csv:FOLDER", "jsonl:FOLDER", "tensorboard:FOLDER", a `Tracker` of one's own, or several.
+            One trial is told while it is trained; of several each is a run of its own, told once its batch
+            has ended.
         **changes: Hyperparameters that differ from the preset, by their names in `Config`.
 
     Returns:
@@ -106,7 +108,7 @@ def train(
     max_ticks = check_number("max_ticks", max_ticks, 1, 10**9)
     check_callback(callback)
     check_progress(progress)
-    tracking = Tracking(feeds_of(trackers))
+    tracking = Tracking(feeds_of(trackers), trials)
     if isinstance(parent, Person):
         if trials != 1:
             raise ValueError(f"trials: a person raises one agent at a time, not {trials}.")
@@ -147,7 +149,8 @@ def _train(
 
     with one_thread(), batches.kept(collected):
         for chunk in chunks(trials):
-            trainer = _trainer(task, rule, seed, chunk, _logged(behind, log, task, trials, chunk))
+            made = _logged(behind, log, task, trials, chunk)
+            trainer = _trainer(task, rule, seed, chunk, made, tracking.wants_history and not ended)
             if ended:  # before these have begun
                 parts.append(_ended(trainer))
                 continue
@@ -155,6 +158,7 @@ def _train(
             report = tracking.watching(trainer, _report(chunk, trials, parts, told))
             trained, ended = _run(trainer, max_ticks, report)
             parts.append(trained)
+            tracking.ended(trainer, chunk, rule)
     return collected(parts, range(trials)), ended
 
 
@@ -202,12 +206,12 @@ def _logged(
     return make
 
 
-def _trainer(task: Task, rule: StopRule, seed: int, chunk: range, parent: MakeParent) -> BatchTrainer:
+def _trainer(
+    task: Task, rule: StopRule, seed: int, chunk: range, parent: MakeParent, history: bool
+) -> BatchTrainer:
     mine = keys(seed, chunk.stop, task.world.device).pick(torch.arange(chunk.start, chunk.stop))
-    begun = task.beginning
-    return BatchTrainer(
-        task.world, task.config, mine, rule, weights=task.weights, beginning=begun, parent=parent
-    )
+    begun: dict[str, Any] = {"weights": task.weights, "beginning": task.beginning, "history": history}
+    return BatchTrainer(task.world, task.config, mine, rule, parent=parent, **begun)
 
 
 def _run(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,14 @@ import pytest
 import torch
 
 import parenting as pt
-from parenting.library import page_training
+from parenting.library import page_run, page_training
 from parenting.library.page_server import is_ready
+from parenting.library.task import prepare, stop_rule
+from parenting.server.db import connect
+from parenting.server.migrate import upgrade
+from parenting.server.reads.schemas import run_schema
 from parenting.server.security import NOBODY
+from parenting.server.settings import Settings
 from tests import simulated_person
 from tests.library.person_at_page import PersonAtPage
 
@@ -51,6 +57,21 @@ def test_a_person_on_the_page_raises_an_agent_and_goes_on_after_an_interruption(
     # what the page stored is what the engine does with these answers
     replayed = pt.train(WORLD, parent=pt.ReplayParent(result), progress=False, **arguments)
     assert torch.equal(replayed.policies[0].parameters, result.policies[0].parameters)
+
+
+@pytest.mark.parametrize(("until", "finish"), [("optimal", "optimal"), ("queries:5", "never")])
+def test_the_worker_ends_a_persons_run_at_the_tick_of_the_optimum(
+    until: str, finish: str, tmp_path: Path
+) -> None:
+    """A row of metrics, which may come later, does not (`server.optimality`)."""
+    task, settings = prepare(WORLD, None, "conservative", {}), Settings(data=tmp_path)
+    rule = stop_rule(task.world, until)
+    with closing(connect(settings)) as db:
+        upgrade(db)
+        run = page_run.begin(db, settings, task, rule, 3, pt.Person())
+        seen = run_schema(db, run).model_copy(update={"optimal": True})
+    assert seen.finish == finish
+    assert not page_training._is_done(seen, rule)
 
 
 def test_a_server_that_does_not_come_up_is_told_with_its_last_words(

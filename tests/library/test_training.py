@@ -141,9 +141,9 @@ def test_ctrl_c_hands_out_the_trials_that_had_ended(done: int) -> None:
         pt.train("unsafe-exploration", callback=impatient, trackers=impatient, **arguments)
     assert torch.get_num_threads() == threads
     torch.set_num_threads(threads - 1)
-    partial, ended = stop.value.partial, len(impatient.ended)  # type: ignore[attr-defined]
-    assert ended >= 1
-    assert set(impatient.ended) == {"The training failed or was interrupted."}
+    partial = stop.value.partial  # type: ignore[attr-defined]
+    whole_batches = 4 * (done > 4)  # their trials have been told by then
+    assert impatient.ended == ["It came to the end that was set: queries:6."] * whole_batches
     if not done:
         assert partial is None
         return

@@ -86,12 +86,27 @@ def test_a_training_has_the_same_bits_with_a_tracker_that_hangs(
     without = pt.train("unsafe-exploration", **given)
     for one, other in zip(with_one.policies, without.policies, strict=True):
         assert torch.equal(one.parameters, other.parameters)
-    told = rows(tmp_path)
-    steps = [row["step"] for row in told if row["event"] == "metrics"]
-    assert all(before < after for before, after in pairwise(steps))
-    assert (told[0]["event"], told[-1]["reason"]) == ("begin", "The training ended.")
-    assert told[-2]["values"]["queries"] == sum(row["trial"] == 1 for row in without.answers)
-    assert {row.get("id") for row in told} == {told[0]["id"]}
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("trials", [1, 3])
+def test_each_trial_of_a_training_is_a_run_whose_counts_grow(trials: int, tmp_path: Path) -> None:
+    result = pt.train(
+        "unsafe-exploration", until="queries:9", trials=trials, trackers=f"jsonl:{tmp_path}", progress=False
+    )
+    files = [[json.loads(line) for line in file.read_text().splitlines()] for file in tmp_path.iterdir()]
+    files.sort(key=lambda told: str(told[0]["name"]))
+    assert len(files) == trials
+    for told, trial in zip(files, result.trials, strict=True):
+        begun, *metrics, end = told
+        assert begun["name"].endswith("island" if trials == 1 else f"island, trial {trial['trial']}")
+        assert end["reason"] in ("The training ended.", "It came to the end that was set: queries:9.")
+        for before, after in pairwise(metrics):
+            assert before["step"] < after["step"]
+            assert all(before["values"][name] <= after["values"][name] for name in ("guidance", "queries"))
+        assert metrics[-1]["step"] == trial["ticks"]
+        assert (metrics[-1]["values"]["queries"], metrics[-1]["values"]["finished"]) == (9, 1)
+        assert {row.get("id") for row in told} == {begun["id"]}
 
 
 def test_what_is_no_tracker_is_told(tmp_path: Path) -> None:
