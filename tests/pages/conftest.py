@@ -81,8 +81,9 @@ def site(settings: Settings, db: Database) -> FastAPI:
 
 @pytest.fixture
 def address(site: FastAPI, settings: Settings) -> Iterator[str]:
-    """The site served at a free port, for a browser."""
+    """The site served at a free port, for a browser; requests wait longer, since machines stand still."""
     app = site
+    app.state.admission.seconds = 60.0
     listener = bind(settings.model_copy(update={"port": 0}))
     server = Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})

@@ -39,6 +39,7 @@ def test_the_words_in_the_tree_answer_the_question(
 ) -> None:
     clips = guidance(registry.make("unsafe-exploration"), *moves)
     page = tabs.open(posted(db, "unsafe-exploration", "guidance", clips, 1))
+    expect(page.locator("#question[data-listening]")).to_be_visible()  # before, no key is heard
     told = heard(page)
     said = page.locator("#said")
     said.evaluate("said => { said.textContent = ''; }")
