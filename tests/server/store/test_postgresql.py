@@ -105,7 +105,7 @@ def test_a_row_that_stays_locked_is_busy(
 def test_who_stands_still_in_a_write_holds_up_nobody_for_long(
     db: Database, settings: Settings, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(postgresql.LIMITS, "idle_in_transaction_session_timeout", 50)
+    monkeypatch.setitem(postgresql.LIMITS, "idle_in_transaction_session_timeout", 1000)
     slow = connect(settings)
 
     def write_too_slowly() -> None:
