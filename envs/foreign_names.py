@@ -15,9 +15,11 @@ ABOUT = re.compile(
 """The beginning of a line that tells of a map, or of the collection that it is from, or is of JSON."""
 TITLE = re.compile(r"[;#/%\s]*(?:title|name)\s*:(.*)", re.I)
 BLANK = "; \t'\""
-MARKS = re.compile(r"^(?:;|//|/\*|#|%|--|==|<!--)[;#/%*=\s-]*|[;*=\s-]*(?:\*/|--|==|-->)$|(?<=\s)#+$")
+MARKS = re.compile(
+    r"^(?:;|//|/\*|#|%|--|==|<!--)[;#/%*=\s-]*|(?<![;*=\s-])[;*=\s-]*(?:\*/|--|==|-->)$|(?<=\s)#+$"
+)
 """The signs of comments and rulers around a text, of these collections, of programs and of Markdown."""
-MOVES = re.compile(r"[lurd0-9() ]*[lurd][lurd0-9() ]*", re.I)
+MOVES = re.compile(r"(?=.*[lurd])[lurd0-9() ]+", re.I)
 """A line of moves, which tell how a map is solved."""
 SOLVED = 6
 """Signs of a line of moves that stands behind no line `Solution`, at least; a shorter one may be a word."""

@@ -16,8 +16,8 @@ LETTERS = str.maketrans("pPbBo", "@+$*.")
 ROW = re.compile(r"[0-9 #@+$*.\-_pPbBo()|]+")
 COUNTED = re.compile(r"\||[0-9][#@+$*.\-_pPbBo(]")
 """The signs by which a row is known to be encoded: the end of a row, or a count before a sign."""
-RUNS = re.compile(r"([0-9]*)([ #@+$*.\-_pPbBo])")
-GROUP = re.compile(r"([0-9]*)\(([^()]*)\)")
+RUNS = re.compile(r"(?<![0-9])([0-9]*+)([ #@+$*.\-_pPbBo])")  # a count is looked at once, however long
+GROUP = re.compile(r"(?<![0-9])([0-9]*+)\(([^()]*+)\)")
 WALLED = re.compile(r"[ \-_]*[#*$](.*[#*$])?[ \-_]*")
 """A row from wall to wall; in a few collections boxes stand in the walls."""
 NO_ROW = re.compile(rf"\s*({COMMENT}|[A-Za-z][\w \-]*:)")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from parenting.envs import registry
-from parenting.envs.foreign_hint import foreign_format
+from parenting.envs.foreign_hint import foreign_format, hint
 from parenting.envs.foreign_import import ForeignMapError, imported
 from parenting.envs.levels.spec import LevelError
 
@@ -237,3 +237,11 @@ def test_maps_behind_other_lines_are_recognised_where_a_level_is_wanted(above: s
     assert foreign_format(f"{above}{CRATE}") == "xsb"
     with pytest.raises(LevelError, match="reads like Sokoban's XSB, which `parenting worlds import FILE`"):
         registry.read_level("side-effects", f"{above}{CRATE}")
+
+
+@pytest.mark.timeout(30)
+@pytest.mark.parametrize(("sign", "end"), [("9", "#@"), ("l", "!"), ("= -", "x")])
+def test_a_long_line_is_looked_at_once(sign: str, end: str) -> None:
+    """Where each place of it is looked at from each other one, these take an hour."""
+    short, long = (hint(f"{sign * count}{end}\n\n####\n#@.#\n####\n") for count in (20, 200_000))
+    assert long == short
