@@ -44,6 +44,12 @@ PATIENCE = 180.0
 LOOK_SECONDS = 5.0
 """After waiting in vain for so long, a test looks at whether a run has failed."""
 
+UNSAVED = """
+SELECT id FROM run WHERE NOT EXISTS (
+  SELECT 1 FROM checkpoint JOIN answer ON answer.run_id = checkpoint.run_id
+  WHERE checkpoint.run_id = run.id AND answer.applied_tick <= checkpoint.tick)
+"""
+
 
 def in_time(end: float, said: Callable[[], str]) -> None:
     """Give up waiting once a moment is over. It asserts nothing: a test that waits in vain caught nothing.
@@ -176,6 +182,15 @@ class House:
             self.keep()
             time.sleep(0.01)
 
+    def until_saved(self) -> None:
+        """Wait until each run has a checkpoint with an answer in it: after early deaths it may have none."""
+        end = time.monotonic() + PATIENCE
+        while bare := self.store.rows(UNSAVED):
+            message = f"without an answer in a checkpoint: {bare}"
+            in_time(end, lambda: f"{message}; {self.state()}")  # noqa: B023  # called at once
+            self.keep()
+            time.sleep(0.05)
+
     def until_killed(self, name: str, what: str) -> None:
         """Wait until a process has killed itself."""
         one, end = self.commands[name], time.monotonic() + PATIENCE
@@ -192,7 +207,8 @@ class House:
             time.sleep(0.01)
 
     def move_out(self) -> None:
-        """Let the parents leave, and stop the processes in order."""
+        """Let the parents leave, and stop the processes in order, once each run has a checkpoint."""
+        self.until_saved()
         for person in self._people():
             person.leaving.set()
         for person in self._people():

@@ -16,8 +16,9 @@ from tests.lengths import length
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(300, 900))]
 RUNS, WORKERS, SECONDS = length((16, 2, 8), (24, 3, 120))
 MOST_TO_LEAST = length(2.0, 1.5)
-"""Of few answers some more or less are chance. A worker that prefers runs gives some a hundred
-times as many, but only seconds of a crowd show it."""
+CHANCE = length(4, 0)
+"""So many answers more or less are chance where each run gets only five to ten of them in the short time.
+A worker that prefers runs gives some a hundred times as many, but only seconds of a crowd show it."""
 
 
 def test_of_equal_runs_none_is_served_far_more_than_another(
@@ -34,4 +35,4 @@ def test_of_equal_runs_none_is_served_far_more_than_another(
     found = figures_of(people)
     figures.count("fairness", "answers", found["answered"])
     answers = sorted(run.standing for run in list_runs(db))
-    assert answers[-1] <= MOST_TO_LEAST * answers[0], answers
+    assert answers[-1] <= MOST_TO_LEAST * answers[0] + CHANCE, answers
