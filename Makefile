@@ -1,7 +1,7 @@
 # Everything needs only make and python3 (3.11 or newer): the rest goes into .venv. `make` alone prints the list.
 # A stamp file says that .venv is up to date; it is older than pyproject.toml or constraints.txt when it is not.
 .DEFAULT_GOAL := help
-.PHONY: help run test faults mutants torture stress check types lint docs format coverage pictures weights catalogue corpus constraints clean wheel
+.PHONY: help run test slow faults mutants torture stress check types lint docs format coverage pictures weights catalogue corpus constraints clean wheel
 
 # Tests start many processes; without byte code each of them would compile a thousand modules again.
 unexport PYTHONDONTWRITEBYTECODE
@@ -19,9 +19,9 @@ run: $(VENV)/.installed ## Install, migrate, start the web pages and a worker, o
 	@$(BIN)/parenting up
 
 # The tests run after a failed check too, so that one run tells everything.
-test: $(VENV)/.installed-dev ## Install, then run every check and every test (ARGS="-k queue" for some)
+test: $(VENV)/.installed-dev ## Install, then run every check and the tests of every run (ARGS="-k queue" for some)
 	@checks=passed; start=$$(date +%s); $(MAKE) --no-print-directory check || checks=failed; \
-	middle=$$(date +%s); tests=passed; $(BIN)/pytest -m "not postgresql and not faults" $(ARGS) || tests=failed; end=$$(date +%s); \
+	middle=$$(date +%s); tests=passed; $(BIN)/pytest -m "not postgresql and not faults and not slow" $(ARGS) || tests=failed; end=$$(date +%s); \
 	echo "checks: $$checks in $$((middle - start)) s, tests: $$tests in $$((end - middle)) s"; \
 	test $$checks = passed && test $$tests = passed
 
@@ -31,8 +31,11 @@ faults: $(VENV)/.installed-dev ## Kills, power cuts, refusing stores, races, sab
 mutants: $(VENV)/.installed-dev ## Plant faults one by one; each must be caught by its test (10 minutes, nightly)
 	$(BIN)/python -m scripts.mutants $(ARGS)
 
-torture: $(VENV)/.installed-dev ## The long forms of the tests that have two lengths (hours), and all sabotaged servers
-	PARENTING_TORTURE=1 $(BIN)/pytest -m torture tests tests/faults $(ARGS)
+slow: $(VENV)/.installed-dev ## The tests that are too long for every run, on both stores (30 minutes; ARGS for some)
+	$(BIN)/pytest -m slow tests tests/faults $(ARGS)
+
+torture: $(VENV)/.installed-dev ## Those of `make slow`, tests of two lengths at their long one (hours), all sabotaged servers
+	PARENTING_TORTURE=1 $(BIN)/pytest -m "torture or slow" tests tests/faults $(ARGS)
 	$(BIN)/python -m scripts.mutants --sabotage
 
 stress: $(VENV)/.installed-dev ## Every test, ten times over, with both cores busy (needs stress; ARGS for some)

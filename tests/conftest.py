@@ -14,7 +14,7 @@ import hypothesis
 import pytest
 import structlog
 
-from tests import access
+from tests import access, slow
 
 FAULTS = Path(__file__).parent / "faults"
 
@@ -73,12 +73,13 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
 
 
-def pytest_collection_modifyitems() -> None:
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Have torch use one thread: two are slower here, and give other bits. pytest-xdist keeps the cores busy.
 
     This is not done when this file is read, for the process that only hands out tests needs no torch. What
     the modules have made by now stays; the garbage collector need not look through it again and again.
     """
+    slow.mark_later_cases(items)
     import torch
 
     torch.set_num_threads(1)
